@@ -1,0 +1,1 @@
+"""The command line: ``rover-companion``, one file a command."""

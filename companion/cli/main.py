@@ -1,0 +1,18 @@
+"""``rover-companion``: puts the commands together."""
+
+from __future__ import annotations
+
+import typer
+
+app = typer.Typer(
+    name="rover-companion",
+    help="Finds a rover's way to a mission's targets through unknown ground.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def main() -> None:
+    """Entry point of the ``rover-companion`` script."""
+    app()

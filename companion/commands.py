@@ -1,0 +1,118 @@
+"""What the companion can ask of the autopilot, as plain values; only the codec knows their bytes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from companion.frames import NedPoint
+
+
+@dataclass(frozen=True, slots=True)
+class Heartbeat:
+    """Here I am: component 191, an onboard controller."""
+
+
+@dataclass(frozen=True, slots=True)
+class SetMode:
+    """Change the flight mode (ArduRover's number)."""
+
+    mode: int
+
+
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """Arm the motors."""
+
+
+@dataclass(frozen=True, slots=True)
+class GuidedPosition:
+    """Drive to a place in the local frame (from the EKF origin)."""
+
+    point: NedPoint
+
+
+@dataclass(frozen=True, slots=True)
+class GuidedVelocity:
+    """Drive along the rover's own axis at this speed (negative: backwards) with this turn rate, clockwise.
+
+    The autopilot stops by itself 3 s after the last one.
+    """
+
+    forward_m_s: float
+    yaw_rate_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class GuidedHeading:
+    """Turn on the spot to a heading, clockwise from north."""
+
+    heading_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class ChangeSpeed:
+    """Cruise speed for the present position target."""
+
+    speed_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class RequestRate:
+    """Stream a message at a rate."""
+
+    message_id: int
+    rate_hz: float
+
+
+@dataclass(frozen=True, slots=True)
+class RequestMessage:
+    """Send one message now."""
+
+    message_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class ReadParameter:
+    """Read one parameter by name."""
+
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Say:
+    """Text for the people at the ground station; severity as in MAVLink (6 info, 4 warning, 2 critical)."""
+
+    severity: int
+    text: str
+
+
+Setpoint = GuidedPosition | GuidedVelocity | GuidedHeading
+Command = (
+    Heartbeat
+    | SetMode
+    | Arm
+    | GuidedPosition
+    | GuidedVelocity
+    | GuidedHeading
+    | ChangeSpeed
+    | RequestRate
+    | RequestMessage
+    | ReadParameter
+    | Say
+)
+
+__all__ = [
+    "Arm",
+    "ChangeSpeed",
+    "Command",
+    "GuidedHeading",
+    "GuidedPosition",
+    "GuidedVelocity",
+    "Heartbeat",
+    "ReadParameter",
+    "RequestMessage",
+    "RequestRate",
+    "Say",
+    "SetMode",
+    "Setpoint",
+]

@@ -1,0 +1,1 @@
+"""Missions: where to go, what to do there, and the files they come from."""

@@ -1,0 +1,113 @@
+"""A mission: targets in order, the ground they lie on, and the rover that is to drive there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+
+from companion.frames import GeoPoint
+from companion.grid import Cell
+
+
+class MissionError(Exception):
+    """A mission file that cannot be driven; the text is one line with file, place and reason."""
+
+
+class OnBlocked(StrEnum):
+    """What to do when a target cannot be reached."""
+
+    SKIP = "skip"
+    WAIT = "wait"
+    RETURN = "return"
+    HOLD = "hold"
+
+
+@dataclass(frozen=True, slots=True)
+class HomePoint:
+    """A place in metres north and east of home (where the rover stands when the mission begins)."""
+
+    north_m: float
+    east_m: float
+
+
+Place = Cell | HomePoint | GeoPoint
+"""A place as missions write it: a field of the mission's grid, local metres from home, or latitude and longitude."""
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """One place to reach."""
+
+    name: str
+    place: Place
+    hold_s: float = 0.0
+    on_blocked: OnBlocked = OnBlocked.SKIP
+    speed_m_s: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class GridSpec:
+    """The grid as the mission asks for it.
+
+    With ``size`` (width, height in fields) and ``home`` (the field whose middle is home) the grid is fixed; without, it
+    is laid round home, all targets and fences with ``margin_m`` to spare.
+    """
+
+    resolution_m: float = 1.0
+    size: tuple[int, int] | None = None
+    home: Cell | None = None
+    margin_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RoverSpec:
+    """The vehicle: everything within ``radius_m`` of its centre must stay clear."""
+
+    radius_m: float = 0.35
+    cruise_speed_m_s: float = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class Area:
+    """A polygon (three or more places, closed by itself) or, with one place and a radius, a circle."""
+
+    places: tuple[Place, ...]
+    radius_m: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class WeightedArea:
+    """Ground with a weight of its own, 0 (preferred) to below 1: a corridor or rough ground."""
+
+    area: Area
+    weight: float
+
+
+@dataclass(frozen=True, slots=True)
+class SitlSpec:
+    """What only the simulator reads. ``world``: map file; ``start``: field; heading clockwise from north."""
+
+    world: Path | None = None
+    start: Cell | None = None
+    heading_deg: float = 90.0
+    sensors: str = "lidar-90"
+    home: GeoPoint = field(default_factory=lambda: GeoPoint(53.1325, 23.1688))
+
+
+@dataclass(frozen=True, slots=True)
+class Mission:
+    """Everything that a mission file says. ``notes`` tells people what was understood beyond the targets."""
+
+    name: str
+    targets: tuple[Target, ...]
+    grid: GridSpec = GridSpec()
+    rover: RoverSpec = RoverSpec()
+    keep_out: tuple[Area, ...] = ()
+    keep_in: tuple[Area, ...] = ()
+    weighted: tuple[WeightedArea, ...] = ()
+    prior_map: Path | None = None
+    planned_home: GeoPoint | None = None
+    sitl: SitlSpec | None = None
+    source: Path | None = None
+    notes: tuple[str, ...] = ()

@@ -1,0 +1,1 @@
+"""Planners: each turns a problem (grid, start, target) into a path."""

@@ -1,0 +1,26 @@
+"""One set of range readings, whatever message it came from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RangeScan:
+    """Ranges in the rover's own frame.
+
+    ``bearing_rad``: shape (n,), clockwise from straight ahead. ``range_m``: shape (n,), metres; ``inf`` = nothing
+    seen up to ``max_range_m``; ``nan`` = unknown, says nothing. ``beam_width_rad`` is the width that each reading speaks for.
+    ``time_s`` is the companion's clock when the scan arrived.
+    """
+
+    time_s: float
+    bearing_rad: NDArray[np.float64]
+    range_m: NDArray[np.float64]
+    min_range_m: float
+    max_range_m: float
+    beam_width_rad: float
+    source: str

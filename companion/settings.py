@@ -1,0 +1,166 @@
+"""Every setting of the companion, with its default, unit and meaning, and the file they are read from."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from pathlib import Path
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+
+class SettingsError(Exception):
+    """A settings file that cannot be used; the text is one line with file, place and reason."""
+
+
+class Section(BaseModel):
+    """A group of settings: immutable, unknown names refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class PlannerSettings(Section):
+    """The genetic algorithm of Kwasniewski & Gosiewski 2018, section 3."""
+
+    way_points: int = Field(
+        5, ge=3, le=64, description="points of the B-spline that are joined by straight lines (3.4)"
+    )
+    mixing: float = Field(0.8, gt=0.5, le=1.0, description="D of equation 6: the better parent's share")
+    selected_share: float = Field(0.25, gt=0.0, le=1.0, description="best part that is copied and crossed (3.5)")
+    mutation_probability: float = Field(0.4, ge=0.0, le=1.0, description="per gene (3.7)")
+    mutation_range: float = Field(1.0, gt=0.0, description="h of 3.7 as a share of the smaller map dimension")
+    line_probability: float = Field(
+        0.5, ge=0.0, le=1.0, description="first third: chance to shift a point of the line (3.3)"
+    )
+    line_range_fields: float = Field(10.0, ge=0.0, description="first third: largest shift")
+    neighbourhood_fields: float = Field(10.0, gt=0.0, description="second third: reach round the start (3.3)")
+    margin_fields: int = Field(1, ge=0, description="third third: distance kept from the map's edge (3.3)")
+
+
+class SearchSettings(Section):
+    """One kind of search by the navigator."""
+
+    min_epochs: int = Field(1, ge=1)
+    max_epochs: int = Field(100, ge=1)
+    control_points: tuple[int, ...] = Field((4,), min_length=1, description="tried one after the other")
+    population: int = Field(30, ge=12, le=3000)
+
+
+class NavigatorSettings(Section):
+    """The obstacle avoidance of section 4."""
+
+    planner: str = Field("hybrid", description="a name of `rover-companion plan --planner`")
+    better_every_fields: int = Field(5, ge=1, description="part B: fields between looks for a better path")
+    quick: SearchSettings = SearchSettings(min_epochs=5, max_epochs=50, control_points=(4,))
+    thorough: SearchSettings = SearchSettings(min_epochs=10, max_epochs=300, control_points=(4, 5, 6, 8), population=60)
+
+
+class MappingSettings(Section):
+    """From ranges to field weights."""
+
+    subdivisions: int = Field(4, ge=1, le=16, description="evidence cells along a field's side")
+    hit: float = Field(0.9, gt=0.0, description="log-odds added by a return")
+    miss: float = Field(0.4, gt=0.0, description="log-odds removed where a beam passed")
+    occupied_at: float = Field(0.6, description="log-odds from which evidence counts as an obstacle")
+    limit: float = Field(
+        3.0, gt=0.0, description="log-odds are kept within +- this, so that what disappears is forgotten"
+    )
+    soft_cost: float = Field(0.3, ge=0.0, lt=0.5, description="weight added beside obstacles")
+    soft_reach_m: float = Field(2.0, ge=0.0, description="how far from an obstacle the soft cost reaches")
+
+
+class GuidanceSettings(Section):
+    """From the path to one guided target and a speed."""
+
+    horizon_m: float = Field(8.0, gt=0.0, description="a target is never farther than this")
+    clearance_m: float = Field(0.15, ge=0.0, description="kept beside the rover's radius where there is room")
+    deceleration_m_s2: float = Field(1.0, gt=0.0, description="what the rover brakes with")
+    latency_s: float = Field(0.5, ge=0.0, description="from seeing to braking")
+    resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
+    min_speed_m_s: float = Field(0.5, gt=0.0)
+    stuck_after_s: float = Field(6.0, gt=0.0, description="no progress for so long: back out and plan anew")
+    arrival_m: float = Field(0.8, gt=0.0, description="a target is reached within this distance")
+
+
+class SafetySettings(Section):
+    """Watchdogs."""
+
+    stale_s: float = Field(1.0, gt=0.0, description="position, EKF or range data older than this: stop")
+    hold_after_s: float = Field(2.0, ge=0.0, description="from stop to HOLD when nothing gets better")
+    heartbeat_s: float = Field(3.0, gt=0.0, description="autopilot silent for so long: stop")
+    jump_m: float = Field(2.0, gt=0.0, description="a position jump larger than this is noticed")
+
+
+class LinkSettings(Section):
+    """How the companion talks to the autopilot."""
+
+    setpoint: Literal["local", "global", "mission-item", "reposition"] = Field(
+        "local", description="SET_POSITION_TARGET_LOCAL_NED | _GLOBAL_INT | MISSION_ITEM_INT current=2 | DO_REPOSITION"
+    )
+    position_rate_hz: float = Field(10.0, gt=0.0, le=50.0)
+    attitude_rate_hz: float = Field(20.0, gt=0.0, le=50.0)
+    range_rate_hz: float = Field(10.0, gt=0.0, le=50.0)
+    tick_hz: float = Field(20.0, ge=5.0, le=100.0, description="the companion's own loop")
+    component_id: int = Field(191, ge=1, le=255)
+
+
+class Settings(Section):
+    """All settings. ``profile = "paper"`` uses the genetic algorithm alone, as the paper does."""
+
+    profile: Literal["default", "paper"] = "default"
+    planner: PlannerSettings = PlannerSettings()
+    navigator: NavigatorSettings = NavigatorSettings()
+    mapping: MappingSettings = MappingSettings()
+    guidance: GuidanceSettings = GuidanceSettings()
+    safety: SafetySettings = SafetySettings()
+    link: LinkSettings = LinkSettings()
+
+
+def load_settings(path: Path | None) -> Settings:
+    """Read a TOML settings file; None gives the defaults.
+
+    Raises SettingsError (one line: file, place, reason, for an unknown key the nearest known one).
+    """
+    if path is None:
+        return Settings()
+    try:
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise SettingsError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise SettingsError(f"{path}: not UTF-8 text (byte {error.start})") from error
+    except tomllib.TOMLDecodeError as error:
+        raise SettingsError(f"{path}: not valid TOML: {error}") from error
+    return parse_settings(data, str(path))
+
+
+def parse_settings(data: dict[str, object], source: str) -> Settings:
+    """Settings from parsed TOML. Raises SettingsError naming ``source``."""
+    if data.get("profile") == "paper":
+        navigator = data.setdefault("navigator", {})
+        if isinstance(navigator, dict):
+            navigator.setdefault("planner", "bspline-ga")
+    try:
+        return Settings.model_validate(data)
+    except ValidationError as error:
+        raise SettingsError(f"{source}: {describe_first(error, Settings)}") from error
+
+
+def describe_first(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first fault of a validation as one line: place, reason, and for an unknown key the nearest known one."""
+    fault = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in fault["loc"]) or "file"
+    if fault["type"] != "extra_forbidden":
+        return f"{place}: {fault['msg'].lower()} (got {fault.get('input')!r:.60})"
+    known = _known_keys(model, fault["loc"][:-1])
+    near = difflib.get_close_matches(str(fault["loc"][-1]), known, n=1, cutoff=0.0)
+    return f"{place}: unknown key" + (f", did you mean '{near[0]}'?" if near else "")
+
+
+def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
+    for part in place:
+        field = model.model_fields.get(str(part))
+        if field is not None and isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
+            model = field.annotation
+    return list(model.model_fields)

@@ -1,0 +1,242 @@
+"""What is known of the vehicle: events come in, ``fold`` keeps the state, ``health`` judges it.
+
+Every event carries ``time_s``, the companion's clock at arrival.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+
+from companion.frames import GeoPoint, Pose
+from companion.scan import RangeScan
+
+EKF_POSITION = 8 | 16
+"""POS_HORIZ_REL or POS_HORIZ_ABS: one of them must be set to drive."""
+EKF_CONST_POSITION = 128
+
+
+class RoverMode(IntEnum):
+    """ArduRover's flight modes that the companion names."""
+
+    MANUAL = 0
+    HOLD = 4
+    AUTO = 10
+    RTL = 11
+    GUIDED = 15
+
+
+@dataclass(frozen=True, slots=True)
+class HeartbeatSeen:
+    """The autopilot's HEARTBEAT (component 1)."""
+
+    time_s: float
+    mode: int
+    armed: bool
+    system_id: int
+
+
+@dataclass(frozen=True, slots=True)
+class LocalPositionSeen:
+    """LOCAL_POSITION_NED: metres and m/s from the EKF origin."""
+
+    time_s: float
+    boot_s: float
+    north_m: float
+    east_m: float
+    north_m_s: float
+    east_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class AttitudeSeen:
+    """ATTITUDE: heading clockwise from north and its rate."""
+
+    time_s: float
+    boot_s: float
+    heading_rad: float
+    yaw_rate_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class GlobalPositionSeen:
+    """GLOBAL_POSITION_INT."""
+
+    time_s: float
+    boot_s: float
+    point: GeoPoint
+
+
+@dataclass(frozen=True, slots=True)
+class EkfStatusSeen:
+    """EKF_STATUS_REPORT flags."""
+
+    time_s: float
+    flags: int
+
+
+@dataclass(frozen=True, slots=True)
+class OriginSeen:
+    """GPS_GLOBAL_ORIGIN: where the local frame begins."""
+
+    time_s: float
+    point: GeoPoint
+
+
+@dataclass(frozen=True, slots=True)
+class HomeSeen:
+    """HOME_POSITION."""
+
+    time_s: float
+    point: GeoPoint
+
+
+@dataclass(frozen=True, slots=True)
+class RangeSeen:
+    """Range readings of any kind."""
+
+    time_s: float
+    scan: RangeScan
+
+
+@dataclass(frozen=True, slots=True)
+class AckSeen:
+    """COMMAND_ACK (``command`` is the MAV_CMD) or MISSION_ACK (``command`` is -1)."""
+
+    time_s: float
+    command: int
+    result: int
+
+
+@dataclass(frozen=True, slots=True)
+class TargetSeen:
+    """POSITION_TARGET_GLOBAL_INT: what the autopilot really follows."""
+
+    time_s: float
+    point: GeoPoint
+    type_mask: int
+
+
+@dataclass(frozen=True, slots=True)
+class TextSeen:
+    """STATUSTEXT of the autopilot."""
+
+    time_s: float
+    severity: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSeen:
+    """PARAM_VALUE."""
+
+    time_s: float
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
+class PrearmSeen:
+    """The pre-arm bit of SYS_STATUS."""
+
+    time_s: float
+    ok: bool
+
+
+Event = (
+    HeartbeatSeen
+    | LocalPositionSeen
+    | AttitudeSeen
+    | GlobalPositionSeen
+    | EkfStatusSeen
+    | OriginSeen
+    | HomeSeen
+    | RangeSeen
+    | AckSeen
+    | TargetSeen
+    | TextSeen
+    | ParameterSeen
+    | PrearmSeen
+)
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleState:
+    """The newest of everything; ``None`` until first heard."""
+
+    heartbeat: HeartbeatSeen | None = None
+    position: LocalPositionSeen | None = None
+    attitude: AttitudeSeen | None = None
+    global_position: GlobalPositionSeen | None = None
+    ekf: EkfStatusSeen | None = None
+    origin: OriginSeen | None = None
+    home: HomeSeen | None = None
+    scan: RangeSeen | None = None
+    target: TargetSeen | None = None
+    prearm: PrearmSeen | None = None
+    jump_m: float = 0.0
+    """How far the last position report lay from where the velocity had led us to expect it."""
+    parameters: dict[str, float] = field(default_factory=dict)
+
+    def pose_at(self, time_s: float) -> Pose | None:
+        """Position and heading carried forward to a moment with the last known velocities; None if not known yet."""
+        if self.position is None or self.attitude is None:
+            return None
+        ahead_s = min(max(time_s - self.position.time_s, 0.0), 0.5)
+        turn_s = min(max(time_s - self.attitude.time_s, 0.0), 0.5)
+        return Pose(
+            self.position.north_m + self.position.north_m_s * ahead_s,
+            self.position.east_m + self.position.east_m_s * ahead_s,
+            self.attitude.heading_rad + self.attitude.yaw_rate_rad_s * turn_s,
+            time_s,
+        )
+
+    @property
+    def speed_m_s(self) -> float:
+        """Ground speed; 0 until a position is known."""
+        return 0.0 if self.position is None else math.hypot(self.position.north_m_s, self.position.east_m_s)
+
+    @property
+    def ekf_ok(self) -> bool:
+        """Whether the autopilot trusts its own position."""
+        flags = 0 if self.ekf is None else self.ekf.flags
+        return bool(flags & EKF_POSITION) and not flags & EKF_CONST_POSITION
+
+
+def fold(state: VehicleState, event: Event) -> VehicleState:
+    """The state after one more event."""
+    match event:
+        case HeartbeatSeen():
+            return replace(state, heartbeat=event)
+        case LocalPositionSeen():
+            return replace(state, position=event, jump_m=_jump_m(state.position, event))
+        case AttitudeSeen():
+            return replace(state, attitude=event)
+        case GlobalPositionSeen():
+            return replace(state, global_position=event)
+        case EkfStatusSeen():
+            return replace(state, ekf=event)
+        case OriginSeen():
+            return replace(state, origin=event)
+        case HomeSeen():
+            return replace(state, home=event)
+        case RangeSeen():
+            return replace(state, scan=event)
+        case TargetSeen():
+            return replace(state, target=event)
+        case PrearmSeen():
+            return replace(state, prearm=event)
+        case ParameterSeen():
+            return replace(state, parameters={**state.parameters, event.name: event.value})
+        case _:
+            return state
+
+
+def _jump_m(before: LocalPositionSeen | None, now: LocalPositionSeen) -> float:
+    if before is None:
+        return 0.0
+    elapsed_s = now.boot_s - before.boot_s
+    north_m = before.north_m + (before.north_m_s + now.north_m_s) / 2.0 * elapsed_s
+    east_m = before.east_m + (before.east_m_s + now.east_m_s) / 2.0 * elapsed_s
+    return math.hypot(now.north_m - north_m, now.east_m - east_m)

@@ -1,0 +1,1 @@
+"""A light rover simulator that speaks ArduRover's MAVLink."""

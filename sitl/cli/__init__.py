@@ -1,0 +1,1 @@
+"""The command line: ``rover-sitl``, one file a command."""
