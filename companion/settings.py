@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import tomllib
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -33,9 +33,16 @@ class PlannerSettings(Section):
     line_probability: float = Field(
         0.5, ge=0.0, le=1.0, description="first third: chance to shift a point of the line (3.3)"
     )
-    line_range_fields: float = Field(10.0, ge=0.0, description="first third: largest shift")
-    neighbourhood_fields: float = Field(10.0, gt=0.0, description="second third: reach round the start (3.3)")
+    line_range: float = Field(
+        0.2, ge=0.0, description="first third: largest shift, as a share of the smaller map dimension"
+    )
+    neighbourhood: float = Field(
+        0.2, gt=0.0, description="second third: reach round the start, as a share of the smaller map dimension (3.3)"
+    )
     margin_fields: int = Field(1, ge=0, description="third third: distance kept from the map's edge (3.3)")
+    obstacle_value: float = Field(
+        100_000.0, ge=1000.0, description="VLN of 3.4: what an obstacle field adds to a path's fitness"
+    )
 
 
 class SearchSettings(Section):
@@ -43,7 +50,9 @@ class SearchSettings(Section):
 
     min_epochs: int = Field(1, ge=1)
     max_epochs: int = Field(100, ge=1)
-    control_points: tuple[int, ...] = Field((4,), min_length=1, description="tried one after the other")
+    control_points: tuple[Annotated[int, Field(ge=3, le=64)], ...] = Field(
+        (4,), min_length=1, description="tried one after the other"
+    )
     population: int = Field(30, ge=12, le=3000)
 
 
@@ -52,6 +61,8 @@ class NavigatorSettings(Section):
 
     planner: str = Field("hybrid", description="a name of `rover-companion plan --planner`")
     better_every_fields: int = Field(5, ge=1, description="part B: fields between looks for a better path")
+    wait_retry_s: float = Field(5.0, gt=0.0, description="on_blocked = wait: time between tries")
+    wait_limit_s: float = Field(600.0, ge=0.0, description="on_blocked = wait: then the target is given up")
     quick: SearchSettings = SearchSettings(min_epochs=5, max_epochs=50, control_points=(4,))
     thorough: SearchSettings = SearchSettings(min_epochs=10, max_epochs=300, control_points=(4, 5, 6, 8), population=60)
 
@@ -60,27 +71,50 @@ class MappingSettings(Section):
     """From ranges to field weights."""
 
     subdivisions: int = Field(4, ge=1, le=16, description="evidence cells along a field's side")
-    hit: float = Field(0.9, gt=0.0, description="log-odds added by a return")
+    hit: float = Field(0.9, gt=0.0, description="log-odds added where a beam ended")
     miss: float = Field(0.4, gt=0.0, description="log-odds removed where a beam passed")
-    occupied_at: float = Field(0.6, description="log-odds from which evidence counts as an obstacle")
+    occupied_at: float = Field(0.6, gt=0.0, description="log-odds from which evidence counts as an obstacle")
     limit: float = Field(
-        3.0, gt=0.0, description="log-odds are kept within +- this, so that what disappears is forgotten"
+        2.5, gt=0.0, description="evidence for an obstacle grows no further: what disappears is forgotten"
+    )
+    free_limit: float = Field(
+        1.2, gt=0.0, description="evidence for free ground grows no further: what appears is seen"
+    )
+    hit_depth_m: float = Field(
+        0.1, ge=0.0, description="a surface is entered this deep, so that noise does not fill the free side"
     )
     soft_cost: float = Field(0.3, ge=0.0, lt=0.5, description="weight added beside obstacles")
     soft_reach_m: float = Field(2.0, ge=0.0, description="how far from an obstacle the soft cost reaches")
+    max_yaw_rate_deg_s: float = Field(120.0, gt=0.0, description="scans taken while turning faster are not used")
 
 
 class GuidanceSettings(Section):
     """From the path to one guided target and a speed."""
 
-    horizon_m: float = Field(8.0, gt=0.0, description="a target is never farther than this")
-    clearance_m: float = Field(0.15, ge=0.0, description="kept beside the rover's radius where there is room")
+    horizon_m: float = Field(8.0, gt=0.0, description="a target is never farther than this along the route")
+    clearance_m: float = Field(0.15, ge=0.0, description="kept beside the rover's radius when speed is chosen")
+    clearances: tuple[tuple[float, float], ...] = Field(
+        ((0.5, 3.0), (0.25, 1.5), (0.1, 0.5)),
+        description="room kept beside the rover's radius, tried in turn; the next one when the reach is less than the second figure, metres",
+    )
+    least_reach_m: float = Field(0.4, gt=0.0, description="less clear way than this is no way")
+    look_ahead_m: float = Field(1.0, gt=0.0, description="the place to turn to when the way has not been seen")
+    turn_first_deg: float = Field(
+        45.0, gt=0.0, le=180.0, description="turn on the spot before driving off at a larger angle"
+    )
+    roll_out_m_s: float = Field(0.3, ge=0.0, description="faster than this the rover first brakes straight, then turns on the spot")
+    slow_within_m: float = Field(0.8, gt=0.0, description="obstacles nearer than this beside the rover slow it down")
     deceleration_m_s2: float = Field(1.0, gt=0.0, description="what the rover brakes with")
-    latency_s: float = Field(0.5, ge=0.0, description="from seeing to braking")
+    latency_s: float = Field(0.4, ge=0.0, description="from seeing to braking")
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
-    min_speed_m_s: float = Field(0.5, gt=0.0)
+    change_after_s: float = Field(
+        0.4, ge=0.0, description="a target that moved is sent not sooner than this after the last"
+    )
+    min_speed_m_s: float = Field(0.5, gt=0.0, description="never asked to go slower than this")
     stuck_after_s: float = Field(6.0, gt=0.0, description="no progress for so long: back out and plan anew")
-    arrival_m: float = Field(0.8, gt=0.0, description="a target is reached within this distance")
+    back_out_m: float = Field(0.8, ge=0.0, description="how far to back out")
+    back_out_speed_m_s: float = Field(0.4, gt=0.0)
+    arrival_m: float = Field(0.5, gt=0.0, description="a target is reached within this distance")
 
 
 class SafetySettings(Section):

@@ -1,0 +1,220 @@
+"""Drives one leg: field steps of the navigator, the route that follows from them, and what to do when the rover is stuck."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from companion.commands import GuidedVelocity
+from companion.frames import NedPoint, Pose, wrap_pi_rad
+from companion.grid import Cell
+from companion.guidance import (
+    Guide,
+    Motion,
+    Route,
+    RoverLimits,
+    advanced,
+    guide,
+    route_along_cells,
+    route_along_curve,
+    route_is_clear,
+)
+from companion.mapping import EvidenceMap, look_along, penalise
+from companion.mission.resolve import ResolvedTarget
+from companion.navigator import Action, Decision, NavState, Part, SearchKind, abandon_path, begin, is_clear, step
+from companion.planning.problem import PlanResult
+from companion.searching import Searcher
+from companion.settings import Settings
+from companion.stepping import StepRunner
+
+STANDSTILL = Guide(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
+MOVED_M = 0.3
+TURNED_RAD = math.radians(15.0)
+FRESH_PENALTY = 0.15
+FINAL_PENALTY = 1.0
+TRIES_AT_ONE_PLACE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """Where the rover last got on, for noticing that it is stuck."""
+
+    pose: Pose
+    moved_s: float
+    changed_s: float
+
+
+@dataclass
+class Tally:
+    """Counts for the summary."""
+
+    steps: int = 0
+    return_steps: int = 0
+    stuck: int = 0
+
+
+class Driver:
+    """One leg after the other, on one map."""
+
+    def __init__(
+        self, evidence: EvidenceMap, rover: RoverLimits, settings: Settings, searcher: Searcher, runner: StepRunner
+    ) -> None:
+        self.evidence = evidence
+        self.searcher = searcher
+        self.tally = Tally()
+        self.route: Route | None = None
+        self.decision: Decision | None = None
+        self._rover = rover
+        self._settings = settings
+        self._runner = runner
+        self._goal: ResolvedTarget | None = None
+        self._state: NavState | None = None
+        self._progress: Progress | None = None
+        self._back_until_s = -math.inf
+        self._stuck_places: dict[Cell, int] = {}
+
+    def head_for(self, goal: ResolvedTarget, pose: Pose) -> None:
+        """Begin a leg from here."""
+        self._goal = goal
+        self._runner.take()
+        cell = self.evidence.base.cell_at(pose.point)
+        seed = int(self.searcher.rng.integers(2**63))
+        self._state = begin(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
+        self.route = None
+        self.decision = None
+        self._progress = Progress(pose, pose.time_s, pose.time_s)
+
+    @property
+    def goal(self) -> ResolvedTarget | None:
+        """Where this leg leads."""
+        return self._goal
+
+    def leave(self) -> None:
+        """The leg is over (or must begin again from where the rover is now)."""
+        self._goal = None
+        self._state = None
+        self.route = None
+
+    def pause(self) -> None:
+        """The rover stands still for a good reason: do not count it as stuck."""
+        self._progress = None
+
+    def update(self, pose: Pose, speed_m_s: float) -> tuple[Guide, Decision | None]:
+        """One tick: the setpoint for now, and the navigator's decision if it has just made one."""
+        if self._goal is None or self._state is None:
+            return STANDSTILL, None
+        if pose.time_s < self._back_until_s:
+            return self._backing_out(), None
+        decision = self._field_step(pose)
+        if self._arrived(pose, speed_m_s):
+            self.decision = Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
+            return STANDSTILL, self.decision
+        if decision is not None and decision.action is Action.UNREACHABLE:
+            return STANDSTILL, decision
+        if self.route is None:
+            return STANDSTILL, decision
+        self.route = advanced(self.route, pose)
+        rover = self._rover
+        if self._goal.speed_m_s is not None:
+            rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
+        now = guide(self.route, pose, speed_m_s, self.evidence, rover, self._settings.guidance)
+        if self._is_stuck(pose, now):
+            self._get_unstuck(pose)
+        return now, decision
+
+    def _field_step(self, pose: Pose) -> Decision | None:
+        """Start the navigator's step when a new field is entered or the path ahead is blocked; take its result."""
+        assert self._state is not None
+        cell = self.evidence.base.cell_at(pose.point)
+        if not self._runner.busy and self.evidence.base.contains(cell) and self._step_is_due(cell):
+            state, weights = self._state, self.evidence.grid.weights.copy()
+            grid = self.evidence.grid.with_weights(weights)
+
+            def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
+                return self.searcher.search(weights, kind, start, target)
+
+            if cell != state.past[-1]:
+                self.tally.steps += 1
+                self.tally.return_steps += 1 if state.returning else 0
+            self._runner.start(lambda: step(state, grid, cell, search))
+        result = self._runner.take()
+        if result is None:
+            return None
+        self._state, self.decision = result
+        self._lay_route(self.decision, pose)
+        return self.decision
+
+    def _step_is_due(self, cell: Cell) -> bool:
+        assert self._state is not None
+        if cell != self._state.past[-1] or self.decision is None:
+            return True
+        if self._state.returning:
+            return not is_clear(self.evidence.grid, self._state.past[:-4:-1])
+        current = self._state.current
+        return current is None or not is_clear(self.evidence.grid, current.cells[self._state.index :])
+
+    def _lay_route(self, decision: Decision, pose: Pose) -> None:
+        """The route for a decision; a path that goes on keeps its route."""
+        assert self._goal is not None
+        if decision.action is Action.FOLLOW and decision.new_path is None and self.route is not None:
+            return
+        if decision.action not in (Action.FOLLOW, Action.BACKTRACK) or not decision.path:
+            self.route = None
+            return
+        end = self._goal.point if decision.action is Action.FOLLOW else None
+        grid = self.evidence.grid
+        path = decision.new_path
+        if path is not None and path.curve is not None:
+            route = route_along_curve(grid, path.curve, pose.point, end)
+            if route_is_clear(route, self.evidence, self._rover.radius_m + self._settings.guidance.clearance_m):
+                self.route = route
+                return
+        self.route = route_along_cells(grid, decision.path, pose.point, end)
+
+    def _arrived(self, pose: Pose, speed_m_s: float) -> bool:
+        assert self._goal is not None
+        distance_m = pose.point.distance_m(self._goal.point)
+        near_m = self._settings.guidance.arrival_m
+        return distance_m <= near_m or (distance_m <= 2.0 * near_m and speed_m_s < 0.1)
+
+    def _is_stuck(self, pose: Pose, now: Guide) -> bool:
+        """No movement (turning counts for a while) for ``stuck_after_s``."""
+        last = self._progress
+        if last is None or pose.point.distance_m(last.pose.point) >= MOVED_M:
+            self._progress = Progress(pose, pose.time_s, pose.time_s)
+            return False
+        if abs(wrap_pi_rad(pose.heading_rad - last.pose.heading_rad)) >= TURNED_RAD:
+            self._progress = Progress(
+                replace(pose, north_m=last.pose.north_m, east_m=last.pose.east_m), last.moved_s, pose.time_s
+            )
+            return pose.time_s - last.moved_s >= 3.0 * self._settings.guidance.stuck_after_s
+        limit_s = self._settings.guidance.stuck_after_s
+        return pose.time_s - last.changed_s >= (limit_s / 3.0 if now.motion is Motion.BLOCKED else limit_s)
+
+    def _get_unstuck(self, pose: Pose) -> None:
+        """Remember the place ahead as costly (in the end as an obstacle), back out if there is room, plan anew."""
+        assert self._state is not None
+        self.tally.stuck += 1
+        ahead = self._place_ahead(pose)
+        cell = self.evidence.base.cell_at(ahead)
+        self._stuck_places[cell] = self._stuck_places.get(cell, 0) + 1
+        final = self._stuck_places[cell] >= TRIES_AT_ONE_PLACE
+        penalise(self.evidence, cell, FINAL_PENALTY if final else FRESH_PENALTY)
+        behind = pose.point.moved(pose.heading_rad + math.pi, self._settings.guidance.back_out_m)
+        room_m = look_along(self.evidence, pose.point, behind, self._rover.radius_m).clear_m
+        self._back_until_s = pose.time_s + room_m / self._settings.guidance.back_out_speed_m_s
+        self._state = abandon_path(self._state)
+        self._progress = None
+        self.route = None
+        self.decision = None
+
+    def _place_ahead(self, pose: Pose) -> NedPoint:
+        if self.route is None:
+            return pose.point.moved(pose.heading_rad, self.evidence.base.resolution_m)
+        point = self.route.point_ahead(self.evidence.base.resolution_m)
+        return pose.point.moved(pose.point.bearing_rad(point), self.evidence.base.resolution_m)
+
+    def _backing_out(self) -> Guide:
+        self._progress = None
+        speed_m_s = self._settings.guidance.back_out_speed_m_s
+        return Guide(Motion.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)

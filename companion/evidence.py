@@ -1,0 +1,148 @@
+"""Compiled loops over the evidence raster; ``mapping`` gives them their meaning.
+
+All rasters are indexed [y, x], y north. Log-odds: 0 unknown, negative free, from ``occupied_at`` on an obstacle.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+import math
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True, nogil=True)
+def cast_scan(
+    log_odds, stamps, stamp, x0, y0, heading_rad, bearing_rad, range_cells, min_cells, max_cells, width_rad,
+    depth_cells, radius_cells, hit, miss, limit, free_limit,
+):  # fmt: skip
+    """Add one scan to the evidence. Lengths are in evidence cells, (x0, y0) is the sensor, headings clockwise from north."""
+    height, width = log_odds.shape
+    # Hits first: a cell stamped by a hit cannot be freed by another beam of the same scan.
+    for i in range(bearing_rad.size):
+        r = range_cells[i]
+        if not np.isfinite(r):
+            continue
+        angle = heading_rad + bearing_rad[i]
+        x = int(math.floor(x0 + (r + depth_cells) * math.sin(angle)))
+        y = int(math.floor(y0 + (r + depth_cells) * math.cos(angle)))
+        if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
+            stamps[y, x] = stamp
+            log_odds[y, x] = min(log_odds[y, x] + hit, limit)
+    for i in range(bearing_rad.size):
+        r = range_cells[i]
+        if math.isnan(r):
+            continue
+        reach = max_cells if math.isinf(r) else r - 0.5
+        rays = max(1, int(math.ceil(reach * width_rad)))
+        for k in range(rays):
+            angle = heading_rad + bearing_rad[i] + width_rad * ((k + 0.5) / rays - 0.5)
+            dx = math.sin(angle)
+            dy = math.cos(angle)
+            d = 0.0
+            while d < reach:
+                x = int(math.floor(x0 + d * dx))
+                y = int(math.floor(y0 + d * dy))
+                d += 0.7
+                if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
+                    stamps[y, x] = stamp
+                    log_odds[y, x] = max(log_odds[y, x] - miss, -free_limit)
+    r = int(math.ceil(radius_cells))
+    for y in range(max(0, int(y0) - r), min(height, int(y0) + r + 1)):
+        for x in range(max(0, int(x0) - r), min(width, int(x0) + r + 1)):
+            if math.hypot(x + 0.5 - x0, y + 0.5 - y0) <= radius_cells:
+                log_odds[y, x] = -free_limit
+
+
+@njit(cache=True, nogil=True)
+def weigh(
+    log_odds, base, penalty, weights, s, x0, y0, x1, y1, occupied_at, radius_cells, soft_reach, soft_cost, max_soft
+):  # fmt: skip
+    """Weights of the fields x0 <= x < x1, y0 <= y < y1. ``s``: evidence cells along a field; reach of soft cost in fields."""
+    height, width = base.shape
+    half = s / 2.0
+    reach = int(math.ceil(max(radius_cells - half, 0.0)))
+    for fy in range(y0, y1):
+        for fx in range(x0, x1):
+            weight = base[fy, fx] + penalty[fy, fx]
+            blocked = weight >= 1.0
+            for y in range(max(0, fy * s - reach), min(height * s, fy * s + s + reach)):
+                for x in range(max(0, fx * s - reach), min(width * s, fx * s + s + reach)):
+                    if log_odds[y, x] >= occupied_at:
+                        distance = math.hypot(x + 0.5 - fx * s - half, y + 0.5 - fy * s - half)
+                        inside = fx * s <= x < fx * s + s and fy * s <= y < fy * s + s
+                        blocked = blocked or inside or distance < radius_cells
+            weights[fy, fx] = 1.0 if blocked else weight
+    n = int(math.ceil(soft_reach))
+    for fy in range(y0, y1):
+        for fx in range(x0, x1):
+            if weights[fy, fx] >= 1.0:
+                continue
+            nearest = soft_reach + 1.0
+            for y in range(max(0, fy - n), min(height, fy + n + 1)):
+                for x in range(max(0, fx - n), min(width, fx + n + 1)):
+                    if weights[y, x] >= 1.0:
+                        nearest = min(nearest, math.hypot(x - fx, y - fy))
+            if nearest <= soft_reach:
+                extra = soft_cost * (1.0 - (nearest - 1.0) / soft_reach)
+                weights[fy, fx] = max(weights[fy, fx], min(weights[fy, fx] + extra, max_soft))
+
+
+@njit(cache=True, nogil=True)
+def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, occupied_at):
+    """How far a disc of this half width can go from (x0, y0) towards (x1, y1), and how far the line has been seen; in cells."""
+    height, width = log_odds.shape
+    length = math.hypot(x1 - x0, y1 - y0)
+    if length < 1e-9:
+        return 0.0, 0.0
+    dx = (x1 - x0) / length
+    dy = (y1 - y0) / length
+    seen = length
+    d = 0.0
+    while d < length:
+        x = int(math.floor(x0 + d * dx))
+        y = int(math.floor(y0 + d * dy))
+        if not (0 <= x < width and 0 <= y < height):
+            return min(d, seen), min(d, seen)
+        if base[y // s, x // s] + penalty[y // s, x // s] >= 1.0 and d > s * 0.75:
+            length = d
+            break
+        if log_odds[y, x] == 0.0 and d < seen:
+            seen = d
+        d += 0.5
+    # An obstacle may fill its whole evidence cell, not only the middle.
+    half_width += 0.5
+    clear = length
+    r = int(math.ceil(half_width)) + 1
+    left = max(0, int(min(x0, x0 + dx * length)) - r)
+    right = min(width, int(max(x0, x0 + dx * length)) + r + 1)
+    low = max(0, int(min(y0, y0 + dy * length)) - r)
+    high = min(height, int(max(y0, y0 + dy * length)) + r + 1)
+    for y in range(low, high):
+        for x in range(left, right):
+            if log_odds[y, x] < occupied_at:
+                continue
+            px = x + 0.5 - x0
+            py = y + 0.5 - y0
+            along = px * dx + py * dy
+            across = abs(px * dy - py * dx)
+            if across >= half_width or along <= 0.0:
+                continue
+            # The rover is a disc: it touches before its middle is level with the obstacle.
+            contact = along - math.sqrt(half_width * half_width - across * across)
+            if contact < clear:
+                clear = max(contact, 0.0)
+    return clear, min(seen, length)
+
+
+@njit(cache=True, nogil=True)
+def nearest(log_odds, x0, y0, reach, occupied_at):
+    """Distance in cells from (x0, y0) to the nearest obstacle evidence, at most ``reach``."""
+    height, width = log_odds.shape
+    best = reach
+    r = int(math.ceil(reach + 0.5))
+    for y in range(max(0, int(y0) - r), min(height, int(y0) + r + 1)):
+        for x in range(max(0, int(x0) - r), min(width, int(x0) + r + 1)):
+            if log_odds[y, x] >= occupied_at:
+                best = min(best, max(math.hypot(x + 0.5 - x0, y + 0.5 - y0) - 0.5, 0.0))
+    return best

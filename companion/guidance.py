@@ -1,0 +1,246 @@
+"""From the navigator's path to one guided setpoint and a speed.
+
+The autopilot brakes for every guided point, so the point is rolled to the farthest place of the route that can be reached
+straight and clear. It never lies beyond the ground seen free plus the stopping distance. Where the next piece of
+the route has not been seen, the rover turns to look before it drives.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
+from companion.frames import NedPoint, Pose, wrap_pi_rad
+from companion.grid import Cell, Grid
+from companion.mapping import EvidenceMap, clearance_m, look_along
+from companion.settings import GuidanceSettings
+
+Points = NDArray[np.float64]
+"""Shape (n, 2): columns north_m and east_m in the local frame."""
+
+STEP_M = 0.25
+STOP = GuidedVelocity(0.0, 0.0)
+
+
+class Motion(StrEnum):
+    """What the setpoint is for."""
+
+    DRIVE = "drive"
+    LOOK = "look"
+    BRAKE = "brake"
+    BLOCKED = "blocked"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Route:
+    """The line to drive, in points ``STEP_M`` apart, and how far along it the rover has come."""
+
+    points: Points
+    progress: int = 0
+
+    @property
+    def end(self) -> NedPoint:
+        """The last point."""
+        return self.point(-1)
+
+    def point(self, index: int) -> NedPoint:
+        """One of the points."""
+        return NedPoint(float(self.points[index, 0]), float(self.points[index, 1]))
+
+    def point_ahead(self, distance_m: float) -> NedPoint:
+        """The point so far on from the rover, along the route; at most its end."""
+        return self.point(min(self.progress + round(distance_m / STEP_M), len(self.points) - 1))
+
+    @property
+    def left_m(self) -> float:
+        """Length of the route that is left, in metres."""
+        return (len(self.points) - 1 - self.progress) * STEP_M
+
+
+@dataclass(frozen=True, slots=True)
+class Guide:
+    """What to tell the autopilot now."""
+
+    motion: Motion
+    setpoint: Setpoint
+    speed_m_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class RoverLimits:
+    """The rover as guidance sees it."""
+
+    radius_m: float
+    cruise_speed_m_s: float
+    sight_m: float
+    """Valid range of the sensor."""
+
+
+def route_along_cells(grid: Grid, cells: tuple[Cell, ...], start: NedPoint, end: NedPoint | None) -> Route:
+    """The route from ``start`` (in the first field) through the middles of the others; ``end`` replaces the last one."""
+    corners = [start, *(grid.centre_of(cell) for cell in cells[1:])]
+    if end is not None:
+        corners[-1 if len(corners) > 1 else 1 :] = [end]
+    return Route(_densified(np.array([(p.north_m, p.east_m) for p in corners])))
+
+
+def route_along_curve(grid: Grid, curve: NDArray[np.float64], start: NedPoint, end: NedPoint | None) -> Route:
+    """The route along a planner's smooth curve (x, y in fields); ``start`` and ``end`` replace its ends."""
+    north = grid.south_west.north_m + (curve[:, 1] + 0.5) * grid.resolution_m
+    east = grid.south_west.east_m + (curve[:, 0] + 0.5) * grid.resolution_m
+    points = np.column_stack((north, east))
+    points[0] = (start.north_m, start.east_m)
+    if end is not None:
+        points[-1] = (end.north_m, end.east_m)
+    return Route(_densified(points))
+
+
+def route_is_clear(route: Route, evidence: EvidenceMap, half_width_m: float) -> bool:
+    """Whether a rover of this half width can drive the whole route on the map as known."""
+    stride = max(1, round(evidence.base.resolution_m / STEP_M))
+    stops = [*range(0, len(route.points) - 1, stride), len(route.points) - 1]
+    for i, j in pairwise(stops):
+        here, there = route.point(i), route.point(j)
+        if look_along(evidence, here, there, half_width_m).clear_m < here.distance_m(there) - 1e-6:
+            return False
+    return True
+
+
+def advanced(route: Route, pose: Pose, window_m: float = 4.0) -> Route:
+    """The route with its progress moved to the point nearest to the rover, never back and not more than the window ahead."""
+    stop = min(len(route.points), route.progress + int(window_m / STEP_M) + 1)
+    ahead = route.points[route.progress : stop]
+    nearest = int(np.argmin((ahead[:, 0] - pose.north_m) ** 2 + (ahead[:, 1] - pose.east_m) ** 2))
+    return Route(route.points, route.progress + nearest)
+
+
+def guide(
+    route: Route, pose: Pose, speed_m_s: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
+) -> Guide:
+    """The setpoint and speed for this moment. ``BLOCKED`` means that not even the next piece of the route is clear."""
+    if _must_brake(pose, speed_m_s, evidence, rover, settings):
+        return Guide(Motion.BRAKE, STOP, 0.0)
+    target, reach_m = _farthest_clear(route, pose, speed_m_s, evidence, rover, settings)
+    bearing = pose.point.bearing_rad(target)
+    error = abs(wrap_pi_rad(bearing - pose.heading_rad))
+    at_end = len(route.points) - 1 - route.progress <= int(1.0 / STEP_M)
+    if reach_m < min(settings.least_reach_m, pose.point.distance_m(route.end)) and not (at_end and reach_m > 0.0):
+        ahead = route.point_ahead(settings.look_ahead_m)
+        return _look_or_blocked(pose, speed_m_s, ahead, evidence, rover, settings)
+    beside_m = clearance_m(evidence, pose.point, settings.slow_within_m + rover.radius_m) - rover.radius_m
+    close = beside_m < settings.slow_within_m
+    if close and error > math.radians(settings.turn_first_deg) and pose.point.distance_m(target) > 0.5:
+        # Near something the rover must not drive an arc while it turns.
+        return _turn_to(bearing, speed_m_s, settings)
+    return Guide(Motion.DRIVE, GuidedPosition(target), _speed_limit(beside_m, error, rover, settings))
+
+
+def _must_brake(
+    pose: Pose, speed_m_s: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
+) -> bool:
+    """Whether the rover, going on as it does, would touch something before it could stop."""
+    if speed_m_s <= settings.roll_out_m_s:
+        return False
+    needed_m = speed_m_s**2 / (2.0 * settings.deceleration_m_s2) + 0.1 * speed_m_s
+    ahead = pose.point.moved(pose.heading_rad, needed_m)
+    return look_along(evidence, pose.point, ahead, rover.radius_m).clear_m < needed_m - 1e-6
+
+
+def _turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -> Guide:
+    """Turn on the spot; a rover that still rolls brakes first, lest it drives an arc."""
+    if speed_m_s > settings.roll_out_m_s:
+        return Guide(Motion.BRAKE, STOP, 0.0)
+    return Guide(Motion.LOOK, GuidedHeading(bearing_rad), settings.min_speed_m_s)
+
+
+def stopping_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
+    """Distance from deciding to stop to standing still."""
+    return speed_m_s * settings.latency_s + speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
+
+
+def fastest_within_m(distance_m: float, settings: GuidanceSettings) -> float:
+    """The speed from which the rover can stop within a distance: the inverse of ``stopping_distance_m``."""
+    a, t = settings.deceleration_m_s2, settings.latency_s
+    return a * (math.sqrt(t * t + 2.0 * max(distance_m, 0.0) / a) - t)
+
+
+def _farthest_clear(
+    route: Route, pose: Pose, speed_m_s: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
+) -> tuple[NedPoint, float]:
+    """The farthest route point in clear sight, and how far away it is; with wide clearance where there is room."""
+    best: tuple[NedPoint, float] = (pose.point, 0.0)
+    for extra_m, enough_m in settings.clearances:
+        target, reach_m = _farthest_with(
+            route, pose, speed_m_s, evidence, rover.radius_m + extra_m, settings.horizon_m, settings
+        )
+        if reach_m > best[1] + 0.5 or best[1] == 0.0:
+            best = (target, reach_m)
+        if best[1] >= min(enough_m, pose.point.distance_m(route.end) - 0.1):
+            break
+    return best
+
+
+def _farthest_with(
+    route: Route,
+    pose: Pose,
+    speed_m_s: float,
+    evidence: EvidenceMap,
+    half_width_m: float,
+    horizon_m: float,
+    settings: GuidanceSettings,
+) -> tuple[NedPoint, float]:
+    beyond_m = speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
+    last = min(len(route.points) - 1, route.progress + int(horizon_m / STEP_M))
+    for index in range(last, route.progress, -2):
+        point = route.point(index)
+        distance_m = pose.point.distance_m(point)
+        if distance_m < 0.05:
+            continue
+        line = look_along(evidence, pose.point, point, half_width_m)
+        if line.clear_m >= distance_m - 0.05 and line.seen_m + beyond_m >= distance_m - 0.05:
+            return point, distance_m
+    return pose.point, 0.0
+
+
+def _look_or_blocked(
+    pose: Pose,
+    speed_m_s: float,
+    ahead: NedPoint,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: GuidanceSettings,
+) -> Guide:
+    """The next piece is not clear, or has not been seen: turn to it; when turned and still so, it is blocked."""
+    bearing = pose.point.bearing_rad(ahead)
+    if abs(wrap_pi_rad(bearing - pose.heading_rad)) > math.radians(10.0):
+        return _turn_to(bearing, speed_m_s, settings)
+    line = look_along(evidence, pose.point, ahead, rover.radius_m)
+    if line.clear_m >= pose.point.distance_m(ahead) - 0.05:
+        # Looked at, and nothing there, but between the beams: creep.
+        return Guide(Motion.DRIVE, GuidedPosition(ahead), settings.min_speed_m_s)
+    return Guide(Motion.BLOCKED, STOP, 0.0)
+
+
+def _speed_limit(beside_m: float, bearing_error_rad: float, rover: RoverLimits, settings: GuidanceSettings) -> float:
+    """Cruise speed; less where the sensor sees too short, something is close beside, or the rover is still turning."""
+    sight = fastest_within_m(rover.sight_m - rover.radius_m - settings.clearance_m, settings)
+    share = min(max(beside_m / settings.slow_within_m, 0.0), 1.0)
+    beside = settings.min_speed_m_s + share * max(rover.cruise_speed_m_s - settings.min_speed_m_s, 0.0)
+    turning = rover.cruise_speed_m_s if bearing_error_rad < math.radians(20.0) else 2.0 * settings.min_speed_m_s
+    return max(min(rover.cruise_speed_m_s, sight, beside, turning), settings.min_speed_m_s)
+
+
+def _densified(corners: Points) -> Points:
+    """Points ``STEP_M`` apart (at most) along the line through the corners, ends included."""
+    if len(corners) == 1:
+        return corners
+    lengths = np.hypot(*np.diff(corners, axis=0).T)
+    along = np.concatenate(([0.0], np.cumsum(lengths)))
+    wanted = np.linspace(0.0, along[-1], max(2, math.ceil(along[-1] / STEP_M) + 1))
+    return np.column_stack((np.interp(wanted, along, corners[:, 0]), np.interp(wanted, along, corners[:, 1])))

@@ -1,0 +1,167 @@
+"""From range readings to field weights.
+
+Readings become log-odds evidence on a raster finer than the fields (a thin post must not be outvoted by the free
+ground beside it in the same field). A field is an obstacle when something was seen in it, or when the rover standing
+in its middle would touch something; beside obstacles the mission's own weight is raised (soft cost).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.evidence import cast_scan, look, nearest, weigh
+from companion.frames import NedPoint, Pose
+from companion.grid import Cell, Grid
+from companion.scan import RangeScan
+from companion.settings import MappingSettings
+
+MAX_EVIDENCE_CELLS = 16_000_000
+MAX_SOFT_WEIGHT = 0.9
+"""Soft cost never makes a field look like an obstacle."""
+
+
+@dataclass(frozen=True, eq=False)
+class EvidenceMap:
+    """What has been seen, on a raster of ``subdivisions`` cells along a field's side.
+
+    ``log_odds``: shape (height * subdivisions, width * subdivisions), indexed [y, x]: 0 unknown, below 0 seen free, from
+    ``settings.occupied_at`` on an obstacle. ``base`` holds the mission's own weights (obstacles in it are
+    never forgotten: they are fences or prior knowledge), ``penalty`` what experience adds.
+    The arrays belong to the map and are changed in place by ``integrate``; ``grid`` is always up to date.
+    """
+
+    base: Grid
+    grid: Grid
+    log_odds: NDArray[np.float32]
+    stamps: NDArray[np.int32]
+    penalty: NDArray[np.float32]
+    subdivisions: int
+    rover_radius_m: float
+    settings: MappingSettings
+
+    @property
+    def evidence_m(self) -> float:
+        """Side of one evidence cell."""
+        return self.base.resolution_m / self.subdivisions
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What lies along a straight line: how far it is free of obstacles, and how far it has been seen."""
+
+    clear_m: float
+    seen_m: float
+
+
+def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> EvidenceMap:
+    """A map without evidence. On very large grids the evidence raster is coarser, to spare memory."""
+    subdivisions = settings.subdivisions
+    while subdivisions > 1 and base.width * base.height * subdivisions**2 > MAX_EVIDENCE_CELLS:
+        subdivisions -= 1
+    shape = (base.height * subdivisions, base.width * subdivisions)
+    evidence = EvidenceMap(
+        base=base,
+        grid=base.with_weights(base.weights.copy()),
+        log_odds=np.zeros(shape, np.float32),
+        stamps=np.zeros(shape, np.int32),
+        penalty=np.zeros(base.weights.shape, np.float32),
+        subdivisions=subdivisions,
+        rover_radius_m=rover_radius_m,
+        settings=settings,
+    )
+    _refresh(evidence, 0, 0, base.width, base.height)
+    return evidence
+
+
+def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) -> None:
+    """Take one scan into the map; ``stamp`` must differ from scan to scan.
+
+    A beam frees the cells it passed and hardens the one it ended in; in one scan a hit outweighs any number of passes, and
+    each cell changes once. The ground under the rover is free.
+    """
+    settings = evidence.settings
+    scale = 1.0 / evidence.evidence_m
+    x0 = (pose.east_m - evidence.base.south_west.east_m) * scale
+    y0 = (pose.north_m - evidence.base.south_west.north_m) * scale
+    cast_scan(
+        evidence.log_odds, evidence.stamps, np.int32(stamp), x0, y0, pose.heading_rad,
+        scan.bearing_rad, scan.range_m * scale, scan.min_range_m * scale, scan.max_range_m * scale, scan.beam_width_rad,
+        settings.hit_depth_m * scale, evidence.rover_radius_m * scale,
+        settings.hit, settings.miss, settings.limit, settings.free_limit,
+    )  # fmt: skip
+    reach = math.ceil(scan.max_range_m / evidence.base.resolution_m) + 1 + _soft_reach(evidence)
+    cell = evidence.base.cell_at(pose.point)
+    _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
+
+
+def penalise(evidence: EvidenceMap, cell: Cell, amount: float) -> None:
+    """Remember a field as costly, by this much more weight; from 1 on it counts as an obstacle."""
+    if evidence.base.contains(cell):
+        evidence.penalty[cell.y, cell.x] += amount
+        reach = _soft_reach(evidence) + 1
+        _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
+
+
+def forget(evidence: EvidenceMap) -> None:
+    """Drop all that was seen (the local frame has moved under it); fences and prior knowledge stay."""
+    evidence.log_odds.fill(0.0)
+    evidence.penalty.fill(0.0)
+    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+
+
+def look_along(evidence: EvidenceMap, start: NedPoint, end: NedPoint, half_width_m: float) -> Line:
+    """How far a rover of this half width could drive straight from start towards end (up to its distance).
+
+    ``clear_m`` ends at the first evidence of an obstacle within the half width or the first field that is an obstacle by mission or
+    penalty; ``seen_m`` ends where the middle of the line has not been seen yet.
+    """
+    scale = 1.0 / evidence.evidence_m
+    corner = evidence.base.south_west
+    clear, seen = look(
+        evidence.log_odds, evidence.base.weights, evidence.penalty, evidence.subdivisions,
+        (start.east_m - corner.east_m) * scale, (start.north_m - corner.north_m) * scale,
+        (end.east_m - corner.east_m) * scale, (end.north_m - corner.north_m) * scale,
+        half_width_m * scale, evidence.settings.occupied_at,
+    )  # fmt: skip
+    return Line(clear / scale, seen / scale)
+
+
+def clearance_m(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> float:
+    """Distance from a place to the nearest evidence of an obstacle, at most ``reach_m``."""
+    scale = 1.0 / evidence.evidence_m
+    corner = evidence.base.south_west
+    distance = nearest(
+        evidence.log_odds,
+        (point.east_m - corner.east_m) * scale,
+        (point.north_m - corner.north_m) * scale,
+        reach_m * scale,
+        evidence.settings.occupied_at,
+    )
+    return float(distance) / scale
+
+
+def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
+    """Shape (height, width): True where at least one evidence cell of the field has been seen."""
+    s = evidence.subdivisions
+    blocks = (evidence.log_odds != 0.0).reshape(evidence.base.height, s, evidence.base.width, s)
+    return np.asarray(blocks.any(axis=(1, 3)))
+
+
+def _soft_reach(evidence: EvidenceMap) -> int:
+    return math.ceil((evidence.settings.soft_reach_m + evidence.rover_radius_m) / evidence.base.resolution_m)
+
+
+def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
+    """Recompute the weights of the fields x0 <= x < x1, y0 <= y < y1 from the evidence."""
+    base = evidence.base
+    settings = evidence.settings
+    weigh(
+        evidence.log_odds, base.weights, evidence.penalty, evidence.grid.weights, evidence.subdivisions,
+        max(x0, 0), max(y0, 0), min(x1, base.width), min(y1, base.height), settings.occupied_at,
+        evidence.rover_radius_m / evidence.evidence_m, settings.soft_reach_m / base.resolution_m,
+        settings.soft_cost, MAX_SOFT_WEIGHT,
+    )  # fmt: skip

@@ -1,0 +1,103 @@
+"""MAVLink over a serial port; an unplugged adapter may be plugged in again."""
+
+from __future__ import annotations
+
+import serial
+
+from companion.clock import Clock
+from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, LinkError, OutBuffer
+
+
+class SerialLink:
+    """A serial port, 8N1 without flow control. Raises LinkError when it cannot be opened at first; later it tries again by itself."""
+
+    def __init__(self, device: str, baud: int, clock: Clock) -> None:
+        self._device = device
+        self._baud = baud
+        self._clock = clock
+        self._back_off = BackOff(first_s=1.0)
+        self._out = OutBuffer()
+        self._closed = False
+        self._port: serial.Serial | None = None
+        try:
+            self._port = self._open()
+        except (OSError, ValueError) as error:
+            raise LinkError(f"{self._name}: cannot be opened: {_reason(error)}") from error
+
+    @property
+    def _name(self) -> str:
+        return f"serial:{self._device}:{self._baud}"
+
+    @property
+    def description(self) -> str:
+        """The link in words."""
+        return self._name if self._port is not None else f"{self._name} (not there)"
+
+    def read(self) -> bytes:
+        """What has arrived; tries to open the port again when it was lost."""
+        if self._port is None and not self._reopen():
+            return b""
+        assert self._port is not None
+        try:
+            self._flush()
+            return bytes(self._port.read(MAX_READ_BYTES))
+        except (OSError, TypeError):
+            # pyserial fails with a TypeError when the port is lost between two of its own calls.
+            self._lose()
+            return b""
+
+    def write(self, data: bytes) -> None:
+        """Send; dropped while the port is not there."""
+        if self._port is None:
+            return
+        self._out.add(data)
+        try:
+            self._flush()
+        except (OSError, TypeError):
+            self._lose()
+
+    def close(self) -> None:
+        """Close the port for good."""
+        self._closed = True
+        self._lose()
+
+    def _open(self) -> serial.Serial:
+        return serial.Serial(self._device, self._baud, timeout=0, write_timeout=0, exclusive=True)
+
+    def _reopen(self) -> bool:
+        if self._closed or not self._back_off.due(self._clock.now_s()):
+            return False
+        try:
+            self._port = self._open()
+        except (OSError, ValueError):
+            return False
+        self._back_off.reset()
+        return True
+
+    def _flush(self) -> None:
+        assert self._port is not None
+        if self._out.waiting:
+            try:
+                self._out.taken(int(self._port.write(bytes(self._out.waiting)) or 0))
+            except serial.SerialTimeoutException:
+                return  # the port's own buffer is full: next time
+
+    def _lose(self) -> None:
+        self._out.clear()
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+
+
+def _reason(error: Exception) -> str:
+    """pyserial's error in plain words, with the remedy."""
+    text = str(error)
+    if isinstance(error, FileNotFoundError) or "No such file" in text:
+        return "there is no such device; check the cable and `ls /dev/tty*`"
+    if isinstance(error, PermissionError) or "Permission denied" in text:
+        return "no permission; add yourself to the group 'dialout'"
+    if "lock" in text or "busy" in text.lower():
+        return "another program uses it; stop that one"
+    if isinstance(error, ValueError):
+        return f"the port does not take this baud rate ({text})"
+    return text

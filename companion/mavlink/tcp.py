@@ -1,0 +1,203 @@
+"""MAVLink over TCP, as client or as server; a peer that dies may come back."""
+
+from __future__ import annotations
+
+import select
+import socket
+
+from companion.clock import Clock
+from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, LinkError, OutBuffer
+from companion.mavlink.udp import resolve
+
+CONNECT_TIMEOUT_S = 5.0
+UNACKNOWLEDGED_LIMIT_MS = 5000
+"""A peer that has vanished without a word is given up when it has not acknowledged anything for so long."""
+
+
+class _Stream:
+    """One connected socket, never waiting. ``ok`` turns False when the peer has gone."""
+
+    def __init__(self, connection: socket.socket) -> None:
+        connection.setblocking(False)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        if hasattr(socket, "TCP_USER_TIMEOUT"):
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, UNACKNOWLEDGED_LIMIT_MS)
+        self._socket = connection
+        self._out = OutBuffer()
+        self.ok = True
+
+    def read(self) -> bytes:
+        self._flush()
+        try:
+            data = self._socket.recv(MAX_READ_BYTES)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            self.ok = False
+            return b""
+        self.ok = self.ok and bool(data)
+        return data
+
+    def write(self, data: bytes) -> None:
+        self._out.add(data)
+        self._flush()
+
+    def close(self) -> None:
+        self._socket.close()
+
+    def _flush(self) -> None:
+        if not self._out.waiting:
+            return
+        try:
+            self._out.taken(self._socket.send(self._out.waiting))
+        except BlockingIOError:
+            return
+        except OSError:
+            self.ok = False
+
+
+class TcpLink:
+    """A client that connects by itself, again and again with growing pauses; nothing of it waits, except the look-up of the name."""
+
+    def __init__(self, host: str, port: int, clock: Clock) -> None:
+        self._name = f"tcp:{host}:{port}"
+        self._family, self._address = resolve(host, port, socket.SOCK_STREAM, self._name)
+        self._clock = clock
+        self._back_off = BackOff()
+        self._connecting: socket.socket | None = None
+        self._began_s = 0.0
+        self._stream: _Stream | None = None
+        self._closed = False
+        self._connect()
+
+    @property
+    def description(self) -> str:
+        """The link in words."""
+        return self._name if self.connected else f"{self._name} (not connected)"
+
+    @property
+    def connected(self) -> bool:
+        """Whether there is a peer."""
+        return self._stream is not None
+
+    def read(self) -> bytes:
+        """What has arrived; looks after the connection as well."""
+        if self._stream is None:
+            self._connect()
+            if self._stream is None:
+                return b""
+        data = self._stream.read()
+        self._drop_if_gone()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send; dropped while there is no peer."""
+        if self._stream is not None:
+            self._stream.write(data)
+            self._drop_if_gone()
+
+    def close(self) -> None:
+        """Close the connection for good."""
+        self._closed = True
+        for thing in (self._connecting, self._stream):
+            if thing is not None:
+                thing.close()
+        self._connecting = self._stream = None
+
+    def _drop_if_gone(self) -> None:
+        if self._stream is not None and not self._stream.ok:
+            self._stream.close()
+            self._stream = None
+
+    def _connect(self) -> None:
+        """Move the connection on by one step: begin it, or see whether it has come about."""
+        now_s = self._clock.now_s()
+        if self._connecting is None:
+            if self._closed or not self._back_off.due(now_s):
+                return
+            self._connecting = socket.socket(self._family, socket.SOCK_STREAM)
+            self._connecting.setblocking(False)
+            self._connecting.connect_ex(self._address)
+            self._began_s = now_s
+        _, writable, _ = select.select([], [self._connecting], [], 0)
+        if writable and self._connecting.getsockopt(socket.SOL_SOCKET, socket.SO_ERROR) == 0 and self._is_up():
+            self._stream = _Stream(self._connecting)
+            self._connecting = None
+            self._back_off.reset()
+        elif writable or now_s - self._began_s > CONNECT_TIMEOUT_S:
+            self._connecting.close()
+            self._connecting = None
+
+    def _is_up(self) -> bool:
+        """A refused connection is writable too, and its error may have been fetched already: a peer is the proof."""
+        assert self._connecting is not None
+        try:
+            return self._connecting.getpeername() is not None
+        except OSError:
+            return False
+
+
+class TcpServerLink:
+    """Listens, and talks to the one who connected last: an autopilot that has restarted takes its own old place.
+
+    Raises LinkError when the port is taken.
+    """
+
+    def __init__(self, host: str, port: int) -> None:
+        self._name = f"tcpin:{host}:{port}"
+        family, address = resolve(host, port, socket.SOCK_STREAM, self._name)
+        self._listener = socket.socket(family, socket.SOCK_STREAM)
+        self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        self._listener.setblocking(False)
+        self._stream: _Stream | None = None
+        try:
+            self._listener.bind(address)
+            self._listener.listen(1)
+        except OSError as error:
+            self._listener.close()
+            raise LinkError(
+                f"{self._name}: cannot listen: {error.strerror}; stop the other program or choose another port"
+            ) from error
+
+    @property
+    def description(self) -> str:
+        """The link in words."""
+        return self._name if self._stream is not None else f"{self._name} (nobody has connected yet)"
+
+    @property
+    def port(self) -> int:
+        """The local port (of interest when 0 was asked for)."""
+        return int(self._listener.getsockname()[1])
+
+    def read(self) -> bytes:
+        """What has arrived; takes a new connection as well."""
+        try:
+            connection, _ = self._listener.accept()
+        except OSError:
+            connection = None
+        if connection is not None:
+            self._drop()
+            self._stream = _Stream(connection)
+        if self._stream is None:
+            return b""
+        data = self._stream.read()
+        if not self._stream.ok:
+            self._drop()
+        return data
+
+    def write(self, data: bytes) -> None:
+        """Send; dropped while nobody is connected."""
+        if self._stream is not None:
+            self._stream.write(data)
+            if not self._stream.ok:
+                self._drop()
+
+    def close(self) -> None:
+        """Close the connection and stop listening."""
+        self._drop()
+        self._listener.close()
+
+    def _drop(self) -> None:
+        if self._stream is not None:
+            self._stream.close()
+            self._stream = None

@@ -1,0 +1,55 @@
+"""From a URL to a link."""
+
+from __future__ import annotations
+
+from companion.clock import Clock, WallClock
+from companion.mavlink.byte_link import ByteLink, LinkError, MemoryLink
+from companion.mavlink.serial_port import SerialLink
+from companion.mavlink.tcp import TcpLink, TcpServerLink
+from companion.mavlink.udp import UdpLink
+
+FORMS = (
+    "udpin:HOST:PORT, udp:HOST:PORT (the same), udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT, "
+    "serial:DEVICE:BAUD, /dev/ttyNAME or /dev/ttyNAME,BAUD"
+)
+DEFAULT_BAUD = 115200
+
+__all__ = ["FORMS", "ByteLink", "LinkError", "MemoryLink", "SerialLink", "TcpLink", "TcpServerLink", "UdpLink", "open_link"]
+
+
+def open_link(url: str, clock: Clock | None = None) -> ByteLink:
+    """Open the link that a URL names; ``clock`` times the tries to connect again.
+
+    ``udp`` means listening, as in pymavlink. Raises LinkError with one line: an unknown form, a port that is taken, a device
+    that is not there. A TCP server that does not answer yet is no error: the link tries again by itself.
+    """
+    clock = clock or WallClock()
+    if url.startswith("/dev/"):
+        device, comma, baud = url.partition(",")
+        return SerialLink(device, _number(baud, url, "baud rate") if comma else DEFAULT_BAUD, clock)
+    kind, colon, rest = url.partition(":")
+    if not colon or kind not in {"udp", "udpin", "udpout", "tcp", "tcpin", "serial"}:
+        raise LinkError(f"'{url}' is not a link; use {FORMS}")
+    if kind == "serial":
+        device, colon, baud = rest.rpartition(":")
+        return SerialLink(device or rest, _number(baud, url, "baud rate") if colon else DEFAULT_BAUD, clock)
+    host, colon, port_text = rest.rpartition(":")
+    if not colon or not host:
+        raise LinkError(f"'{url}' names no port; use {FORMS}")
+    host = host.removeprefix("[").removesuffix("]")
+    port = _number(port_text, url, "port")
+    if port > 65535:
+        raise LinkError(f"'{url}': port {port} is out of range; use {FORMS}")
+    match kind:
+        case "tcp":
+            return TcpLink(host, port, clock)
+        case "tcpin":
+            return TcpServerLink(host, port)
+        case _:
+            return UdpLink(host, port, bind=kind != "udpout")
+
+
+def _number(text: str, url: str, what: str) -> int:
+    if not text.isascii() or not text.isdigit():
+        raise LinkError(f"'{url}': '{text}' is not a {what}; use {FORMS}")
+    return int(text)

@@ -1,0 +1,92 @@
+"""MAVLink over UDP: every datagram holds whole packets."""
+
+from __future__ import annotations
+
+import socket
+
+from companion.mavlink.byte_link import MAX_READ_BYTES, LinkError
+
+Address = tuple[str | int, ...]
+MAX_PEERS = 8
+"""More speakers than this on one port: the one that has been silent longest is forgotten."""
+
+
+def resolve(host: str, port: int, kind: socket.SocketKind, what: str) -> tuple[socket.AddressFamily, Address]:
+    """Family and address of a host name or number. Raises LinkError. May wait for the name server: only when opening."""
+    try:
+        family, _, _, _, address = socket.getaddrinfo(host, port, type=kind)[0]
+    except (OSError, UnicodeError) as error:
+        raise LinkError(f"{what}: host '{host}' is not known; check the name or use its number ({error})") from error
+    return family, address
+
+
+class UdpLink:
+    """A datagram socket. ``bind``: listens there and answers to whoever has spoken; otherwise it speaks first, to the address.
+
+    Raises LinkError when the port is taken or the address unknown.
+    """
+
+    def __init__(self, host: str, port: int, *, bind: bool) -> None:
+        self._name = f"{'udpin' if bind else 'udpout'}:{host}:{port}"
+        family, address = resolve(host, port, socket.SOCK_DGRAM, self._name)
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._peers: dict[Address, None] = {}
+        self._fixed = None if bind else address
+        self.dropped = 0
+        if bind:
+            try:
+                self._socket.bind(address)
+            except OSError as error:
+                self._socket.close()
+                raise LinkError(
+                    f"{self._name}: cannot listen: {error.strerror}; stop the other program or choose another port"
+                ) from error
+
+    @property
+    def description(self) -> str:
+        """The link in words."""
+        if self._fixed is None and not self._peers:
+            return f"{self._name} (nobody has spoken yet)"
+        return self._name
+
+    @property
+    def port(self) -> int:
+        """The local port (of interest when 0 was asked for)."""
+        return int(self._socket.getsockname()[1])
+
+    def read(self) -> bytes:
+        """All datagrams that have arrived, one after the other."""
+        parts: list[bytes] = []
+        size = 0
+        while size < MAX_READ_BYTES:
+            try:
+                data, sender = self._socket.recvfrom(MAX_READ_BYTES)
+            except BlockingIOError:
+                break
+            except OSError:
+                # For instance "connection refused" from a host where nobody listens yet: nothing has arrived.
+                break
+            if self._fixed is None:
+                self._remember(sender)
+            parts.append(data)
+            size += len(data) + 1
+        return b"".join(parts)
+
+    def write(self, data: bytes) -> None:
+        """One datagram to everybody who has spoken (bound) or to the address."""
+        for address in [self._fixed] if self._fixed is not None else list(self._peers):
+            try:
+                self._socket.sendto(data, address)
+            except OSError:
+                self.dropped += 1
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+    def _remember(self, sender: Address) -> None:
+        self._peers.pop(sender, None)
+        self._peers[sender] = None
+        if len(self._peers) > MAX_PEERS:
+            del self._peers[next(iter(self._peers))]

@@ -1,0 +1,114 @@
+"""The paper's planner: a genetic algorithm whose chromosomes are B-spline control points (section 3)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from companion.grid import Weights
+from companion.planning import bspline
+from companion.planning.chance import draw_seed, seeded
+from companion.planning.ends import ends_free
+from companion.planning.ga_kernel import Task, Tuning, evolve, large_value, way_point
+from companion.planning.planner import Capabilities
+from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
+from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
+from companion.settings import PlannerSettings
+
+Found = tuple[bool, CellArray, NDArray[np.float64], float, int, int, int]
+
+
+@njit(cache=True, nogil=True)
+def path_of(genes: CellArray, way_points: int) -> tuple[CellArray, NDArray[np.float64]]:
+    """A chromosome's fields, without loops, and its curve, about two points a field."""
+    first, basis = bspline.basis(len(genes), way_points)
+    points = np.empty((way_points, 2), np.int64)
+    for i in range(way_points):
+        points[i, 0], points[i, 1] = way_point(genes, first, basis, i)
+    cells = without_loops(polyline(points))
+    return cells, bspline.curve(genes.astype(np.float64), 2 * len(cells) + 1)
+
+
+@njit(cache=True, nogil=True)
+def search(
+    weights: Weights,
+    task: Task,
+    tuning: Tuning,
+    control_points: NDArray[np.int64],
+    population: int,
+    min_epochs: int,
+    max_epochs: int,
+    seed: int,
+) -> Found:
+    """One whole search: each number of control points in turn, until one gives a correct path."""
+    state = seeded(seed)
+    vln = large_value(tuning, weights.shape[1], weights.shape[0])
+    epochs = 0
+    evaluations = 0
+    for count in control_points:
+        value, genes, spent, tried = evolve(
+            weights, task, tuning, count, population, min_epochs, max_epochs, state
+        )
+        epochs += spent
+        evaluations += tried
+        if value < vln:
+            cells, curve = path_of(genes, tuning.way_points)
+            return True, cells, curve, cells_cost(weights, cells), count, epochs, evaluations
+    return False, np.empty((0, 2), np.int64), np.empty((0, 2)), 0.0, 0, epochs, evaluations
+
+
+class BsplineGa:
+    """The genetic algorithm alone, as the paper's profile uses it. It never proves that there is no path."""
+
+    name = "bspline-ga"
+    capabilities = Capabilities(random=True, smooth_curve=True)
+
+    def __init__(self, settings: PlannerSettings) -> None:
+        self._tuning = Tuning(
+            settings.way_points,
+            settings.mixing,
+            settings.selected_share,
+            settings.mutation_probability,
+            settings.mutation_range,
+            settings.line_probability,
+            settings.line_range,
+            settings.neighbourhood,
+            settings.margin_fields,
+            settings.obstacle_value,
+        )
+
+    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
+        """See ``Planner.plan``. FOUND or BUDGET_SPENT.
+
+        Raises ValueError for a budget without sense: fewer than 3 control points or 4 chromosomes.
+        """
+        check_budget(budget)
+        seed = draw_seed(rng)
+        if not ends_free(problem):
+            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
+        if problem.start == problem.target:
+            return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
+        found, cells, curve, cost, count, epochs, evaluations = search(
+            plain(problem.weights),
+            Task(*problem.start, *problem.target, problem.corner_cutting),
+            self._tuning,
+            np.array(budget.control_points, np.int64),
+            budget.population,
+            budget.min_epochs,
+            budget.max_epochs,
+            seed,
+        )
+        if not found:
+            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, evaluations, epochs)
+        path = Path(as_cells(cells), cost, curve)
+        return PlanResult(PlanStatus.FOUND, path, self.name, evaluations, epochs, count)
+
+
+def check_budget(budget: Budget) -> None:
+    """Raise ValueError for a budget that no search can be made of."""
+    if not budget.control_points or min(budget.control_points) < bspline.DEGREE + 1:
+        raise ValueError(f"a B-spline of degree 2 needs 3 control points or more, not {budget.control_points}")
+    if budget.population < 4:
+        raise ValueError(f"a population needs 4 chromosomes or more, not {budget.population}")

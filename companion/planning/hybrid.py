@@ -1,0 +1,32 @@
+"""The navigator's default: the genetic algorithm first, graph search when its budget is spent."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from numpy.random import Generator
+
+from companion.planning.bspline_ga import BsplineGa
+from companion.planning.dijkstra import Dijkstra
+from companion.planning.planner import Capabilities
+from companion.planning.problem import Budget, PlanningProblem, PlanResult, PlanStatus
+from companion.settings import PlannerSettings
+
+
+class Hybrid:
+    """Fast and smooth where the way is easy, complete where it is not: NO_PATH is a proof."""
+
+    name = "hybrid"
+    capabilities = Capabilities(proves_no_path=True, random=True, smooth_curve=True)
+
+    def __init__(self, settings: PlannerSettings) -> None:
+        self._genetic = BsplineGa(settings)
+        self._graph = Dijkstra(settings)
+
+    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
+        """See ``Planner.plan``. FOUND or NO_PATH. Raises ValueError for a budget without sense."""
+        tried = self._genetic.plan(problem, budget, rng)
+        if tried.status is PlanStatus.FOUND:
+            return replace(tried, planner=self.name)
+        proof = self._graph.plan(problem, budget, rng)
+        return replace(proof, planner=self.name, evaluations=tried.evaluations, epochs=tried.epochs)

@@ -1,0 +1,48 @@
+"""The planners there are, by name."""
+
+from __future__ import annotations
+
+import difflib
+
+import numpy as np
+
+from companion.grid import BASE_WEIGHT, OBSTACLE, Cell
+from companion.planning.bspline_ga import BsplineGa
+from companion.planning.dijkstra import Dijkstra, reachable_costs
+from companion.planning.hybrid import Hybrid
+from companion.planning.planner import Planner, PlannerFactory
+from companion.planning.problem import Budget, PlanningProblem
+from companion.planning.raster import is_path
+from companion.settings import PlannerSettings
+
+PLANNERS: dict[str, PlannerFactory] = {"bspline-ga": BsplineGa, "hybrid": Hybrid, "dijkstra": Dijkstra}
+
+
+class UnknownPlannerError(ValueError):
+    """A planner's name that is not in PLANNERS; the text names the known ones and the nearest."""
+
+
+def make_planner(name: str, settings: PlannerSettings) -> Planner:
+    """The planner of this name. Raises UnknownPlannerError."""
+    factory = PLANNERS.get(name)
+    if factory is None:
+        nearest = difflib.get_close_matches(name, PLANNERS, n=1, cutoff=0.0)[0]
+        raise UnknownPlannerError(f"unknown planner {name!r}, did you mean {nearest!r}? known: {', '.join(PLANNERS)}")
+    return factory(settings)
+
+
+def warm_up() -> None:
+    """Compile every kernel, or load it from the cache, so that no later plan waits for the compiler.
+
+    The first time on a machine this takes some ten seconds, later a fraction of one.
+    """
+    weights = np.full((6, 8), BASE_WEIGHT)
+    weights[2:4, 4] = OBSTACLE
+    problem = PlanningProblem(weights, Cell(0, 2), Cell(7, 3))
+    settings = PlannerSettings()
+    rng = np.random.default_rng(0)
+    for name in PLANNERS:
+        result = make_planner(name, settings).plan(problem, Budget(), rng)
+        if result.path is not None:
+            is_path(weights, result.path.cells)
+    reachable_costs(weights, problem.start)

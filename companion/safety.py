@@ -1,0 +1,90 @@
+"""Who may drive, and whether it is safe to: the pilot-wins latch and the watchdogs. Pure functions, no I/O."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from companion.settings import SafetySettings
+from companion.vehicle import RoverMode, VehicleState
+
+
+class Control(StrEnum):
+    """Who drives."""
+
+    NOBODY = "nobody"
+    """The companion has not had the rover yet."""
+    COMPANION = "companion"
+    PERSON = "person"
+    """A person (or a failsafe) took over: the companion is silent until the mode is GUIDED again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """The state of latch and watchdogs."""
+
+    control: Control = Control.NOBODY
+    unsafe_since_s: float | None = None
+    hold_sent: bool = False
+
+
+class Reaction(StrEnum):
+    """What the companion does in this tick."""
+
+    SILENT = "silent"
+    DRIVE = "drive"
+    STOP = "stop"
+    HOLD = "hold"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """The reaction and its reason (empty when all is well)."""
+
+    reaction: Reaction
+    reason: str = ""
+
+
+def check(watch: Watch, vehicle: VehicleState, now_s: float, settings: SafetySettings) -> tuple[Watch, Verdict]:
+    """One tick of latch and watchdogs.
+
+    Setpoints may be sent only on DRIVE and STOP. Unsafe for longer than ``hold_after_s``: HOLD once, then silence until a
+    person puts the vehicle back into GUIDED.
+    """
+    guided = vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.GUIDED
+    armed = vehicle.heartbeat is not None and vehicle.heartbeat.armed
+    if not guided:
+        control = Control.NOBODY if watch.control is Control.NOBODY else Control.PERSON
+        return Watch(control), Verdict(Reaction.SILENT, "" if control is Control.NOBODY else "mode is not GUIDED")
+    if watch.hold_sent:
+        # The heartbeat may still show GUIDED just after our own HOLD: wait until it has been seen to leave GUIDED.
+        return watch, Verdict(Reaction.SILENT, "waiting for HOLD")
+    watch = replace(watch, control=Control.COMPANION)
+    if not armed:
+        return replace(watch, unsafe_since_s=None), Verdict(Reaction.SILENT, "disarmed")
+    reason = unsafe_reason(vehicle, now_s, settings)
+    if not reason:
+        return replace(watch, unsafe_since_s=None), Verdict(Reaction.DRIVE)
+    since_s = now_s if watch.unsafe_since_s is None else watch.unsafe_since_s
+    if now_s - since_s >= settings.hold_after_s:
+        return Watch(Control.PERSON, since_s, hold_sent=True), Verdict(Reaction.HOLD, reason)
+    return replace(watch, unsafe_since_s=since_s), Verdict(Reaction.STOP, reason)
+
+
+def unsafe_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> str:
+    """Why the rover must not move now, in words; empty when it may."""
+    ages = (
+        ("autopilot heartbeat", vehicle.heartbeat, settings.heartbeat_s),
+        ("position", vehicle.position, settings.stale_s),
+        ("attitude", vehicle.attitude, settings.stale_s),
+        ("range data", vehicle.scan, settings.stale_s),
+        ("EKF status", vehicle.ekf, settings.stale_s),
+    )
+    for name, event, limit_s in ages:
+        if event is None:
+            return f"no {name}"
+        if now_s - event.time_s > limit_s:
+            return f"{name} silent for {now_s - event.time_s:.1f} s"
+    if not vehicle.ekf_ok:
+        return "EKF has no position"
+    return ""

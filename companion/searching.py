@@ -1,0 +1,41 @@
+"""The navigator's searches: which budget each kind gets, and what they have cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.random import Generator
+
+from companion.clock import stopwatch_s
+from companion.grid import Cell, Weights
+from companion.navigator import SearchKind
+from companion.planning.planner import Planner
+from companion.planning.problem import Budget, PlanningProblem, PlanResult
+from companion.settings import NavigatorSettings, SearchSettings
+
+
+def budget_of(settings: SearchSettings) -> Budget:
+    """The planner's budget for one kind of search."""
+    return Budget(settings.min_epochs, settings.max_epochs, settings.control_points, settings.population)
+
+
+@dataclass
+class Searcher:
+    """Asks the planner, and keeps count. ``seconds`` has one entry per search."""
+
+    planner: Planner
+    settings: NavigatorSettings
+    rng: Generator
+    seconds: list[float] = field(default_factory=list)
+
+    def search(self, weights: Weights, kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
+        """One search over ``weights`` (not changed). The field the rover stands in is free, whatever the map says."""
+        began_s = stopwatch_s()
+        if weights[start.y, start.x] >= 1.0:
+            weights = np.array(weights)
+            weights[start.y, start.x] = 0.9
+        budget = budget_of(self.settings.thorough if kind is SearchKind.THOROUGH else self.settings.quick)
+        result = self.planner.plan(PlanningProblem(weights, start, target), budget, self.rng)
+        self.seconds.append(stopwatch_s() - began_s)
+        return result

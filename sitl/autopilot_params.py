@@ -1,0 +1,130 @@
+"""ArduRover's parameters as far as the simulator has them: names, types, values of the simulated skid rover."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
+"""MAV_PARAM_TYPE."""
+
+DEFAULTS: dict[str, tuple[float, int]] = {
+    "ACRO_TURN_RATE": (180, REAL32),
+    "AHRS_EKF_TYPE": (3, INT8),
+    "ARMING_REQUIRE": (1, INT8),
+    "ATC_ACCEL_MAX": (1.0, REAL32),
+    "ATC_BRAKE": (1, INT8),
+    "ATC_DECEL_MAX": (0.0, REAL32),
+    "ATC_SPEED_FLTE": (10.0, REAL32),
+    "ATC_SPEED_I": (0.2, REAL32),
+    "ATC_SPEED_IMAX": (1.0, REAL32),
+    "ATC_SPEED_P": (0.1, REAL32),
+    "ATC_STOP_SPEED": (0.1, REAL32),
+    "ATC_STR_ACC_MAX": (120.0, REAL32),
+    "ATC_STR_ANG_P": (2.0, REAL32),
+    "ATC_STR_RAT_FF": (0.2, REAL32),
+    "ATC_STR_RAT_FLTE": (10.0, REAL32),
+    "ATC_STR_RAT_I": (0.2, REAL32),
+    "ATC_STR_RAT_IMAX": (1.0, REAL32),
+    "ATC_STR_RAT_MAX": (120.0, REAL32),
+    "ATC_STR_RAT_P": (0.2, REAL32),
+    "ATC_TURN_MAX_G": (0.6, REAL32),
+    "AVOID_ENABLE": (7, INT8),
+    "AVOID_MARGIN": (2.0, REAL32),
+    "CRASH_ANGLE": (0, INT8),
+    "CRUISE_SPEED": (3.0, REAL32),
+    "CRUISE_THROTTLE": (75, INT8),
+    "FENCE_ENABLE": (0, INT8),
+    "FRAME_CLASS": (1, INT8),
+    "FS_ACTION": (2, INT8),
+    "FS_CRASH_CHECK": (0, INT8),
+    "FS_EKF_ACTION": (1, INT8),
+    "FS_GCS_ENABLE": (0, INT8),
+    "FS_GCS_TIMEOUT": (5.0, REAL32),
+    "FS_TIMEOUT": (1.5, REAL32),
+    "GUID_OPTIONS": (0, INT32),
+    "GUID_TIMEOUT": (3.0, REAL32),
+    "MAV_GCS_SYSID": (255, INT16),
+    "MAV_SYSID": (1, INT16),
+    "MIS_TOTAL": (0, INT16),
+    "MOT_SLEWRATE": (100, INT16),
+    "OA_TYPE": (0, INT8),
+    "PRX1_TYPE": (0, INT8),
+    "PSC_POS_P": (0.2, REAL32),
+    "PSC_VEL_FLTE": (5.0, REAL32),
+    "PSC_VEL_P": (1.0, REAL32),
+    "RNGFND1_MAX": (0.0, REAL32),
+    "RNGFND1_MIN": (0.0, REAL32),
+    "RNGFND1_ORIENT": (0, INT8),
+    "RNGFND1_TYPE": (0, INT8),
+    "RNGFND2_MAX": (0.0, REAL32),
+    "RNGFND2_MIN": (0.0, REAL32),
+    "RNGFND2_ORIENT": (0, INT8),
+    "RNGFND2_TYPE": (0, INT8),
+    "RNGFND3_MAX": (0.0, REAL32),
+    "RNGFND3_MIN": (0.0, REAL32),
+    "RNGFND3_ORIENT": (0, INT8),
+    "RNGFND3_TYPE": (0, INT8),
+    "SCHED_LOOP_RATE": (50, INT16),
+    "SERVO1_FUNCTION": (73, INT16),
+    "SERVO3_FUNCTION": (74, INT16),
+    "WP_ACCEL": (0.0, REAL32),
+    "WP_JERK": (0.0, REAL32),
+    "WP_PIVOT_ANGLE": (60, REAL32),
+    "WP_PIVOT_DELAY": (0, REAL32),
+    "WP_PIVOT_RATE": (60, REAL32),
+    "WP_RADIUS": (3.0, REAL32),
+    "WP_SPEED": (3.0, REAL32),
+}
+"""Value and type of each parameter, those that the simulator acts on and those that people look at."""
+
+LIMITS = {INT8: (-128.0, 127.0), INT16: (-32768.0, 32767.0), INT32: (-(2.0**31), 2.0**31 - 1.0)}
+
+
+class Parameters:
+    """The parameter table: read by name or index, set with the firmware's rounding of integers."""
+
+    def __init__(self, changes: Mapping[str, float] | None = None) -> None:
+        """Start from the defaults; KeyError names an unknown parameter of ``changes``."""
+        self._values = {name: float(value) for name, (value, _) in DEFAULTS.items()}
+        self._names = list(DEFAULTS)
+        for name, value in (changes or {}).items():
+            if not self.set(name, value):
+                raise KeyError(f"the simulated rover has no parameter {name}")
+
+    def __getitem__(self, name: str) -> float:
+        return self._values[name]
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._values
+
+    def name_of(self, index: int) -> str | None:
+        """The name at an index, None outside the table."""
+        return self._names[index] if 0 <= index < len(self._names) else None
+
+    def index_of(self, name: str) -> int:
+        """The index of a known parameter."""
+        return self._names.index(name)
+
+    def type_of(self, name: str) -> int:
+        """MAV_PARAM_TYPE of a known parameter."""
+        return DEFAULTS[name][1]
+
+    def set(self, name: str, value: float) -> bool:
+        """Change a parameter; False if there is none of this name or the value is no number."""
+        if name not in self._values or value != value or value in (float("inf"), float("-inf")):
+            return False
+        limits = LIMITS.get(DEFAULTS[name][1])
+        if limits is not None:
+            value = min(max(float(round(value)), limits[0]), limits[1])
+        self._values[name] = float(value)
+        return True
+
+    def as_dict(self) -> dict[str, float]:
+        """A copy of all values by name."""
+        return dict(self._values)

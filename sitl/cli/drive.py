@@ -1,0 +1,169 @@
+"""``rover-sitl drive``: companion and simulator in lock-step on one mission."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from companion.app import Status
+from companion.grid import Cell
+from companion.mapfiles import MapError, load_map
+from companion.mission.load import load_mission
+from companion.mission.mission import GridSpec, Mission, MissionError, SitlSpec, Target
+from companion.recorder import NullRecorder, Recorder, RecordError
+from companion.settings import SettingsError, load_settings
+from sitl.lockstep import Drive, Report
+from sitl.picture import save_picture
+from sitl.scenario import scenario_from_mission
+
+EXIT_BAD_INPUT = 2
+
+
+def drive(
+    mission_file: Annotated[
+        Path | None, typer.Argument(metavar="[MISSION]", help="TOML, .plan or .waypoints file.", show_default=False)
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of planner and simulator: the same seed gives the same run.")] = 0,
+    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Directory for the record of this run.")] = None,
+    image: Annotated[Path | None, typer.Option(help="Write a PNG of map and track.")] = None,
+    map_stem: Annotated[Path | None, typer.Option("--map", help="Write what was mapped as STEM.yaml and STEM.pgm.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")] = None,
+    sensors: Annotated[str | None, typer.Option(help="lidar-90, lidar-360 or beams instead of the mission's.")] = None,
+    world: Annotated[Path | None, typer.Option(help="Map of the ground (image, ROS yaml, MovingAI .map).")] = None,
+    start: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to start from.")] = None,
+    target: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to reach.")] = None,
+    top_left: Annotated[bool, typer.Option("--top-left", help="Y counts down from the top row.")] = False,
+    resolution_m: Annotated[float | None, typer.Option(help="Field size of --world, where the map has none.")] = None,
+    prior: Annotated[bool, typer.Option("--prior", help="The companion knows the map from the start.")] = False,
+    time_limit_s: Annotated[float, typer.Option(min=1.0, help="Simulated seconds before giving up.")] = 3600.0,
+) -> None:
+    """Drive MISSION (or --world with --start and --target) in lock-step.
+
+    Exit code 0: all targets reached and no collision; 3: a target unreachable or given up; 4: collision; 2: bad input.
+    """
+    console = Console()
+    try:
+        settings = load_settings(settings_file)
+        mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
+        if sensors is not None:
+            mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=sensors))
+        scenario = scenario_from_mission(mission)
+        recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
+        for output in (image, json_file, map_stem):
+            if output is not None:
+                output.parent.mkdir(parents=True, exist_ok=True)
+        with console.status("compiling (once a machine) ..."):
+            run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
+        report = _run_with_progress(run, console)
+    except (SettingsError, MissionError, MapError, RecordError, OSError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+    recorder.close()
+    _print_summary(report, console)
+    if image is not None:
+        save_picture(run, image)
+        console.print(f"picture: {image}")
+    if map_stem is not None:
+        run.save_map(map_stem)
+        console.print(f"map:     {map_stem}.yaml")
+    if json_file is not None:
+        json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+    raise typer.Exit(report.exit_code)
+
+
+def _mission(
+    mission_file: Path | None,
+    world: Path | None,
+    start: str | None,
+    target: str | None,
+    resolution_m: float | None,
+    *,
+    top_left: bool,
+    prior: bool,
+) -> Mission:
+    """The mission to drive, from a file, from --world with --start and --target, or from both."""
+    if world is None:
+        if mission_file is None:
+            raise MissionError("drive: give a MISSION file, or --world MAP with --start X,Y and --target X,Y")
+        if start or target or top_left or prior or resolution_m:
+            raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
+        return load_mission(mission_file)
+    ground = load_map(world, resolution_m)
+
+    def field_at(text: str, option: str) -> Cell:
+        try:
+            x, y = (int(part) for part in text.split(","))
+        except ValueError:
+            raise MissionError(f"{option} {text}: not two whole numbers X,Y") from None
+        cell = Cell(x, ground.height - 1 - y if top_left else y)
+        if not ground.contains(cell):
+            raise MissionError(f"{option} {text}: outside the map of {ground.width} x {ground.height} fields")
+        if ground.is_obstacle(cell):
+            raise MissionError(f"{option} {text}: this field of {world} is an obstacle")
+        return cell
+
+    sitl = SitlSpec(world=world, resolution_m=resolution_m)
+    if mission_file is not None:
+        if target is not None:
+            raise MissionError("drive: --target goes with --world alone; the mission has its own targets")
+        mission = load_mission(mission_file)
+        sitl = replace(mission.sitl or sitl, world=world, resolution_m=resolution_m)
+        sitl = replace(sitl, start=field_at(start, "--start") if start else sitl.start)
+        return replace(mission, sitl=sitl, prior_map=world if prior else mission.prior_map)
+    if start is None or target is None:
+        raise MissionError("drive: --world without a mission needs --start X,Y and --target X,Y")
+    begin = field_at(start, "--start")
+    return Mission(
+        name=world.stem,
+        targets=(Target("target", field_at(target, "--target")),),
+        grid=GridSpec(ground.resolution_m, (ground.width, ground.height), begin),
+        prior_map=world if prior else None,
+        sitl=replace(sitl, start=begin),
+    )
+
+
+def _run_with_progress(run: Drive, console: Console) -> Report:
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task(run.mission.name, total=None, state="")
+
+        def observe(status: Status) -> None:
+            part = status.decision.part.value if status.decision else "-"
+            state = f"{status.time_s:6.1f} s  {status.doing}  {status.target}  part {part}  step {status.steps}"
+            goal = run.companion.itinerary.goal if run.companion.itinerary else None
+            if goal is not None and status.pose is not None:
+                state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
+            progress.update(task, state=state)
+
+        report = run.run(observe)
+        progress.update(task, total=1, completed=1, state=report.outcome)
+    return report
+
+
+def _print_summary(report: Report, console: Console) -> None:
+    table = Table(title=f"outcome: {report.outcome}", show_header=False)
+    for name, status in report.targets:
+        table.add_row(f"target {name}", status)
+    speed = report.distance_m / report.driving_time_s if report.driving_time_s else 0.0
+    rows = {
+        "collisions": f"{report.collisions}",
+        "driven": f"{report.distance_m:.1f} m in {report.driving_time_s:.0f} s ({speed:.2f} m/s)",
+        "steps": f"{report.steps} fields, {report.return_steps} of them going back, {report.searches} searches",
+        "stuck": f"{report.stuck} times",
+        "planning": f"{1e3 * report.planning_time_s:.1f} ms in all; 99 % of ticks within {report.tick_p99_ms:.2f} ms",
+        "time": f"{report.sim_time_s:.0f} s simulated in {report.wall_time_s:.1f} s "
+        f"({report.sim_time_s / max(report.wall_time_s, 1e-9):.0f} times real time)",
+        "compilation": f"{report.compile_time_s:.1f} s (kept for the next run)",
+        "seed": f"{report.seed}",
+    }
+    for key, value in rows.items():
+        table.add_row(key, value)
+    console.print(table)

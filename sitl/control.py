@@ -1,0 +1,118 @@
+"""Records shared by the compiled controllers: what they know, what they want, what they were tuned to.
+
+Each is an array of one record, so that compiled code changes it in place.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+LOOP_HZ = 50
+LOOP_S = 1.0 / LOOP_HZ
+
+STOP, WAYPOINT, HEADING, TURN_RATE, COAST = 0, 1, 2, 3, 4
+"""What the motion controller is doing: braking, driving to a place, holding a heading or a turn rate, nothing."""
+
+NEVER = -1_000_000
+"""Tick of something that has not happened."""
+
+Record = NDArray[Any]
+
+ESTIMATE = np.dtype(
+    [
+        (name, "f8")
+        for name in (
+            "north_m", "east_m", "vel_n", "vel_e", "accel_n", "accel_e", "heading_rad", "yaw_rate_rad_s",
+            "bias_n", "bias_e", "drift_n", "drift_e", "bias_heading",
+        )
+    ]
+)  # fmt: skip
+"""What the autopilot believes, from the EKF origin, and the slowly wandering errors in it."""
+
+CONTROL = np.dtype(
+    [
+        (name, "i8")
+        for name in (
+            "tick", "armed", "task", "reversed", "fresh_target", "reached", "arrived", "timed_out", "have_target",
+            "target_tick", "nav_tick", "speed_change_tick", "pivoting", "pivot_done_tick", "place_tick",
+            "place_valid", "speed_error_fresh", "steer_error_fresh", "vel_error_fresh", "speed_tick", "stop_tick",
+            "steer_tick", "left_limited", "right_limited", "throttle_limited",
+        )
+    ]
+    + [
+        (name, "f8")
+        for name in (
+            "dest_n", "dest_e", "target_heading", "target_turn_rate", "target_speed",
+            "base_speed", "speed_max", "accel_max", "jerk_max",
+            "shaped_n", "shaped_e", "shaped_vn", "shaped_ve", "shaped_an", "shaped_ae", "vel_error_n", "vel_error_e",
+            "nav_speed", "nav_turn_rate",
+            "desired_speed", "speed_error", "speed_integral",
+            "desired_turn_rate", "steer_error", "steer_integral",
+            "throttle", "throttle_before", "steering", "left", "right",
+        )
+    ]
+)  # fmt: skip
+"""Everything the motion controllers remember; metres, m/s, radians, outputs -1 to 1."""
+
+TUNING_NAMES = {
+    "wp_speed": "WP_SPEED",
+    "wp_radius": "WP_RADIUS",
+    "wp_accel": "WP_ACCEL",
+    "wp_jerk": "WP_JERK",
+    "pivot_angle_deg": "WP_PIVOT_ANGLE",
+    "pivot_rate_deg": "WP_PIVOT_RATE",
+    "pivot_delay_s": "WP_PIVOT_DELAY",
+    "accel_max": "ATC_ACCEL_MAX",
+    "decel_max": "ATC_DECEL_MAX",
+    "turn_max_g": "ATC_TURN_MAX_G",
+    "steer_angle_p": "ATC_STR_ANG_P",
+    "steer_accel_deg": "ATC_STR_ACC_MAX",
+    "steer_rate_deg": "ATC_STR_RAT_MAX",
+    "steer_ff": "ATC_STR_RAT_FF",
+    "steer_p": "ATC_STR_RAT_P",
+    "steer_i": "ATC_STR_RAT_I",
+    "steer_imax": "ATC_STR_RAT_IMAX",
+    "steer_filter_hz": "ATC_STR_RAT_FLTE",
+    "speed_p": "ATC_SPEED_P",
+    "speed_i": "ATC_SPEED_I",
+    "speed_imax": "ATC_SPEED_IMAX",
+    "speed_filter_hz": "ATC_SPEED_FLTE",
+    "stop_speed": "ATC_STOP_SPEED",
+    "pos_p": "PSC_POS_P",
+    "vel_p": "PSC_VEL_P",
+    "vel_filter_hz": "PSC_VEL_FLTE",
+    "cruise_speed": "CRUISE_SPEED",
+    "cruise_throttle": "CRUISE_THROTTLE",
+    "slew_rate": "MOT_SLEWRATE",
+    "guided_timeout_s": "GUID_TIMEOUT",
+}
+"""Fields of a tuning record and the parameters they come from."""
+
+TUNING = np.dtype([(name, "f8") for name in TUNING_NAMES])
+
+
+def new_estimate() -> Record:
+    """An estimate of zeros."""
+    return np.zeros(1, dtype=ESTIMATE)
+
+
+def new_control() -> Record:
+    """Controllers that have never run."""
+    control = np.zeros(1, dtype=CONTROL)
+    names = CONTROL.names or ()
+    for name in names:
+        if name.endswith("_tick"):
+            control[name] = NEVER
+    control["task"] = COAST
+    return control
+
+
+def new_tuning(parameters: dict[str, float]) -> Record:
+    """A tuning record with the values of these parameters."""
+    tuning = np.zeros(1, dtype=TUNING)
+    for field, parameter in TUNING_NAMES.items():
+        tuning[field] = parameters[parameter]
+    return tuning

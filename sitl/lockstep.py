@@ -1,0 +1,173 @@
+"""Companion and simulator in one process on one simulated clock, real MAVLink bytes between them.
+
+The companion's sleep moves the world: nothing waits, and the same seed gives the same run.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from companion.app import Companion, Status
+from companion.clock import stopwatch_s
+from companion.mapfiles import save_ros_map
+from companion.mapping import known_fields
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.codec import Codec
+from companion.mavlink.transport import MemoryLink
+from companion.mission.mission import Mission
+from companion.recorder import NullRecorder, Recorder
+from companion.settings import Settings
+from companion.stepping import InlineRunner
+from companion.warmup import warm_up
+from sitl.scenario import Scenario
+from sitl.simulator import SimLink, Simulator
+
+TRACK_PERIOD_S = 0.5
+
+
+class LockstepClock:
+    """The simulator's time; sleeping exchanges the bytes and moves the world."""
+
+    def __init__(self, simulator: Simulator, vehicle_end: SimLink, companion_end: MemoryLink) -> None:
+        self._simulator = simulator
+        self._vehicle_end = vehicle_end
+        self._companion_end = companion_end
+        self._now_s = simulator.time_s
+
+    def now_s(self) -> float:
+        """Simulated seconds since the autopilot booted."""
+        return self._now_s
+
+    def sleep_until_s(self, time_s: float) -> None:
+        """Deliver what was written, let the world move on, and bring back what the vehicle sent."""
+        if time_s <= self._now_s:
+            return
+        self._vehicle_end.receive(self._companion_end.read())
+        self._simulator.advance_to_s(time_s)
+        self._companion_end.write(self._vehicle_end.take())
+        self._now_s = time_s
+
+
+@dataclass(frozen=True, slots=True)
+class TrackPoint:
+    """Where the rover really was (world frame), and which part of the navigator had led it there."""
+
+    time_s: float
+    north_m: float
+    east_m: float
+    part: str
+
+
+@dataclass
+class Report:
+    """What a lock-step run came to; ``as_json`` gives the documented keys."""
+
+    seed: int
+    outcome: str = "time limit"
+    targets: list[tuple[str, str]] = field(default_factory=list)
+    steps: int = 0
+    return_steps: int = 0
+    searches: int = 0
+    stuck: int = 0
+    distance_m: float = 0.0
+    collisions: int = 0
+    sim_time_s: float = 0.0
+    driving_time_s: float = 0.0
+    wall_time_s: float = 0.0
+    compile_time_s: float = 0.0
+    planning_time_s: float = 0.0
+    tick_p99_ms: float = 0.0
+    track: list[TrackPoint] = field(default_factory=list)
+    said: list[str] = field(default_factory=list)
+
+    @property
+    def exit_code(self) -> int:
+        """0 all targets reached without a collision, 3 a target missed, 4 a collision."""
+        if self.collisions:
+            return 4
+        return 0 if self.outcome == "reached" else 3
+
+    def as_json(self) -> dict[str, object]:
+        """For ``--json``: everything but track and texts."""
+        hidden = {"track", "said", "targets"}
+        result: dict[str, object] = {key: value for key, value in vars(self).items() if key not in hidden}
+        result["targets"] = [{"name": name, "status": status} for name, status in self.targets]
+        return result
+
+
+@dataclass
+class Drive:
+    """One mission in lock-step; after ``run`` the companion's map and the simulator's truth can be looked at."""
+
+    mission: Mission
+    scenario: Scenario
+    settings: Settings
+    seed: int
+    recorder: Recorder | NullRecorder
+    time_limit_s: float = 3600.0
+
+    def __post_init__(self) -> None:
+        self.report = Report(self.seed)
+        began_s = stopwatch_s()
+        warm_up(self.settings)
+        self.simulator = self.scenario.simulator(self.seed)
+        self.report.compile_time_s = stopwatch_s() - began_s
+        near, far = MemoryLink.pair()
+        clock = LockstepClock(self.simulator, self.simulator.connect(), far)
+        codec = Codec(self.settings.link)
+        autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder)
+        self.companion = Companion(
+            autopilot, clock, self.mission, self.settings, InlineRunner(), self.recorder, seed=self.seed, arm=True
+        )
+
+    def run(self, observe: Callable[[Status], None] = lambda status: None) -> Report:
+        """Drive until the mission has ended or the time limit is reached."""
+        began_s = stopwatch_s()
+        next_track_s = 0.0
+        while not self.companion.done and self.simulator.time_s < self.time_limit_s:
+            self.companion.tick()
+            if self.simulator.time_s >= next_track_s:
+                next_track_s += TRACK_PERIOD_S
+                self._note_track()
+                observe(self.companion.status())
+        self._note_track()
+        self.report.wall_time_s = stopwatch_s() - began_s
+        self._sum_up()
+        return self.report
+
+    def save_map(self, stem: Path) -> None:
+        """Write what the companion has mapped as a ROS map (``stem``.yaml and ``stem``.pgm)."""
+        evidence = self.companion.evidence
+        if evidence is not None:
+            save_ros_map(evidence.grid, stem, known=known_fields(evidence))
+
+    def _note_track(self) -> None:
+        truth = self.simulator.truth
+        decision = self.companion.driver.decision if self.companion.driver else None
+        part = decision.part.value if decision else "-"
+        self.report.track.append(TrackPoint(self.simulator.time_s, truth.north_m, truth.east_m, part))
+
+    def _sum_up(self) -> None:
+        report, companion = self.report, self.companion
+        report.said = companion.outcome.said
+        report.targets = [(name, str(status)) for name, status in companion.statuses()]
+        report.collisions = len(self.simulator.collisions)
+        report.distance_m = self.simulator.driven_m
+        report.sim_time_s = self.simulator.time_s
+        if companion.driver is not None:
+            report.steps = companion.driver.tally.steps
+            report.return_steps = companion.driver.tally.return_steps
+            report.stuck = companion.driver.tally.stuck
+            report.searches = len(companion.driver.searcher.seconds)
+            report.planning_time_s = math.fsum(companion.driver.searcher.seconds)
+        moving = [p.time_s for p, q in zip(report.track, report.track[1:], strict=False) if (p.north_m, p.east_m) != (q.north_m, q.east_m)]
+        report.driving_time_s = moving[-1] - moving[0] if moving else 0.0
+        seconds = sorted(companion.outcome.step_seconds)
+        report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0
+        if report.collisions:
+            report.outcome = "collision"
+        elif companion.done:
+            report.outcome = "reached" if companion.outcome.complete else "incomplete"

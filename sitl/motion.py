@@ -1,0 +1,98 @@
+"""The compiled main loop: estimate, controllers, plant, a batch of loops in one call."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sitl.autopilot_guided import run_control
+from sitl.control import LOOP_S
+from sitl.rover import drive
+from sitl.world import Obstacles
+
+SUBSTEPS = 4
+"""Steps of the plant in one main loop."""
+
+NOISE_COLUMNS = 5
+"""Normal variates per loop: velocity error north, east; position jitter north, east; heading error."""
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseSettings:
+    """How far the autopilot's estimate and the sensors are from the truth (standard deviations)."""
+
+    position_bias_m: float = 0.12
+    position_jitter_m: float = 0.01
+    heading_bias_deg: float = 0.5
+    range_m: float = 0.02
+    bias_time_s: float = 20.0
+    """How slowly the position error wanders."""
+
+    @classmethod
+    def none(cls) -> NoiseSettings:
+        """Estimates and sensors that tell the truth."""
+        return cls(0.0, 0.0, 0.0, 0.0)
+
+    def as_array(self) -> NDArray[np.float64]:
+        """For the compiled loop: velocity error, its time, bias time, jitter, heading error, its time."""
+        drift_time_s = self.bias_time_s / 5.0
+        total_s = self.bias_time_s + drift_time_s
+        drift_m_s = self.position_bias_m / math.sqrt(drift_time_s * self.bias_time_s**2 / total_s)
+        heading_rad = math.radians(self.heading_bias_deg)
+        jitter_m = self.position_jitter_m
+        return np.array([drift_m_s, drift_time_s, self.bias_time_s, jitter_m, heading_rad, 2.0 * self.bias_time_s])
+
+
+@njit(cache=True, nogil=True)
+def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: Any) -> None:
+    """What the autopilot believes after one loop: the truth, a slowly wandering error, a little jitter."""
+    keep = math.exp(-LOOP_S / noise[1])
+    kick = noise[0] * math.sqrt(1.0 - keep * keep)
+    estimate.drift_n = keep * estimate.drift_n + kick * draw[0]
+    estimate.drift_e = keep * estimate.drift_e + kick * draw[1]
+    rate_n = estimate.drift_n - estimate.bias_n / noise[2]
+    rate_e = estimate.drift_e - estimate.bias_e / noise[2]
+    estimate.bias_n += rate_n * LOOP_S
+    estimate.bias_e += rate_e * LOOP_S
+    keep = math.exp(-LOOP_S / noise[5])
+    estimate.bias_heading = keep * estimate.bias_heading + noise[4] * math.sqrt(1.0 - keep * keep) * draw[4]
+    ahead_n, ahead_e = math.cos(rover.heading_rad), math.sin(rover.heading_rad)
+    side_m_s2 = rover.yaw_rate_rad_s * rover.speed_m_s
+    estimate.north_m = rover.north_m - origin[0] + estimate.bias_n + noise[3] * draw[2]
+    estimate.east_m = rover.east_m - origin[1] + estimate.bias_e + noise[3] * draw[3]
+    estimate.vel_n = rover.speed_m_s * ahead_n + rate_n
+    estimate.vel_e = rover.speed_m_s * ahead_e + rate_e
+    estimate.accel_n = rover.accel_m_s2 * ahead_n - side_m_s2 * ahead_e
+    estimate.accel_e = rover.accel_m_s2 * ahead_e + side_m_s2 * ahead_n
+    heading_rad = rover.heading_rad + estimate.bias_heading
+    estimate.heading_rad = (heading_rad + math.pi) % (2.0 * math.pi) - math.pi
+    estimate.yaw_rate_rad_s = rover.yaw_rate_rad_s
+
+
+@njit(cache=True, nogil=True)
+def run_loops(
+    rovers: Any, estimates: Any, controls: Any, tunings: Any, origin: Any, noise: Any, draws: Any,
+    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
+) -> int:  # fmt: skip
+    """Run main loops until the draws are used up or something happened that people must be told at once.
+
+    Returns how many loops were run (a target reached, a time-out, a new contact end the batch early).
+    """
+    rover, estimate, control, tuning = rovers[0], estimates[0], controls[0], tunings[0]
+    contacts = rover.contacts
+    for loop in range(draws.shape[0]):
+        control.tick += 1
+        update_estimate(estimate, rover, origin, noise, draws[loop])
+        run_control(control, tuning, estimate)
+        for _ in range(SUBSTEPS):
+            drive(
+                rover, obstacles, south_m, west_m, resolution_m, control.left, control.right, LOOP_S / SUBSTEPS
+            )
+        if control.arrived or control.timed_out or rover.contacts != contacts:
+            return loop + 1
+    return int(draws.shape[0])

@@ -1,0 +1,102 @@
+"""A picture of a run: the truth, what the companion has seen of it, and the way it took."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.grid import OBSTACLE
+from companion.mapping import known_fields
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from sitl.lockstep import Drive
+
+PART_COLOURS = {"B": "#1f6fd6", "C": "#e07b00", "A": "#c2185b", "-": "#1f6fd6"}
+PART_NAMES = {"B": "exploring (B)", "C": "new path (C)", "A": "returning (A)"}
+
+
+def save_picture(run: Drive, path: Path) -> None:
+    """Write a north-up PNG: obstacles, what was mapped, the driven track coloured by the navigator's part, start and targets."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    track = run.report.track
+    north = np.array([p.north_m for p in track])
+    east = np.array([p.east_m for p in track])
+    figure = Figure(figsize=(12, 6.6), dpi=110, layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    _draw_world(axes, run)
+    _draw_map(axes, run)
+    _draw_track(axes, north, east, [p.part for p in track])
+    _draw_places(axes, run)
+    axes.set_aspect("equal")
+    axes.set_xlabel("east, m")
+    axes.set_ylabel("north, m")
+    report = run.report
+    axes.set_title(
+        f"{run.mission.name}: {report.outcome} - {report.distance_m:.0f} m in {report.driving_time_s:.0f} s, "
+        f"{report.steps} steps ({report.return_steps} returning), {report.collisions} collisions, seed {report.seed}"
+    )
+    figure.legend(loc="outside lower center", ncols=7, frameon=False)
+    figure.savefig(path)
+
+
+def _draw_world(axes: Axes, run: Drive) -> None:
+    """The truth in light grey."""
+    world = run.simulator.world
+    if not world.obstacles.any():
+        return
+    height, width = world.obstacles.shape
+    left, low = world.west_m, world.south_m
+    extent = (left, left + width * world.resolution_m, low, low + height * world.resolution_m)
+    picture = np.where(world.obstacles, 0.0, np.nan)
+    axes.imshow(picture, origin="lower", extent=extent, cmap="gray", vmin=-3.2, vmax=1.0, interpolation="nearest")
+    axes.plot([], [], "s", color="#c2c2c2", label="obstacle, not seen")
+
+
+def _draw_map(axes: Axes, run: Drive) -> None:
+    """What the companion has seen: free ground tinted, obstacles dark."""
+    evidence = run.companion.evidence
+    if evidence is None:
+        return
+    grid = evidence.grid
+    start = run.scenario.start
+    left, low = grid.south_west.east_m + start.east_m, grid.south_west.north_m + start.north_m
+    extent = (left, left + grid.width * grid.resolution_m, low, low + grid.height * grid.resolution_m)
+    picture: NDArray[np.float64] = np.zeros((grid.height, grid.width, 4))
+    picture[known_fields(evidence)] = (0.85, 0.93, 0.82, 0.6)
+    picture[grid.weights >= OBSTACLE] = (0.15, 0.15, 0.15, 0.85)
+    axes.imshow(picture, origin="lower", extent=extent, interpolation="nearest")
+    axes.plot([], [], "s", color="#262626", label="obstacle in the companion's map")
+    axes.plot([], [], "s", color="#dcefd8", label="seen free")
+
+
+def _draw_track(axes: Axes, north: NDArray[np.float64], east: NDArray[np.float64], parts: list[str]) -> None:
+    from matplotlib.collections import LineCollection
+
+    points = np.column_stack((east, north))
+    segments = np.stack((points[:-1], points[1:]), axis=1)
+    axes.add_collection(LineCollection(list(segments), colors=[PART_COLOURS[part] for part in parts[1:]], linewidths=2.0))
+    for part, name in PART_NAMES.items():
+        if part in parts:
+            axes.plot([], [], color=PART_COLOURS[part], linewidth=2.0, label=name)
+    margin_m = 3.0
+    axes.set_xlim(min(axes.get_xlim()[0], east.min() - margin_m), max(axes.get_xlim()[1], east.max() + margin_m))
+    axes.set_ylim(min(axes.get_ylim()[0], north.min() - margin_m), max(axes.get_ylim()[1], north.max() + margin_m))
+
+
+def _draw_places(axes: Axes, run: Drive) -> None:
+    start = run.scenario.start
+    axes.plot(start.east_m, start.north_m, "o", color="#2e7d32", markersize=9, label="start")
+    itinerary = run.companion.itinerary
+    for i, target in enumerate(itinerary.targets if itinerary else ()):
+        place = (target.point.east_m + start.east_m, target.point.north_m + start.north_m)
+        axes.plot(*place, "*", color="#d32f2f", markersize=14, label="target" if i == 0 else None)
+        if itinerary is not None and len(itinerary.targets) > 1:
+            axes.annotate(target.name, place, textcoords="offset points", xytext=(8, 6), fontsize=9)

@@ -1,0 +1,85 @@
+"""The plant: a skid-steered rover's motion in the world frame, and what happens where it touches something.
+
+The model is that of the firmware's own simulated skid rover: speed follows the mean of both motors with a
+first-order lag, the turn rate follows their difference at once.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sitl.world import Obstacles, clearance_m
+
+TOP_SPEED_M_S = 4.0
+SPEED_LAG_S = 4.0 / 14.0
+TURN_RATE_RAD_S = math.radians(140.0)
+"""Turn rate for one motor's full output of difference between left and right."""
+
+RELEASE_M = 0.05
+"""A contact has ended when the rover has come this far away from the obstacle."""
+
+ROVER = np.dtype(
+    [
+        ("north_m", "f8"),
+        ("east_m", "f8"),
+        ("heading_rad", "f8"),
+        ("speed_m_s", "f8"),
+        ("accel_m_s2", "f8"),
+        ("yaw_rate_rad_s", "f8"),
+        ("driven_m", "f8"),
+        ("radius_m", "f8"),
+        ("touching", "i8"),
+        ("contacts", "i8"),
+    ]
+)
+"""The truth about the rover, world frame, heading clockwise from north; ``contacts`` counts collisions so far."""
+
+RoverState = NDArray[Any]
+
+
+def new_rover(north_m: float, east_m: float, heading_rad: float, radius_m: float) -> RoverState:
+    """A rover at rest: an array of one ``ROVER`` record."""
+    state = np.zeros(1, dtype=ROVER)
+    state["north_m"], state["east_m"] = north_m, east_m
+    state["heading_rad"], state["radius_m"] = heading_rad, radius_m
+    return state
+
+
+@njit(cache=True, nogil=True)
+def drive(
+    rover: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
+    left: float, right: float, step_s: float,
+) -> None:  # fmt: skip
+    """Move the rover for ``step_s`` (a few milliseconds) with motor outputs -1 to 1."""
+    goal_m_s = 0.5 * (left + right) * TOP_SPEED_M_S
+    before_m_s = rover.speed_m_s
+    speed_m_s = goal_m_s + (before_m_s - goal_m_s) * math.exp(-step_s / SPEED_LAG_S)
+    rover.accel_m_s2 = (speed_m_s - before_m_s) / step_s
+    rover.yaw_rate_rad_s = (left - right) * TURN_RATE_RAD_S
+    heading_rad = rover.heading_rad + rover.yaw_rate_rad_s * step_s
+    rover.heading_rad = (heading_rad + math.pi) % (2.0 * math.pi) - math.pi
+    way_m = 0.5 * (before_m_s + speed_m_s) * step_s
+    north_m = rover.north_m + way_m * math.cos(rover.heading_rad)
+    east_m = rover.east_m + way_m * math.sin(rover.heading_rad)
+    reach_m = rover.radius_m + RELEASE_M
+    room_m = clearance_m(obstacles, south_m, west_m, resolution_m, north_m, east_m, reach_m)
+    if room_m < rover.radius_m:
+        here_m = clearance_m(obstacles, south_m, west_m, resolution_m, rover.north_m, rover.east_m, reach_m)
+        if room_m <= here_m:
+            if rover.touching == 0:
+                rover.contacts += 1
+            rover.touching = 1
+            rover.speed_m_s = 0.0
+            rover.accel_m_s2 = 0.0
+            return
+    elif room_m >= reach_m:
+        rover.touching = 0
+    rover.speed_m_s = speed_m_s
+    rover.driven_m += abs(way_m)
+    rover.north_m = north_m
+    rover.east_m = east_m
