@@ -19,7 +19,7 @@ from companion.guidance import (
     route_along_curve,
     route_is_clear,
 )
-from companion.mapping import EvidenceMap, look_along, penalise
+from companion.mapping import EvidenceMap, doubt, look_along, penalise
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Action, Decision, NavState, Part, SearchKind, abandon_path, begin, is_clear, step
 from companion.planning.problem import PlanResult
@@ -33,6 +33,7 @@ TURNED_RAD = math.radians(15.0)
 FRESH_PENALTY = 0.15
 FINAL_PENALTY = 1.0
 TRIES_AT_ONE_PLACE = 3
+DOUBT_REACH_M = 2.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,6 +72,7 @@ class Driver:
         self._state: NavState | None = None
         self._progress: Progress | None = None
         self._back_until_s = -math.inf
+        self._doubts_left = 0
         self._stuck_places: dict[Cell, int] = {}
 
     def head_for(self, goal: ResolvedTarget, pose: Pose) -> None:
@@ -82,6 +84,7 @@ class Driver:
         self._state = begin(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
         self.route = None
         self.decision = None
+        self._doubts_left = self._settings.navigator.doubts
         self._progress = Progress(pose, pose.time_s, pose.time_s)
 
     @property
@@ -140,9 +143,19 @@ class Driver:
         result = self._runner.take()
         if result is None:
             return None
+        if self._is_doubtful(result[1]) and doubt(self.evidence, pose.point, DOUBT_REACH_M):
+            self._doubts_left -= 1
+            self._state = abandon_path(self._state)
+            self.route = self.decision = None
+            return None
         self._state, self.decision = result
         self._lay_route(self.decision, pose)
         return self.decision
+
+    def _is_doubtful(self, decision: Decision) -> bool:
+        """Before the first step back, or giving up, on a proof: the proof is only as good as the map."""
+        giving_up = decision.action is Action.UNREACHABLE or (decision.part is Part.RETURN and decision.proved)
+        return giving_up and self._doubts_left > 0
 
     def _step_is_due(self, cell: Cell) -> bool:
         assert self._state is not None

@@ -126,10 +126,12 @@ def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, occupied_at):
             py = y + 0.5 - y0
             along = px * dx + py * dy
             across = abs(px * dy - py * dx)
-            if across >= half_width or along <= 0.0:
+            # What is nearer than the wanted room already must not come nearer still; so the rover can leave a wall.
+            room = min(half_width, math.hypot(px, py) - 0.1)
+            if across >= room or along <= 0.0:
                 continue
             # The rover is a disc: it touches before its middle is level with the obstacle.
-            contact = along - math.sqrt(half_width * half_width - across * across)
+            contact = along - math.sqrt(room * room - across * across)
             if contact < clear:
                 clear = max(contact, 0.0)
     return clear, min(seen, length)

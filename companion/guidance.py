@@ -126,7 +126,7 @@ def guide(
     """The setpoint and speed for this moment. ``BLOCKED`` means that not even the next piece of the route is clear."""
     if _must_brake(pose, speed_m_s, evidence, rover, settings):
         return Guide(Motion.BRAKE, STOP, 0.0)
-    target, reach_m = _farthest_clear(route, pose, speed_m_s, evidence, rover, settings)
+    target, reach_m, room_m = _farthest_clear(route, pose, speed_m_s, evidence, rover, settings)
     bearing = pose.point.bearing_rad(target)
     error = abs(wrap_pi_rad(bearing - pose.heading_rad))
     at_end = len(route.points) - 1 - route.progress <= int(1.0 / STEP_M)
@@ -138,7 +138,7 @@ def guide(
     if close and error > math.radians(settings.turn_first_deg) and pose.point.distance_m(target) > 0.5:
         # Near something the rover must not drive an arc while it turns.
         return _turn_to(bearing, speed_m_s, settings)
-    return Guide(Motion.DRIVE, GuidedPosition(target), _speed_limit(beside_m, error, rover, settings))
+    return Guide(Motion.DRIVE, GuidedPosition(target), _speed_limit(min(beside_m, room_m), error, rover, settings))
 
 
 def _must_brake(
@@ -149,7 +149,7 @@ def _must_brake(
         return False
     needed_m = speed_m_s**2 / (2.0 * settings.deceleration_m_s2) + 0.1 * speed_m_s
     ahead = pose.point.moved(pose.heading_rad, needed_m)
-    return look_along(evidence, pose.point, ahead, rover.radius_m).clear_m < needed_m - 1e-6
+    return look_along(evidence, pose.point, ahead, rover.radius_m + 0.05).clear_m < needed_m - 1e-6
 
 
 def _turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -> Guide:
@@ -172,15 +172,16 @@ def fastest_within_m(distance_m: float, settings: GuidanceSettings) -> float:
 
 def _farthest_clear(
     route: Route, pose: Pose, speed_m_s: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
-) -> tuple[NedPoint, float]:
-    """The farthest route point in clear sight, and how far away it is; with wide clearance where there is room."""
-    best: tuple[NedPoint, float] = (pose.point, 0.0)
+) -> tuple[NedPoint, float, float]:
+    """The farthest route point in clear sight, how far away it is, and the room kept beside the rover on the way there.
+
+    Wide clearance where there is room; less only where that leads farther.
+    """
+    best = (pose.point, 0.0, 0.0)
     for extra_m, enough_m in settings.clearances:
-        target, reach_m = _farthest_with(
-            route, pose, speed_m_s, evidence, rover.radius_m + extra_m, settings.horizon_m, settings
-        )
+        target, reach_m = _farthest_with(route, pose, speed_m_s, evidence, rover.radius_m + extra_m, settings)
         if reach_m > best[1] + 0.5 or best[1] == 0.0:
-            best = (target, reach_m)
+            best = (target, reach_m, extra_m)
         if best[1] >= min(enough_m, pose.point.distance_m(route.end) - 0.1):
             break
     return best
@@ -192,11 +193,10 @@ def _farthest_with(
     speed_m_s: float,
     evidence: EvidenceMap,
     half_width_m: float,
-    horizon_m: float,
     settings: GuidanceSettings,
 ) -> tuple[NedPoint, float]:
     beyond_m = speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
-    last = min(len(route.points) - 1, route.progress + int(horizon_m / STEP_M))
+    last = min(len(route.points) - 1, route.progress + int(settings.horizon_m / STEP_M))
     for index in range(last, route.progress, -2):
         point = route.point(index)
         distance_m = pose.point.distance_m(point)

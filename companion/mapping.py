@@ -113,6 +113,27 @@ def forget(evidence: EvidenceMap) -> None:
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
 
 
+def doubt(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
+    """Forget, before giving up, what may be an error of sensor or position, so that it is looked at again.
+
+    That is weak evidence of obstacles anywhere (below ``settings.sure_at``), any evidence of obstacles within ``reach_m`` of the
+    place, and all penalties. Returns whether there was any.
+    """
+    occupied = evidence.log_odds >= evidence.settings.occupied_at
+    doubtful = occupied & (evidence.log_odds < evidence.settings.sure_at)
+    scale = 1.0 / evidence.evidence_m
+    x = (point.east_m - evidence.base.south_west.east_m) * scale
+    y = (point.north_m - evidence.base.south_west.north_m) * scale
+    reach = reach_m * scale
+    window = np.s_[max(0, int(y - reach)) : max(0, int(y + reach) + 1), max(0, int(x - reach)) : max(0, int(x + reach) + 1)]
+    doubtful[window] |= occupied[window]
+    found = bool(doubtful.any() or (evidence.penalty > 0.0).any())
+    evidence.log_odds[doubtful] = 0.0
+    evidence.penalty.fill(0.0)
+    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+    return found
+
+
 def look_along(evidence: EvidenceMap, start: NedPoint, end: NedPoint, half_width_m: float) -> Line:
     """How far a rover of this half width could drive straight from start towards end (up to its distance).
 

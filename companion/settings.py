@@ -26,6 +26,13 @@ class PlannerSettings(Section):
     way_points: int = Field(
         5, ge=3, le=64, description="points of the B-spline that are joined by straight lines (3.4)"
     )
+    span_way_points: int = Field(
+        2,
+        ge=0,
+        le=16,
+        description="but at least so many in each knot span: 5 at 4 control points, more with more of them, or the path "
+        "could not become more complex (4.5). 0: always way_points",
+    )
     mixing: float = Field(0.8, gt=0.5, le=1.0, description="D of equation 6: the better parent's share")
     selected_share: float = Field(0.25, gt=0.0, le=1.0, description="best part that is copied and crossed (3.5)")
     mutation_probability: float = Field(0.4, ge=0.0, le=1.0, description="per gene (3.7)")
@@ -61,6 +68,7 @@ class NavigatorSettings(Section):
 
     planner: str = Field("hybrid", description="a name of `rover-companion plan --planner`")
     better_every_fields: int = Field(5, ge=1, description="part B: fields between looks for a better path")
+    doubts: int = Field(3, ge=0, description="how often per target weak evidence is forgotten when no path is left")
     wait_retry_s: float = Field(5.0, gt=0.0, description="on_blocked = wait: time between tries")
     wait_limit_s: float = Field(600.0, ge=0.0, description="on_blocked = wait: then the target is given up")
     quick: SearchSettings = SearchSettings(min_epochs=5, max_epochs=50, control_points=(4,))
@@ -72,16 +80,19 @@ class MappingSettings(Section):
 
     subdivisions: int = Field(4, ge=1, le=16, description="evidence cells along a field's side")
     hit: float = Field(0.9, gt=0.0, description="log-odds added where a beam ended")
-    miss: float = Field(0.4, gt=0.0, description="log-odds removed where a beam passed")
+    miss: float = Field(0.3, gt=0.0, description="log-odds removed where a beam passed")
     occupied_at: float = Field(0.6, gt=0.0, description="log-odds from which evidence counts as an obstacle")
+    sure_at: float = Field(
+        2.0, gt=0.0, description="weaker evidence is doubted, and looked at again, before a target is given up"
+    )
     limit: float = Field(
-        2.5, gt=0.0, description="evidence for an obstacle grows no further: what disappears is forgotten"
+        3.0, gt=0.0, description="evidence for an obstacle grows no further: what disappears is forgotten"
     )
     free_limit: float = Field(
         1.2, gt=0.0, description="evidence for free ground grows no further: what appears is seen"
     )
     hit_depth_m: float = Field(
-        0.1, ge=0.0, description="a surface is entered this deep, so that noise does not fill the free side"
+        0.05, ge=0.0, description="a surface is entered this deep, so that noise does not fill the free side"
     )
     soft_cost: float = Field(0.3, ge=0.0, lt=0.5, description="weight added beside obstacles")
     soft_reach_m: float = Field(2.0, ge=0.0, description="how far from an obstacle the soft cost reaches")
@@ -94,7 +105,7 @@ class GuidanceSettings(Section):
     horizon_m: float = Field(8.0, gt=0.0, description="a target is never farther than this along the route")
     clearance_m: float = Field(0.15, ge=0.0, description="kept beside the rover's radius when speed is chosen")
     clearances: tuple[tuple[float, float], ...] = Field(
-        ((0.5, 3.0), (0.25, 1.5), (0.1, 0.5)),
+        ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5)),
         description="room kept beside the rover's radius, tried in turn; the next one when the reach is less than the second figure, metres",
     )
     least_reach_m: float = Field(0.4, gt=0.0, description="less clear way than this is no way")
@@ -103,7 +114,7 @@ class GuidanceSettings(Section):
         45.0, gt=0.0, le=180.0, description="turn on the spot before driving off at a larger angle"
     )
     roll_out_m_s: float = Field(0.3, ge=0.0, description="faster than this the rover first brakes straight, then turns on the spot")
-    slow_within_m: float = Field(0.8, gt=0.0, description="obstacles nearer than this beside the rover slow it down")
+    slow_within_m: float = Field(0.6, gt=0.0, description="obstacles nearer than this beside the rover slow it down")
     deceleration_m_s2: float = Field(1.0, gt=0.0, description="what the rover brakes with")
     latency_s: float = Field(0.4, ge=0.0, description="from seeing to braking")
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")

@@ -139,7 +139,7 @@ def follow_shaped(control: Any, tuning: Any, estimate: Any) -> None:
     control.place_tick = control.tick
     goal_n = goal_e = feed_n = feed_e = 0.0
     if control.place_valid:
-        accel = min(min(control.accel_max, tuning.turn_max_g * GRAVITY_M_S2), control.jerk_max / tuning.pos_p)
+        accel = min(control.accel_max, tuning.turn_max_g * GRAVITY_M_S2, control.jerk_max / tuning.pos_p)
         error_n, error_e = shortened(
             control.shaped_n - estimate.north_m,
             control.shaped_e - estimate.east_m,

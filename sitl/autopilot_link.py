@@ -68,6 +68,10 @@ class Router:
         """Remember the last channel on which a component was heard."""
         self._routes[(system, component)] = channel
 
+    def forget(self, channel: int) -> None:
+        """A channel was closed."""
+        self._routes = {who: where for who, where in self._routes.items() if where != channel}
+
     def is_for_autopilot(self, system: int, target_system: int, target_component: int, source: int) -> bool:
         """Whether the autopilot answers: broadcasts, its own address, and components of its system nobody has heard."""
         if target_system == 0:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
@@ -117,7 +118,7 @@ class Parameters:
 
     def set(self, name: str, value: float) -> bool:
         """Change a parameter; False if there is none of this name or the value is no number."""
-        if name not in self._values or value != value or value in (float("inf"), float("-inf")):
+        if name not in self._values or not math.isfinite(value):
             return False
         limits = LIMITS.get(DEFAULTS[name][1])
         if limits is not None:

@@ -30,7 +30,8 @@ def filter_share(cutoff_hz: float) -> float:
 @njit(cache=True, nogil=True)
 def forward_speed(estimate: Any) -> float:
     """Estimated speed along the rover's own axis."""
-    return estimate.vel_n * math.cos(estimate.heading_rad) + estimate.vel_e * math.sin(estimate.heading_rad)
+    ahead_m_s: float = estimate.vel_n * math.cos(estimate.heading_rad)
+    return ahead_m_s + float(estimate.vel_e * math.sin(estimate.heading_rad))
 
 
 @njit(cache=True, nogil=True)
@@ -41,7 +42,7 @@ def accel_limited(control: Any, tuning: Any, speed: float) -> float:
     change = tuning.accel_max
     if abs(speed) < abs(control.desired_speed) and tuning.decel_max > 0.0:
         change = tuning.decel_max
-    return control.desired_speed + limited(speed - control.desired_speed, change * LOOP_S)
+    return float(control.desired_speed) + limited(speed - control.desired_speed, change * LOOP_S)
 
 
 @njit(cache=True, nogil=True)
@@ -107,7 +108,7 @@ def run_stop(control: Any, tuning: Any, estimate: Any) -> None:
 def rate_to_heading(tuning: Any, estimate: Any, heading_rad: float, rate_max: float) -> float:
     """Turn rate that brings the rover to a heading and can still be stopped there; no limit if ``rate_max`` is 0."""
     error = (heading_rad - estimate.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
-    rate = tuning.steer_angle_p * error
+    rate: float = tuning.steer_angle_p * error
     if rate_max > 0.0:
         rate = limited(rate, rate_max)
     if tuning.steer_accel_deg > 0.0:

@@ -163,7 +163,11 @@ class Drive:
             report.stuck = companion.driver.tally.stuck
             report.searches = len(companion.driver.searcher.seconds)
             report.planning_time_s = math.fsum(companion.driver.searcher.seconds)
-        moving = [p.time_s for p, q in zip(report.track, report.track[1:], strict=False) if (p.north_m, p.east_m) != (q.north_m, q.east_m)]
+        moving = [
+            p.time_s
+            for p, q in zip(report.track, report.track[1:], strict=False)
+            if (p.north_m, p.east_m) != (q.north_m, q.east_m)
+        ]
         report.driving_time_s = moving[-1] - moving[0] if moving else 0.0
         seconds = sorted(companion.outcome.step_seconds)
         report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0

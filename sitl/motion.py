@@ -90,9 +90,7 @@ def run_loops(
         update_estimate(estimate, rover, origin, noise, draws[loop])
         run_control(control, tuning, estimate)
         for _ in range(SUBSTEPS):
-            drive(
-                rover, obstacles, south_m, west_m, resolution_m, control.left, control.right, LOOP_S / SUBSTEPS
-            )
+            drive(rover, obstacles, south_m, west_m, resolution_m, control.left, control.right, LOOP_S / SUBSTEPS)
         if control.arrived or control.timed_out or rover.contacts != contacts:
             return loop + 1
     return int(draws.shape[0])

@@ -82,7 +82,9 @@ def _draw_track(axes: Axes, north: NDArray[np.float64], east: NDArray[np.float64
 
     points = np.column_stack((east, north))
     segments = np.stack((points[:-1], points[1:]), axis=1)
-    axes.add_collection(LineCollection(list(segments), colors=[PART_COLOURS[part] for part in parts[1:]], linewidths=2.0))
+    axes.add_collection(
+        LineCollection(list(segments), colors=[PART_COLOURS[part] for part in parts[1:]], linewidths=2.0)
+    )
     for part, name in PART_NAMES.items():
         if part in parts:
             axes.plot([], [], color=PART_COLOURS[part], linewidth=2.0, label=name)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import typer
 
+from companion.cli.plan import plan
+
 app = typer.Typer(
     name="rover-companion",
     help="Finds a rover's way to a mission's targets through unknown ground.",
@@ -11,6 +13,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+app.command()(plan)
+
+
+@app.callback()
+def options() -> None:
+    """Finds a rover's way to a mission's targets through unknown ground."""
 
 
 def main() -> None:

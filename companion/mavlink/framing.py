@@ -1,8 +1,8 @@
 """From a stream of bytes to MAVLink packets, checked and with as little lost as possible.
 
 pymavlink's own stream parser gives up as many bytes as a damaged header claims, which costs up to 280 good ones; and
-it decodes every message, though most are of no interest. Here a packet that fails its check costs one byte, and only the
-frame is looked at (MAVLink guide, "Packet Serialization").
+it decodes every message, though most are of no interest. Here a beginning that fails its check costs one byte, a stray
+beginning does not hold up the valid packets behind it, and only the frame is looked at (MAVLink guide, "Packet Serialization").
 """
 
 from __future__ import annotations
@@ -48,39 +48,59 @@ class Framer:
                 self.bad_bytes += 1
                 continue
             end = _end(buffer, at)
-            if end is None or end > len(buffer):
-                break  # the rest is still to come
-            packet = self._packet(buffer, at, end)
-            if packet is not None:
+            if end is None:
+                break
+            if end > len(buffer):
+                if _next_packet(buffer, at + 1, len(buffer)) is None:
+                    break  # the rest is still to come
+            elif (packet := _packet(buffer, at, end)) is not None:
                 packets.append(packet)
-            if packet is not None or self._is_unknown(buffer, at, end):
                 at = end
-            else:
-                at += 1
-                self.bad_bytes += 1
+                continue
+            elif _is_unknown(buffer, at, end):
+                self.unknown += 1
+                at = end
+                continue
+            at += 1
+            self.bad_bytes += 1
         self._rest = buffer[at:]
         return packets
 
-    def _packet(self, buffer: bytes, at: int, end: int) -> Packet | None:
-        """The packet in these bytes, or None when it is unknown or damaged."""
-        version_2 = buffer[at] == MAGIC_V2
-        header = HEADER_V2 if version_2 else HEADER_V1
-        message_id, sequence, system_id, component_id = _identity(buffer, at)
-        known = ardupilotmega.mavlink_map.get(message_id)
-        checked_end = at + header + buffer[at + 1]
-        if known is None or (version_2 and buffer[at + 2] & ~SIGNED):
-            return None
-        checksum = ardupilotmega.x25crc(buffer[at + 1 : checked_end] + bytes([known.crc_extra])).crc
-        if checksum != int.from_bytes(buffer[checked_end : checked_end + CHECKSUM], "little"):
-            return None
-        return Packet(message_id, system_id, component_id, sequence, buffer[at:end])
 
-    def _is_unknown(self, buffer: bytes, at: int, end: int) -> bool:
-        """Whether this looks like a whole packet of a message we do not know: another packet, or nothing, follows."""
-        unknown = _identity(buffer, at)[0] not in ardupilotmega.mavlink_map
-        whole = end == len(buffer) or buffer[end] in (MAGIC_V1, MAGIC_V2)
-        self.unknown += unknown and whole
-        return unknown and whole
+def _packet(buffer: bytes, at: int, end: int) -> Packet | None:
+    """The packet in these bytes, or None when it is unknown or damaged."""
+    version_2 = buffer[at] == MAGIC_V2
+    header = HEADER_V2 if version_2 else HEADER_V1
+    message_id, sequence, system_id, component_id = _identity(buffer, at)
+    known = ardupilotmega.mavlink_map.get(message_id)
+    checked_end = at + header + buffer[at + 1]
+    if known is None or (version_2 and buffer[at + 2] & ~SIGNED):
+        return None
+    checksum = ardupilotmega.x25crc(buffer[at + 1 : checked_end] + bytes([known.crc_extra])).crc
+    if checksum != int.from_bytes(buffer[checked_end : checked_end + CHECKSUM], "little"):
+        return None
+    return Packet(message_id, system_id, component_id, sequence, buffer[at:end])
+
+
+def _next_packet(buffer: bytes, start: int, stop: int) -> int | None:
+    """Where a valid packet begins in start <= at < stop, None if nowhere."""
+    for at in range(start, stop):
+        if buffer[at] in (MAGIC_V1, MAGIC_V2):
+            end = _end(buffer, at)
+            if end is not None and end <= len(buffer) and _packet(buffer, at, end) is not None:
+                return at
+    return None
+
+
+def _is_unknown(buffer: bytes, at: int, end: int) -> bool:
+    """Whether this is a packet of a message we do not know, rather than a stray byte that looks like a beginning.
+
+    Its checksum cannot be checked; so nothing valid may lie in it, and another packet, or nothing, must follow.
+    """
+    if _identity(buffer, at)[0] in ardupilotmega.mavlink_map:
+        return False
+    followed = end == len(buffer) or buffer[end] in (MAGIC_V1, MAGIC_V2)
+    return followed and _next_packet(buffer, at + 1, end) is None
 
 
 def _end(buffer: bytes, at: int) -> int | None:

@@ -14,7 +14,17 @@ FORMS = (
 )
 DEFAULT_BAUD = 115200
 
-__all__ = ["FORMS", "ByteLink", "LinkError", "MemoryLink", "SerialLink", "TcpLink", "TcpServerLink", "UdpLink", "open_link"]
+__all__ = [
+    "FORMS",
+    "ByteLink",
+    "LinkError",
+    "MemoryLink",
+    "SerialLink",
+    "TcpLink",
+    "TcpServerLink",
+    "UdpLink",
+    "open_link",
+]
 
 
 def open_link(url: str, clock: Clock | None = None) -> ByteLink:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import socket
+from typing import Any
 
 from companion.mavlink.byte_link import MAX_READ_BYTES, LinkError
 
-Address = tuple[str | int, ...]
+Address = tuple[Any, ...]
 MAX_PEERS = 8
 """More speakers than this on one port: the one that has been silent longest is forgotten."""
 

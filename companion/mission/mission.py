@@ -70,10 +70,16 @@ class RoverSpec:
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """A polygon (three or more places, closed by itself) or, with one place and a radius, a circle."""
+    """A polygon (three or more places, closed by itself), with ``radius_m`` a circle, with ``width_m`` a broad line."""
 
     places: tuple[Place, ...]
     radius_m: float | None = None
+    width_m: float | None = None
+
+
+def open_ring(places: tuple[Place, ...]) -> tuple[Place, ...]:
+    """A polygon's corners without the repeated first one at the end, which some files write and some do not."""
+    return places[:-1] if len(places) > 1 and places[0] == places[-1] else places
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +92,14 @@ class WeightedArea:
 
 @dataclass(frozen=True, slots=True)
 class SitlSpec:
-    """What only the simulator reads. ``world``: map file; ``start``: field; heading clockwise from north."""
+    """What only the simulator reads.
+
+    ``world``: map file; ``resolution_m``: its field size where it has none of its own (None: the mission's);
+    ``start``: the field of the world where the rover stands; heading clockwise from north.
+    """
 
     world: Path | None = None
+    resolution_m: float | None = None
     start: Cell | None = None
     heading_deg: float = 90.0
     sensors: str = "lidar-90"
@@ -97,7 +108,10 @@ class SitlSpec:
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """Everything that a mission file says. ``notes`` tells people what was understood beyond the targets."""
+    """Everything that a mission file says. ``notes`` tells people what was understood beyond the targets.
+
+    Ground is passable inside all of ``keep_in`` and outside each of ``keep_out``.
+    """
 
     name: str
     targets: tuple[Target, ...]

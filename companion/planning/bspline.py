@@ -15,12 +15,6 @@ Points = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
-def knot(index: int, control_points: int) -> float:
-    """Knot ``index`` of U = {0, 0, 0, 1, 2, ..., n-2, n-2, n-2}, in spans."""
-    return float(min(max(index - DEGREE, 0), control_points - DEGREE))
-
-
-@njit(cache=True, nogil=True)
 def basis(control_points: int, samples: int) -> tuple[NDArray[np.int64], Points]:
     """Basis functions at ``samples`` places equally far apart in u, ends included.
 
@@ -31,17 +25,17 @@ def basis(control_points: int, samples: int) -> tuple[NDArray[np.int64], Points]
     values = np.empty((samples, DEGREE + 1))
     spans = control_points - DEGREE
     for i in range(samples):
-        u = spans * i / (samples - 1)
+        u = i * (spans / (samples - 1.0))
         span = min(int(u), spans - 1)
-        left, low = knot(span + 1, control_points), knot(span + 2, control_points)
-        high, right = knot(span + 3, control_points), knot(span + 4, control_points)
-        rise = (u - low) / (high - low)
-        before = (high - u) / (high - left)
-        after = (u - low) / (right - low)
+        rise = u - span
+        # With equidistant knots the recursion comes down to squares: halved where the function's support goes on into
+        # the next span, not halved at the clamped ends. The three always sum to 1.
+        falling = (1.0 - rise) * (1.0 - rise) * (1.0 if span == 0 else 0.5)
+        rising = rise * rise * (1.0 if span == spans - 1 else 0.5)
         first[i] = span
-        values[i, 0] = before * (1.0 - rise)
-        values[i, 2] = after * rise
-        values[i, 1] = (1.0 - before) * (1.0 - rise) + (1.0 - after) * rise
+        values[i, 0] = falling
+        values[i, 1] = 1.0 - falling - rising
+        values[i, 2] = rising
     return first, values
 
 
@@ -51,8 +45,11 @@ def curve(control: Points, samples: int) -> Points:
     first, values = basis(len(control), samples)
     points = np.empty((samples, 2))
     for i in range(samples):
+        at = first[i]
         for axis in range(2):
-            points[i, axis] = 0.0
-            for j in range(DEGREE + 1):
-                points[i, axis] += values[i, j] * control[first[i] + j, axis]
+            points[i, axis] = (
+                values[i, 0] * control[at, axis]
+                + values[i, 1] * control[at + 1, axis]
+                + values[i, 2] * control[at + 2, axis]
+            )
     return points

@@ -11,50 +11,58 @@ from companion.grid import Weights
 from companion.planning import bspline
 from companion.planning.chance import draw_seed, seeded
 from companion.planning.ends import ends_free
-from companion.planning.ga_kernel import Task, Tuning, evolve, large_value, way_point
+from companion.planning.ga_kernel import Task, Tuning, evolve, large_value, way_point, way_points_for
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
 from companion.settings import PlannerSettings
 
+TuningValues = tuple[int, int, float, float, float, float, float, float, float, int, float]
 Found = tuple[bool, CellArray, NDArray[np.float64], float, int, int, int]
 
 
 @njit(cache=True, nogil=True)
 def path_of(genes: CellArray, way_points: int) -> tuple[CellArray, NDArray[np.float64]]:
-    """A chromosome's fields, without loops, and its curve, about two points a field."""
+    """A chromosome's fields, and its curve, about two points a field.
+
+    Where fields are visited twice the loop is cut out, and there is no curve (no rows) that would still lead round it.
+    """
     first, basis = bspline.basis(len(genes), way_points)
     points = np.empty((way_points, 2), np.int64)
     for i in range(way_points):
         points[i, 0], points[i, 1] = way_point(genes, first, basis, i)
-    cells = without_loops(polyline(points))
-    return cells, bspline.curve(genes.astype(np.float64), 2 * len(cells) + 1)
+    walk = polyline(points)
+    cells = without_loops(walk)
+    samples = 2 * len(cells) + 1 if len(cells) == len(walk) else 0
+    return cells, bspline.curve(genes.astype(np.float64), samples)
 
 
 @njit(cache=True, nogil=True)
 def search(
     weights: Weights,
-    task: Task,
-    tuning: Tuning,
+    places: tuple[int, int, int, int, bool],
+    settings: TuningValues,
     control_points: NDArray[np.int64],
     population: int,
     min_epochs: int,
     max_epochs: int,
     seed: int,
 ) -> Found:
-    """One whole search: each number of control points in turn, until one gives a correct path."""
+    """One whole search: each number of control points in turn, until one gives a correct path.
+
+    Task and tuning come as plain tuples: named ones take the dispatcher microseconds.
+    """
+    task, tuning = Task(*places), Tuning(*settings)
     state = seeded(seed)
-    vln = large_value(tuning, weights.shape[1], weights.shape[0])
+    height, width = weights.shape
     epochs = 0
     evaluations = 0
     for count in control_points:
-        value, genes, spent, tried = evolve(
-            weights, task, tuning, count, population, min_epochs, max_epochs, state
-        )
+        value, genes, spent, tried = evolve(weights, task, tuning, count, population, min_epochs, max_epochs, state)
         epochs += spent
         evaluations += tried
-        if value < vln:
-            cells, curve = path_of(genes, tuning.way_points)
+        if value < large_value(count, width, height, tuning):
+            cells, curve = path_of(genes, way_points_for(count, tuning))
             return True, cells, curve, cells_cost(weights, cells), count, epochs, evaluations
     return False, np.empty((0, 2), np.int64), np.empty((0, 2)), 0.0, 0, epochs, evaluations
 
@@ -66,8 +74,9 @@ class BsplineGa:
     capabilities = Capabilities(random=True, smooth_curve=True)
 
     def __init__(self, settings: PlannerSettings) -> None:
-        self._tuning = Tuning(
+        self._settings = (
             settings.way_points,
+            settings.span_way_points,
             settings.mixing,
             settings.selected_share,
             settings.mutation_probability,
@@ -92,8 +101,8 @@ class BsplineGa:
             return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
         found, cells, curve, cost, count, epochs, evaluations = search(
             plain(problem.weights),
-            Task(*problem.start, *problem.target, problem.corner_cutting),
-            self._tuning,
+            (*problem.start, *problem.target, problem.corner_cutting),
+            self._settings,
             np.array(budget.control_points, np.int64),
             budget.population,
             budget.min_epochs,
@@ -102,7 +111,7 @@ class BsplineGa:
         )
         if not found:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, evaluations, epochs)
-        path = Path(as_cells(cells), cost, curve)
+        path = Path(as_cells(cells), cost, curve if len(curve) else None)
         return PlanResult(PlanStatus.FOUND, path, self.name, evaluations, epochs, count)
 
 

@@ -35,7 +35,7 @@ def uniform(state: State) -> float:
     z = state[0]
     z = (z ^ (z >> _30)) * _MIX_1
     z = (z ^ (z >> _27)) * _MIX_2
-    return ((z ^ (z >> _31)) >> _11) * (1.0 / 9007199254740992.0)
+    return float((z ^ (z >> _31)) >> _11) * (1.0 / 9007199254740992.0)
 
 
 @njit(cache=True, nogil=True)

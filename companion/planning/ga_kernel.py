@@ -27,6 +27,7 @@ class Tuning(NamedTuple):
     """The settings of the algorithm as the kernel wants them; see ``PlannerSettings``."""
 
     way_points: int
+    span_way_points: int
     mixing: float
     selected_share: float
     mutation_probability: float
@@ -49,9 +50,15 @@ class Task(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
-def large_value(tuning: Tuning, width: int, height: int) -> float:
+def way_points_for(control_points: int, tuning: Tuning) -> int:
+    """How many points of the curve are joined by straight lines (3.4)."""
+    return max(tuning.way_points, tuning.span_way_points * (control_points - bspline.DEGREE) + 1)
+
+
+@njit(cache=True, nogil=True)
+def large_value(control_points: int, width: int, height: int, tuning: Tuning) -> float:
     """VLN (3.4): the setting, or more on a map so large that a correct path could cost as much."""
-    return max(tuning.obstacle_value, float(tuning.way_points * max(width, height)))
+    return max(tuning.obstacle_value, float(way_points_for(control_points, tuning) * max(width, height)))
 
 
 @njit(cache=True, nogil=True)
@@ -80,7 +87,7 @@ def fitness(
     once more: a call for each would take longer than the line.
     """
     height, width = weights.shape
-    total = -weights[genes[-1, 1], genes[-1, 0]]
+    total: float = -weights[genes[-1, 1], genes[-1, 0]]
     x, y = genes[0, 0], genes[0, 1]
     inside = True
     for i in range(1, len(first)):
@@ -153,15 +160,27 @@ def breed(genes: CellArray, parents: Chromosomes, mutation_fields: int, tuning: 
 
 
 @njit(cache=True, nogil=True)
-def select(selected: Chromosomes, values: NDArray[np.float64], genes: CellArray, value: float) -> None:
-    """Put a chromosome in its rank among the selected (3.5); the last one drops out. Needs value < values[-1]."""
+def copy_genes(source: CellArray, destination: CellArray) -> None:
+    """Element by element: for so few, the assignment of a slice takes several times as long."""
+    for i in range(len(source)):
+        destination[i, 0], destination[i, 1] = source[i, 0], source[i, 1]
+
+
+@njit(cache=True, nogil=True)
+def select(
+    selected: Chromosomes, ranks: NDArray[np.int64], values: NDArray[np.float64], genes: CellArray, value: float
+) -> None:
+    """Put a chromosome in its rank among the selected (3.5); the last one drops out. Needs value < values[-1].
+
+    ``ranks`` says which of ``selected`` is first, second and so on; ``values`` is in that order.
+    """
+    place = ranks[-1]
+    copy_genes(genes, selected[place])
     rank = len(values) - 1
     while rank > 0 and values[rank - 1] > value:
-        values[rank] = values[rank - 1]
-        selected[rank] = selected[rank - 1]
+        values[rank], ranks[rank] = values[rank - 1], ranks[rank - 1]
         rank -= 1
-    values[rank] = value
-    selected[rank] = genes
+    values[rank], ranks[rank] = value, place
 
 
 @njit(cache=True, nogil=True)
@@ -177,31 +196,31 @@ def evolve(
 ) -> tuple[float, CellArray, int, int]:
     """Evolve paths of so many control points: (best fitness, best chromosome, epochs, evaluations)."""
     height, width = weights.shape
-    first, basis = bspline.basis(control_points, tuning.way_points)
+    first, basis = bspline.basis(control_points, way_points_for(control_points, tuning))
     genes = np.empty((control_points, 2), np.int64)
     genes[0, 0], genes[0, 1] = task.start_x, task.start_y
     genes[-1, 0], genes[-1, 1] = task.target_x, task.target_y
     chosen = min(max(int(tuning.selected_share * population), 2), population)
     selected = np.empty((chosen, control_points, 2), np.int64)
-    selected[:] = genes
+    parents = np.empty_like(selected)
+    ranks = np.arange(chosen)
     values = np.full(chosen, np.inf)
-    vln = large_value(tuning, width, height)
+    vln = large_value(control_points, width, height, tuning)
     mutation_fields = int(tuning.mutation_range * min(width, height) / 2.0)
-    evaluations = population
     for i in range(population):
         scatter(genes, i * 3 // population, width, height, tuning, state)
         value = fitness(weights, genes, first, basis, task.corner_cutting, vln, values[-1])
         if value < values[-1]:
-            select(selected, values, genes, value)
+            select(selected, ranks, values, genes, value)
     epoch = 1
-    parents = selected.copy()
     while epoch < max_epochs and (epoch < min_epochs or values[0] >= vln):
-        parents[:] = selected
+        for rank in range(chosen):
+            copy_genes(selected[ranks[rank]], parents[rank])
         for _ in range(population - chosen):
             breed(genes, parents, mutation_fields, tuning, state)
             value = fitness(weights, genes, first, basis, task.corner_cutting, vln, values[-1])
             if value < values[-1]:
-                select(selected, values, genes, value)
-        evaluations += population - chosen
+                select(selected, ranks, values, genes, value)
         epoch += 1
-    return values[0], selected[0].copy(), epoch, evaluations
+    evaluations = population + (epoch - 1) * (population - chosen)
+    return values[0], selected[ranks[0]].copy(), epoch, evaluations

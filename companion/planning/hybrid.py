@@ -25,8 +25,19 @@ class Hybrid:
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
         """See ``Planner.plan``. FOUND or NO_PATH. Raises ValueError for a budget without sense."""
-        tried = self._genetic.plan(problem, budget, rng)
+        # A look of a few epochs finds the easy paths. Whatever is left is worth its budget only if there is a path
+        # at all: on a map of 100 x 50 fields the proof takes as long as some ten epochs, the budget thousands.
+        look = replace(budget, control_points=budget.control_points[:1], max_epochs=budget.min_epochs)
+        tried = self._genetic.plan(problem, look, rng)
         if tried.status is PlanStatus.FOUND:
             return replace(tried, planner=self.name)
-        proof = self._graph.plan(problem, budget, rng)
-        return replace(proof, planner=self.name, evaluations=tried.evaluations, epochs=tried.epochs)
+        fallback = self._graph.plan(problem, budget, rng)
+        if fallback.status is PlanStatus.NO_PATH:
+            return replace(fallback, planner=self.name, evaluations=tried.evaluations, epochs=tried.epochs)
+        full = self._genetic.plan(problem, budget, rng)
+        return replace(
+            full if full.status is PlanStatus.FOUND else fallback,
+            planner=self.name,
+            evaluations=tried.evaluations + full.evaluations,
+            epochs=tried.epochs + full.epochs,
+        )

@@ -1,0 +1,139 @@
+"""The conversation with the autopilot: who we are, what we need, what we said and what came of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Protocol
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from companion.commands import Command, Heartbeat, RequestMessage
+from companion.mavlink.acks import AckKeeper
+from companion.mavlink.byte_link import ByteLink
+from companion.mavlink.codec import Codec
+from companion.mavlink.rates import RateFault, RateKeeper, wanted_rates
+from companion.mavlink.readback import ReadBack
+from companion.settings import LinkSettings
+from companion.vehicle import AckSeen, Event, HeartbeatSeen, HomeSeen, TargetSeen
+
+HEARTBEAT_S = 1.0
+PLACES_S = 2.0
+"""Origin and home are asked for this often until known,"""
+PLACES_AGAIN_S = 30.0
+"""and then this often, for the autopilot says only once when it has moved them."""
+
+
+class PacketLog(Protocol):
+    """Takes every packet of both directions."""
+
+    def packet(self, time_s: float, raw: bytes) -> None:
+        """One whole packet; ``time_s`` is the companion's clock."""
+        ...
+
+
+class _NoLog:
+    def packet(self, time_s: float, raw: bytes) -> None:
+        """Nobody listens."""
+
+
+class AutopilotLink:
+    """Polls, speaks and looks after the link. It never waits and reads no clock: the time is handed in."""
+
+    def __init__(self, link: ByteLink, codec: Codec, settings: LinkSettings, log: PacketLog | None = None) -> None:
+        self._link = link
+        self._codec = codec
+        self._log = log or _NoLog()
+        self._rates = RateKeeper(wanted_rates(settings))
+        self._acks = AckKeeper()
+        self._read_back = ReadBack()
+        self._heartbeat_s = -math.inf
+        self._places_s = -math.inf
+        self._home_known = False
+
+    @property
+    def description(self) -> str:
+        """The link in words."""
+        return self._link.description
+
+    @property
+    def codec(self) -> Codec:
+        """For its counters."""
+        return self._codec
+
+    @property
+    def target_confirmed(self) -> bool | None:
+        """Whether the autopilot follows the position sent last: None while nothing can be said, False 2 s after it should have."""
+        return self._read_back.confirmed
+
+    @property
+    def rate_faults(self) -> tuple[RateFault, ...]:
+        """Messages that come at less than half the rate asked for."""
+        return self._rates.faults
+
+    def last_ack(self, command: Command) -> AckSeen | None:
+        """The last answer to a command of this kind (result -1: never answered); None while there is none."""
+        return self._acks.last(command)
+
+    def poll(self, now_s: float) -> list[Event]:
+        """What has come in since the last call."""
+        events: list[Event] = []
+        for packet in self._codec.packets(self._link.read()):
+            self._log.packet(now_s, packet.raw)
+            for event in self._codec.decode_packet(packet, now_s):
+                self._note(event)
+                events.append(event)
+        return events
+
+    def send(self, command: Command, now_s: float) -> None:
+        """Say something; commands that are answered are repeated up to twice if no answer comes within a second.
+
+        Raises EncodeError when the command cannot be said yet (a position in degrees without an origin).
+        """
+        self._write(command, now_s)
+        self._acks.sent(command, now_s)
+        self._read_back.sent(command, now_s)
+
+    def service(self, now_s: float) -> None:
+        """To be called every tick: heartbeat, requests, repetitions.
+
+        The heartbeat goes out from the first tick on: the autopilot learns the way to us from our own packets.
+        """
+        if now_s - self._heartbeat_s >= HEARTBEAT_S - 1e-6:
+            self._heartbeat_s = now_s
+            self._write(Heartbeat(), now_s)
+        self._read_back.check(now_s)
+        if not self._codec.vehicle_known:
+            return
+        for request in self._rates.due(now_s, self._codec.message_counts):
+            self._write(request, now_s)
+        self._ask_places(now_s)
+        for command, repetition in self._acks.due(now_s):
+            self._write(command, now_s, repetition)
+
+    def close(self) -> None:
+        """Let go of the line."""
+        self._link.close()
+
+    def _ask_places(self, now_s: float) -> None:
+        missing = self._codec.origin is None or not self._home_known
+        if now_s - self._places_s < (PLACES_S if missing else PLACES_AGAIN_S):
+            return
+        self._places_s = now_s
+        for message_id in (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, mavlink.MAVLINK_MSG_ID_HOME_POSITION):
+            self._write(RequestMessage(message_id), now_s)
+
+    def _note(self, event: Event) -> None:
+        match event:
+            case HeartbeatSeen() | AckSeen():
+                self._acks.heard(event)
+            case TargetSeen():
+                self._read_back.heard(event, self._codec.origin)
+            case HomeSeen():
+                self._home_known = True
+            case _:
+                pass
+
+    def _write(self, command: Command, now_s: float, repetition: int = 0) -> None:
+        for raw in self._codec.encode_packets(command, repetition):
+            self._log.packet(now_s, raw)
+            self._link.write(raw)

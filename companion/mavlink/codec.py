@@ -1,0 +1,100 @@
+"""MAVLink 2 on one side, the companion's events and commands on the other; the only place that scales units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from companion.commands import Command
+from companion.frames import GeoPoint
+from companion.mavlink.decode import MISSION_ACK_COMMAND, Decoder
+from companion.mavlink.encode import EncodeError, Encoder, command_number
+from companion.mavlink.framing import Framer, Packet
+from companion.settings import LinkSettings
+from companion.vehicle import Event
+
+__all__ = ["MISSION_ACK_COMMAND", "Codec", "EncodeError", "LinkCounters", "Packet", "command_number"]
+
+
+@dataclass(frozen=True, slots=True)
+class LinkCounters:
+    """How good the line is; all counted from the start."""
+
+    bad_bytes: int
+    """Bytes that belonged to no valid packet."""
+    unknown: int
+    """Packets of messages that are not in the dialect."""
+    other_systems: int
+    """Packets of other vehicles and ground stations, or before the vehicle was known."""
+    lost: int
+    """Packets of the autopilot that are missing, by their sequence numbers."""
+
+
+class Codec:
+    """Decodes what the vehicle sends and encodes what the companion says to it.
+
+    The vehicle is the first ArduPilot rover or boat whose heartbeat is heard (component 1); until then ``system_id`` is a guess.
+    The companion speaks under the vehicle's system id. Any bytes may be fed; none make it fail.
+    """
+
+    def __init__(self, settings: LinkSettings, system_id: int = 1) -> None:
+        self._framer = Framer()
+        self._decoder = Decoder(system_id, settings.component_id)
+        self._encoder = Encoder(settings.setpoint, settings.component_id)
+
+    @property
+    def system_id(self) -> int:
+        """The vehicle's system id, and ours."""
+        return self._decoder.system_id
+
+    @property
+    def vehicle_known(self) -> bool:
+        """Whether a rover's heartbeat has been heard."""
+        return self._decoder.vehicle_known
+
+    @property
+    def refused_type(self) -> int | None:
+        """MAV_TYPE of an autopilot that was heard but is not an ArduPilot rover; None once a rover was heard."""
+        return self._decoder.refused_type
+
+    @property
+    def origin(self) -> GeoPoint | None:
+        """The EKF origin; None until heard, and again after the autopilot has restarted."""
+        return self._decoder.origin
+
+    @property
+    def boot_s(self) -> float:
+        """The autopilot's time since boot when last heard, in seconds."""
+        return self._decoder.boot_ms / 1000.0
+
+    @property
+    def message_counts(self) -> Mapping[int, int]:
+        """How many messages of each id the autopilot has sent."""
+        return self._decoder.message_counts
+
+    @property
+    def counters(self) -> LinkCounters:
+        """How good the line is."""
+        decoder = self._decoder
+        return LinkCounters(self._framer.bad_bytes, self._framer.unknown, decoder.other_systems, decoder.lost)
+
+    def decode(self, data: bytes, time_s: float) -> list[Event]:
+        """The events in these bytes; pieces of packets are kept for the next call. ``time_s``: the companion's clock."""
+        return [event for packet in self.packets(data) for event in self.decode_packet(packet, time_s)]
+
+    def packets(self, data: bytes) -> list[Packet]:
+        """The whole packets in these bytes, of whomever and whatever (for recording)."""
+        return self._framer.feed(data)
+
+    def decode_packet(self, packet: Packet, time_s: float) -> list[Event]:
+        """The events of one packet."""
+        return self._decoder.decode(packet, time_s)
+
+    def encode(self, command: Command, confirmation: int = 0) -> bytes:
+        """A command as bytes. Raises EncodeError for a position in degrees while the EKF origin is unknown."""
+        return b"".join(self.encode_packets(command, confirmation))
+
+    def encode_packets(self, command: Command, confirmation: int = 0) -> list[bytes]:
+        """The same, packet by packet (a long text is several)."""
+        decoder = self._decoder
+        return self._encoder.encode(command, decoder.system_id, decoder.boot_ms, decoder.origin, confirmation)

@@ -1,0 +1,250 @@
+"""From MAVLink packets to the companion's events: whom to believe, what is old, and what the numbers mean."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from companion.frames import GeoPoint
+from companion.mavlink import ranges
+from companion.mavlink.framing import Packet
+from companion.mavlink.texts import TextAssembler
+from companion.scan import RangeScan
+from companion.vehicle import (
+    AckSeen,
+    AttitudeSeen,
+    EkfStatusSeen,
+    Event,
+    GlobalPositionSeen,
+    HeartbeatSeen,
+    HomeSeen,
+    LocalPositionSeen,
+    OriginSeen,
+    ParameterSeen,
+    PrearmSeen,
+    RangeSeen,
+    TargetSeen,
+    TextSeen,
+)
+
+AUTOPILOT = 1
+"""Component id of the autopilot: only it speaks for the vehicle."""
+ROVERS = (mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT)
+RANGE_MESSAGES = (mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE)
+ECHO_S = 2.0
+"""For so long after a message, what repeats its readings in a coarser form is left out."""
+REBOOT_MS = 5000
+"""A boot time that goes back further than packets overtake each other means that the autopilot has restarted."""
+MISSION_ACK_COMMAND = -1
+
+
+class Decoder:
+    """Turns packets into events and remembers what that needs: the vehicle's id, its clock, and which range data is live."""
+
+    def __init__(self, system_id: int, component_id: int) -> None:
+        self.system_id = system_id
+        self.component_id = component_id
+        self.vehicle_known = False
+        self.origin: GeoPoint | None = None
+        self.boot_ms = 0
+        self.other_systems = 0
+        self.refused_type: int | None = None
+        """MAV_TYPE of an autopilot that was heard and is not an ArduPilot rover."""
+        self.message_counts: dict[int, int] = {}
+        self._mav: Any = mavlink.MAVLink(None)
+        self._last: dict[int, Packet] = {}
+        self.lost = 0
+        self._newest_ms: dict[int, int] = {}
+        self._texts = TextAssembler()
+        self._first_s: float | None = None
+        self._cells_s = -math.inf
+        self._other_range_s = -math.inf
+        self._beam_s: dict[int, float] = {}
+        self._readers: dict[int, Callable[[Any, float], Event | None]] = {
+            mavlink.MAVLINK_MSG_ID_SYS_STATUS: _prearm,
+            mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
+            mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
+            mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
+            mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
+            mavlink.MAVLINK_MSG_ID_MISSION_ACK: self._mission_ack,
+            mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._gps_origin,
+            mavlink.MAVLINK_MSG_ID_COMMAND_ACK: self._command_ack,
+            mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _target,
+            mavlink.MAVLINK_MSG_ID_RANGEFINDER: self._rangefinder,
+            mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
+            mavlink.MAVLINK_MSG_ID_HOME_POSITION: _home,
+        }
+
+    def decode(self, packet: Packet, time_s: float) -> list[Event]:
+        """The events of one packet; none when it is of no interest, from somebody else, repeated or too old."""
+        if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not self.vehicle_known:
+            self._learn(packet)
+        if packet.system_id != self.system_id or not self.vehicle_known:
+            self.other_systems += 1
+            return []
+        if packet.component_id == self.component_id or self._is_repeated(packet):
+            return []
+        if self._first_s is None:
+            self._first_s = time_s
+        if packet.component_id == AUTOPILOT:
+            self.message_counts[packet.message_id] = self.message_counts.get(packet.message_id, 0) + 1
+            return self._of_autopilot(packet, time_s)
+        if packet.message_id in RANGE_MESSAGES:
+            return self._range(packet, time_s)
+        return []
+
+    def _learn(self, packet: Packet) -> None:
+        """The first ArduPilot rover that is heard is ours."""
+        if packet.component_id != AUTOPILOT:
+            return
+        message = self._message(packet)
+        if message.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA or message.type not in ROVERS:
+            if message.type != mavlink.MAV_TYPE_GCS:
+                self.refused_type = message.type
+            return
+        self.system_id = packet.system_id
+        self.vehicle_known = True
+        self.refused_type = None
+
+    def _of_autopilot(self, packet: Packet, time_s: float) -> list[Event]:
+        if packet.message_id in RANGE_MESSAGES:
+            return self._range(packet, time_s)
+        if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            return [*self._texts.late(time_s), self._heartbeat(self._message(packet), time_s)]
+        if packet.message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
+            message = self._message(packet)
+            return [*self._texts.add(TextSeen(time_s, message.severity, message.text), message.id, message.chunk_seq)]
+        reader = self._readers.get(packet.message_id)
+        event = reader(self._message(packet), time_s) if reader is not None else None
+        return [] if event is None else [event]
+
+    def _message(self, packet: Packet) -> Any:
+        return self._mav.decode(bytearray(packet.raw))
+
+    def _is_repeated(self, packet: Packet) -> bool:
+        """Whether this very packet has just been heard (two routes to one place); also counts what is missing."""
+        last = self._last.get(packet.component_id)
+        self._last[packet.component_id] = packet
+        if last is None:
+            return False
+        if packet.raw == last.raw:
+            return True
+        if packet.component_id == AUTOPILOT:
+            gap = (packet.sequence - last.sequence - 1) & 0xFF
+            self.lost += gap if gap < 128 else 0
+        return False
+
+    def _is_late(self, message: Any) -> bool:
+        """Whether a newer message of this kind has been heard; notices a restart, after which nothing old holds."""
+        message_id, now_ms = message.get_msgId(), message.time_boot_ms
+        newest_ms = self._newest_ms.get(message_id, 0)
+        if newest_ms - REBOOT_MS < now_ms < newest_ms:
+            return True
+        if now_ms < newest_ms:
+            self.origin = None
+            self._newest_ms.clear()
+        self._newest_ms[message_id] = self.boot_ms = now_ms
+        return False
+
+    # Range data --------------------------------------------------------------------------------------------------
+
+    def _range(self, packet: Packet, time_s: float) -> list[Event]:
+        message = self._message(packet)
+        if packet.message_id == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
+            scan = ranges.obstacle_distance(message, time_s)
+            self._cells_s = time_s if scan is not None else self._cells_s
+        else:
+            scan = self._distance_sensor(message, packet.component_id == AUTOPILOT, time_s)
+        if scan is None:
+            return []
+        self._other_range_s = time_s
+        return [RangeSeen(time_s, scan)]
+
+    def _distance_sensor(self, message: Any, of_autopilot: bool, time_s: float) -> RangeScan | None:
+        """Leaves out proximity sectors that only echo finer data: a lidar's cells, or a rangefinder that looks the same way."""
+        if of_autopilot and ranges.is_sector(message):
+            finer_s = max(self._cells_s, self._beam_s.get(message.orientation, -math.inf))
+            return None if time_s - finer_s < ECHO_S else ranges.distance_sensor(message, time_s, sector=True)
+        scan = ranges.distance_sensor(message, time_s, sector=False)
+        if scan is not None:
+            self._beam_s[message.orientation] = time_s
+        return scan
+
+    def _rangefinder(self, message: Any, time_s: float) -> Event | None:
+        """Only when nothing better has been heard for a while."""
+        assert self._first_s is not None
+        if time_s - max(self._other_range_s, self._first_s) < ECHO_S:
+            return None
+        scan = ranges.rangefinder(message, time_s)
+        return None if scan is None else RangeSeen(time_s, scan)
+
+    # Vehicle state -----------------------------------------------------------------------------------------------
+
+    def _heartbeat(self, message: Any, time_s: float) -> Event:
+        armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
+        return HeartbeatSeen(time_s, message.custom_mode, armed, self.system_id)
+
+    def _local_position(self, message: Any, time_s: float) -> Event | None:
+        values = (message.x, message.y, message.vx, message.vy)
+        if self._is_late(message) or not all(map(math.isfinite, values)):
+            return None
+        return LocalPositionSeen(time_s, message.time_boot_ms / 1000.0, *values)
+
+    def _attitude(self, message: Any, time_s: float) -> Event | None:
+        if self._is_late(message) or not (math.isfinite(message.yaw) and math.isfinite(message.yawspeed)):
+            return None
+        return AttitudeSeen(time_s, message.time_boot_ms / 1000.0, message.yaw, message.yawspeed)
+
+    def _global_position(self, message: Any, time_s: float) -> Event | None:
+        point = _point(message.lat, message.lon)
+        if self._is_late(message) or point is None:
+            return None
+        return GlobalPositionSeen(time_s, message.time_boot_ms / 1000.0, point)
+
+    def _gps_origin(self, message: Any, time_s: float) -> Event | None:
+        self.origin = _point(message.latitude, message.longitude) or self.origin
+        return None if self.origin is None else OriginSeen(time_s, self.origin)
+
+    def _command_ack(self, message: Any, time_s: float) -> Event | None:
+        ours = self._is_for_us(message)
+        return AckSeen(time_s, message.command, message.result) if ours else None
+
+    def _mission_ack(self, message: Any, time_s: float) -> Event | None:
+        ours = self._is_for_us(message)
+        return AckSeen(time_s, MISSION_ACK_COMMAND, message.type) if ours else None
+
+    def _is_for_us(self, message: Any) -> bool:
+        """Answers to a ground station come by as well; 0 is everybody (and what a MAVLink 1 answer says)."""
+        return message.target_system in (0, self.system_id) and message.target_component in (0, self.component_id)
+
+
+def _point(lat_e7: int, lon_e7: int) -> GeoPoint | None:
+    """Degrees from 1e-7 degrees; None for 0/0, which is sent when there is no position, and for what is not on the earth."""
+    if (lat_e7 == 0 and lon_e7 == 0) or abs(lat_e7) > 90e7 or abs(lon_e7) > 180e7:
+        return None
+    return GeoPoint(lat_e7 / 1e7, lon_e7 / 1e7)
+
+
+def _home(message: Any, time_s: float) -> Event | None:
+    point = _point(message.latitude, message.longitude)
+    return None if point is None else HomeSeen(time_s, point)
+
+
+def _target(message: Any, time_s: float) -> Event | None:
+    point = _point(message.lat_int, message.lon_int)
+    return None if point is None else TargetSeen(time_s, point, message.type_mask)
+
+
+def _ekf(message: Any, time_s: float) -> Event:
+    return EkfStatusSeen(time_s, message.flags)
+
+
+def _parameter(message: Any, time_s: float) -> Event:
+    return ParameterSeen(time_s, message.param_id, message.param_value)
+
+
+def _prearm(message: Any, time_s: float) -> Event:
+    return PrearmSeen(time_s, bool(message.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK))

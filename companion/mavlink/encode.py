@@ -1,0 +1,195 @@
+"""From the companion's commands to MAVLink packets."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from companion.commands import (
+    Arm,
+    ChangeSpeed,
+    Command,
+    GuidedHeading,
+    GuidedPosition,
+    GuidedVelocity,
+    Heartbeat,
+    ReadParameter,
+    RequestMessage,
+    RequestRate,
+    Say,
+    SetMode,
+)
+from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.mavlink.texts import chunks_of
+
+POSITION_ONLY = 0x0DFC
+"""Type mask 3580: x and y count, nothing else does (height included)."""
+VELOCITY_AND_YAW_RATE = 1511
+"""Type mask. With the yaw rate given, a negative speed means backwards; without it the rover would turn round (measured)."""
+YAW_ONLY = 2559
+"""Type mask."""
+KEEP_THROTTLE = -1.0
+KEEP_SPEED = -1.0
+GUIDED_ITEM = 2
+"""``current`` of a mission item that is not part of a mission but a guided target."""
+
+
+class EncodeError(Exception):
+    """A command that cannot be said in the chosen form (yet)."""
+
+
+class Encoder:
+    """Writes packets under one system and component id, numbered in order."""
+
+    def __init__(self, setpoint_form: str, component_id: int) -> None:
+        self._form = setpoint_form
+        self._mav: Any = mavlink.MAVLink(None)
+        self._mav.srcComponent = component_id
+        self._text_id = 0
+        self._system_id = 1
+        self._boot_ms = 0
+
+    def encode(
+        self, command: Command, system_id: int, boot_ms: int, origin: GeoPoint | None, confirmation: int = 0
+    ) -> list[bytes]:
+        """The packets of a command. ``confirmation`` counts repetitions.
+
+        Raises EncodeError for a position that is to be said in degrees while the EKF origin is unknown.
+        """
+        self._system_id, self._boot_ms = system_id, boot_ms
+        self._mav.srcSystem = system_id
+        return [self._packed(message) for message in self._messages(command, origin, confirmation)]
+
+    def _packed(self, message: Any) -> bytes:
+        raw = bytes(message.pack(self._mav))
+        self._mav.seq = (self._mav.seq + 1) % 256
+        return raw
+
+    def _messages(self, command: Command, origin: GeoPoint | None, confirmation: int) -> list[Any]:
+        match command:
+            case Heartbeat():
+                return [_heartbeat()]
+            case GuidedPosition():
+                return [self._position(command.point, origin)]
+            case GuidedVelocity():
+                return [self._velocity(command)]
+            case GuidedHeading():
+                return [self._heading(command)]
+            case ReadParameter():
+                return [self._read(command)]
+            case Say():
+                return self._say(command)
+            case _:
+                return [self._command_long(command, confirmation)]
+
+    def _command_long(self, command: SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage, again: int) -> Any:
+        first, second, third = _parameters(command)
+        number = command_number(command)
+        return mavlink.MAVLink_command_long_message(
+            self._system_id, 1, number, again, first, second, third, 0.0, 0.0, 0.0, 0.0
+        )
+
+    def _position(self, point: NedPoint, origin: GeoPoint | None) -> Any:
+        if self._form == "local":
+            return self._local_target(
+                mavlink.MAV_FRAME_LOCAL_NED, POSITION_ONLY, north_m=point.north_m, east_m=point.east_m
+            )
+        if origin is None:
+            raise EncodeError(f"setpoint form '{self._form}' needs the EKF origin, which is not known yet")
+        geo = LocalFrame(origin).to_geo(point)
+        lat_e7, lon_e7 = round(geo.lat_deg * 1e7), round(geo.lon_deg * 1e7)
+        frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT
+        if self._form == "global":
+            return mavlink.MAVLink_set_position_target_global_int_message(
+                self._boot_ms, self._system_id, 1, frame, POSITION_ONLY, lat_e7, lon_e7, *[0.0] * 9
+            )
+        if self._form == "mission-item":
+            return mavlink.MAVLink_mission_item_int_message(
+                self._system_id, 1, 0, frame, mavlink.MAV_CMD_NAV_WAYPOINT, GUIDED_ITEM, 0, *[0.0] * 4, lat_e7, lon_e7, 0.0
+            )  # fmt: skip
+        # The flag that would switch to GUIDED stays 0: only a person, or the start-up, chooses the mode.
+        return mavlink.MAVLink_command_int_message(
+            self._system_id, 1, frame, mavlink.MAV_CMD_DO_REPOSITION, 0, 0, KEEP_SPEED, 0.0, 0.0, 0.0, lat_e7, lon_e7, 0.0
+        )  # fmt: skip
+
+    def _velocity(self, command: GuidedVelocity) -> Any:
+        return self._local_target(
+            mavlink.MAV_FRAME_BODY_NED,
+            VELOCITY_AND_YAW_RATE,
+            forward_m_s=command.forward_m_s,
+            yaw_rate_rad_s=command.yaw_rate_rad_s,
+        )
+
+    def _heading(self, command: GuidedHeading) -> Any:
+        return self._local_target(mavlink.MAV_FRAME_LOCAL_NED, YAW_ONLY, yaw_rad=command.heading_rad)
+
+    def _local_target(
+        self,
+        frame: int,
+        mask: int,
+        *,
+        north_m: float = 0.0,
+        east_m: float = 0.0,
+        forward_m_s: float = 0.0,
+        yaw_rad: float = 0.0,
+        yaw_rate_rad_s: float = 0.0,
+    ) -> Any:
+        position, velocity = (north_m, east_m, 0.0), (forward_m_s, 0.0, 0.0)
+        return mavlink.MAVLink_set_position_target_local_ned_message(
+            self._boot_ms, self._system_id, 1, frame, mask, *position, *velocity, 0.0, 0.0, 0.0, yaw_rad, yaw_rate_rad_s
+        )
+
+    def _read(self, command: ReadParameter) -> Any:
+        return mavlink.MAVLink_param_request_read_message(self._system_id, 1, command.name.encode("ascii"), -1)
+
+    def _say(self, command: Say) -> list[Any]:
+        pieces = chunks_of(command.text)
+        if len(pieces) == 1:
+            return [mavlink.MAVLink_statustext_message(command.severity, pieces[0])]
+        self._text_id = self._text_id % 65535 + 1
+        return [
+            mavlink.MAVLink_statustext_message(command.severity, piece, self._text_id, number)
+            for number, piece in enumerate(pieces)
+        ]
+
+
+def _heartbeat() -> Any:
+    return mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
+    )
+
+
+def command_number(command: Command) -> int | None:
+    """The MAV_CMD of a command that is answered with a COMMAND_ACK; None for those that are not."""
+    match command:
+        case SetMode():
+            return int(mavlink.MAV_CMD_DO_SET_MODE)
+        case Arm():
+            return int(mavlink.MAV_CMD_COMPONENT_ARM_DISARM)
+        case ChangeSpeed():
+            return int(mavlink.MAV_CMD_DO_CHANGE_SPEED)
+        case RequestRate():
+            return int(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
+        case RequestMessage():
+            return int(mavlink.MAV_CMD_REQUEST_MESSAGE)
+        case _:
+            return None
+
+
+def _parameters(command: SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage) -> tuple[float, float, float]:
+    """The first three parameters of COMMAND_LONG."""
+    match command:
+        case SetMode():
+            return float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(command.mode), 0.0
+        case Arm():
+            return 1.0, 0.0, 0.0
+        case ChangeSpeed():
+            return float(mavlink.SPEED_TYPE_GROUNDSPEED), command.speed_m_s, KEEP_THROTTLE
+        case RequestRate():
+            # Interval in microseconds; -1 switches the stream off.
+            interval = round(1e6 / command.rate_hz) if command.rate_hz > 0.0 and math.isfinite(command.rate_hz) else -1
+            return float(command.message_id), float(interval), 0.0
+        case RequestMessage():
+            return float(command.message_id), 0.0, 0.0

@@ -1,0 +1,102 @@
+"""Asks for the message rates that are needed, and sees to it that they really come."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from companion.commands import RequestRate
+from companion.settings import LinkSettings
+
+WINDOW_S = 3.0
+"""Rates are measured over so long."""
+ENOUGH = 0.5
+"""Less than this share of what was asked for is asked for again."""
+LONGEST_WAIT_S = 30.0
+SLOW_HZ = 2.0
+
+
+@dataclass(frozen=True, slots=True)
+class WantedRate:
+    """A message that is to come at a rate. ``always`` False: it comes only under conditions, so that none at all is no fault."""
+
+    message_id: int
+    rate_hz: float
+    always: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class RateFault:
+    """A message that comes too seldom."""
+
+    message_id: int
+    wanted_hz: float
+    measured_hz: float
+
+
+def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
+    """What the companion needs of ArduRover, which sends everything at 1 Hz unasked.
+
+    OBSTACLE_DISTANCE is not asked for: ArduRover refuses to stream it, it comes from the lidar's own driver. The read-back of the
+    target comes only while there is one, DISTANCE_SENSOR and RANGEFINDER only with a rangefinder.
+    """
+    return (
+        WantedRate(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, settings.position_rate_hz),
+        WantedRate(mavlink.MAVLINK_MSG_ID_ATTITUDE, settings.attitude_rate_hz),
+        WantedRate(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, SLOW_HZ),
+        WantedRate(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, SLOW_HZ),
+        WantedRate(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, settings.range_rate_hz, always=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_RANGEFINDER, settings.range_rate_hz, always=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, SLOW_HZ, always=False),
+    )
+
+
+class RateKeeper:
+    """Requests every rate once, then measures, and repeats the request with growing pauses while too little comes."""
+
+    def __init__(self, wanted: tuple[WantedRate, ...]) -> None:
+        self._wanted = wanted
+        self._asked = False
+        self._began_s = 0.0
+        self._counts: dict[int, int] = {}
+        self._wait_s = {rate.message_id: WINDOW_S for rate in wanted}
+        self._again_s = {rate.message_id: 0.0 for rate in wanted}
+        self.faults: tuple[RateFault, ...] = ()
+        """What came too seldom when last measured."""
+
+    def due(self, now_s: float, counts: Mapping[int, int]) -> list[RequestRate]:
+        """The requests to send now; ``counts``: messages heard so far, by id."""
+        if not self._asked:
+            self._asked = True
+            self._begin(now_s, counts)
+            for rate in self._wanted:
+                self._again_s[rate.message_id] = now_s + self._wait_s[rate.message_id]
+            return [RequestRate(rate.message_id, rate.rate_hz) for rate in self._wanted]
+        if now_s - self._began_s < WINDOW_S:
+            return []
+        faults = [self._fault(rate, now_s - self._began_s, counts) for rate in self._wanted]
+        self.faults = tuple(fault for fault in faults if fault is not None)
+        self._begin(now_s, counts)
+        return [RequestRate(fault.message_id, fault.wanted_hz) for fault in self.faults if self._may_ask(fault, now_s)]
+
+    def _begin(self, now_s: float, counts: Mapping[int, int]) -> None:
+        self._began_s, self._counts = now_s, dict(counts)
+
+    def _fault(self, rate: WantedRate, elapsed_s: float, counts: Mapping[int, int]) -> RateFault | None:
+        came = counts.get(rate.message_id, 0) - self._counts.get(rate.message_id, 0)
+        enough = came / elapsed_s >= ENOUGH * rate.rate_hz
+        if enough:
+            self._wait_s[rate.message_id] = WINDOW_S
+            self._again_s[rate.message_id] = 0.0
+        if enough or (came == 0 and not rate.always):
+            return None
+        return RateFault(rate.message_id, rate.rate_hz, came / elapsed_s)
+
+    def _may_ask(self, fault: RateFault, now_s: float) -> bool:
+        if now_s < self._again_s[fault.message_id]:
+            return False
+        self._wait_s[fault.message_id] = min(2.0 * self._wait_s[fault.message_id], LONGEST_WAIT_S)
+        self._again_s[fault.message_id] = now_s + self._wait_s[fault.message_id]
+        return True

@@ -1,0 +1,110 @@
+"""What must hold for a mission whatever file it came from. Anything else is a MissionError with one line."""
+
+from __future__ import annotations
+
+import shapely
+
+from companion.frames import GeoPoint
+from companion.grid import Cell
+from companion.mission.mission import Area, HomePoint, Mission, MissionError, Place
+
+MAX_GRID_FIELDS = 4_000_000
+"""Larger grids are refused: the companion keeps several rasters of that size."""
+
+
+def check_mission(mission: Mission) -> None:
+    """Raise MissionError (file, place, reason) unless the mission can be driven, as far as the file alone tells."""
+    try:
+        _check_grid(mission)
+        for kind, areas in _areas(mission).items():
+            for number, area in enumerate(areas, start=1):
+                _check_area(mission, f"{kind} {number}", area)
+        for number, target in enumerate(mission.targets, start=1):
+            _check_place(mission, f"target {number} '{target.name}'", target.place)
+        if not mission.targets:
+            raise MissionError("target: there is none; a mission needs at least one place to go to")
+        _check_files(mission)
+    except MissionError as error:
+        raise MissionError(f"{mission.source or mission.name}: {error}") from None
+
+
+def _areas(mission: Mission) -> dict[str, tuple[Area, ...]]:
+    corridors = tuple(weighted.area for weighted in mission.weighted)
+    return {"keep_out": mission.keep_out, "keep_in": mission.keep_in, "corridor": corridors}
+
+
+def _check_grid(mission: Mission) -> None:
+    grid = mission.grid
+    if grid.size is None:
+        return
+    if grid.home is None:
+        raise MissionError("grid.home: missing; with a size, the field whose middle is home must be given")
+    if grid.size[0] * grid.size[1] > MAX_GRID_FIELDS:
+        raise MissionError(f"grid.size: {grid.size[0]} x {grid.size[1]} is more than {MAX_GRID_FIELDS} fields")
+    if grid.margin_m is not None:
+        raise MissionError("grid.margin_m: goes with a grid laid round the targets, not with a size")
+    _check_place(mission, "grid.home", grid.home)
+
+
+def _check_place(mission: Mission, what: str, place: Place) -> None:
+    """A field needs a fixed grid to lie in; metres from home are checked against it as soon as it is fixed."""
+    grid = mission.grid
+    if isinstance(place, Cell):
+        if grid.size is None or grid.home is None:
+            raise MissionError(f"{what}: a field needs [grid] size and home; or give metres or degrees instead")
+        cell = place
+    elif isinstance(place, HomePoint) and grid.size is not None and grid.home is not None:
+        # Home is the middle of its field.
+        x = grid.home.x + 0.5 + place.east_m / grid.resolution_m
+        y = grid.home.y + 0.5 + place.north_m / grid.resolution_m
+        cell = Cell(int(x // 1), int(y // 1))
+    else:
+        return
+    if not (0 <= cell.x < grid.size[0] and 0 <= cell.y < grid.size[1]):
+        raise MissionError(
+            f"{what}: field {cell.x}, {cell.y} is outside the grid of {grid.size[0]} x {grid.size[1]} fields"
+        )
+
+
+def _check_area(mission: Mission, what: str, area: Area) -> None:
+    """Areas may reach beyond the grid, but they need a shape."""
+    if any(isinstance(place, Cell) for place in area.places) and mission.grid.size is None:
+        raise MissionError(f"{what}: fields need [grid] size and home; or give metres or degrees instead")
+    if area.radius_m is not None:
+        return
+    points = [_plane(place, area.places[0]) for place in area.places]
+    if area.width_m is not None:
+        if len(set(points)) < 2:
+            raise MissionError(f"{what}: a line needs at least two places")
+        return
+    if len(points) < 3:
+        raise MissionError(f"{what}: a polygon needs at least three corners, not {len(points)}")
+    polygon = shapely.Polygon(points)
+    if not polygon.is_valid or polygon.area == 0.0:
+        raise MissionError(f"{what}: not a simple polygon: {_why(polygon)}")
+
+
+def _why(polygon: shapely.Polygon) -> str:
+    reason = str(shapely.is_valid_reason(polygon))
+    if polygon.area == 0.0:
+        return "it encloses nothing"
+    return "its sides cross or touch" if "intersection" in reason.lower() else reason.lower()
+
+
+def _plane(place: Place, first: Place) -> tuple[float, float]:
+    """Any flat coordinates will do to see whether sides cross; longitudes are taken the short way round from the first."""
+    if isinstance(place, GeoPoint):
+        west_deg = first.lon_deg if isinstance(first, GeoPoint) else 0.0
+        return ((place.lon_deg - west_deg + 180.0) % 360.0 - 180.0, place.lat_deg)
+    if isinstance(place, HomePoint):
+        return (place.east_m, place.north_m)
+    return (float(place.x), float(place.y))
+
+
+def _check_files(mission: Mission) -> None:
+    sitl = mission.sitl
+    for what, path in (("prior_map", mission.prior_map), ("sitl.world", sitl.world if sitl else None)):
+        if path is not None and not path.is_file():
+            raise MissionError(f"{what}: no such file: {path}")
+    if sitl is not None and sitl.start is not None and sitl.world is None:
+        _check_place(mission, "sitl.start", sitl.start)

@@ -1,0 +1,269 @@
+"""What MAVLink mission items mean to a rover: the part that ``.plan`` and ``.waypoints`` files share.
+
+The items are walked as ArduPilot walks them, jumps included, and every one becomes a target, a fence, a note or an
+error with its index and name: nothing is dropped in silence.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from companion.frames import GeoPoint
+from companion.mission import mav_commands as mav
+from companion.mission.mission import Area, HomePoint, Mission, Place, Target, open_ring
+
+MAX_ITEMS = 100_000
+MAX_TARGETS = 10_000
+
+
+class Fault(Exception):
+    """Something wrong inside a file: place and reason. Whoever knows the file makes it a MissionError."""
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One mission item. ``index`` is what jumps refer to; ``params`` are p1 to p4, nan where the file has none."""
+
+    index: int
+    command: int
+    frame: int
+    params: tuple[float, float, float, float]
+    lat_deg: float
+    lon_deg: float
+    autocontinue: bool = True
+
+    @property
+    def label(self) -> str:
+        """How messages call it."""
+        return f"item {self.index}: {mav.command_name(self.command)}"
+
+    def param(self, number: int) -> float:
+        """p1 to p4; one that is not given counts as 0, its default in every command that is understood here."""
+        value = self.params[number - 1]
+        return 0.0 if math.isnan(value) else value
+
+
+@dataclass
+class _Walk:
+    """What has been understood so far."""
+
+    targets: list[Target] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    speed_m_s: float | None = None
+    ended_by: Item | None = None
+    visits: Counter[int] = field(default_factory=Counter)
+    jumps: Counter[int] = field(default_factory=Counter)
+
+    def note(self, text: str) -> None:
+        if text not in self.notes:
+            self.notes.append(text)
+
+
+@dataclass
+class _Fences:
+    keep_in: list[Area] = field(default_factory=list)
+    keep_out: list[Area] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def understand(items: Sequence[Item], path: Path, name: str, planned_home: GeoPoint | None) -> Mission:
+    """The mission that the items are. Raises Fault with the item's index and its command."""
+    fences = _fences([item for item in items if _is_fence(item)])
+    walk = _walked([item for item in items if not _is_fence(item)])
+    return Mission(
+        name=name,
+        targets=tuple(walk.targets),
+        keep_out=tuple(fences.keep_out),
+        keep_in=tuple(fences.keep_in),
+        planned_home=planned_home,
+        source=path,
+        notes=(*walk.notes, *fences.notes),
+    )
+
+
+def geo_point(lat_deg: float, lon_deg: float, what: str) -> GeoPoint:
+    """A checked place on the earth. Raises Fault."""
+    if not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):
+        raise Fault(f"{what}: latitude and longitude are missing")
+    if not (-90.0 <= lat_deg <= 90.0 and -180.0 <= lon_deg <= 180.0):
+        raise Fault(f"{what}: {lat_deg}, {lon_deg} is not a latitude and longitude")
+    return GeoPoint(lat_deg, lon_deg)
+
+
+def circle(centre: GeoPoint, radius_m: float, what: str) -> Area:
+    """A round fence. Raises Fault."""
+    if not (math.isfinite(radius_m) and radius_m > 0.0):
+        raise Fault(f"{what}: a radius of {radius_m} m encloses nothing")
+    return Area((centre,), radius_m=radius_m)
+
+
+# --- where to go -----------------------------------------------------------------------------------------------------
+
+
+def _walked(items: Sequence[Item]) -> _Walk:
+    walk = _Walk()
+    places = {item.index: i for i, item in enumerate(items)}
+    i = steps = 0
+    while i < len(items):
+        steps += 1
+        if steps > MAX_ITEMS or len(walk.targets) > MAX_TARGETS:
+            raise Fault(f"{items[i].label}: jumps make this mission longer than {MAX_TARGETS} targets")
+        item = items[i]
+        if item.command == mav.DO_JUMP:
+            i = _jumped(item, i, places, walk)
+            continue
+        if item.command in _TRAVEL:
+            _travel(item, walk)
+        elif item.command == mav.NAV_DELAY:
+            _delay(item, walk)
+        elif item.command == mav.DO_CHANGE_SPEED:
+            _change_speed(item, walk)
+        else:
+            raise Fault(f"{item.label}: not understood; a rover can do waypoints, holds, speeds, jumps and return")
+        i += 1
+    return walk
+
+
+_TRAVEL = (mav.NAV_WAYPOINT, mav.NAV_LOITER_UNLIM, mav.NAV_LOITER_TIME, mav.NAV_RETURN_TO_LAUNCH)
+
+
+def _travel(item: Item, walk: _Walk) -> None:
+    if walk.ended_by is not None:
+        raise Fault(f"{item.label}: can never begin, {walk.ended_by.label} never ends")
+    if item.command == mav.NAV_LOITER_UNLIM:
+        walk.ended_by = item
+        walk.note(f"{item.label}: stays there, the mission ends")
+    place = _place(item, walk)
+    if place is None:
+        return
+    walk.visits[item.index] += 1
+    turn = walk.visits[item.index]
+    name = "home" if item.command == mav.NAV_RETURN_TO_LAUNCH else f"waypoint {item.index}"
+    hold_s = item.param(1) if item.command in (mav.NAV_WAYPOINT, mav.NAV_LOITER_TIME) else 0.0
+    if not (math.isfinite(hold_s) and hold_s >= 0.0):
+        raise Fault(f"{item.label}: a hold of {hold_s} s")
+    walk.targets.append(
+        Target(name if turn == 1 else f"{name} pass {turn}", place, hold_s=hold_s, speed_m_s=walk.speed_m_s)
+    )
+    _note_unused(item, walk)
+
+
+def _place(item: Item, walk: _Walk) -> Place | None:
+    """Where an item leads; None is "where the rover is"."""
+    if item.command == mav.NAV_RETURN_TO_LAUNCH:
+        return HomePoint(0.0, 0.0)
+    if item.frame not in mav.GLOBAL_FRAMES:
+        frame = mav.FRAME_NAMES.get(item.frame, "unknown")
+        raise Fault(f"{item.label}: frame {item.frame} ({frame}) has no latitude and longitude")
+    if item.lat_deg == 0.0 and item.lon_deg == 0.0:
+        # ArduPilot takes 0, 0 as "here".
+        if item.command == mav.NAV_LOITER_UNLIM and walk.targets:
+            return None
+        raise Fault(f"{item.label}: has no place (latitude and longitude are 0)")
+    return geo_point(item.lat_deg, item.lon_deg, item.label)
+
+
+def _note_unused(item: Item, walk: _Walk) -> None:
+    """A rover that stands still has no use for radii and headings of items; people should know."""
+    names = {
+        mav.NAV_WAYPOINT: ((2, "acceptance radius"), (3, "pass-by radius"), (4, "heading")),
+        mav.NAV_LOITER_UNLIM: ((3, "circle radius"), (4, "heading")),
+        mav.NAV_LOITER_TIME: ((3, "circle radius"), (4, "exit rule")),
+    }.get(item.command, ())
+    for number, name in names:
+        if item.param(number) != 0.0:
+            walk.note(f"{item.label}: {name} {item.param(number):g} is not used")
+    if not item.autocontinue:
+        walk.note(f"{item.label}: the rover goes on after it, though autocontinue is off")
+
+
+def _delay(item: Item, walk: _Walk) -> None:
+    """NAV_DELAY holds the rover where it is: longer at the last target."""
+    delay_s = item.param(1)
+    if not walk.targets:
+        raise Fault(f"{item.label}: a delay before the first waypoint is not understood")
+    if not (math.isfinite(delay_s) and delay_s >= 0.0):
+        raise Fault(f"{item.label}: waiting for a time of day is not understood")
+    walk.targets[-1] = replace(walk.targets[-1], hold_s=walk.targets[-1].hold_s + delay_s)
+
+
+def _change_speed(item: Item, walk: _Walk) -> None:
+    """p1 kind (air and ground speed are one for a rover), p2 m/s (-1 as before, -2 the default), p3 throttle."""
+    if item.param(1) not in (0.0, 1.0):
+        raise Fault(f"{item.label}: speed of kind {item.param(1):g} is not for a rover")
+    speed_m_s = item.param(2)
+    if speed_m_s == -2.0:
+        walk.speed_m_s = None
+    elif speed_m_s != -1.0:
+        if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
+            raise Fault(f"{item.label}: a speed of {speed_m_s:g} m/s")
+        walk.speed_m_s = speed_m_s
+    if item.param(3) not in (0.0, -1.0):
+        walk.note(f"{item.label}: throttle {item.param(3):g} is not used")
+
+
+def _jumped(item: Item, here: int, places: dict[int, int], walk: _Walk) -> int:
+    """The next position. As in ArduPilot each jump item counts its own jumps, once for the whole mission."""
+    to, repeats = item.param(1), item.param(2)
+    if repeats == -1.0:
+        raise Fault(f"{item.label}: repeats for ever (-1); give a number of repeats")
+    if not (math.isfinite(repeats) and repeats >= 0.0 and repeats == int(repeats)):
+        raise Fault(f"{item.label}: {repeats:g} repeats")
+    if not math.isfinite(to) or to != int(to) or int(to) not in places or int(to) == item.index:
+        raise Fault(f"{item.label}: there is no item {to:g} to jump to")
+    if walk.jumps[item.index] >= repeats:
+        return here + 1
+    walk.jumps[item.index] += 1
+    walk.note(f"{item.label}: to item {int(to)}, {int(repeats)} times, written out")
+    return places[int(to)]
+
+
+# --- fences ----------------------------------------------------------------------------------------------------------
+
+
+def _is_fence(item: Item) -> bool:
+    return mav.FENCE_RETURN_POINT <= item.command <= mav.RALLY_POINT
+
+
+def _fences(items: Sequence[Item]) -> _Fences:
+    fences = _Fences()
+    i = 0
+    while i < len(items):
+        item = items[i]
+        place = geo_point(item.lat_deg, item.lon_deg, item.label)
+        if item.command in (mav.FENCE_POLYGON_IN, mav.FENCE_POLYGON_OUT):
+            corners = _corners(items, i)
+            area = Area(open_ring(tuple(corners)))
+            (fences.keep_in if item.command == mav.FENCE_POLYGON_IN else fences.keep_out).append(area)
+            i += len(corners)
+            continue
+        if item.command in (mav.FENCE_CIRCLE_IN, mav.FENCE_CIRCLE_OUT):
+            area = circle(place, item.param(1), item.label)
+            (fences.keep_in if item.command == mav.FENCE_CIRCLE_IN else fences.keep_out).append(area)
+        elif item.command == mav.FENCE_RETURN_POINT:
+            fences.notes.append(f"{item.label}: the rover stays inside its fences and needs no return point")
+        elif item.command == mav.RALLY_POINT:
+            fences.notes.append(f"{item.label}: rally point {place.lat_deg:.7f}, {place.lon_deg:.7f} is not used")
+        else:
+            raise Fault(f"{item.label}: not understood")
+        i += 1
+    return fences
+
+
+def _corners(items: Sequence[Item], first: int) -> list[GeoPoint]:
+    """The corners of one polygon: every vertex item says how many there are, and they follow one another."""
+    item = items[first]
+    count = item.param(1)
+    if not math.isfinite(count) or count != int(count) or not 3 <= count <= MAX_ITEMS:
+        raise Fault(f"{item.label}: a polygon of {count:g} corners")
+    corners = items[first : first + int(count)]
+    for corner in corners:
+        if corner.command != item.command or corner.param(1) != count:
+            raise Fault(f"{corner.label}: the polygon from item {item.index} on should have {count:g} corners")
+    if len(corners) < count:
+        raise Fault(f"{item.label}: the polygon has {len(corners)} of its {count:g} corners")
+    return [geo_point(corner.lat_deg, corner.lon_deg, corner.label) for corner in corners]

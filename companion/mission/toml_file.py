@@ -1,0 +1,275 @@
+"""Our own mission files: TOML, every key checked, units in the names.
+
+Places are fields ``[x, y]`` (x east, y north, from the south-west corner), metres north and east of home, or latitude
+and longitude in degrees. Lists of places say which by their name: ``polygon_fields``, ``polygon_m``, ``polygon_deg``.
+"""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal, TypeVar
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from companion.frames import GeoPoint
+from companion.grid import Cell
+from companion.mission.check import check_mission
+from companion.mission.mission import (
+    Area,
+    GridSpec,
+    HomePoint,
+    Mission,
+    MissionError,
+    OnBlocked,
+    Place,
+    RoverSpec,
+    SitlSpec,
+    Target,
+    WeightedArea,
+    open_ring,
+)
+from companion.mission.qgc import load_qgc
+from companion.settings import describe_first
+
+MAX_BYTES = 5_000_000
+
+T = TypeVar("T")
+
+Pair = Annotated[tuple[float, float], Field(strict=False)]
+Field2 = Annotated[tuple[int, int], Field(strict=False)]
+Positive = Annotated[float, Field(gt=0.0)]
+
+
+class Table(BaseModel):
+    """A TOML table: unknown keys, wrong types, inf and nan are refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+
+class PlaceTable(Table):
+    """One place: a field, metres from home, or latitude and longitude."""
+
+    field: Field2 | None = None
+    north_m: float | None = None
+    east_m: float | None = None
+    lat_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None
+    lon_deg: Annotated[float, Field(ge=-180.0, le=180.0)] | None = None
+
+    def place(self) -> Place | None:
+        """The place, or None if none is given. Raises ValueError when it is ambiguous or half given."""
+        places: list[Place] = []
+        if self.field is not None:
+            places.append(Cell(*self.field))
+        if self.north_m is not None or self.east_m is not None:
+            if self.north_m is None or self.east_m is None:
+                raise ValueError("north_m and east_m are both needed")
+            places.append(HomePoint(self.north_m, self.east_m))
+        if self.lat_deg is not None or self.lon_deg is not None:
+            if self.lat_deg is None or self.lon_deg is None:
+                raise ValueError("lat_deg and lon_deg are both needed")
+            places.append(GeoPoint(self.lat_deg, self.lon_deg))
+        if len(places) > 1:
+            raise ValueError("a place is given twice; use one of field, north_m and east_m, lat_deg and lon_deg")
+        return places[0] if places else None
+
+
+class TargetTable(PlaceTable):
+    """``[[target]]``."""
+
+    name: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    hold_s: Annotated[float, Field(ge=0.0)] = 0.0
+    on_blocked: Literal["skip", "wait", "return", "hold"] = "skip"
+    speed_m_s: Positive | None = None
+
+    def target(self, number: int) -> Target:
+        """The target; without a name it is called after its number, counted from 1."""
+        place = self.place()
+        if place is None:
+            raise ValueError("has no place; use one of field, north_m and east_m, lat_deg and lon_deg")
+        name = self.name or f"target {number}"
+        return Target(name, place, self.hold_s, OnBlocked(self.on_blocked), self.speed_m_s)
+
+
+class AreaTable(PlaceTable):
+    """``[[keep_out]]`` and ``[[keep_in]]``: a polygon, or a circle round a place."""
+
+    polygon_fields: list[Field2] | None = None
+    polygon_m: list[Pair] | None = None
+    polygon_deg: list[Pair] | None = None
+    radius_m: Positive | None = None
+
+    def area(self) -> Area:
+        """The area. Raises ValueError unless it is exactly one polygon or one circle."""
+        shapes = [*self.shapes()]
+        middle = self.place()
+        if (middle is None) != (self.radius_m is None):
+            raise ValueError("a circle needs a place (field, north_m and east_m, or lat_deg and lon_deg) and radius_m")
+        if middle is not None:
+            shapes.append(Area((middle,), radius_m=self.radius_m))
+        if len(shapes) != 1:
+            raise ValueError(f"exactly one shape is needed, not {len(shapes)}")
+        return shapes[0]
+
+    def shapes(self) -> list[Area]:
+        """The shapes given as lists of places."""
+        lists = (self.polygon_fields, self.polygon_m, self.polygon_deg)
+        return [Area(open_ring(places)) for places in _places(*lists)]
+
+
+class CorridorTable(AreaTable):
+    """``[[corridor]]``: ground with a weight of its own; also a line with a width."""
+
+    weight: Annotated[float, Field(ge=0.0, lt=1.0)]
+    line_fields: list[Field2] | None = None
+    line_m: list[Pair] | None = None
+    line_deg: list[Pair] | None = None
+    width_m: Positive | None = None
+
+    def shapes(self) -> list[Area]:
+        """The shapes given as lists of places."""
+        lines = _places(self.line_fields, self.line_m, self.line_deg)
+        if bool(lines) != (self.width_m is not None):
+            raise ValueError("a line needs line_fields, line_m or line_deg, and width_m")
+        return [*super().shapes(), *(Area(line, width_m=self.width_m) for line in lines)]
+
+
+class GridTable(Table):
+    """``[grid]``."""
+
+    resolution_m: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
+    size: Annotated[tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]], Field(strict=False)] | None = None
+    home: Field2 | None = None
+    margin_m: Annotated[float, Field(ge=0.0)] | None = None
+
+
+class RoverTable(Table):
+    """``[rover]``."""
+
+    radius_m: Annotated[float, Field(gt=0.0, le=20.0)] = RoverSpec().radius_m
+    cruise_speed_m_s: Annotated[float, Field(gt=0.0, le=50.0)] = RoverSpec().cruise_speed_m_s
+
+
+class GeoTable(Table):
+    """Latitude and longitude."""
+
+    lat_deg: Annotated[float, Field(ge=-90.0, le=90.0)]
+    lon_deg: Annotated[float, Field(ge=-180.0, le=180.0)]
+
+
+class SitlTable(Table):
+    """``[sitl]``: a real rover ignores it."""
+
+    world: Annotated[str, Field(min_length=1)] | None = None
+    resolution_m: Positive | None = None
+    start: Field2 | None = None
+    heading_deg: float = SitlSpec().heading_deg
+    sensors: Annotated[str, Field(min_length=1)] = SitlSpec().sensors
+    home: GeoTable | None = None
+
+
+class MissionTable(Table):
+    """The whole file."""
+
+    name: Annotated[str, Field(min_length=1, max_length=100)] | None = None
+    prior_map: Annotated[str, Field(min_length=1)] | None = None
+    fence: Annotated[str, Field(min_length=1)] | None = None
+    grid: GridTable = GridTable()
+    rover: RoverTable = RoverTable()
+    target: list[TargetTable] = []
+    keep_out: list[AreaTable] = []
+    keep_in: list[AreaTable] = []
+    corridor: list[CorridorTable] = []
+    sitl: SitlTable | None = None
+
+
+def load(path: Path) -> Mission:
+    """Read one of our mission files. Raises MissionError: one line with file, place and reason."""
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise MissionError(f"{path}: larger than {MAX_BYTES} bytes")
+        table = MissionTable.model_validate(tomllib.loads(data.decode("utf-8")))
+    except OSError as error:
+        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise MissionError(f"{path}: not UTF-8 text (byte {error.start})") from error
+    except tomllib.TOMLDecodeError as error:
+        raise MissionError(f"{path}: not valid TOML: {error}") from error
+    except RecursionError as error:
+        raise MissionError(f"{path}: not valid TOML: nested too deeply") from error
+    except ValidationError as error:
+        raise MissionError(f"{path}: {_counted(describe_first(error, MissionTable))}") from error
+    mission = _mission(table, path)
+    check_mission(mission)
+    return mission
+
+
+def _mission(table: MissionTable, path: Path) -> Mission:
+    folder = path.parent
+    fences = load_qgc(folder / table.fence) if table.fence else None
+    keep_out = tuple(_named(path, "keep_out", i, item.area) for i, item in enumerate(table.keep_out, 1))
+    keep_in = tuple(_named(path, "keep_in", i, item.area) for i, item in enumerate(table.keep_in, 1))
+    return Mission(
+        name=table.name or path.stem,
+        targets=tuple(_named(path, "target", i, partial(item.target, i)) for i, item in enumerate(table.target, 1)),
+        grid=GridSpec(
+            table.grid.resolution_m,
+            table.grid.size,
+            None if table.grid.home is None else Cell(*table.grid.home),
+            table.grid.margin_m,
+        ),
+        rover=RoverSpec(table.rover.radius_m, table.rover.cruise_speed_m_s),
+        keep_out=keep_out + (fences.keep_out if fences else ()),
+        keep_in=keep_in + (fences.keep_in if fences else ()),
+        weighted=tuple(
+            WeightedArea(_named(path, "corridor", i, item.area), item.weight)
+            for i, item in enumerate(table.corridor, 1)
+        ),
+        prior_map=folder / table.prior_map if table.prior_map else None,
+        sitl=None if table.sitl is None else _sitl(table.sitl, folder),
+        source=path,
+        notes=(f"fences taken from {table.fence}; its targets, if any, are not used",) if fences else (),
+    )
+
+
+def _sitl(table: SitlTable, folder: Path) -> SitlSpec:
+    return SitlSpec(
+        world=folder / table.world if table.world else None,
+        resolution_m=table.resolution_m,
+        start=None if table.start is None else Cell(*table.start),
+        heading_deg=table.heading_deg,
+        sensors=table.sensors,
+        home=SitlSpec().home if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
+    )
+
+
+def _places(
+    fields: list[Field2] | None, metres: list[Pair] | None, degrees: list[Pair] | None
+) -> list[tuple[Place, ...]]:
+    """The lists of places that are given, each in its own kind."""
+    lists: list[tuple[Place, ...]] = []
+    if fields is not None:
+        lists.append(tuple(Cell(*pair) for pair in fields))
+    if metres is not None:
+        lists.append(tuple(HomePoint(*pair) for pair in metres))
+    if degrees is not None:
+        lists.append(tuple(GeoPoint(*pair) for pair in degrees))
+    return lists
+
+
+def _named(path: Path, kind: str, number: int, make: Callable[[], T]) -> T:
+    try:
+        return make()
+    except ValueError as error:
+        raise MissionError(f"{path}: {kind} {number}: {error}") from None
+
+
+def _counted(fault: str) -> str:
+    """People count tables from 1: ``target.0.hold_s: ...`` becomes ``target 1.hold_s: ...``."""
+    place, colon, reason = fault.partition(": ")
+    return re.sub(r"\.(\d+)", lambda found: f" {int(found[1]) + 1}", place) + colon + reason

@@ -1,0 +1,264 @@
+"""ArduRover's face: takes in packets, keeps to its start-up timetable, sends what is due."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl.autopilot_commands import answer
+from sitl.autopilot_link import AUTOPILOT, Channel, new_channel
+from sitl.autopilot_modes import INFO, WARNING, run_failsafes, set_mode
+from sitl.autopilot_params import REAL32
+from sitl.autopilot_streams import heartbeat, send_due, set_group, start_streams
+from sitl.autopilot_targets import GLOBAL_FRAMES, attitude_target, global_target, go_to, local_target
+from sitl.autopilot_vehicle import HOME_S, ORIGIN_S, POSITION_S, Mode, Vehicle
+from sitl.control import LOOP_HZ
+
+PARAMETERS_PER_LOOP = 5
+MISSION_OK, MISSION_ERROR, MISSION_FRAME, MISSION_UNSUPPORTED = 0, 1, 2, 3
+
+TIMETABLE: tuple[tuple[float, tuple[str, ...]], ...] = (
+    (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "ArduPilot Ready")),
+    (4.0, ("EKF3 IMU0 initialised",)),
+    (5.0, ("EKF3 IMU0 tilt alignment complete",)),
+    (6.0, ("EKF3 IMU0 MAG0 initial yaw alignment complete",)),
+    (9.0, ("GPS 1: detected u-blox",)),
+    (HOME_S, ()),
+    (ORIGIN_S, ("EKF3 IMU0 origin set",)),
+    (POSITION_S, ("EKF3 IMU0 is using GPS", "AHRS: EKF3 active")),
+)
+"""What is said when, seconds since boot (measured)."""
+
+
+class Autopilot:
+    """Packets in, packets out, one main loop at a time; motion itself is in the vehicle's compiled records."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """An autopilot that has just been booted."""
+        self.vehicle = vehicle
+        self._opened = 0
+        self._next_event = 0
+        self._next_second_us = 0
+
+    def open_channel(self) -> Channel:
+        """A new connection; it is streamed to at once."""
+        channel = new_channel(self._opened, self.vehicle.system)
+        self._opened += 1
+        start_streams(channel, self.vehicle.time_us)
+        self.vehicle.channels[channel.number] = channel
+        return channel
+
+    def close_channel(self, channel: Channel) -> None:
+        """Forget a connection and who was heard there."""
+        self.vehicle.channels.pop(channel.number, None)
+        self.vehicle.router.forget(channel.number)
+
+    def receive(self, channel: Channel, data: bytes) -> None:
+        """Handle what arrived on a channel."""
+        for message in channel.parse(data):
+            self._route(channel, message)
+        self.vehicle.flush_texts()
+
+    def _route(self, channel: Channel, message: Any) -> None:
+        vehicle = self.vehicle
+        source = (message.get_srcSystem(), message.get_srcComponent())
+        channel.spoken = True
+        if source == (vehicle.system, AUTOPILOT):
+            return
+        vehicle.router.learn(*source, channel.number)
+        target_system = getattr(message, "target_system", 0)
+        target_component = getattr(message, "target_component", 0)
+        for number in sorted(
+            vehicle.router.forward_to(vehicle.system, target_system, target_component, channel.number)
+        ):
+            vehicle.channels[number].outbox += message.get_msgbuf()
+        if vehicle.router.is_for_autopilot(vehicle.system, target_system, target_component, channel.number):
+            handler = HANDLERS.get(message.get_type())
+            if handler is not None:
+                handler(vehicle, channel, message)
+
+    def next_due_us(self) -> float:
+        """When something must be sent or said next."""
+        due_us = float(self._next_second_us)
+        if self._next_event < len(TIMETABLE):
+            due_us = min(due_us, TIMETABLE[self._next_event][0] * 1e6)
+        for channel in self.vehicle.channels.values():
+            if channel.requested or channel.parameter_queue:
+                return 0.0
+            if channel.due_us:
+                due_us = min(due_us, *channel.due_us.values())
+        return due_us
+
+    def run_due(self) -> None:
+        """Say and send what is due, tell of targets reached and of time-outs."""
+        vehicle = self.vehicle
+        self._report_motion()
+        self._follow_timetable()
+        if vehicle.time_us >= self._next_second_us:
+            self._next_second_us += 1_000_000
+            run_failsafes(vehicle)
+            for channel in vehicle.channels.values():
+                for message in heartbeat(vehicle):
+                    channel.send(message)
+        for channel in vehicle.channels.values():
+            send_due(vehicle, channel)
+            for name in channel.parameter_queue[:PARAMETERS_PER_LOOP]:
+                channel.send(parameter_message(vehicle, name, in_list=True))
+            del channel.parameter_queue[:PARAMETERS_PER_LOOP]
+        vehicle.flush_texts()
+
+    def _report_motion(self) -> None:
+        vehicle, control = self.vehicle, self.vehicle.control
+        if control[0]["arrived"]:
+            control["arrived"] = 0
+            if vehicle.mode == Mode.GUIDED:
+                for channel in vehicle.channels.values():
+                    channel.send(mavlink.MAVLink_mission_item_reached_message(0))
+        if control[0]["timed_out"]:
+            control["timed_out"] = 0
+            vehicle.say(WARNING, f"target not received last {vehicle.parameters['GUID_TIMEOUT']:.0f}secs, stopping")
+
+    def _follow_timetable(self) -> None:
+        vehicle = self.vehicle
+        while self._next_event < len(TIMETABLE) and vehicle.time_s >= TIMETABLE[self._next_event][0]:
+            moment_s, texts = TIMETABLE[self._next_event]
+            self._next_event += 1
+            for text in texts:
+                vehicle.say(INFO, text)
+            if moment_s == HOME_S:
+                for channel in vehicle.channels.values():
+                    channel.requested.append(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+
+
+def parameter_message(vehicle: Vehicle, name: str, in_list: bool = False) -> Any:
+    """PARAM_VALUE of a known parameter; the index is only told in a list."""
+    table = vehicle.parameters
+    index = table.index_of(name) if in_list else 65535
+    return mavlink.MAVLink_param_value_message(name.encode(), table[name], table.type_of(name), len(table), index)
+
+
+def _text_of(name: Any) -> str:
+    return name if isinstance(name, str) else bytes(name).split(b"\0")[0].decode("ascii", "replace")
+
+
+def _read_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    name = _text_of(message.param_id) if message.param_index < 0 else vehicle.parameters.name_of(message.param_index)
+    if name is not None and name in vehicle.parameters:
+        channel.send(parameter_message(vehicle, name, in_list=message.param_index >= 0))
+
+
+def _list_parameters(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    channel.parameter_queue[:] = list(vehicle.parameters)
+
+
+def _set_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    name = _text_of(message.param_id)
+    if name not in vehicle.parameters:
+        return
+    vehicle.parameters.set(name, message.param_value)
+    vehicle.retune()
+    for listener in vehicle.channels.values():
+        listener.send(parameter_message(vehicle, name))
+
+
+def _mission_ack(channel: Channel, message: Any, result: int) -> None:
+    channel.send(
+        mavlink.MAVLink_mission_ack_message(
+            message.get_srcSystem(), message.get_srcComponent(), result, getattr(message, "mission_type", 0)
+        )
+    )
+
+
+def _mission_item(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_ITEM(_INT) with current = 2 is a guided target."""
+    if message.current != 2:
+        _mission_ack(channel, message, MISSION_ERROR)
+        return
+    if message.command != mavlink.MAV_CMD_NAV_WAYPOINT:
+        _mission_ack(channel, message, MISSION_UNSUPPORTED)
+        return
+    if message.frame not in GLOBAL_FRAMES:
+        _mission_ack(channel, message, MISSION_FRAME)
+        return
+    scale = 1 if message.get_type() == "MISSION_ITEM_INT" else 1e7
+    fits = abs(message.x * scale) <= 9e8 and abs(message.y * scale) <= 18e8
+    if vehicle.mode != Mode.GUIDED or not vehicle.has_origin or not fits:
+        _mission_ack(channel, message, MISSION_ERROR)
+        return
+    go_to(vehicle, (round(message.x * scale), round(message.y * scale)))
+    _mission_ack(channel, message, MISSION_OK)
+
+
+def _mission_count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """Uploads are refused: this rover drives no missions of its own."""
+    _mission_ack(channel, message, MISSION_UNSUPPORTED)
+
+
+def _mission_list(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    channel.send(
+        mavlink.MAVLink_mission_count_message(
+            message.get_srcSystem(), message.get_srcComponent(), 0, getattr(message, "mission_type", 0)
+        )
+    )
+
+
+def _mission_clear(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    _mission_ack(channel, message, MISSION_OK)
+
+
+def _old_set_mode(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    if message.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
+        set_mode(vehicle, message.custom_mode)
+
+
+def _heartbeat(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    if message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"]):
+        vehicle.clocks.ground_station_s = vehicle.time_s
+
+
+def _data_stream(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    rate_hz = message.req_message_rate if message.start_stop else 0
+    set_group(channel, message.req_stream_id, rate_hz, vehicle.time_us)
+
+
+def _timesync(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    if message.tc1 == 0:
+        channel.send(mavlink.MAVLink_timesync_message(vehicle.time_us * 1000, message.ts1))
+
+
+def _local(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    local_target(vehicle, message)
+
+
+def _global(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    global_target(vehicle, message)
+
+
+def _attitude(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    attitude_target(vehicle, message)
+
+
+HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
+    "COMMAND_LONG": answer,
+    "COMMAND_INT": answer,
+    "HEARTBEAT": _heartbeat,
+    "MISSION_CLEAR_ALL": _mission_clear,
+    "MISSION_COUNT": _mission_count,
+    "MISSION_ITEM": _mission_item,
+    "MISSION_ITEM_INT": _mission_item,
+    "MISSION_REQUEST_LIST": _mission_list,
+    "PARAM_REQUEST_LIST": _list_parameters,
+    "PARAM_REQUEST_READ": _read_parameter,
+    "PARAM_SET": _set_parameter,
+    "REQUEST_DATA_STREAM": _data_stream,
+    "SET_ATTITUDE_TARGET": _attitude,
+    "SET_MODE": _old_set_mode,
+    "SET_POSITION_TARGET_GLOBAL_INT": _global,
+    "SET_POSITION_TARGET_LOCAL_NED": _local,
+    "TIMESYNC": _timesync,
+}
+"""Everything else is taken in and ignored."""
+
+__all__ = ["LOOP_HZ", "REAL32", "Autopilot"]

@@ -1,0 +1,48 @@
+"""The scanner: a component of its own (196) whose OBSTACLE_DISTANCE the autopilot's router forwards to every link."""
+
+from __future__ import annotations
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl.autopilot_link import new_codec
+from sitl.sensors import Lidar, RangeSensing
+
+OBSTACLE_AVOIDANCE = 196
+HEARTBEAT_US = 1_000_000
+
+
+class LidarComponent:
+    """Packs scans and heartbeats at the scanner's rate."""
+
+    def __init__(self, lidar: Lidar, sensing: RangeSensing, system: int) -> None:
+        """``sensing`` measures, ``system`` is the vehicle's system id."""
+        self._lidar = lidar
+        self._sensing = sensing
+        self._codec = new_codec(OBSTACLE_AVOIDANCE, system)
+        self._interval_us = 1e6 / lidar.rate_hz
+        self._scan_us = self._interval_us
+        self._heartbeat_us = 0.0
+
+    def next_due_us(self) -> float:
+        """Time of the next packet."""
+        return min(self._scan_us, self._heartbeat_us)
+
+    def packets(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> bytes:
+        """What the scanner sends at this moment; empty when nothing is due."""
+        data = b""
+        if time_us >= self._heartbeat_us:
+            self._heartbeat_us += HEARTBEAT_US
+            data += mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3).pack(self._codec)
+        if time_us >= self._scan_us:
+            self._scan_us = max(self._scan_us + self._interval_us, float(time_us - HEARTBEAT_US))
+            data += self._scan(time_us, north_m, east_m, heading_rad)
+        return data
+
+    def _scan(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> bytes:
+        lidar = self._lidar
+        cells = self._sensing.scan_cm(north_m, east_m, heading_rad)
+        message = mavlink.MAVLink_obstacle_distance_message(
+            time_us, 0, cells, round(lidar.increment_deg), round(lidar.min_m * 100), round(lidar.max_m * 100),
+            lidar.increment_deg, lidar.offset_deg, 12,
+        )  # fmt: skip
+        return bytes(message.pack(self._codec))

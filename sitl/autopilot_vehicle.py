@@ -1,0 +1,196 @@
+"""The vehicle's state that all parts of the autopilot share: records of the compiled loop, mode, position, who listens."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl import geodesy
+from sitl.autopilot_link import Channel, Router
+from sitl.autopilot_params import Parameters
+from sitl.control import LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
+from sitl.sensors import RangeSensing
+
+ALTITUDE_M = 120.0
+"""Height of the ground everywhere, above sea level."""
+
+STREAMS_S = 3.0
+EKF_SEEN_S = 4.0
+ATTITUDE_S = 7.0
+HOME_S = 10.0
+LOCAL_POSITION_S = 11.0
+ORIGIN_S = 19.0
+PREARM_S = 24.0
+POSITION_S = 42.0
+ARMABLE_S = 43.0
+"""The firmware's start-up, seconds since boot (measured)."""
+
+EKF_UNINITIALISED, EKF_CONSTANT_POSITION, EKF_ABSOLUTE = 1024, 167, 831
+"""EKF_STATUS_REPORT flags: nothing yet; attitude and velocity but a constant position; everything."""
+
+
+class Mode(IntEnum):
+    """ArduRover's flight modes."""
+
+    MANUAL = 0
+    ACRO = 1
+    STEERING = 3
+    HOLD = 4
+    LOITER = 5
+    FOLLOW = 6
+    SIMPLE = 7
+    DOCK = 8
+    CIRCLE = 9
+    AUTO = 10
+    RTL = 11
+    SMART_RTL = 12
+    GUIDED = 15
+    INITIALISING = 16
+
+
+AUTOPILOT_MODES = {Mode.LOITER, Mode.CIRCLE, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED}
+"""Modes that drive by themselves and need a position."""
+
+
+@dataclass
+class Clocks:
+    """Times the autopilot remembers, seconds since boot."""
+
+    ground_station_s: float | None = None
+    prearm_text_s: float = 0.0
+    armed_s: float | None = None
+
+
+class Vehicle:
+    """State of the simulated ArduRover since it was booted."""
+
+    def __init__(
+        self,
+        rover: Record,
+        origin: tuple[int, int],
+        origin_m: tuple[float, float],
+        sensing: RangeSensing,
+        parameters: Mapping[str, float],
+    ) -> None:
+        """``origin``: where it boots, 1e-7 degree; ``origin_m``: the same place in the world frame."""
+        self.rover = rover
+        self.sensing = sensing
+        self.parameters = Parameters(parameters)
+        self.estimate: Record = new_estimate()
+        self.control: Record = new_control()
+        self.tuning: Record = new_tuning(self.parameters.as_dict())
+        self.origin = origin
+        self.origin_m = np.array(origin_m)
+        self.home = origin
+        self.mode = Mode.MANUAL
+        self.armed = False
+        self.system = int(self.parameters["MAV_SYSID"])
+        self.channels: dict[int, Channel] = {}
+        self.router = Router()
+        self.clocks = Clocks()
+        self.texts: list[tuple[int, str]] = []
+        self.rebooting = False
+        self.destination: tuple[int, int] = origin
+        self.beams_cm: list[int] = []
+
+    @property
+    def time_us(self) -> int:
+        """Microseconds since boot."""
+        return max(int(self.control[0]["tick"]), 0) * (1_000_000 // LOOP_HZ)
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since boot."""
+        return self.time_us * 1e-6
+
+    @property
+    def has_home(self) -> bool:
+        """GPS fix and home are there."""
+        return self.time_s >= HOME_S
+
+    @property
+    def has_origin(self) -> bool:
+        """The EKF has an origin."""
+        return self.time_s >= ORIGIN_S
+
+    @property
+    def has_position(self) -> bool:
+        """The EKF has an absolute position."""
+        return self.time_s >= POSITION_S
+
+    @property
+    def ekf_flags(self) -> int:
+        """EKF_STATUS_REPORT's flags at this moment."""
+        if self.has_position:
+            return EKF_ABSOLUTE
+        if self.time_s >= ATTITUDE_S:
+            return EKF_CONSTANT_POSITION
+        return 0 if self.time_s >= ATTITUDE_S - 1.0 else EKF_UNINITIALISED
+
+    @property
+    def has_target(self) -> bool:
+        """A guided position target is being followed or was reached."""
+        return self.mode == Mode.GUIDED and int(self.control[0]["task"]) == WAYPOINT
+
+    def position_m(self) -> tuple[float, float]:
+        """Estimated metres north and east of the EKF origin; zeros before there is a position."""
+        if not self.has_position:
+            return 0.0, 0.0
+        believed = self.estimate[0]
+        return float(believed["north_m"]), float(believed["east_m"])
+
+    def velocity_m_s(self) -> tuple[float, float]:
+        """Estimated speed north and east; zeros before there is a position."""
+        if not self.has_position:
+            return 0.0, 0.0
+        believed = self.estimate[0]
+        return float(believed["vel_n"]), float(believed["vel_e"])
+
+    def place(self) -> tuple[int, int]:
+        """Estimated latitude and longitude, 1e-7 degree; zeros without a fix."""
+        if not self.has_home:
+            return 0, 0
+        return geodesy.moved(self.origin, *self.position_m())
+
+    def heading_rad(self) -> float:
+        """Estimated heading, -pi to pi."""
+        return float(self.estimate[0]["heading_rad"])
+
+    def heading_cdeg(self) -> int:
+        """Estimated heading in hundredths of a degree, 0 to 35999."""
+        return round(math.degrees(self.heading_rad()) * 100.0) % 36000
+
+    def say(self, severity: int, text: str) -> None:
+        """Queue a STATUSTEXT for every channel; it goes out after the answers of this moment."""
+        self.texts.append((severity, text))
+
+    def flush_texts(self) -> None:
+        """Send the queued texts, longer ones in chunks of 50 characters."""
+        for severity, text in self.texts:
+            for channel in self.channels.values():
+                for message in text_messages(channel, severity, text):
+                    channel.send(message)
+        self.texts.clear()
+
+    def retune(self) -> None:
+        """Take changed parameters over into the compiled controllers."""
+        fresh = new_tuning(self.parameters.as_dict())
+        self.tuning[:] = fresh
+
+
+def text_messages(channel: Channel, severity: int, text: str) -> list[Any]:
+    """A text as STATUSTEXT messages."""
+    if len(text) <= 50:
+        return [mavlink.MAVLink_statustext_message(severity, text.encode(), 0, 0)]
+    channel.text_id = channel.text_id % 65535 + 1
+    pieces = [text[start : start + 50] for start in range(0, len(text), 50)]
+    return [
+        mavlink.MAVLink_statustext_message(severity, piece.encode(), channel.text_id, number)
+        for number, piece in enumerate(pieces)
+    ]

@@ -1,0 +1,28 @@
+"""``rover-sitl``: puts the commands together."""
+
+from __future__ import annotations
+
+import typer
+
+from sitl.cli.serve import serve
+
+app = typer.Typer(
+    name="rover-sitl",
+    help="A light rover simulator that speaks ArduRover's MAVLink.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+@app.callback()
+def _commands() -> None:
+    """Keeps ``serve`` a named command, however many there are."""
+
+
+app.command()(serve)
+
+
+def main() -> None:
+    """Entry point of the ``rover-sitl`` script."""
+    app()

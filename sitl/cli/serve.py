@@ -1,0 +1,58 @@
+"""``rover-sitl serve``: the simulated rover on the network, as ArduPilot's own SITL would stand there."""
+
+from __future__ import annotations
+
+import signal
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from companion.clock import WallClock
+from companion.mapfiles import MapError
+from companion.mission.load import load_mission
+from companion.mission.mission import MissionError
+from sitl.scenario import ScenarioError, scenario_from_mission
+from sitl.server import Endpoint, ListenError, open_endpoint
+from sitl.server import serve as run_server
+
+DEFAULT_LISTEN = ["udpout:127.0.0.1:14550", "tcp:127.0.0.1:5760"]
+BAD_INPUT = 2
+
+
+def serve(
+    mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.")],
+    listen: Annotated[
+        list[str] | None,
+        typer.Option(help="tcp:HOST:PORT (listens), udpout:HOST:PORT, udpin:HOST:PORT; several times for several."),
+    ] = None,
+    speedup: Annotated[float, typer.Option(min=0.01, max=200.0, help="Times real time.")] = 1.0,
+    seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
+) -> None:
+    """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C."""
+    endpoints: list[Endpoint] = []
+    try:
+        simulator = scenario_from_mission(load_mission(mission_file)).simulator(seed)
+        # Compiles what is not compiled yet before anybody connects and time begins to count.
+        simulator.advance_to_s(0.02)
+        for url in listen or DEFAULT_LISTEN:
+            endpoints.append(open_endpoint(url, simulator))
+            typer.echo(f"listening on {url}" if not url.startswith("udpout") else f"sending to {url}")
+    except (MissionError, MapError, ScenarioError, ListenError) as error:
+        for endpoint in endpoints:
+            endpoint.close()
+        typer.echo(str(error), err=True)
+        raise typer.Exit(BAD_INPUT) from error
+    stop: list[int] = []
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        stop.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    try:
+        run_server(simulator, endpoints, WallClock().now_s, speedup, lambda: not stop)
+    finally:
+        for endpoint in endpoints:
+            endpoint.close()

@@ -1,0 +1,201 @@
+"""Bytes between a simulator and the network: UDP and TCP, clients that come and go, in real time or faster."""
+
+from __future__ import annotations
+
+import contextlib
+import select
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from sitl.simulator import SimLink, Simulator
+
+STEP_S = 0.02
+READ_BYTES = 65536
+BACKLOG_BYTES = 1_000_000
+"""A TCP client that does not read is dropped when so much is waiting for it."""
+LATE_S = 1.0
+"""When the machine cannot keep up, the clock is moved by what is later than this."""
+
+
+class ListenError(Exception):
+    """An address that cannot be used; the text is one line."""
+
+
+class Endpoint(Protocol):
+    """Something that exchanges bytes with the simulator."""
+
+    def sockets(self) -> list[socket.socket]:
+        """What to wait on for input."""
+        ...
+
+    def exchange(self, simulator: Simulator) -> None:
+        """Take in what arrived and send what is queued; never blocks."""
+        ...
+
+    def close(self) -> None:
+        """Let go of all sockets."""
+        ...
+
+
+def _address(url: str) -> tuple[str, str, int]:
+    kind, _, place = url.partition(":")
+    host, _, port = place.rpartition(":")
+    if kind not in ("tcp", "udpout", "udpin") or not host or not port.isdigit() or not 0 < int(port) < 65536:
+        raise ListenError(f"{url}: not an address; write tcp:HOST:PORT, udpout:HOST:PORT or udpin:HOST:PORT")
+    return kind, host, int(port)
+
+
+def open_endpoint(url: str, simulator: Simulator) -> Endpoint:
+    """Open ``tcp:HOST:PORT`` (listens), ``udpout:HOST:PORT`` (sends) or ``udpin:HOST:PORT`` (waits). Raises ListenError."""
+    kind, host, port = _address(url)
+    try:
+        if kind == "tcp":
+            return TcpServer(host, port)
+        return UdpEndpoint(host, port, listens=kind == "udpin", link=simulator.connect())
+    except OSError as error:
+        raise ListenError(f"{url}: cannot be opened: {error.strerror or error}; choose another port") from error
+
+
+class UdpEndpoint:
+    """One UDP partner: a fixed one (udpout) or whoever spoke last (udpin)."""
+
+    def __init__(self, host: str, port: int, listens: bool, link: SimLink) -> None:
+        """Raises OSError when the address cannot be used."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._link = link
+        self._partner: tuple[str, int] | None = None
+        try:
+            if listens:
+                self._socket.bind((host, port))
+            else:
+                self._partner = (socket.gethostbyname(host), port)
+                self._socket.bind(("", 0))
+        except OSError:
+            self._socket.close()
+            raise
+
+    def sockets(self) -> list[socket.socket]:
+        """The one socket."""
+        return [self._socket]
+
+    def exchange(self, simulator: Simulator) -> None:
+        """Datagrams in and out; an absent partner is no error."""
+        while True:
+            try:
+                data, self._partner = self._socket.recvfrom(READ_BYTES)
+            except BlockingIOError:
+                break
+            except OSError:  # the partner's port is closed; it may open again
+                continue
+            self._link.receive(data)
+        if self._link.dropped:
+            self._link = simulator.connect()
+        data = self._link.take()
+        for start in range(0, len(data), 1400):
+            if self._partner is not None:
+                with contextlib.suppress(OSError):
+                    self._socket.sendto(data[start : start + 1400], self._partner)
+
+    def close(self) -> None:
+        """Close the socket."""
+        self._socket.close()
+
+
+@dataclass
+class TcpClient:
+    """A connected client, its link and what it has not read yet."""
+
+    socket: socket.socket
+    link: SimLink
+    waiting: bytearray = field(default_factory=bytearray)
+    gone: bool = False
+
+    def exchange(self) -> None:
+        """Read all there is, write what fits."""
+        try:
+            while data := self.socket.recv(READ_BYTES):
+                self.link.receive(data)
+            self.gone = True
+        except BlockingIOError:
+            pass
+        except OSError:
+            self.gone = True
+        self.waiting += self.link.take()
+        try:
+            while self.waiting:
+                sent = self.socket.send(self.waiting)
+                del self.waiting[:sent]
+        except BlockingIOError:
+            self.gone |= len(self.waiting) > BACKLOG_BYTES
+        except OSError:
+            self.gone = True
+
+
+class TcpServer:
+    """Listens on one port; every client has a link of its own."""
+
+    def __init__(self, host: str, port: int) -> None:
+        """Raises OSError when the port is in use."""
+        self._clients: list[TcpClient] = []
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        try:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            self._socket.bind((host, port))
+            self._socket.listen()
+            self._socket.setblocking(False)
+        except OSError:
+            self._socket.close()
+            raise
+
+    def sockets(self) -> list[socket.socket]:
+        """The listener and all clients."""
+        return [self._socket, *(client.socket for client in self._clients)]
+
+    def exchange(self, simulator: Simulator) -> None:
+        """Let new clients in, serve the others, forget those that left."""
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                caller, _ = self._socket.accept()
+                caller.setblocking(False)
+                caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._clients.append(TcpClient(caller, simulator.connect()))
+        for client in self._clients:
+            client.exchange()
+            if client.gone or client.link.dropped:
+                simulator.disconnect(client.link)
+                client.socket.close()
+        self._clients = [client for client in self._clients if not (client.gone or client.link.dropped)]
+
+    def close(self) -> None:
+        """Close the listener and every client."""
+        for client in self._clients:
+            client.socket.close()
+        self._socket.close()
+
+
+def serve(
+    simulator: Simulator,
+    endpoints: list[Endpoint],
+    now_s: Callable[[], float],
+    speedup: float,
+    running: Callable[[], bool],
+) -> None:
+    """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no."""
+    began_s = now_s() - simulator.time_s / speedup
+    while running():
+        for endpoint in endpoints:
+            endpoint.exchange(simulator)
+        goal_s = (now_s() - began_s) * speedup
+        if goal_s - simulator.time_s > LATE_S * max(speedup, 1.0):
+            began_s += (goal_s - simulator.time_s) / speedup
+            goal_s = simulator.time_s + STEP_S
+        simulator.advance_to_s(goal_s)
+        for endpoint in endpoints:
+            endpoint.exchange(simulator)
+        wait_s = (simulator.time_s + STEP_S) / speedup + began_s - now_s()
+        if wait_s > 0.0:
+            sockets = [one for endpoint in endpoints for one in endpoint.sockets()]
+            select.select(sockets, [], [], wait_s)

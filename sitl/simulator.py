@@ -1,0 +1,250 @@
+"""A rover with its autopilot in a world, moved in lock-step: bytes in, time forward, bytes out.
+
+Deterministic: the same world, start, seed and bytes at the same times give the same bytes back.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from sitl import geodesy
+from sitl.autopilot import Autopilot
+from sitl.autopilot_lidar import LidarComponent
+from sitl.autopilot_link import Channel
+from sitl.autopilot_vehicle import Vehicle
+from sitl.control import LOOP_HZ
+from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
+from sitl.rover import new_rover
+from sitl.sensors import RangeSensing, SensorSuite, suite_named
+from sitl.world import World
+
+NOISE_ROWS = 500
+
+
+class GeoPlace(Protocol):
+    """Anything with latitude and longitude in degrees."""
+
+    @property
+    def lat_deg(self) -> float:
+        """Latitude, WGS-84."""
+        ...
+
+    @property
+    def lon_deg(self) -> float:
+        """Longitude, WGS-84."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class SimStart:
+    """Where the rover stands when it is switched on, in the world frame, and where on earth that is.
+
+    The EKF origin and home are set here, so LOCAL_POSITION_NED begins at 0, 0.
+    """
+
+    north_m: float
+    east_m: float
+    heading_rad: float
+    home: GeoPlace
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Where the rover really is, world frame."""
+
+    time_s: float
+    north_m: float
+    east_m: float
+    heading_rad: float
+    speed_m_s: float
+    yaw_rate_rad_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Collision:
+    """The rover touched an obstacle: when, and where its centre was (world frame)."""
+
+    time_s: float
+    north_m: float
+    east_m: float
+
+
+class SimLink:
+    """One connection to the vehicle and to the components on its network."""
+
+    def __init__(self, channel: Channel) -> None:
+        """Use ``Simulator.connect``."""
+        self.channel = channel
+        self.inbox = bytearray()
+        self.dropped = False
+
+    def receive(self, data: bytes) -> None:
+        """Bytes on their way to the vehicle; it handles them with its next main loop."""
+        self.inbox += data
+
+    def take(self) -> bytes:
+        """What was sent to this link since the last call."""
+        return self.channel.take()
+
+
+class Simulator:
+    """The whole simulated vehicle."""
+
+    def __init__(
+        self,
+        world: World,
+        start: SimStart,
+        sensors: str | SensorSuite = "lidar-90",
+        seed: int = 0,
+        rover_radius_m: float = 0.35,
+        parameters: Mapping[str, float] | None = None,
+        noise: bool | NoiseSettings = True,
+        lidar_rate_hz: float | None = None,
+    ) -> None:
+        """``sensors`` is a suite or its name; ``parameters`` are ArduRover's, other than the defaults.
+
+        Raises ValueError for an unknown suite, KeyError for an unknown parameter.
+        """
+        suite = suite_named(sensors) if isinstance(sensors, str) else sensors
+        if lidar_rate_hz is not None and suite.lidar is not None:
+            suite = replace(suite, lidar=replace(suite.lidar, rate_hz=lidar_rate_hz))
+        settings = noise if isinstance(noise, NoiseSettings) else NoiseSettings() if noise else NoiseSettings.none()
+        motion_seed, range_seed = np.random.SeedSequence(seed).spawn(2)
+        self.world = world
+        self._start = start
+        self._parameters = dict(parameters or {})
+        self._noise = settings.as_array()
+        self._rng = np.random.default_rng(motion_seed)
+        self._sensing = RangeSensing(suite, world, settings.range_m, np.random.default_rng(range_seed))
+        self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, rover_radius_m)
+        self._geo_start = (geodesy.to_units(start.home.lat_deg), geodesy.to_units(start.home.lon_deg))
+        # Noise is drawn in fixed blocks, so that it does not depend on how the loops are batched.
+        self._draws = np.empty((NOISE_ROWS, NOISE_COLUMNS))
+        self._row = NOISE_ROWS
+        self._tick = 0
+        self._links: list[SimLink] = []
+        self._collisions: list[Collision] = []
+        self._boot()
+
+    def _boot(self) -> None:
+        rover = self._rover[0]
+        here = (float(rover["north_m"]), float(rover["east_m"]))
+        origin = geodesy.moved(self._geo_start, here[0] - self._start.north_m, here[1] - self._start.east_m)
+        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters)
+        self._vehicle.control["tick"] = 0
+        self._vehicle.estimate["heading_rad"] = rover["heading_rad"]
+        self._autopilot = Autopilot(self._vehicle)
+        lidar = self._sensing.suite.lidar
+        self._lidar = LidarComponent(lidar, self._sensing, self._vehicle.system) if lidar else None
+
+    @property
+    def time_s(self) -> float:
+        """Simulated seconds since the simulator was made."""
+        return self._tick / LOOP_HZ
+
+    @property
+    def truth(self) -> Truth:
+        """Where the rover really is."""
+        rover = self._rover[0]
+        return Truth(
+            self.time_s,
+            float(rover["north_m"]),
+            float(rover["east_m"]),
+            float(rover["heading_rad"]),
+            float(rover["speed_m_s"]),
+            float(rover["yaw_rate_rad_s"]),
+        )
+
+    @property
+    def collisions(self) -> tuple[Collision, ...]:
+        """Every contact with an obstacle so far; one that lasts counts once."""
+        return tuple(self._collisions)
+
+    @property
+    def driven_m(self) -> float:
+        """Metres driven, backwards too."""
+        return float(self._rover[0]["driven_m"])
+
+    @property
+    def clearance_m(self) -> float:
+        """Room between the rover's circle and the nearest obstacle, at most 5 m; negative never."""
+        rover = self._rover[0]
+        reach_m = 5.0 + float(rover["radius_m"])
+        room_m = self.world.clearance_m(float(rover["north_m"]), float(rover["east_m"]), reach_m)
+        return max(room_m - float(rover["radius_m"]), 0.0)
+
+    def connect(self) -> SimLink:
+        """A new link to the vehicle; several may be open at once."""
+        link = SimLink(self._autopilot.open_channel())
+        self._links.append(link)
+        return link
+
+    def disconnect(self, link: SimLink) -> None:
+        """The other side has gone; nothing is queued for this link any more."""
+        link.dropped = True
+        if link in self._links:
+            self._links.remove(link)
+            self._autopilot.close_channel(link.channel)
+
+    def advance_to_s(self, time_s: float) -> None:
+        """Run the vehicle up to a time (in whole main loops of 20 ms); times in the past do nothing."""
+        goal = math.floor(time_s * LOOP_HZ + 1e-6)
+        while self._tick < goal:
+            self._receive()
+            self._run(min(goal - self._tick, self._loops_until_due()))
+            self._send()
+
+    def _receive(self) -> None:
+        for link in self._links:
+            if link.inbox:
+                data = bytes(link.inbox)
+                link.inbox.clear()
+                self._autopilot.receive(link.channel, data)
+        if self._vehicle.rebooting:
+            self._links_dropped()
+            self._boot()
+
+    def _links_dropped(self) -> None:
+        for link in self._links:
+            link.dropped = True
+        self._links.clear()
+
+    def _loops_until_due(self) -> int:
+        due_us = self._autopilot.next_due_us()
+        if self._lidar is not None:
+            due_us = min(due_us, self._lidar.next_due_us())
+        return max(1, math.ceil((due_us - self._vehicle.time_us) * 1e-6 * LOOP_HZ - 1e-6))
+
+    def _run(self, loops: int) -> None:
+        """Run main loops until they are done or something happened that must be told at once."""
+        world, vehicle, rover = self.world, self._vehicle, self._rover[0]
+        contacts = int(rover["contacts"])
+        if self._row == NOISE_ROWS:
+            self._draws = self._rng.standard_normal((NOISE_ROWS, NOISE_COLUMNS))
+            self._row = 0
+        done = run_loops(
+            self._rover, vehicle.estimate, vehicle.control, vehicle.tuning, vehicle.origin_m, self._noise,
+            self._draws[self._row : self._row + loops],
+            world.obstacles, world.south_m, world.west_m, world.resolution_m,
+        )  # fmt: skip
+        self._row += done
+        self._tick += done
+        if int(rover["contacts"]) > contacts:
+            self._collisions.append(Collision(self.time_s, float(rover["north_m"]), float(rover["east_m"])))
+
+    def _send(self) -> None:
+        self._autopilot.run_due()
+        if self._lidar is None:
+            return
+        rover = self._rover[0]
+        data = self._lidar.packets(
+            self._vehicle.time_us, float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"])
+        )
+        if data:
+            for link in self._links:
+                link.channel.outbox += data
