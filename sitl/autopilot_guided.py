@@ -34,6 +34,8 @@ ARRIVED_M = 0.01
 SPEED_CHANGE_TICKS = 25
 """Changes of the top speed are taken over no more often than every 0.5 s."""
 UNLIMITED_ACCEL_M_S2 = 20.0
+PLAN_FROM_REST = 64
+"""Bit of GUID_OPTIONS: every target is planned anew from standstill, so that quick repeats keep the rover standing."""
 
 
 @njit(cache=True, nogil=True)
@@ -81,6 +83,14 @@ def check_pivot(control: Any, tuning: Any, estimate: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
+def restart_shaping(control: Any, estimate: Any) -> None:
+    """Put the inner target where the rover is, moving as it moves."""
+    control.shaped_n, control.shaped_e = estimate.north_m, estimate.east_m
+    control.shaped_vn, control.shaped_ve = estimate.vel_n, estimate.vel_e
+    control.shaped_an, control.shaped_ae = estimate.accel_n, estimate.accel_e
+
+
+@njit(cache=True, nogil=True)
 def begin_target(control: Any, tuning: Any, estimate: Any, north_m: float, east_m: float) -> None:
     """Take a new position target, metres from the EKF origin."""
     control.dest_n = north_m
@@ -89,15 +99,10 @@ def begin_target(control: Any, tuning: Any, estimate: Any, north_m: float, east_
     control.arrived = 0
     control.fresh_target = 1
     control.task = WAYPOINT
+    if int(tuning.guided_options) & PLAN_FROM_REST:
+        restart_shaping(control, estimate)
+        control.shaped_vn = control.shaped_ve = control.shaped_an = control.shaped_ae = 0.0
     check_pivot(control, tuning, estimate)
-
-
-@njit(cache=True, nogil=True)
-def restart_shaping(control: Any, estimate: Any) -> None:
-    """Put the inner target where the rover is, moving as it moves."""
-    control.shaped_n, control.shaped_e = estimate.north_m, estimate.east_m
-    control.shaped_vn, control.shaped_ve = estimate.vel_n, estimate.vel_e
-    control.shaped_an, control.shaped_ae = estimate.accel_n, estimate.accel_e
 
 
 @njit(cache=True, nogil=True)

@@ -52,7 +52,8 @@ def _enter(vehicle: Vehicle) -> None:
     control, tuning, estimate = vehicle.control, vehicle.tuning, vehicle.estimate
     begin_guided(control[0], tuning[0])
     control["task"] = STOP
-    if vehicle.mode in (Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.SIMPLE):
+    # HOLD takes the throttle away at once, it does not brake by a controller.
+    if vehicle.mode in (Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.SIMPLE, Mode.HOLD):
         control["task"] = COAST
     elif vehicle.mode in (Mode.RTL, Mode.SMART_RTL):
         begin_target(control[0], tuning[0], estimate[0], 0.0, 0.0)

@@ -88,6 +88,7 @@ TUNING_NAMES = {
     "cruise_throttle": "CRUISE_THROTTLE",
     "slew_rate": "MOT_SLEWRATE",
     "guided_timeout_s": "GUID_TIMEOUT",
+    "guided_options": "GUID_OPTIONS",
 }
 """Fields of a tuning record and the parameters they come from."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from companion.cli import mission
 from companion.cli.plan import plan
 
 app = typer.Typer(
@@ -15,6 +16,7 @@ app = typer.Typer(
 )
 
 app.command()(plan)
+app.add_typer(mission.app)
 
 
 @app.callback()

@@ -20,7 +20,7 @@ MAX_ITEMS = 100_000
 MAX_TARGETS = 10_000
 
 
-class Fault(Exception):
+class ItemError(Exception):
     """Something wrong inside a file: place and reason. Whoever knows the file makes it a MissionError."""
 
 
@@ -71,7 +71,7 @@ class _Fences:
 
 
 def understand(items: Sequence[Item], path: Path, name: str, planned_home: GeoPoint | None) -> Mission:
-    """The mission that the items are. Raises Fault with the item's index and its command."""
+    """The mission that the items are. Raises ItemError with the item's index and its command."""
     fences = _fences([item for item in items if _is_fence(item)])
     walk = _walked([item for item in items if not _is_fence(item)])
     return Mission(
@@ -86,18 +86,18 @@ def understand(items: Sequence[Item], path: Path, name: str, planned_home: GeoPo
 
 
 def geo_point(lat_deg: float, lon_deg: float, what: str) -> GeoPoint:
-    """A checked place on the earth. Raises Fault."""
+    """A checked place on the earth. Raises ItemError."""
     if not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):
-        raise Fault(f"{what}: latitude and longitude are missing")
+        raise ItemError(f"{what}: latitude and longitude are missing")
     if not (-90.0 <= lat_deg <= 90.0 and -180.0 <= lon_deg <= 180.0):
-        raise Fault(f"{what}: {lat_deg}, {lon_deg} is not a latitude and longitude")
+        raise ItemError(f"{what}: {lat_deg}, {lon_deg} is not a latitude and longitude")
     return GeoPoint(lat_deg, lon_deg)
 
 
 def circle(centre: GeoPoint, radius_m: float, what: str) -> Area:
-    """A round fence. Raises Fault."""
+    """A round fence. Raises ItemError."""
     if not (math.isfinite(radius_m) and radius_m > 0.0):
-        raise Fault(f"{what}: a radius of {radius_m} m encloses nothing")
+        raise ItemError(f"{what}: a radius of {radius_m} m encloses nothing")
     return Area((centre,), radius_m=radius_m)
 
 
@@ -111,7 +111,7 @@ def _walked(items: Sequence[Item]) -> _Walk:
     while i < len(items):
         steps += 1
         if steps > MAX_ITEMS or len(walk.targets) > MAX_TARGETS:
-            raise Fault(f"{items[i].label}: jumps make this mission longer than {MAX_TARGETS} targets")
+            raise ItemError(f"{items[i].label}: jumps make this mission longer than {MAX_TARGETS} targets")
         item = items[i]
         if item.command == mav.DO_JUMP:
             i = _jumped(item, i, places, walk)
@@ -123,7 +123,7 @@ def _walked(items: Sequence[Item]) -> _Walk:
         elif item.command == mav.DO_CHANGE_SPEED:
             _change_speed(item, walk)
         else:
-            raise Fault(f"{item.label}: not understood; a rover can do waypoints, holds, speeds, jumps and return")
+            raise ItemError(f"{item.label}: not understood; a rover can do waypoints, holds, speeds, jumps and return")
         i += 1
     return walk
 
@@ -133,7 +133,7 @@ _TRAVEL = (mav.NAV_WAYPOINT, mav.NAV_LOITER_UNLIM, mav.NAV_LOITER_TIME, mav.NAV_
 
 def _travel(item: Item, walk: _Walk) -> None:
     if walk.ended_by is not None:
-        raise Fault(f"{item.label}: can never begin, {walk.ended_by.label} never ends")
+        raise ItemError(f"{item.label}: can never begin, {walk.ended_by.label} never ends")
     if item.command == mav.NAV_LOITER_UNLIM:
         walk.ended_by = item
         walk.note(f"{item.label}: stays there, the mission ends")
@@ -145,7 +145,7 @@ def _travel(item: Item, walk: _Walk) -> None:
     name = "home" if item.command == mav.NAV_RETURN_TO_LAUNCH else f"waypoint {item.index}"
     hold_s = item.param(1) if item.command in (mav.NAV_WAYPOINT, mav.NAV_LOITER_TIME) else 0.0
     if not (math.isfinite(hold_s) and hold_s >= 0.0):
-        raise Fault(f"{item.label}: a hold of {hold_s} s")
+        raise ItemError(f"{item.label}: a hold of {hold_s} s")
     walk.targets.append(
         Target(name if turn == 1 else f"{name} pass {turn}", place, hold_s=hold_s, speed_m_s=walk.speed_m_s)
     )
@@ -158,12 +158,12 @@ def _place(item: Item, walk: _Walk) -> Place | None:
         return HomePoint(0.0, 0.0)
     if item.frame not in mav.GLOBAL_FRAMES:
         frame = mav.FRAME_NAMES.get(item.frame, "unknown")
-        raise Fault(f"{item.label}: frame {item.frame} ({frame}) has no latitude and longitude")
+        raise ItemError(f"{item.label}: frame {item.frame} ({frame}) has no latitude and longitude")
     if item.lat_deg == 0.0 and item.lon_deg == 0.0:
         # ArduPilot takes 0, 0 as "here".
         if item.command == mav.NAV_LOITER_UNLIM and walk.targets:
             return None
-        raise Fault(f"{item.label}: has no place (latitude and longitude are 0)")
+        raise ItemError(f"{item.label}: has no place (latitude and longitude are 0)")
     return geo_point(item.lat_deg, item.lon_deg, item.label)
 
 
@@ -185,22 +185,22 @@ def _delay(item: Item, walk: _Walk) -> None:
     """NAV_DELAY holds the rover where it is: longer at the last target."""
     delay_s = item.param(1)
     if not walk.targets:
-        raise Fault(f"{item.label}: a delay before the first waypoint is not understood")
+        raise ItemError(f"{item.label}: a delay before the first waypoint is not understood")
     if not (math.isfinite(delay_s) and delay_s >= 0.0):
-        raise Fault(f"{item.label}: waiting for a time of day is not understood")
+        raise ItemError(f"{item.label}: waiting for a time of day is not understood")
     walk.targets[-1] = replace(walk.targets[-1], hold_s=walk.targets[-1].hold_s + delay_s)
 
 
 def _change_speed(item: Item, walk: _Walk) -> None:
     """p1 kind (air and ground speed are one for a rover), p2 m/s (-1 as before, -2 the default), p3 throttle."""
     if item.param(1) not in (0.0, 1.0):
-        raise Fault(f"{item.label}: speed of kind {item.param(1):g} is not for a rover")
+        raise ItemError(f"{item.label}: speed of kind {item.param(1):g} is not for a rover")
     speed_m_s = item.param(2)
     if speed_m_s == -2.0:
         walk.speed_m_s = None
     elif speed_m_s != -1.0:
         if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
-            raise Fault(f"{item.label}: a speed of {speed_m_s:g} m/s")
+            raise ItemError(f"{item.label}: a speed of {speed_m_s:g} m/s")
         walk.speed_m_s = speed_m_s
     if item.param(3) not in (0.0, -1.0):
         walk.note(f"{item.label}: throttle {item.param(3):g} is not used")
@@ -210,11 +210,11 @@ def _jumped(item: Item, here: int, places: dict[int, int], walk: _Walk) -> int:
     """The next position. As in ArduPilot each jump item counts its own jumps, once for the whole mission."""
     to, repeats = item.param(1), item.param(2)
     if repeats == -1.0:
-        raise Fault(f"{item.label}: repeats for ever (-1); give a number of repeats")
+        raise ItemError(f"{item.label}: repeats for ever (-1); give a number of repeats")
     if not (math.isfinite(repeats) and repeats >= 0.0 and repeats == int(repeats)):
-        raise Fault(f"{item.label}: {repeats:g} repeats")
+        raise ItemError(f"{item.label}: {repeats:g} repeats")
     if not math.isfinite(to) or to != int(to) or int(to) not in places or int(to) == item.index:
-        raise Fault(f"{item.label}: there is no item {to:g} to jump to")
+        raise ItemError(f"{item.label}: there is no item {to:g} to jump to")
     if walk.jumps[item.index] >= repeats:
         return here + 1
     walk.jumps[item.index] += 1
@@ -249,7 +249,7 @@ def _fences(items: Sequence[Item]) -> _Fences:
         elif item.command == mav.RALLY_POINT:
             fences.notes.append(f"{item.label}: rally point {place.lat_deg:.7f}, {place.lon_deg:.7f} is not used")
         else:
-            raise Fault(f"{item.label}: not understood")
+            raise ItemError(f"{item.label}: not understood")
         i += 1
     return fences
 
@@ -259,11 +259,11 @@ def _corners(items: Sequence[Item], first: int) -> list[GeoPoint]:
     item = items[first]
     count = item.param(1)
     if not math.isfinite(count) or count != int(count) or not 3 <= count <= MAX_ITEMS:
-        raise Fault(f"{item.label}: a polygon of {count:g} corners")
+        raise ItemError(f"{item.label}: a polygon of {count:g} corners")
     corners = items[first : first + int(count)]
     for corner in corners:
         if corner.command != item.command or corner.param(1) != count:
-            raise Fault(f"{corner.label}: the polygon from item {item.index} on should have {count:g} corners")
+            raise ItemError(f"{corner.label}: the polygon from item {item.index} on should have {count:g} corners")
     if len(corners) < count:
-        raise Fault(f"{item.label}: the polygon has {len(corners)} of its {count:g} corners")
+        raise ItemError(f"{item.label}: the polygon has {len(corners)} of its {count:g} corners")
     return [geo_point(corner.lat_deg, corner.lon_deg, corner.label) for corner in corners]

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from companion.frames import GeoPoint
-from companion.mission.items import MAX_ITEMS, Fault, Item, circle, geo_point, understand
+from companion.mission.items import MAX_ITEMS, Item, ItemError, circle, geo_point, understand
 from companion.mission.mission import Area, Mission, MissionError, open_ring
 
 MAX_BYTES = 50_000_000
@@ -25,13 +25,13 @@ def load(path: Path) -> Mission:
     plan = _read(path)
     try:
         return _understood(plan, path)
-    except Fault as error:
+    except ItemError as error:
         raise MissionError(f"{path}: {error}") from None
 
 
 def _understood(plan: Json, path: Path) -> Mission:
     if plan.get("fileType") != "Plan":
-        raise Fault(f'fileType: expected "Plan", got {reprlib.repr(plan.get("fileType"))}')
+        raise ItemError(f'fileType: expected "Plan", got {reprlib.repr(plan.get("fileType"))}')
     _expect_version(plan, "version", 1)
     mission = _table(plan, "mission")
     _expect_version(mission, "mission.version", 2)
@@ -39,7 +39,7 @@ def _understood(plan: Json, path: Path) -> Mission:
     seen: set[int] = set()
     for item in items:
         if item.index in seen:
-            raise Fault(f"item {item.index}: two items have this doJumpId")
+            raise ItemError(f"item {item.index}: two items have this doJumpId")
         seen.add(item.index)
     home = mission.get("plannedHomePosition")
     planned_home = None if home is None else _geo(home, "mission.plannedHomePosition")
@@ -82,11 +82,11 @@ def _read(path: Path) -> Json:
 def _items(entries: list[object], place: str) -> Iterator[Item]:
     """Simple items in order; a complex item (a survey, say) stands for the simple items it was worked out to."""
     if len(entries) > MAX_ITEMS:
-        raise Fault(f"{place}: {len(entries)} items are more than {MAX_ITEMS}")
+        raise ItemError(f"{place}: {len(entries)} items are more than {MAX_ITEMS}")
     for position, entry in enumerate(entries, start=1):
         where = f"{place} {position}"
         if not isinstance(entry, dict):
-            raise Fault(f"{where}: not an item")
+            raise ItemError(f"{where}: not an item")
         kind = entry.get("type")
         if kind == "SimpleItem":
             yield _simple_item(entry, where, position)
@@ -94,16 +94,16 @@ def _items(entries: list[object], place: str) -> Iterator[Item]:
             name = str(entry.get("complexItemType", "without a name"))[:40]
             transects = entry.get("TransectStyleComplexItem")
             if not isinstance(transects, dict) or not isinstance(transects.get("Items"), list):
-                raise Fault(f"{where}: ComplexItem '{name}' is not understood")
+                raise ItemError(f"{where}: ComplexItem '{name}' is not understood")
             yield from _items(transects["Items"], f"{where} ({name}) item")
         else:
-            raise Fault(f"{where}: type {reprlib.repr(kind)} is not understood")
+            raise ItemError(f"{where}: type {reprlib.repr(kind)} is not understood")
 
 
 def _simple_item(entry: Json, where: str, position: int) -> Item:
     params = entry.get("params")
     if not isinstance(params, list) or len(params) != 7:
-        raise Fault(f"{where}: params: 7 values are needed")
+        raise ItemError(f"{where}: params: 7 values are needed")
     values = [math.nan if value is None else _real(value, f"{where}: params {i}") for i, value in enumerate(params, 1)]
     command, frame = _whole(entry.get("command"), f"{where}: command"), _whole(entry.get("frame"), f"{where}: frame")
     index = _whole(entry.get("doJumpId", position), f"{where}: doJumpId")
@@ -138,7 +138,7 @@ def _geofence(plan: Json) -> tuple[tuple[Area, ...], tuple[Area, ...], tuple[str
 def _inclusion(entry: object, where: str) -> bool:
     inclusion = _dict(entry, where).get("inclusion")
     if not isinstance(inclusion, bool):
-        raise Fault(f"{where}: inclusion: expected true or false")
+        raise ItemError(f"{where}: inclusion: expected true or false")
     return inclusion
 
 
@@ -154,13 +154,13 @@ def _rally_notes(plan: Json) -> tuple[str, ...]:
 
 def _geo(value: object, where: str) -> GeoPoint:
     if not isinstance(value, list) or len(value) < 2:
-        raise Fault(f"{where}: expected [latitude, longitude], got {reprlib.repr(value)}")
+        raise ItemError(f"{where}: expected [latitude, longitude], got {reprlib.repr(value)}")
     return geo_point(_real(value[0], where), _real(value[1], where), where)
 
 
 def _dict(value: object, where: str) -> Json:
     if not isinstance(value, dict):
-        raise Fault(f"{where}: expected an object")
+        raise ItemError(f"{where}: expected an object")
     return value
 
 
@@ -173,23 +173,23 @@ def _list(parent: Json, where: str, *, needed: bool = True) -> list[object]:
     if value is None and not needed:
         return []
     if not isinstance(value, list):
-        raise Fault(f"{where}: expected a list")
+        raise ItemError(f"{where}: expected a list")
     return value
 
 
 def _expect_version(parent: Json, where: str, version: int) -> None:
     value = parent.get("version")
     if value != version or isinstance(value, bool):
-        raise Fault(f"{where}: only version {version} is understood, got {reprlib.repr(value)}")
+        raise ItemError(f"{where}: only version {version} is understood, got {reprlib.repr(value)}")
 
 
 def _real(value: object, where: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST:
-        raise Fault(f"{where}: expected a number, got {reprlib.repr(value)}")
+        raise ItemError(f"{where}: expected a number, got {reprlib.repr(value)}")
     return float(value)
 
 
 def _whole(value: object, where: str) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
-        raise Fault(f"{where}: expected a whole number, got {reprlib.repr(value)}")
+        raise ItemError(f"{where}: expected a whole number, got {reprlib.repr(value)}")
     return value

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from companion.frames import GeoPoint
 from companion.mission import mav_commands as mav
-from companion.mission.items import MAX_ITEMS, Fault, Item, geo_point, understand
+from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point, understand
 from companion.mission.mission import Mission, MissionError
 
 HEADER = ("QGC", "WPL", "110")
@@ -39,7 +39,7 @@ def load(path: Path) -> Mission:
     try:
         home, items = _home(items)
         return understand(items, path, path.stem, home)
-    except Fault as error:
+    except ItemError as error:
         raise MissionError(f"{path}: {error}") from None
 
 

@@ -21,7 +21,9 @@ def problems(draw):
     width, height = draw(st.integers(1, 14)), draw(st.integers(1, 14))
     seed, share = draw(st.integers(0, 2**32 - 1)), draw(st.sampled_from([0.0, 0.1, 0.25, 0.4]))
     rng = np.random.default_rng(seed)
-    weights = draw(st.sampled_from([np.full((height, width), 0.5), rng.random((height, width)), np.zeros((height, width))]))
+    weights = draw(
+        st.sampled_from([np.full((height, width), 0.5), rng.random((height, width)), np.zeros((height, width))])
+    )
     weights = weights.copy()
     weights[rng.random((height, width)) < share] = 1.0
     start = Cell(draw(st.integers(-1, width)), draw(st.integers(-1, height)))
@@ -68,14 +70,17 @@ def test_contract(name, problem, seed):
     assert result.path.cost == pytest.approx(path_cost(problem.weights, cells), rel=1e-9)
     if result.path.curve is not None:
         assert planner.capabilities.smooth_curve
-        assert result.path.curve[0] == pytest.approx(problem.start) and result.path.curve[-1] == pytest.approx(problem.target)
+        assert result.path.curve[0] == pytest.approx(problem.start) and result.path.curve[-1] == pytest.approx(
+            problem.target
+        )
 
 
 @given(problem=problems(), seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=100, deadline=None)
 def test_nothing_is_cheaper_than_an_optimal_planner(problem, seed):
     results = {
-        name: make_planner(name, PlannerSettings()).plan(problem, BUDGET, np.random.default_rng(seed)) for name in PLANNERS
+        name: make_planner(name, PlannerSettings()).plan(problem, BUDGET, np.random.default_rng(seed))
+        for name in PLANNERS
     }
     optimal = [name for name in PLANNERS if make_planner(name, PlannerSettings()).capabilities.optimal]
     assert optimal

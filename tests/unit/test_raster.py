@@ -5,7 +5,17 @@ from hypothesis import strategies as st
 
 from companion.grid import Cell
 from companion.planning.problem import path_cost
-from companion.planning.raster import FAULTS, as_array, as_cells, cells_cost, first_fault, is_path, plain, polyline, without_loops
+from companion.planning.raster import (
+    FAULTS,
+    as_array,
+    as_cells,
+    cells_cost,
+    first_fault,
+    is_path,
+    plain,
+    polyline,
+    without_loops,
+)
 from tests.planning_maps import drawn
 
 places = st.tuples(st.integers(-60, 60), st.integers(-60, 60))

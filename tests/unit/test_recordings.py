@@ -114,15 +114,19 @@ def test_boot_leads_to_a_rover_that_may_be_armed() -> None:
     state = VehicleState()
     modes = []
     ready_before_gps = []
+    arming = []
     for event in events_of("boot-to-armed"):
         state = fold(state, event)
         if isinstance(event, HeartbeatSeen):
             modes.append((event.mode, event.armed))
+        if isinstance(event, AckSeen) and event.command == 400:
+            arming.append(event.result)
         if isinstance(event, PrearmSeen) and event.ok:
             ready_before_gps.append(not state.ekf_ok)
     assert modes[0] == (16, False), "INITIALISING"
     assert (RoverMode.MANUAL, False) in modes
-    assert modes[-1] == (RoverMode.GUIDED, True)
+    assert modes[-1][0] == RoverMode.GUIDED
+    assert arming[-1] == 0 and 4 in arming, "refused at first, accepted in the end"
     assert any(ready_before_gps), "the pre-arm bit comes before the EKF has a position"
     assert state.ekf_ok
     assert state.home is not None and state.home.point == ORIGIN

@@ -1,0 +1,105 @@
+"""``rover-companion mission check``: say what was understood of a mission file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from companion.frames import GeoPoint
+from companion.grid import Cell
+from companion.mission.load import load_mission
+from companion.mission.mission import Area, Mission, MissionError, Place
+
+EXIT_BAD_INPUT = 2
+
+app = typer.Typer(name="mission", help="Mission files.", no_args_is_help=True)
+
+
+@app.callback()
+def group() -> None:
+    """Mission files."""
+
+
+@app.command()
+def check(
+    mission_file: Annotated[Path, typer.Argument(metavar="FILE", help="TOML, .plan or .waypoints file.")],
+) -> None:
+    """Print what was understood of FILE. Exit code 0, or 2 with one line of reason."""
+    try:
+        mission = load_mission(mission_file)
+    except MissionError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+    show(mission, Console(highlight=False))
+
+
+def show(mission: Mission, console: Console) -> None:
+    """Print the mission."""
+    console.print(f"[bold]{escape(mission.name)}[/bold]", soft_wrap=True)
+    console.print(_targets(mission))
+    for line in (*_ground(mission), *_vehicle(mission), *(f"note: {note}" for note in mission.notes)):
+        console.print(escape(line), soft_wrap=True)
+
+
+def _targets(mission: Mission) -> Table:
+    table = Table("", "target", "place", "hold", "if blocked", "speed")
+    for number, target in enumerate(mission.targets, start=1):
+        speed_m_s = target.speed_m_s or mission.rover.cruise_speed_m_s
+        hold = f"{target.hold_s:g} s" if target.hold_s else "-"
+        name, place = escape(target.name), place_text(target.place)
+        table.add_row(str(number), name, place, hold, target.on_blocked.value, f"{speed_m_s:g} m/s")
+    return table
+
+
+def _ground(mission: Mission) -> list[str]:
+    grid = mission.grid
+    size = f"fields of {grid.resolution_m:g} m"
+    if grid.size is not None and grid.home is not None:
+        lines = [f"grid: {grid.size[0]} x {grid.size[1]} {size}, home is the middle of {place_text(grid.home)}"]
+    else:
+        margin = "the larger of 25 m and half its extent" if grid.margin_m is None else f"{grid.margin_m:g} m"
+        lines = [f"grid: {size}, laid round home, targets and fences with a margin of {margin}"]
+    lines += [f"keep out of {area_text(area)}" for area in mission.keep_out]
+    lines += [f"keep inside {area_text(area)}" for area in mission.keep_in]
+    lines += [f"weight {weighted.weight:g} in {area_text(weighted.area)}" for weighted in mission.weighted]
+    if mission.prior_map is not None:
+        lines.append(f"known map: {mission.prior_map}")
+    return lines
+
+
+def _vehicle(mission: Mission) -> list[str]:
+    lines = [f"rover: radius {mission.rover.radius_m:g} m, cruises at {mission.rover.cruise_speed_m_s:g} m/s"]
+    if mission.planned_home is not None:
+        lines.append(f"planned home: {place_text(mission.planned_home)}; the rover's own home is what counts")
+    if mission.sitl is not None:
+        sitl = mission.sitl
+        start = f", start {place_text(sitl.start)}" if sitl.start is not None else ""
+        world = sitl.world or "open ground"
+        lines.append(f"simulator only: world {world}{start}, heading {sitl.heading_deg:g} deg, sensors {sitl.sensors}")
+    return lines
+
+
+def place_text(place: Place) -> str:
+    """A place as people read it."""
+    if isinstance(place, Cell):
+        return f"field {place.x}, {place.y}"
+    if isinstance(place, GeoPoint):
+        return f"{place.lat_deg:.7f}, {place.lon_deg:.7f}"
+    if place.north_m == place.east_m == 0.0:
+        return "home"
+    return f"{place.north_m:g} m north, {place.east_m:g} m east of home"
+
+
+def area_text(area: Area) -> str:
+    """An area as people read it."""
+    first = place_text(area.places[0])
+    if area.radius_m is not None:
+        return f"a circle of {area.radius_m:g} m round {first}"
+    if area.width_m is not None:
+        return f"a line {area.width_m:g} m wide through {len(area.places)} places from {first}"
+    return f"a polygon of {len(area.places)} corners from {first}"

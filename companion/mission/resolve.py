@@ -1,0 +1,203 @@
+"""A mission where it is to be driven: its places in the autopilot's local frame, its grid with fences and known ground."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from shapely.geometry.base import BaseGeometry
+
+from companion.frames import LocalFrame, NedPoint
+from companion.grid import OBSTACLE, Cell, Grid, empty_grid
+from companion.mapfiles import MapError, load_map
+from companion.mission.areas import Mask, Places, covered, middles_in, shape_of, touched
+from companion.mission.check import MAX_GRID_FIELDS
+from companion.mission.mission import Area, Mission, MissionError, OnBlocked, Target
+from companion.mission.prior import stamp_prior
+
+MIN_MARGIN_M = 25.0
+
+
+@dataclass(frozen=True, slots=True)
+class ResolvedTarget:
+    """A target where it lies: local frame and field of the grid."""
+
+    name: str
+    point: NedPoint
+    cell: Cell
+    hold_s: float
+    on_blocked: OnBlocked
+    speed_m_s: float | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ResolvedMission:
+    """The ground as known before the rover moves, and the targets in order. ``home_cell`` is where home lies."""
+
+    grid: Grid
+    targets: tuple[ResolvedTarget, ...]
+    home_cell: Cell
+
+
+def resolve(mission: Mission, frame: LocalFrame, home: NedPoint) -> ResolvedMission:
+    """Lay the mission out. ``home`` is the place, in the autopilot's local frame, that its local metres count from.
+
+    A grid with a size lies so that the middle of the field ``grid.home`` is home; otherwise it is laid round home,
+    targets, fences and known map, with home in the middle of a field. Weights: base, known map, weighted areas,
+    obstacles of the known map, fences. A field is closed when a keep-out area touches it or when it is not wholly inside
+    every keep-in area; of a keep-in area given in fields, the fields whose middle it holds are inside.
+    Raises MissionError: file, place, reason.
+    """
+    try:
+        return _resolved(mission, frame, home)
+    except (MissionError, MapError) as error:
+        raise MissionError(f"{mission.source or mission.name}: {error}") from error
+
+
+def _resolved(mission: Mission, frame: LocalFrame, home: NedPoint) -> ResolvedMission:
+    if not mission.targets:
+        raise MissionError("target: there is none to go to")
+    prior = _prior_map(mission, home)
+    grid = _fixed_grid(mission, home)
+    fixed = grid is not None
+    places = Places(frame, home, _no_fields if grid is None else grid.centre_of)
+    points = [places.point(target.place) for target in mission.targets]
+    if grid is None:
+        grid = _laid_grid(mission, places, points, prior)
+    if prior is not None:
+        grid = stamp_prior(grid, prior)
+    weights = grid.weights.copy()
+    for weighted in mission.weighted:
+        mask = touched(grid, shape_of(weighted.area, places))
+        weights[mask & (weights < OBSTACLE)] = weighted.weight
+    closed = _closed(mission, grid, places)
+    targets = []
+    for number, (target, point) in enumerate(zip(mission.targets, points, strict=True), start=1):
+        cell = grid.cell_at(point)
+        what = f"target {number} '{target.name}'"
+        if fixed and not grid.contains(cell):
+            raise MissionError(
+                f"{what}: {_away(home, point)} is outside the grid of {grid.width} x {grid.height} fields"
+            )
+        _refuse_closed(what, cell, closed)
+        targets.append(_target(target, point, cell))
+    home_cell = grid.cell_at(home)
+    _refuse_closed("home (where the rover begins)", home_cell, closed)
+    for _, mask in closed:
+        weights[mask] = OBSTACLE
+    return ResolvedMission(grid.with_weights(weights), tuple(targets), home_cell)
+
+
+def _target(target: Target, point: NedPoint, cell: Cell) -> ResolvedTarget:
+    return ResolvedTarget(target.name, point, cell, target.hold_s, target.on_blocked, target.speed_m_s)
+
+
+def _no_fields(cell: Cell) -> NedPoint:
+    raise MissionError(f"field {cell.x}, {cell.y}: fields need [grid] size and home")
+
+
+def _away(home: NedPoint, point: NedPoint) -> str:
+    return f"{point.north_m - home.north_m:.1f} m north, {point.east_m - home.east_m:.1f} m east of home"
+
+
+# --- the grid --------------------------------------------------------------------------------------------------------
+
+
+def _south_west(home: NedPoint, home_cell: Cell, resolution_m: float) -> NedPoint:
+    """The grid's corner that puts the middle of ``home_cell`` on home."""
+    return NedPoint(
+        home.north_m - (home_cell.y + 0.5) * resolution_m,
+        home.east_m - (home_cell.x + 0.5) * resolution_m,
+    )
+
+
+def _fixed_grid(mission: Mission, home: NedPoint) -> Grid | None:
+    spec = mission.grid
+    if spec.size is None or spec.home is None:
+        return None
+    width, height = spec.size
+    _refuse_large(width, height, spec.resolution_m)
+    return empty_grid(width, height, spec.resolution_m, _south_west(home, spec.home, spec.resolution_m))
+
+
+def _laid_grid(mission: Mission, places: Places, points: list[NedPoint], prior: Grid | None) -> Grid:
+    """A grid round everything the mission names."""
+    home, size_m = places.home, mission.grid.resolution_m
+    corners = [(point.east_m, point.north_m) for point in (home, *points)]
+    areas = (*mission.keep_out, *mission.keep_in, *(weighted.area for weighted in mission.weighted))
+    for area in areas:
+        west_m, south_m, east_m, north_m = shape_of(area, places).bounds
+        corners += [(west_m, south_m), (east_m, north_m)]
+    if prior is not None:
+        corner = prior.south_west
+        far = (corner.east_m + prior.width * prior.resolution_m, corner.north_m + prior.height * prior.resolution_m)
+        corners += [(corner.east_m, corner.north_m), far]
+    low, high = np.min(corners, axis=0), np.max(corners, axis=0)
+    margin_m = mission.grid.margin_m
+    if margin_m is None:
+        margin_m = max(MIN_MARGIN_M, float(np.max(high - low)) / 2.0)
+    west, south = (
+        math.ceil((at - edge + margin_m) / size_m) for at, edge in zip((home.east_m, home.north_m), low, strict=True)
+    )
+    east, north = (
+        math.ceil((edge - at + margin_m) / size_m) for at, edge in zip((home.east_m, home.north_m), high, strict=True)
+    )
+    width, height = west + east + 1, south + north + 1
+    _refuse_large(width, height, size_m)
+    return empty_grid(width, height, size_m, _south_west(home, Cell(west, south), size_m))
+
+
+def _refuse_large(width: int, height: int, resolution_m: float) -> None:
+    if width * height > MAX_GRID_FIELDS:
+        enough_m = resolution_m * math.sqrt(width * height / MAX_GRID_FIELDS)
+        raise MissionError(
+            f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; are all places near "
+            f"home? If they are, use resolution_m = {math.ceil(enough_m * 10.0) / 10.0:g} or larger, or a smaller margin_m"
+        )
+
+
+def _prior_map(mission: Mission, home: NedPoint) -> Grid | None:
+    """The known map in the local frame. A ROS yaml says where it lies from home; others lie on the mission's grid."""
+    path = mission.prior_map
+    if path is None:
+        return None
+    prior = load_map(path, mission.grid.resolution_m)
+    if path.suffix.lower() in (".yaml", ".yml"):
+        corner = prior.south_west
+        corner = NedPoint(home.north_m + corner.north_m, home.east_m + corner.east_m)
+    elif mission.grid.home is not None:
+        corner = _south_west(home, mission.grid.home, prior.resolution_m)
+    else:
+        raise MissionError(f"prior_map: {path.name} says not where it lies; give [grid] home and size, or a ROS yaml")
+    return Grid(prior.weights, prior.resolution_m, corner)
+
+
+# --- fences ----------------------------------------------------------------------------------------------------------
+
+
+def _closed(mission: Mission, grid: Grid, places: Places) -> list[tuple[str, Mask]]:
+    """What each fence closes, by its name."""
+    closed = []
+    for number, area in enumerate(mission.keep_out, start=1):
+        closed.append((f"keep_out {number}", touched(grid, shape_of(area, places))))
+    for number, area in enumerate(mission.keep_in, start=1):
+        closed.append((f"keep_in {number}", ~_inside(area, grid, shape_of(area, places))))
+    return closed
+
+
+def _inside(area: Area, grid: Grid, shape: BaseGeometry) -> Mask:
+    # A polygon through the middles of its corner fields is meant to hold those fields.
+    in_fields = area.radius_m is None and all(isinstance(place, Cell) for place in area.places)
+    return middles_in(grid, shape) if in_fields else covered(grid, shape)
+
+
+def _refuse_closed(what: str, cell: Cell, closed: list[tuple[str, Mask]]) -> None:
+    for fence, mask in closed:
+        if mask[cell.y, cell.x]:
+            where = (
+                "in (or within a field of)"
+                if fence.startswith("keep_out")
+                else "outside (or within a field of the edge of)"
+            )
+            raise MissionError(f"{what}: lies {where} {fence}")

@@ -1,0 +1,254 @@
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.grid import Cell
+from companion.planning import bspline
+from companion.planning.bspline_ga import BsplineGa
+from companion.planning.chance import seeded
+from companion.planning.ga_kernel import (
+    Task,
+    Tuning,
+    breed,
+    evolve,
+    fitness,
+    large_value,
+    scatter,
+    way_point,
+    way_points_for,
+)
+from companion.planning.problem import Budget, PlanningProblem, PlanStatus
+from companion.planning.raster import polyline
+from companion.settings import PlannerSettings
+from tests.planning_maps import drawn, one_obstacle
+
+VLN = 100_000.0
+TUNING = Tuning(5, 0, 0.8, 0.25, 0.4, 1.0, 0.5, 0.2, 0.2, 1, VLN)
+TABLE_1 = {"GA 1": Budget(1, 500, (4,), 40), "GA 2": Budget(1, 500, (4,), 100), "GA 3": Budget(1, 500, (5,), 100)}
+
+
+def ga(**changes):
+    return BsplineGa(PlannerSettings(**changes))
+
+
+def value_of(weights, genes, corner_cutting=True, way_points=5, limit=np.inf):
+    first, basis = bspline.basis(len(genes), way_points)
+    return fitness(weights, genes, first, basis, corner_cutting, VLN, limit)
+
+
+def walk_of(genes, way_points=5):
+    first, basis = bspline.basis(len(genes), way_points)
+    return polyline(np.array([way_point(genes, first, basis, i) for i in range(way_points)]))
+
+
+def cluttered(seed, share=0.1):
+    rng = np.random.default_rng(seed)
+    weights = rng.random((30, 40))
+    weights[rng.random((30, 40)) < share] = 1.0
+    weights[15, 0] = weights[15, 39] = 0.5
+    return weights
+
+
+genes_strategy = st.lists(st.tuples(st.integers(-10, 50), st.integers(-10, 40)), min_size=1, max_size=4).map(
+    lambda inner: np.array([(0, 15), *inner, (39, 15)])
+)
+
+
+@given(genes_strategy, st.integers(0, 20))
+def test_fitness_is_the_sum_of_the_fields_with_ends_free_and_obstacles_vln(genes, seed):
+    weights = cluttered(seed)
+    expected = 0.0
+    for x, y in walk_of(genes)[1:-1]:
+        inside = 0 <= x < 40 and 0 <= y < 30
+        expected += weights[y, x] if inside and weights[y, x] < 1.0 else VLN
+    assert value_of(weights, genes) == pytest.approx(expected, rel=1e-9, abs=1e-6)
+
+
+@given(genes_strategy, st.integers(0, 20), st.floats(0.1, 40.0))
+def test_stopping_at_a_limit_hides_nothing_below_it(genes, seed, limit):
+    weights = cluttered(seed, 0.01)
+    whole = value_of(weights, genes, False)
+    stopped = value_of(weights, genes, False, limit=limit)
+    assert stopped == whole if whole < limit else stopped >= limit
+
+
+def test_a_cut_corner_counts_as_an_obstacle_unless_allowed():
+    weights = drawn("....", ".#..", "....")
+    genes = np.array([(0, 0), (1, 0), (1, 0), (2, 1)])
+    assert [tuple(cell) for cell in walk_of(genes)] == [(0, 0), (1, 0), (2, 1)]
+    assert value_of(weights, genes, True) == pytest.approx(0.5)
+    assert value_of(weights, genes, False) == pytest.approx(VLN + 0.5 - weights[1, 2])
+
+
+def test_vln_is_above_any_correct_path_of_a_large_map():
+    assert large_value(4, 100, 50, TUNING) == VLN
+    assert large_value(4, 400_000, 50, TUNING) >= 4 * 400_000
+
+
+def test_way_points_are_the_papers_five_and_grow_with_the_control_points():
+    assert [way_points_for(count, TUNING) for count in (3, 4, 5, 8)] == [5, 5, 5, 5]
+    growing = TUNING._replace(span_way_points=2)
+    assert [way_points_for(count, growing) for count in (3, 4, 5, 8)] == [5, 5, 7, 13]
+
+
+def scattered(part, count=300, tuning=TUNING, control_points=4):
+    state = seeded(7)
+    result = np.empty((count, control_points, 2), np.int64)
+    for genes in result:
+        genes[0], genes[-1] = (3, 24), (93, 24)
+        scatter(genes, part, 100, 50, tuning, state)
+    assert (result[:, 0] == (3, 24)).all() and (result[:, -1] == (93, 24)).all()
+    return result[:, 1:-1]
+
+
+def test_first_third_is_the_straight_line_with_some_points_shifted():
+    inner = scattered(0)
+    shift = inner - np.array([(33, 24), (63, 24)])
+    assert np.abs(shift).max() == 10
+    assert 0.4 < (shift != 0).mean() < 0.55
+    assert (scattered(0, tuning=TUNING._replace(line_probability=0.0)) == [(33, 24), (63, 24)]).all()
+
+
+def test_second_third_is_near_the_start_and_inside_the_map():
+    inner = scattered(1)
+    assert inner[..., 0].min() == 0 and inner[..., 0].max() == 13
+    assert inner[..., 1].min() == 14 and inner[..., 1].max() == 34
+
+
+def test_last_third_is_anywhere_but_the_margin():
+    inner = scattered(2, 2000, TUNING._replace(margin_fields=3))
+    assert inner[..., 0].min() == 3 and inner[..., 0].max() == 96
+    assert inner[..., 1].min() == 3 and inner[..., 1].max() == 46
+
+
+def test_crossing_gives_the_better_parent_the_larger_share():
+    parents = np.array([[(0, 0), (10, 20), (9, 9)], [(0, 0), (20, 40), (9, 9)]])
+    genes = parents[0].copy()
+    for seed in range(20):
+        breed(genes, parents, 0, TUNING, seeded(seed))
+        assert genes.tolist() == [[0, 0], [12, 24], [9, 9]]
+
+
+def test_mutation_hits_four_genes_of_ten_within_half_the_smaller_side_and_never_the_ends():
+    parents = np.zeros((2, 5, 2), np.int64)
+    parents[:, -1] = 99
+    genes = parents[0].copy()
+    state = seeded(3)
+    changes = []
+    for _ in range(2000):
+        breed(genes, parents, 25, TUNING, state)
+        assert genes[0].tolist() == [0, 0] and genes[-1].tolist() == [99, 99]
+        changes.append(genes[1:-1].ravel().copy())
+    changed = np.array(changes)
+    assert changed.min() == -25 and changed.max() == 25
+    # 12000 draws: four standard deviations are 0.018; a change of 0 (1 of 51) is not seen as one.
+    assert (changed != 0).mean() == pytest.approx(0.4 * 50 / 51, abs=0.018)
+
+
+def plainly_evolved(weights, task, tuning, control_points, population, min_epochs, max_epochs, state):
+    """Section 3 without any shortcut: whole populations, whole sums, a stable sort."""
+    height, width = weights.shape
+    first, basis = bspline.basis(control_points, way_points_for(control_points, tuning))
+
+    def measured(genes):
+        return fitness(weights, genes, first, basis, task.corner_cutting, VLN, np.inf)
+
+    people = []
+    for i in range(population):
+        genes = np.empty((control_points, 2), np.int64)
+        genes[0], genes[-1] = (task.start_x, task.start_y), (task.target_x, task.target_y)
+        scatter(genes, i * 3 // population, width, height, tuning, state)
+        people.append((measured(genes), genes))
+    epoch = 1
+    while True:
+        people.sort(key=lambda one: one[0])
+        if epoch >= max_epochs or (epoch >= min_epochs and people[0][0] < VLN):
+            return people[0][0], people[0][1], epoch
+        people = people[: int(population * tuning.selected_share)]
+        parents = np.array([genes for _, genes in people])
+        for _ in range(population - len(parents)):
+            genes = parents[0].copy()
+            breed(genes, parents, min(width, height) // 2, tuning, state)
+            people.append((measured(genes), genes))
+        epoch += 1
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 10_000), st.sampled_from([3, 4, 6]), st.sampled_from([12, 30]), st.booleans())
+def test_keeping_only_the_selected_and_stopping_sums_early_changes_nothing(seed, control_points, population, cutting):
+    weights = cluttered(seed, 0.25)
+    task = Task(0, 15, 39, 15, cutting)
+    arguments = (weights, task, TUNING, control_points, population, 4, 12)
+    value, genes, epochs, evaluations = evolve(*arguments, seeded(seed))
+    expected_value, expected_genes, expected_epochs = plainly_evolved(*arguments, seeded(seed))
+    assert value == pytest.approx(expected_value, rel=1e-12)
+    assert genes.tolist() == expected_genes.tolist()
+    assert epochs == expected_epochs
+    assert evaluations == population + (epochs - 1) * (population - population // 4)
+
+
+def test_epochs_are_at_least_the_minimum_and_at_most_the_maximum():
+    easy = one_obstacle()
+    result = ga().plan(easy, Budget(17, 500), np.random.default_rng(0))
+    assert result.status is PlanStatus.FOUND and result.epochs == 17 and result.control_points == 4
+    weights = easy.weights.copy()
+    weights[:, 50] = 1.0
+    hopeless = PlanningProblem(weights, easy.start, easy.target)
+    result = ga().plan(hopeless, Budget(1, 20, (4, 5, 6)), np.random.default_rng(0))
+    assert result.status is PlanStatus.BUDGET_SPENT and result.epochs == 60
+    assert result.evaluations == 3 * (30 + 19 * 23)
+
+
+@pytest.mark.parametrize("budget", TABLE_1.values(), ids=TABLE_1.keys())
+def test_one_obstacle_is_passed_from_nearly_every_seed(budget):
+    problem = one_obstacle()
+    found = sum(ga().plan(problem, budget, np.random.default_rng(seed)).path is not None for seed in range(100))
+    assert found >= 99
+
+
+def test_more_epochs_make_cheaper_paths():
+    problem = one_obstacle()
+
+    def mean_cost(min_epochs):
+        plans = [ga().plan(problem, Budget(min_epochs, 500), np.random.default_rng(seed)) for seed in range(60)]
+        return np.mean([plan.path.cost for plan in plans if plan.path is not None])
+
+    assert mean_cost(40) < mean_cost(1) - 0.5
+
+
+def test_more_control_points_solve_what_fewer_cannot():
+    weights = np.full((50, 100), 0.5)
+    for x, gap in ((20, 4), (40, 44), (60, 4), (80, 44)):
+        weights[:, x] = 1.0
+        weights[gap - 3 : gap + 4, x] = 0.5
+    problem = PlanningProblem(weights, Cell(0, 24), Cell(98, 24))
+
+    def found(count):
+        budget = Budget(1, 200, (count,), 60)
+        return sum(ga().plan(problem, budget, np.random.default_rng(seed)).path is not None for seed in range(20))
+
+    assert found(4) == 0
+    assert found(8) >= 5
+
+
+def test_another_seed_may_give_another_path():
+    problem = one_obstacle()
+    paths = {ga().plan(problem, Budget(), np.random.default_rng(seed)).path.cells for seed in range(10)}
+    assert len(paths) > 1
+
+
+def test_the_curve_is_near_the_fields_it_made():
+    result = ga().plan(one_obstacle(), Budget(), np.random.default_rng(4))
+    curve, cells = result.path.curve, np.array(result.path.cells)
+    assert len(curve) == 2 * len(cells) + 1
+    gaps = np.hypot(*(curve[:, None] - cells[None]).transpose(2, 0, 1))
+    assert gaps.min(axis=1).max() < 8.0  # five way points: a bulge, but no other way
+    assert gaps.min(axis=0).max() < 8.0
+
+
+def test_a_budget_without_sense_is_refused():
+    problem = one_obstacle()
+    for budget in (Budget(control_points=()), Budget(control_points=(4, 2)), Budget(population=3)):
+        with pytest.raises(ValueError):
+            ga().plan(problem, budget, np.random.default_rng(0))

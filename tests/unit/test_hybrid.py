@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+
+from companion.grid import Cell
+from companion.planning.problem import Budget, PlanningProblem, PlanStatus
+from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
+from companion.settings import PlannerSettings
+from tests.planning_maps import one_obstacle
+
+BUDGET = Budget(3, 40, (4, 6), 30)
+
+
+def plan(name, problem, seed=0):
+    return make_planner(name, PlannerSettings()).plan(problem, BUDGET, np.random.default_rng(seed))
+
+
+def maze():
+    """Walls with gaps at alternating ends, too many for so few control points."""
+    weights = np.full((50, 100), 0.5)
+    for i, x in enumerate(range(8, 96, 8)):
+        weights[:, x] = 1.0
+        weights[2 if i % 2 else 47, x] = 0.5
+    return PlanningProblem(weights, Cell(0, 24), Cell(98, 24))
+
+
+def test_easy_maps_get_the_genetic_algorithms_smooth_path():
+    result = plan("hybrid", one_obstacle())
+    assert result.status is PlanStatus.FOUND and result.planner == "hybrid"
+    assert result.path.curve is not None and result.epochs == 3
+
+
+def test_hard_maps_get_the_graphs_path_when_the_budget_is_spent():
+    assert plan("bspline-ga", maze()).status is PlanStatus.BUDGET_SPENT
+    result = plan("hybrid", maze())
+    assert result.status is PlanStatus.FOUND and result.path.curve is None
+    assert result.path.cells == plan("dijkstra", maze()).path.cells
+    assert result.epochs == 3 + 40 + 40
+
+
+def test_sealed_targets_cost_a_look_and_the_proof_only():
+    problem = maze()
+    problem.weights[:, 48] = 1.0
+    result = plan("hybrid", problem)
+    assert result.status is PlanStatus.NO_PATH and result.path is None
+    assert result.epochs == 3
+
+
+def test_an_unknown_planner_is_named_with_the_nearest():
+    with pytest.raises(UnknownPlannerError, match="'dijkstar', did you mean 'dijkstra'") as error:
+        make_planner("dijkstar", PlannerSettings())
+    assert all(name in str(error.value) for name in PLANNERS)
+
+
+def test_warm_up_compiles_what_plans_use():
+    from companion.planning import bspline_ga, dijkstra
+
+    warm_up()
+    compiled = len(bspline_ga.search.signatures), len(dijkstra.shortest.signatures)
+    assert min(compiled) >= 1
+    for name in PLANNERS:
+        plan(name, one_obstacle())
+    assert (len(bspline_ga.search.signatures), len(dijkstra.shortest.signatures)) == compiled
