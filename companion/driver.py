@@ -26,6 +26,7 @@ from companion.planning.problem import PlanResult
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.stepping import StepRunner
+from companion.turning import with_turning_cost
 
 STANDSTILL = Guide(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
 MOVED_M = 0.3
@@ -130,8 +131,9 @@ class Driver:
         assert self._state is not None
         cell = self.evidence.base.cell_at(pose.point)
         if not self._runner.busy and self.evidence.base.contains(cell) and self._step_is_due(cell):
-            state, weights = self._state, self.evidence.grid.weights.copy()
-            grid = self.evidence.grid.with_weights(weights)
+            state = self._state
+            grid = with_turning_cost(self.evidence.grid, pose, self._settings.guidance)
+            weights = grid.weights
 
             def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
                 return self.searcher.search(weights, kind, start, target)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import difflib
 import tomllib
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -114,6 +114,8 @@ class GuidanceSettings(Section):
         45.0, gt=0.0, le=180.0, description="turn on the spot before driving off at a larger angle"
     )
     roll_out_m_s: float = Field(0.3, ge=0.0, description="faster than this the rover first brakes straight, then turns on the spot")
+    turn_cost: float = Field(0.45, ge=0.0, description="weight added to fields behind the rover when it plans")
+    turn_reach_m: float = Field(6.0, ge=0.0, description="how far behind")
     slow_within_m: float = Field(0.6, gt=0.0, description="obstacles nearer than this beside the rover slow it down")
     deceleration_m_s2: float = Field(1.0, gt=0.0, description="what the rover brakes with")
     latency_s: float = Field(0.4, ge=0.0, description="from seeing to braking")
@@ -204,8 +206,10 @@ def describe_first(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
+    """The keys of the model at a place; lists and optional values are looked through."""
     for part in place:
         field = model.model_fields.get(str(part))
-        if field is not None and isinstance(field.annotation, type) and issubclass(field.annotation, BaseModel):
-            model = field.annotation
+        if field is not None:
+            inside = (field.annotation, *get_args(field.annotation))
+            model = next((kind for kind in inside if isinstance(kind, type) and issubclass(kind, BaseModel)), model)
     return list(model.model_fields)

@@ -35,7 +35,10 @@ def offset_m(origin: tuple[int, int], place: tuple[int, int]) -> tuple[float, fl
 
 
 def moved(origin: tuple[int, int], north_m: float, east_m: float) -> tuple[int, int]:
-    """The (latitude, longitude) that lies this many metres north and east of ``origin``."""
-    lat = origin[0] + round(north_m / METRES_PER_UNIT)
-    lon = origin[1] + round(east_m / METRES_PER_UNIT / longitude_scale(origin[0], lat))
+    """The (latitude, longitude) that lies this many metres north and east of ``origin``.
+
+    Fractions of a unit are cut off towards the origin, as the firmware does.
+    """
+    lat = origin[0] + int(north_m / METRES_PER_UNIT)
+    lon = origin[1] + int(east_m / METRES_PER_UNIT / longitude_scale(origin[0], lat))
     return lat, (lon + HALF_TURN) % (2 * HALF_TURN) - HALF_TURN

@@ -47,7 +47,7 @@ class TextAssembler:
 def chunks_of(text: str) -> list[bytes]:
     """A text as UTF-8 pieces of at most 50 bytes, no character cut; the last is shorter than 50, which marks the end."""
     pieces = [b""]
-    for character in text:
+    for character in text.replace("\0", " "):  # a zero byte would mark the end
         data = character.encode("utf-8", errors="replace")
         if len(pieces[-1]) + len(data) > CHUNK_BYTES:
             pieces.append(b"")

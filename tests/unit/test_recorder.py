@@ -1,0 +1,128 @@
+"""The record of a run, read back with other tools."""
+
+import errno
+import io
+import json
+from pathlib import Path
+
+import pytest
+from pymavlink import mavutil
+
+from companion.grid import Cell
+from companion.navigator import Action, Decision, Part, SearchKind
+from companion.planning.problem import Path as FieldPath
+from companion.recorder import NullRecorder, Recorder, RecordError
+from companion.settings import Settings
+from tests.mavlink_vehicle import Station
+
+DECISION = Decision(
+    action=Action.FOLLOW,
+    part=Part.SEARCH,
+    path=(Cell(0, 24), Cell(1, 24)),
+    new_path=FieldPath((Cell(0, 24), Cell(1, 24)), 1.5),
+    reason="the path is blocked",
+    searches=(SearchKind.THOROUGH,),
+)
+
+
+@pytest.fixture
+def mission(tmp_path: Path) -> Path:
+    file = tmp_path / "rooms.toml"
+    file.write_text("name = 'rooms'\n", encoding="utf-8")
+    return file
+
+
+def test_a_ground_stations_tools_read_the_packets(tmp_path: Path, mission: Path) -> None:
+    recorder = Recorder(tmp_path / "new" / "run", mission, Settings(), 7)
+    rover, companion = Station(), Station(1, 191)
+    for i in range(10):
+        recorder.packet(100.0 + 0.5 * i, rover.local_position(1000 + i, float(i)))
+        recorder.packet(100.0 + 0.5 * i, companion.heartbeat(kind=18, autopilot=8))
+    recorder.close()
+    log = mavutil.mavlink_connection(str(tmp_path / "new" / "run" / "link.tlog"))
+    got = []
+    while (message := log.recv_match()) is not None:
+        got.append((message._timestamp, message.get_srcComponent(), message.get_type()))
+    log.close()
+    assert [entry[1:] for entry in got] == [(1, "LOCAL_POSITION_NED"), (191, "HEARTBEAT")] * 10
+    assert got[0][0] > 1.6e9, "seconds since 1970"
+    assert got[-1][0] - got[0][0] == pytest.approx(4.5, abs=1e-5)
+
+
+def test_decisions_and_what_it_was_run_with(tmp_path: Path, mission: Path) -> None:
+    recorder = Recorder(tmp_path / "run", mission, Settings(), 7)
+    recorder.write_decision(12.345678901, "east gate", DECISION)
+    recorder.write_decision(13.0, "east gate", DECISION)
+    recorder.close()
+    first, second = (json.loads(line) for line in (tmp_path / "run" / "decisions.jsonl").read_text().splitlines())
+    assert first["time_s"] == 12.345678901 and second["time_s"] == 13.0
+    assert first | {"time_s": 0} == {
+        "time_s": 0,
+        "target": "east gate",
+        "action": "follow",
+        "part": "C",
+        "reason": "the path is blocked",
+        "searches": ["thorough"],
+        "proved": False,
+        "new_path": True,
+        "path": [[0, 24], [1, 24]],
+    }
+    meta = json.loads((tmp_path / "run" / "meta.json").read_text())
+    assert (meta["seed"], meta["mission"], meta["clock_at_start_s"]) == (7, str(mission), 12.345678901)
+    assert Settings.model_validate(meta["settings"]) == Settings()
+    assert len(meta["settings_sha256"]) == 64 and set(meta["versions"]) >= {"python", "rover-companion", "numpy"}
+    assert (tmp_path / "run" / "mission.toml").read_bytes() == mission.read_bytes()
+
+
+def test_it_is_on_disk_after_a_second_without_closing(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "run", None, Settings(), 0)
+    packet = Station().heartbeat()
+    recorder.packet(0.0, packet)
+    recorder.packet(1.5, packet)
+    assert (tmp_path / "run" / "link.tlog").stat().st_size == 2 * (8 + len(packet))
+    recorder.close()
+
+
+def test_a_place_that_cannot_be_written_is_one_line(tmp_path: Path, mission: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(RecordError) as caught:
+        Recorder(tmp_path / "file" / "run", mission, Settings(), 0)
+    assert str(caught.value).startswith(str(tmp_path / "file" / "run")) and "\n" not in str(caught.value)
+    with pytest.raises(RecordError, match="choose a directory"):
+        Recorder(tmp_path / "run", tmp_path / "no such mission.toml", Settings(), 0)
+
+
+class FullDisk(io.BytesIO):
+    """A file on a disk without room."""
+
+    def write(self, data: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+
+def test_a_full_disk_ends_the_record_but_not_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    recorder = Recorder(tmp_path / "run", None, Settings(), 0)
+    recorder.packet(0.0, b"before")
+    monkeypatch.setattr(recorder, "_decisions", FullDisk())
+    recorder.write_decision(0.1, "x", DECISION)
+    assert "No space left" in recorder.problem and str(tmp_path / "run") in recorder.problem
+    recorder.packet(0.2, b"packet")
+    recorder.write_decision(0.3, "x", DECISION)
+    recorder.close()
+    assert (tmp_path / "run" / "link.tlog").read_bytes().endswith(b"before")
+
+
+def test_closing_twice_and_writing_after_is_harmless(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "run", None, Settings(), 0)
+    recorder.close()
+    recorder.close()
+    recorder.packet(0.0, b"late")
+    assert (tmp_path / "run" / "link.tlog").read_bytes() == b""
+    assert recorder.problem == ""
+
+
+def test_no_record_takes_everything() -> None:
+    recorder = NullRecorder()
+    recorder.packet(0.0, b"x")
+    recorder.write_decision(0.0, "x", DECISION)
+    recorder.close()
+    assert recorder.problem == ""

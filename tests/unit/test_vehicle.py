@@ -1,0 +1,115 @@
+"""The state that events add up to."""
+
+import math
+
+import numpy as np
+import pytest
+
+from companion.frames import GeoPoint
+from companion.scan import RangeScan
+from companion.vehicle import (
+    AckSeen,
+    AttitudeSeen,
+    EkfStatusSeen,
+    Event,
+    GlobalPositionSeen,
+    HeartbeatSeen,
+    HomeSeen,
+    LocalPositionSeen,
+    OriginSeen,
+    ParameterSeen,
+    PrearmSeen,
+    RangeSeen,
+    TargetSeen,
+    TextSeen,
+    VehicleState,
+    fold,
+)
+
+PLACE = GeoPoint(-35.0, 149.0)
+SCAN = RangeScan(1.0, np.zeros(1), np.ones(1), 0.2, 8.0, 0.1, "test")
+
+
+@pytest.mark.parametrize(
+    ("event", "name"),
+    [
+        (HeartbeatSeen(1.0, 15, True, 1), "heartbeat"),
+        (LocalPositionSeen(1.0, 1.0, 2.0, 3.0, 0.0, 0.0), "position"),
+        (AttitudeSeen(1.0, 1.0, 0.5, 0.1), "attitude"),
+        (GlobalPositionSeen(1.0, 1.0, PLACE), "global_position"),
+        (EkfStatusSeen(1.0, 831), "ekf"),
+        (OriginSeen(1.0, PLACE), "origin"),
+        (HomeSeen(1.0, PLACE), "home"),
+        (RangeSeen(1.0, SCAN), "scan"),
+        (TargetSeen(1.0, PLACE, 3580), "target"),
+        (PrearmSeen(1.0, True), "prearm"),
+    ],
+)
+def test_the_newest_is_kept(event: Event, name: str) -> None:
+    state = fold(VehicleState(), event)
+    assert getattr(state, name) is event
+    others = {field for field in VehicleState.__slots__ if field not in (name, "parameters", "jump_m")}
+    assert all(getattr(state, other) is None for other in others)
+
+
+@pytest.mark.parametrize("event", [AckSeen(1.0, 176, 0), TextSeen(1.0, 6, "hello")])
+def test_answers_and_texts_are_no_state(event: Event) -> None:
+    state = VehicleState()
+    assert fold(state, event) is state
+
+
+def test_parameters_are_collected_and_the_old_state_is_not_touched() -> None:
+    first = fold(VehicleState(), ParameterSeen(1.0, "WP_SPEED", 2.0))
+    second = fold(fold(first, ParameterSeen(2.0, "WP_RADIUS", 1.0)), ParameterSeen(3.0, "WP_SPEED", 3.0))
+    assert first.parameters == {"WP_SPEED": 2.0}
+    assert second.parameters == {"WP_SPEED": 3.0, "WP_RADIUS": 1.0}
+
+
+def moving() -> VehicleState:
+    state = fold(VehicleState(), LocalPositionSeen(10.0, 5.0, 100.0, 50.0, 2.0, -1.0))
+    return fold(state, AttitudeSeen(10.1, 5.1, 1.0, 0.5))
+
+
+def test_pose_is_carried_forward() -> None:
+    pose = moving().pose_at(10.2)
+    assert pose is not None
+    assert (pose.north_m, pose.east_m) == (pytest.approx(100.4), pytest.approx(49.8))
+    assert pose.heading_rad == pytest.approx(1.05)
+    assert pose.time_s == 10.2
+
+
+def test_pose_is_not_carried_far_nor_backwards() -> None:
+    late, early = moving().pose_at(60.0), moving().pose_at(9.0)
+    assert late is not None and early is not None
+    assert (late.north_m, late.east_m, late.heading_rad) == (101.0, 49.5, 1.25)
+    assert (early.north_m, early.east_m, early.heading_rad) == (100.0, 50.0, 1.0)
+
+
+def test_no_pose_without_both_position_and_attitude() -> None:
+    assert VehicleState().pose_at(0.0) is None
+    assert fold(VehicleState(), LocalPositionSeen(1.0, 1.0, 0.0, 0.0, 0.0, 0.0)).pose_at(1.0) is None
+    assert fold(VehicleState(), AttitudeSeen(1.0, 1.0, 0.0, 0.0)).pose_at(1.0) is None
+
+
+def test_speed_over_ground() -> None:
+    assert VehicleState().speed_m_s == 0.0
+    assert moving().speed_m_s == pytest.approx(math.sqrt(5.0))
+
+
+@pytest.mark.parametrize(
+    ("flags", "ok"), [(None, False), (0, False), (1024, False), (8, True), (16, True), (831, True), (831 | 128, False)]
+)
+def test_ekf_flags(flags: int | None, ok: bool) -> None:
+    state = VehicleState() if flags is None else fold(VehicleState(), EkfStatusSeen(1.0, flags))
+    assert state.ekf_ok is ok
+
+
+def test_driving_is_no_jump_but_a_reset_is() -> None:
+    state = VehicleState()
+    for i in range(20):
+        state = fold(state, LocalPositionSeen(0.1 * i, 0.1 * i, 0.3 * i, 0.0, 3.0, 0.0))
+        assert state.jump_m == pytest.approx(0.0, abs=1e-9)
+    state = fold(state, LocalPositionSeen(2.0, 2.0, 6.0 + 3.0, 4.0, 3.0, 0.0))
+    assert state.jump_m == pytest.approx(5.0)
+    state = fold(state, LocalPositionSeen(2.1, 2.1, 9.3, 4.0, 3.0, 0.0))
+    assert state.jump_m == pytest.approx(0.0, abs=1e-9)
