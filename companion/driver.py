@@ -74,6 +74,7 @@ class Driver:
         self._progress: Progress | None = None
         self._back_until_s = -math.inf
         self._doubts_left = 0
+        self._looking = False
         self._stuck_places: dict[Cell, int] = {}
 
     def head_for(self, goal: ResolvedTarget, pose: Pose) -> None:
@@ -121,7 +122,9 @@ class Driver:
         rover = self._rover
         if self._goal.speed_m_s is not None:
             rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
-        now = guide(self.route, pose, speed_m_s, self.evidence, rover, self._settings.guidance)
+        settings = self._settings.guidance
+        now = guide(self.route, pose, speed_m_s, self.evidence, rover, settings, looking=self._looking)
+        self._looking = now.motion in (Motion.LOOK, Motion.BRAKE)
         if self._is_stuck(pose, now):
             self._get_unstuck(pose)
         return now, decision

@@ -148,3 +148,28 @@ def nearest(log_odds, x0, y0, reach, occupied_at):
             if log_odds[y, x] >= occupied_at:
                 best = min(best, max(math.hypot(x + 0.5 - x0, y + 0.5 - y0) - 0.5, 0.0))
     return best
+
+
+@njit(cache=True, nogil=True)
+def first_unseen(log_odds, x0, y0, x1, y1, offset, near):
+    """The nearest unseen place on the two lines ``offset`` beside the line to (x1, y1), from distance ``near`` on.
+
+    Returns its distance along the line and its place (x, y); the length of the line and its end when all has been seen.
+    """
+    height, width = log_odds.shape
+    length = math.hypot(x1 - x0, y1 - y0)
+    if length < 1e-9:
+        return 0.0, x1, y1
+    dx = (x1 - x0) / length
+    dy = (y1 - y0) / length
+    d = near
+    while d < length:
+        for side in (-1.0, 1.0):
+            px = x0 + d * dx - side * offset * dy
+            py = y0 + d * dy + side * offset * dx
+            x = int(math.floor(px))
+            y = int(math.floor(py))
+            if 0 <= x < width and 0 <= y < height and log_odds[y, x] == 0.0:
+                return d, px, py
+        d += 0.5
+    return length, x1, y1

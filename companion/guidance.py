@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from companion.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
 from companion.frames import NedPoint, Pose, wrap_pi_rad
 from companion.grid import Cell, Grid
-from companion.mapping import EvidenceMap, clearance_m, look_along
+from companion.mapping import EvidenceMap, Unseen, clearance_m, look_along, unseen_beside
 from companion.settings import GuidanceSettings
 
 Points = NDArray[np.float64]
@@ -121,18 +121,32 @@ def advanced(route: Route, pose: Pose, window_m: float = 4.0) -> Route:
 
 
 def guide(
-    route: Route, pose: Pose, speed_m_s: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
+    route: Route,
+    pose: Pose,
+    speed_m_s: float,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: GuidanceSettings,
+    *,
+    looking: bool = False,
 ) -> Guide:
-    """The setpoint and speed for this moment. ``BLOCKED`` means that not even the next piece of the route is clear."""
+    """The setpoint and speed for this moment. ``BLOCKED`` means that not even the next piece of the route is clear.
+
+    ``looking``: the last answer was LOOK; then a longer clear reach is wanted before driving off, so that a narrow sensor
+    looks to both sides once, not at every step.
+    """
     if _must_brake(pose, speed_m_s, evidence, rover, settings):
         return Guide(Motion.BRAKE, STOP, 0.0)
     target, reach_m, room_m = _farthest_clear(route, pose, speed_m_s, evidence, rover, settings)
+    distance_m = pose.point.distance_m(route.end)
+    at_end = len(route.points) - 1 - route.progress <= int(1.0 / STEP_M)
+    wanted_m = settings.reach_after_look_m if looking else settings.least_reach_m
+    if reach_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach_m > 0.0):
+        look = _look_or_blocked(route, pose, speed_m_s, evidence, rover, settings)
+        if look.motion is not Motion.DRIVE or reach_m < settings.least_reach_m:
+            return look
     bearing = pose.point.bearing_rad(target)
     error = abs(wrap_pi_rad(bearing - pose.heading_rad))
-    at_end = len(route.points) - 1 - route.progress <= int(1.0 / STEP_M)
-    if reach_m < min(settings.least_reach_m, pose.point.distance_m(route.end)) and not (at_end and reach_m > 0.0):
-        ahead = route.point_ahead(settings.look_ahead_m)
-        return _look_or_blocked(pose, speed_m_s, ahead, evidence, rover, settings)
     beside_m = clearance_m(evidence, pose.point, settings.slow_within_m + rover.radius_m) - rover.radius_m
     close = beside_m < settings.slow_within_m
     if close and error > math.radians(settings.turn_first_deg) and pose.point.distance_m(target) > 0.5:
@@ -179,7 +193,7 @@ def _farthest_clear(
     """
     best = (pose.point, 0.0, 0.0)
     for extra_m, enough_m in settings.clearances:
-        target, reach_m = _farthest_with(route, pose, speed_m_s, evidence, rover.radius_m + extra_m, settings)
+        target, reach_m = _farthest_with(route, pose, speed_m_s, evidence, rover, extra_m, settings)
         if reach_m > best[1] + 0.5 or best[1] == 0.0:
             best = (target, reach_m, extra_m)
         if best[1] >= min(enough_m, pose.point.distance_m(route.end) - 0.1):
@@ -192,36 +206,50 @@ def _farthest_with(
     pose: Pose,
     speed_m_s: float,
     evidence: EvidenceMap,
-    half_width_m: float,
+    rover: RoverLimits,
+    extra_m: float,
     settings: GuidanceSettings,
 ) -> tuple[NedPoint, float]:
     beyond_m = speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
+    flanks_m = settings.flanks_seen_m + stopping_distance_m(speed_m_s, settings)
     last = min(len(route.points) - 1, route.progress + int(settings.horizon_m / STEP_M))
     for index in range(last, route.progress, -2):
         point = route.point(index)
         distance_m = pose.point.distance_m(point)
         if distance_m < 0.05:
             continue
-        line = look_along(evidence, pose.point, point, half_width_m)
-        if line.clear_m >= distance_m - 0.05 and line.seen_m + beyond_m >= distance_m - 0.05:
+        line = look_along(evidence, pose.point, point, rover.radius_m + extra_m)
+        if line.clear_m < distance_m - 0.05 or line.seen_m + beyond_m < distance_m - 0.05:
+            continue
+        unseen = _unseen_flank(pose, point, evidence, rover)
+        if unseen is None or unseen.along_m >= min(distance_m, flanks_m):
             return point, distance_m
     return pose.point, 0.0
 
 
+def _unseen_flank(pose: Pose, point: NedPoint, evidence: EvidenceMap, rover: RoverLimits) -> Unseen | None:
+    """Where the rover's flanks would enter unseen ground on the way to a point."""
+    return unseen_beside(evidence, pose.point, point, 0.8 * rover.radius_m, rover.radius_m + evidence.evidence_m)
+
+
 def _look_or_blocked(
+    route: Route,
     pose: Pose,
     speed_m_s: float,
-    ahead: NedPoint,
     evidence: EvidenceMap,
     rover: RoverLimits,
     settings: GuidanceSettings,
 ) -> Guide:
     """The next piece is not clear, or has not been seen: turn to it; when turned and still so, it is blocked."""
-    bearing = pose.point.bearing_rad(ahead)
-    if abs(wrap_pi_rad(bearing - pose.heading_rad)) > math.radians(10.0):
-        return _turn_to(bearing, speed_m_s, settings)
+    ahead = route.point_ahead(settings.look_ahead_m)
     line = look_along(evidence, pose.point, ahead, rover.radius_m)
-    if line.clear_m >= pose.point.distance_m(ahead) - 0.05:
+    distance_m = pose.point.distance_m(ahead)
+    unseen = _unseen_flank(pose, route.point_ahead(settings.reach_after_look_m), evidence, rover)
+    view = ahead if line.seen_m < distance_m - 0.05 or unseen is None else unseen.place
+    bearing = pose.point.bearing_rad(view)
+    if abs(wrap_pi_rad(bearing - pose.heading_rad)) > math.radians(settings.turned_deg):
+        return _turn_to(bearing, speed_m_s, settings)
+    if line.clear_m >= distance_m - 0.05:
         # Looked at, and nothing there, but between the beams: creep.
         return Guide(Motion.DRIVE, GuidedPosition(ahead), settings.min_speed_m_s)
     return Guide(Motion.BLOCKED, STOP, 0.0)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.evidence import cast_scan, look, nearest, weigh
+from companion.evidence import cast_scan, first_unseen, look, nearest, weigh
 from companion.frames import NedPoint, Pose
 from companion.grid import Cell, Grid
 from companion.scan import RangeScan
@@ -149,6 +149,32 @@ def look_along(evidence: EvidenceMap, start: NedPoint, end: NedPoint, half_width
         half_width_m * scale, evidence.settings.occupied_at,
     )  # fmt: skip
     return Line(clear / scale, seen / scale)
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """The nearest place beside a line that has not been seen, and how far along the line it lies."""
+
+    along_m: float
+    place: NedPoint
+
+
+def unseen_beside(evidence: EvidenceMap, start: NedPoint, end: NedPoint, offset_m: float, near_m: float) -> Unseen | None:
+    """Where the rover's flanks, ``offset_m`` beside the line, would enter ground nobody has looked at; None if nowhere.
+
+    Nearer than ``near_m`` does not count: no sensor sees the ground right beside the rover.
+    """
+    scale = 1.0 / evidence.evidence_m
+    corner = evidence.base.south_west
+    along, x, y = first_unseen(
+        evidence.log_odds,
+        (start.east_m - corner.east_m) * scale, (start.north_m - corner.north_m) * scale,
+        (end.east_m - corner.east_m) * scale, (end.north_m - corner.north_m) * scale,
+        offset_m * scale, near_m * scale,
+    )  # fmt: skip
+    if along / scale >= start.distance_m(end) - 1e-6:
+        return None
+    return Unseen(along / scale, NedPoint(corner.north_m + y / scale, corner.east_m + x / scale))
 
 
 def clearance_m(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> float:

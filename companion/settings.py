@@ -52,15 +52,32 @@ class PlannerSettings(Section):
     )
 
 
+ControlPoints = tuple[Annotated[int, Field(ge=3, le=64)], ...]
+
+
 class SearchSettings(Section):
-    """One kind of search by the navigator."""
+    """One kind of search by the navigator: numbers of control points tried one after the other, epochs for each."""
 
     min_epochs: int = Field(1, ge=1)
     max_epochs: int = Field(100, ge=1)
-    control_points: tuple[Annotated[int, Field(ge=3, le=64)], ...] = Field(
-        (4,), min_length=1, description="tried one after the other"
-    )
+    control_points: ControlPoints = Field((4,), min_length=1, description="tried one after the other")
     population: int = Field(30, ge=12, le=3000)
+
+
+class QuickSearch(SearchSettings):
+    """Parts A and B: a quick look."""
+
+    min_epochs: int = Field(5, ge=1)
+    max_epochs: int = Field(50, ge=1)
+
+
+class ThoroughSearch(SearchSettings):
+    """Part C: for quality, with more control points as it gets harder."""
+
+    min_epochs: int = Field(10, ge=1)
+    max_epochs: int = Field(40, ge=1)
+    control_points: ControlPoints = Field((4, 6, 8), min_length=1)
+    population: int = Field(60, ge=12, le=3000)
 
 
 class NavigatorSettings(Section):
@@ -71,8 +88,8 @@ class NavigatorSettings(Section):
     doubts: int = Field(3, ge=0, description="how often per target weak evidence is forgotten when no path is left")
     wait_retry_s: float = Field(5.0, gt=0.0, description="on_blocked = wait: time between tries")
     wait_limit_s: float = Field(600.0, ge=0.0, description="on_blocked = wait: then the target is given up")
-    quick: SearchSettings = SearchSettings(min_epochs=5, max_epochs=50, control_points=(4,))
-    thorough: SearchSettings = SearchSettings(min_epochs=10, max_epochs=300, control_points=(4, 5, 6, 8), population=60)
+    quick: QuickSearch = QuickSearch()
+    thorough: ThoroughSearch = ThoroughSearch()
 
 
 class MappingSettings(Section):
@@ -114,6 +131,9 @@ class GuidanceSettings(Section):
         45.0, gt=0.0, le=180.0, description="turn on the spot before driving off at a larger angle"
     )
     roll_out_m_s: float = Field(0.3, ge=0.0, description="faster than this the rover first brakes straight, then turns on the spot")
+    reach_after_look_m: float = Field(2.5, gt=0.0, description="having turned to look, drive off when so much is clear")
+    flanks_seen_m: float = Field(0.6, ge=0.0, description="ground at the rover's flanks must be seen so far beyond the stopping distance")
+    turned_deg: float = Field(6.0, gt=0.0, description="turned to a place when it is this near to straight ahead")
     turn_cost: float = Field(0.45, ge=0.0, description="weight added to fields behind the rover when it plans")
     turn_reach_m: float = Field(6.0, ge=0.0, description="how far behind")
     slow_within_m: float = Field(0.6, gt=0.0, description="obstacles nearer than this beside the rover slow it down")

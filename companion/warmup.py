@@ -6,7 +6,7 @@ import numpy as np
 
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
-from companion.mapping import clearance_m, integrate, look_along, new_map, penalise
+from companion.mapping import clearance_m, integrate, look_along, new_map, penalise, unseen_beside
 from companion.planning import registry
 from companion.scan import RangeScan
 from companion.settings import Settings
@@ -21,4 +21,5 @@ def warm_up(settings: Settings) -> None:
     integrate(evidence, Pose(4.0, 4.0, 0.0, 0.0), scan, 1)
     penalise(evidence, evidence.base.cell_at(NedPoint(1.0, 1.0)), 0.1)
     look_along(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.5)
+    unseen_beside(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.3, 0.5)
     clearance_m(evidence, NedPoint(4.0, 4.0), 1.0)

@@ -10,10 +10,9 @@ def raw_packets(path: Path) -> Iterator[bytes]:
     data = path.read_bytes()
     at = 8
     while at + 3 <= len(data):
-        if data[at] == 0xFD:
-            length = 12 + data[at + 1] + (13 if data[at + 2] & 1 else 0)
-        else:
-            length = 8 + data[at + 1]
+        version_2 = data[at] == 0xFD
+        signed = version_2 and data[at + 2] & 1
+        length = data[at + 1] + (12 if version_2 else 8) + (13 if signed else 0)
         yield data[at : at + length]
         at += length + 8
 

@@ -11,7 +11,8 @@ from rich.markup import escape
 from rich.table import Table
 
 from companion.frames import GeoPoint
-from companion.grid import Cell
+from companion.grid import OBSTACLE, Cell, Grid
+from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, Mission, MissionError, Place
 
@@ -32,17 +33,18 @@ def check(
     """Print what was understood of FILE. Exit code 0, or 2 with one line of reason."""
     try:
         mission = load_mission(mission_file)
-    except MissionError as error:
+        maps = _maps(mission)
+    except (MissionError, MapError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    show(mission, Console(highlight=False))
+    show(mission, maps, Console(highlight=False))
 
 
-def show(mission: Mission, console: Console) -> None:
+def show(mission: Mission, maps: list[str], console: Console) -> None:
     """Print the mission."""
     console.print(f"[bold]{escape(mission.name)}[/bold]", soft_wrap=True)
     console.print(_targets(mission))
-    for line in (*_ground(mission), *_vehicle(mission), *(f"note: {note}" for note in mission.notes)):
+    for line in (*_ground(mission), *_vehicle(mission), *maps, *(f"note: {note}" for note in mission.notes)):
         console.print(escape(line), soft_wrap=True)
 
 
@@ -67,9 +69,25 @@ def _ground(mission: Mission) -> list[str]:
     lines += [f"keep out of {area_text(area)}" for area in mission.keep_out]
     lines += [f"keep inside {area_text(area)}" for area in mission.keep_in]
     lines += [f"weight {weighted.weight:g} in {area_text(weighted.area)}" for weighted in mission.weighted]
-    if mission.prior_map is not None:
-        lines.append(f"known map: {mission.prior_map}")
     return lines
+
+
+def _maps(mission: Mission) -> list[str]:
+    """The maps that the mission names, opened: a bad one is found now, not when the rover stands in the field."""
+    lines = []
+    sitl = mission.sitl
+    resolution_m = mission.grid.resolution_m
+    if mission.prior_map is not None:
+        lines.append(f"known map: {mission.prior_map}: {_map_text(load_map(mission.prior_map, resolution_m))}")
+    if sitl is not None and sitl.world is not None:
+        world = load_map(sitl.world, sitl.resolution_m or resolution_m)
+        lines.append(f"simulator's world: {sitl.world}: {_map_text(world)}")
+    return lines
+
+
+def _map_text(grid: Grid) -> str:
+    obstacles = int((grid.weights >= OBSTACLE).sum())
+    return f"{grid.width} x {grid.height} fields of {grid.resolution_m:g} m, {obstacles} of them obstacles"
 
 
 def _vehicle(mission: Mission) -> list[str]:
@@ -79,8 +97,8 @@ def _vehicle(mission: Mission) -> list[str]:
     if mission.sitl is not None:
         sitl = mission.sitl
         start = f", start {place_text(sitl.start)}" if sitl.start is not None else ""
-        world = sitl.world or "open ground"
-        lines.append(f"simulator only: world {world}{start}, heading {sitl.heading_deg:g} deg, sensors {sitl.sensors}")
+        world = "" if sitl.world else "open ground, "
+        lines.append(f"simulator only: {world}heading {sitl.heading_deg:g} deg, sensors {sitl.sensors}{start}")
     return lines
 
 

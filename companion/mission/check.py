@@ -80,15 +80,10 @@ def _check_area(mission: Mission, what: str, area: Area) -> None:
     if len(points) < 3:
         raise MissionError(f"{what}: a polygon needs at least three corners, not {len(points)}")
     polygon = shapely.Polygon(points)
-    if not polygon.is_valid or polygon.area == 0.0:
-        raise MissionError(f"{what}: not a simple polygon: {_why(polygon)}")
-
-
-def _why(polygon: shapely.Polygon) -> str:
-    reason = str(shapely.is_valid_reason(polygon))
-    if polygon.area == 0.0:
-        return "it encloses nothing"
-    return "its sides cross or touch" if "intersection" in reason.lower() else reason.lower()
+    if not polygon.is_valid:
+        reason = str(shapely.is_valid_reason(polygon)).lower()
+        why = "its sides cross or touch" if "intersection" in reason else reason
+        raise MissionError(f"{what}: not a simple polygon: {why}")
 
 
 def _plane(place: Place, first: Place) -> tuple[float, float]:

@@ -36,6 +36,8 @@ def _understood(plan: Json, path: Path) -> Mission:
     mission = _table(plan, "mission")
     _expect_version(mission, "mission.version", 2)
     items = list(_items(_list(mission, "mission.items"), "mission.items"))
+    if len(items) > MAX_ITEMS:
+        raise ItemError(f"mission.items: {len(items)} items are more than {MAX_ITEMS}")
     seen: set[int] = set()
     for item in items:
         if item.index in seen:
@@ -79,10 +81,8 @@ def _read(path: Path) -> Json:
 # --- items -----------------------------------------------------------------------------------------------------------
 
 
-def _items(entries: list[object], place: str) -> Iterator[Item]:
+def _items(entries: list[object], place: str, *, inner: bool = False) -> Iterator[Item]:
     """Simple items in order; a complex item (a survey, say) stands for the simple items it was worked out to."""
-    if len(entries) > MAX_ITEMS:
-        raise ItemError(f"{place}: {len(entries)} items are more than {MAX_ITEMS}")
     for position, entry in enumerate(entries, start=1):
         where = f"{place} {position}"
         if not isinstance(entry, dict):
@@ -90,12 +90,12 @@ def _items(entries: list[object], place: str) -> Iterator[Item]:
         kind = entry.get("type")
         if kind == "SimpleItem":
             yield _simple_item(entry, where, position)
-        elif kind == "ComplexItem":
-            name = str(entry.get("complexItemType", "without a name"))[:40]
+        elif kind == "ComplexItem" and not inner:
+            name = reprlib.repr(entry.get("complexItemType"))
             transects = entry.get("TransectStyleComplexItem")
             if not isinstance(transects, dict) or not isinstance(transects.get("Items"), list):
-                raise ItemError(f"{where}: ComplexItem '{name}' is not understood")
-            yield from _items(transects["Items"], f"{where} ({name}) item")
+                raise ItemError(f"{where}: ComplexItem {name} is not understood")
+            yield from _items(transects["Items"], f"{where} ({name}) item", inner=True)
         else:
             raise ItemError(f"{where}: type {reprlib.repr(kind)} is not understood")
 

@@ -8,6 +8,8 @@ as files of their own in the same form; here they may also stand after the missi
 from __future__ import annotations
 
 import math
+import re
+import reprlib
 from pathlib import Path
 
 from companion.frames import GeoPoint
@@ -23,9 +25,9 @@ def load(path: Path) -> Mission:
     """Read a WPL file; fences without any target are allowed. Raises MissionError: file, line or item, reason."""
     lines = _lines(path)
     if not lines or tuple(lines[0][1]) != HEADER:
-        found = " ".join(lines[0][1])[:40] if lines else "nothing"
+        found = reprlib.repr(" ".join(lines[0][1])) if lines else "nothing"
         place = f"line {lines[0][0]}" if lines else "file"
-        raise MissionError(f"{path}: {place}: expected the header 'QGC WPL 110', found '{found}'")
+        raise MissionError(f"{path}: {place}: expected the header 'QGC WPL 110', found {found}")
     if len(lines) - 1 > MAX_ITEMS:
         raise MissionError(f"{path}: {len(lines) - 1} items are more than {MAX_ITEMS}")
     items = []
@@ -56,7 +58,9 @@ def _lines(path: Path) -> list[tuple[int, list[str]]]:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise MissionError(f"{path}: not UTF-8 text (byte {error.start})") from error
-    split = ((number, line.partition("#")[0].split()) for number, line in enumerate(text.splitlines(), start=1))
+    split = (
+        (number, line.partition("#")[0].split()) for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1)
+    )
     return [(number, words) for number, words in split if words]
 
 
@@ -88,15 +92,15 @@ def _home(items: list[Item]) -> tuple[GeoPoint | None, list[Item]]:
 def _whole(word: str, name: str) -> int:
     value = _real(word, name)
     if value != int(value):
-        raise ValueError(f"{name}: expected a whole number, got '{word[:30]}'")
+        raise ValueError(f"{name}: expected a whole number, got {reprlib.repr(word)}")
     return int(value)
 
 
 def _real(word: str, name: str, *, nan: bool = False) -> float:
     try:
-        value = float(word)
+        value = math.inf if "_" in word else float(word)
     except ValueError:
         value = math.inf
     if not (math.isfinite(value) or (nan and math.isnan(value))):
-        raise ValueError(f"{name}: expected a number, got '{word[:30]}'")
+        raise ValueError(f"{name}: expected a number, got {reprlib.repr(word)}")
     return value

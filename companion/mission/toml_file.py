@@ -39,9 +39,16 @@ MAX_BYTES = 5_000_000
 
 T = TypeVar("T")
 
-Pair = Annotated[tuple[float, float], Field(strict=False)]
-Field2 = Annotated[tuple[int, int], Field(strict=False)]
-Positive = Annotated[float, Field(gt=0.0)]
+Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
+Index = Annotated[int, Field(ge=-1_000_000, le=1_000_000)]
+Pair = Annotated[tuple[Metres, Metres], Field(strict=False)]
+Field2 = Annotated[tuple[Index, Index], Field(strict=False)]
+Lat = Annotated[float, Field(ge=-90.0, le=90.0)]
+Lon = Annotated[float, Field(ge=-180.0, le=180.0)]
+LatLon = Annotated[tuple[Lat, Lon], Field(strict=False)]
+Positive = Annotated[float, Field(gt=0.0, le=1e6)]
+Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f\u2028\u2029\x85]+$")]
+FileName = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]+$")]
 
 
 class Table(BaseModel):
@@ -54,10 +61,10 @@ class PlaceTable(Table):
     """One place: a field, metres from home, or latitude and longitude."""
 
     field: Field2 | None = None
-    north_m: float | None = None
-    east_m: float | None = None
-    lat_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None
-    lon_deg: Annotated[float, Field(ge=-180.0, le=180.0)] | None = None
+    north_m: Metres | None = None
+    east_m: Metres | None = None
+    lat_deg: Lat | None = None
+    lon_deg: Lon | None = None
 
     def place(self) -> Place | None:
         """The place, or None if none is given. Raises ValueError when it is ambiguous or half given."""
@@ -80,8 +87,8 @@ class PlaceTable(Table):
 class TargetTable(PlaceTable):
     """``[[target]]``."""
 
-    name: Annotated[str, Field(min_length=1, max_length=100)] | None = None
-    hold_s: Annotated[float, Field(ge=0.0)] = 0.0
+    name: Name | None = None
+    hold_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
     on_blocked: Literal["skip", "wait", "return", "hold"] = "skip"
     speed_m_s: Positive | None = None
 
@@ -99,7 +106,7 @@ class AreaTable(PlaceTable):
 
     polygon_fields: list[Field2] | None = None
     polygon_m: list[Pair] | None = None
-    polygon_deg: list[Pair] | None = None
+    polygon_deg: list[LatLon] | None = None
     radius_m: Positive | None = None
 
     def area(self) -> Area:
@@ -126,7 +133,7 @@ class CorridorTable(AreaTable):
     weight: Annotated[float, Field(ge=0.0, lt=1.0)]
     line_fields: list[Field2] | None = None
     line_m: list[Pair] | None = None
-    line_deg: list[Pair] | None = None
+    line_deg: list[LatLon] | None = None
     width_m: Positive | None = None
 
     def shapes(self) -> list[Area]:
@@ -143,7 +150,7 @@ class GridTable(Table):
     resolution_m: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
     size: Annotated[tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]], Field(strict=False)] | None = None
     home: Field2 | None = None
-    margin_m: Annotated[float, Field(ge=0.0)] | None = None
+    margin_m: Annotated[float, Field(ge=0.0, le=1e6)] | None = None
 
 
 class RoverTable(Table):
@@ -156,27 +163,27 @@ class RoverTable(Table):
 class GeoTable(Table):
     """Latitude and longitude."""
 
-    lat_deg: Annotated[float, Field(ge=-90.0, le=90.0)]
-    lon_deg: Annotated[float, Field(ge=-180.0, le=180.0)]
+    lat_deg: Lat
+    lon_deg: Lon
 
 
 class SitlTable(Table):
     """``[sitl]``: a real rover ignores it."""
 
-    world: Annotated[str, Field(min_length=1)] | None = None
+    world: FileName | None = None
     resolution_m: Positive | None = None
     start: Field2 | None = None
     heading_deg: float = SitlSpec().heading_deg
-    sensors: Annotated[str, Field(min_length=1)] = SitlSpec().sensors
+    sensors: Name = SitlSpec().sensors
     home: GeoTable | None = None
 
 
 class MissionTable(Table):
     """The whole file."""
 
-    name: Annotated[str, Field(min_length=1, max_length=100)] | None = None
-    prior_map: Annotated[str, Field(min_length=1)] | None = None
-    fence: Annotated[str, Field(min_length=1)] | None = None
+    name: Name | None = None
+    prior_map: FileName | None = None
+    fence: FileName | None = None
     grid: GridTable = GridTable()
     rover: RoverTable = RoverTable()
     target: list[TargetTable] = []
@@ -249,7 +256,7 @@ def _sitl(table: SitlTable, folder: Path) -> SitlSpec:
 
 
 def _places(
-    fields: list[Field2] | None, metres: list[Pair] | None, degrees: list[Pair] | None
+    fields: list[Field2] | None, metres: list[Pair] | None, degrees: list[LatLon] | None
 ) -> list[tuple[Place, ...]]:
     """The lists of places that are given, each in its own kind."""
     lists: list[tuple[Place, ...]] = []
@@ -271,5 +278,5 @@ def _named(path: Path, kind: str, number: int, make: Callable[[], T]) -> T:
 
 def _counted(fault: str) -> str:
     """People count tables from 1: ``target.0.hold_s: ...`` becomes ``target 1.hold_s: ...``."""
-    place, colon, reason = fault.partition(": ")
+    place, colon, reason = " ".join(fault.split()).partition(": ")
     return re.sub(r"\.(\d+)", lambda found: f" {int(found[1]) + 1}", place) + colon + reason

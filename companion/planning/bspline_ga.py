@@ -11,7 +11,7 @@ from companion.grid import Weights
 from companion.planning import bspline
 from companion.planning.chance import draw_seed, seeded
 from companion.planning.ends import ends_free
-from companion.planning.ga_kernel import Task, Tuning, evolve, large_value, way_point, way_points_for
+from companion.planning.ga_kernel import Task, Tuning, evolve, is_correct, large_value, way_point, way_points_for
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
@@ -61,7 +61,7 @@ def search(
         value, genes, spent, tried = evolve(weights, task, tuning, count, population, min_epochs, max_epochs, state)
         epochs += spent
         evaluations += tried
-        if value < large_value(count, width, height, tuning):
+        if is_correct(value, large_value(count, width, height, tuning)):
             cells, curve = path_of(genes, way_points_for(count, tuning))
             return True, cells, curve, cells_cost(weights, cells), count, epochs, evaluations
     return False, np.empty((0, 2), np.int64), np.empty((0, 2)), 0.0, 0, epochs, evaluations

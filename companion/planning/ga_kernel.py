@@ -62,6 +62,12 @@ def large_value(control_points: int, width: int, height: int, tuning: Tuning) ->
 
 
 @njit(cache=True, nogil=True)
+def is_correct(value: float, vln: float) -> bool:
+    """Whether this is the fitness of a path without an obstacle; half a field is left for rounding."""
+    return value < vln - 0.5
+
+
+@njit(cache=True, nogil=True)
 def way_point(genes: CellArray, first: NDArray[np.int64], basis: NDArray[np.float64], i: int) -> tuple[int, int]:
     """Way point ``i`` of a chromosome, rounded to the nearest field centre (3.4)."""
     at = first[i]
@@ -82,9 +88,9 @@ def fitness(
 ) -> float:
     """Equation 5: the sum of the fields under the lines from way point to way point, start and target counting 0.
 
-    Obstacles, fields outside the map and cut corners count ``vln`` each; a line that leaves the map is not looked at
-    for corners. Stops early once it has reached ``limit``. The lines are those of ``raster.line_into``, drawn here
-    once more: a call for each would take longer than the line.
+    Obstacles and fields outside the map count ``vln`` each, a cut corner adds ``vln``; a line that leaves the map is
+    not looked at for corners. See ``is_correct``. Stops early once it has reached ``limit``. The lines are those of
+    ``raster.line_into``, drawn here once more: a call for each would take longer than the line.
     """
     height, width = weights.shape
     total: float = -weights[genes[-1, 1], genes[-1, 0]]
@@ -110,7 +116,7 @@ def fitness(
                     beside = max(weights[U(from_y), U(x)], weights[U(y), U(from_x)])
                     worst = max(value, beside if (x != from_x) & (y != from_y) else 0.0)
                 if worst >= OBSTACLE:
-                    value = vln
+                    value = vln if value >= OBSTACLE else vln + value
                     if total >= limit:
                         return total
             total += value
@@ -216,7 +222,7 @@ def evolve(
         if value < values[-1]:
             select(selected, ranks, values, genes, value)
     epoch = 1
-    while epoch < max_epochs and (epoch < min_epochs or values[0] >= vln):
+    while epoch < max_epochs and (epoch < min_epochs or not is_correct(values[0], vln)):
         for rank in range(chosen):
             copy_genes(selected[ranks[rank]], parents[rank])
         for _ in range(population - chosen):

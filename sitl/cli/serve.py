@@ -38,12 +38,13 @@ def serve(
         simulator.advance_to_s(0.02)
         for url in listen or DEFAULT_LISTEN:
             endpoints.append(open_endpoint(url, simulator))
-            typer.echo(f"listening on {url}" if not url.startswith("udpout") else f"sending to {url}")
     except (MissionError, MapError, ScenarioError, ListenError) as error:
         for endpoint in endpoints:
             endpoint.close()
         typer.echo(str(error), err=True)
         raise typer.Exit(BAD_INPUT) from error
+    for url in listen or DEFAULT_LISTEN:
+        typer.echo(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
     stop: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:

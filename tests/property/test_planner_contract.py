@@ -44,7 +44,7 @@ def reachable(problem: PlanningProblem) -> bool:
 
 @pytest.mark.parametrize("name", PLANNERS)
 @given(problem=problems(), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=300, deadline=None)
 def test_contract(name, problem, seed):
     planner = make_planner(name, PlannerSettings())
     before = problem.weights.copy()

@@ -13,13 +13,14 @@ from companion.planning.ga_kernel import (
     breed,
     evolve,
     fitness,
+    is_correct,
     large_value,
     scatter,
     way_point,
     way_points_for,
 )
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
-from companion.planning.raster import polyline
+from companion.planning.raster import first_fault, polyline
 from companion.settings import PlannerSettings
 from tests.planning_maps import drawn, one_obstacle
 
@@ -75,12 +76,30 @@ def test_stopping_at_a_limit_hides_nothing_below_it(genes, seed, limit):
     assert stopped == whole if whole < limit else stopped >= limit
 
 
+@settings(deadline=None, max_examples=300)
+@given(genes_strategy, st.integers(0, 20), st.sampled_from([0.02, 0.3]), st.booleans())
+def test_fitness_is_below_vln_exactly_for_correct_paths(genes, seed, share, corner_cutting):
+    weights = cluttered(seed, share)
+    walk = walk_of(genes)
+    walk = walk[np.append(True, (np.diff(walk, axis=0) != 0).any(axis=1))]
+    correct = first_fault(weights, walk, corner_cutting)[0] == 0
+    assert is_correct(value_of(weights, genes, corner_cutting), VLN) == correct
+
+
+def test_a_corner_cut_by_the_last_step_makes_a_path_incorrect():
+    weights = drawn("...", "#..", "...")
+    genes = np.array([(1, 1), (1, 1), (1, 1), (0, 0)])
+    assert [tuple(cell) for cell in walk_of(genes)] == [(1, 1), (0, 0)]
+    assert value_of(weights, genes, False) == pytest.approx(VLN)
+    assert value_of(weights, genes, True) == 0.0
+
+
 def test_a_cut_corner_counts_as_an_obstacle_unless_allowed():
     weights = drawn("....", ".#..", "....")
     genes = np.array([(0, 0), (1, 0), (1, 0), (2, 1)])
     assert [tuple(cell) for cell in walk_of(genes)] == [(0, 0), (1, 0), (2, 1)]
     assert value_of(weights, genes, True) == pytest.approx(0.5)
-    assert value_of(weights, genes, False) == pytest.approx(VLN + 0.5 - weights[1, 2])
+    assert value_of(weights, genes, False) == pytest.approx(VLN + 0.5)
 
 
 def test_vln_is_above_any_correct_path_of_a_large_map():

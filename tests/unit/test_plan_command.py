@@ -13,8 +13,8 @@ height 6
 width 8
 map
 ........
-...@....
-...@....
+........
+........
 ...@....
 ...@....
 ...@....
@@ -46,7 +46,7 @@ def test_json_holds_the_path_in_the_users_coordinates(map_file, planner):
     answer = json.loads(result.stdout)
     assert answer["status"] == "found" and answer["planner"] == planner
     assert answer["path"][0] == [0, 0] and answer["path"][-1] == [7, 0]
-    assert [3, 5] in answer["path"]
+    assert any(x == 3 and y >= 3 for x, y in answer["path"])
     assert answer["cost"] == pytest.approx(answer["length_fields"] / 2.0)
     assert answer["time_s"] > 0.0
 
@@ -54,7 +54,7 @@ def test_json_holds_the_path_in_the_users_coordinates(map_file, planner):
 def test_top_left_counts_y_down(map_file):
     result = run(map_file, "--start", "0,5", "--target", "7,5", "--top-left", "--json")
     path = json.loads(result.stdout)["path"]
-    assert path[0] == [0, 5] and path[-1] == [7, 5] and [3, 0] in path
+    assert path[0] == [0, 5] and path[-1] == [7, 5] and any(x == 3 and y <= 2 for x, y in path)
 
 
 def test_the_seed_decides(map_file):
@@ -80,7 +80,7 @@ def test_no_path_is_exit_code_3(map_file, tmp_path):
     [
         (["--start", "0,9", "--target", "7,0"], ["--start 0,9", "outside", "7,5"]),
         (["--start", "-1,0", "--target", "7,0"], ["--start -1,0", "outside"]),
-        (["--start", "0,0", "--target", "3,0"], ["--target 3,0", "obstacle"]),
+        (["--start", "0,0", "--target", "3,2"], ["--target 3,2", "obstacle"]),
         (["--start", "0;0", "--target", "7,0"], ["--start 0;0", "two whole numbers"]),
         (["--start", "0,0,0", "--target", "7,0"], ["two whole numbers"]),
         (["--start", "0,0", "--target", "7,0", "--planner", "hibrid"], ["'hibrid'", "'hybrid'"]),
