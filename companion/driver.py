@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.commands import GuidedVelocity
+from companion.commands import GuidedHeading, GuidedVelocity
 from companion.frames import NedPoint, Pose, wrap_pi_rad
 from companion.grid import Cell
 from companion.guidance import (
@@ -35,6 +35,7 @@ FRESH_PENALTY = 0.15
 FINAL_PENALTY = 1.0
 TRIES_AT_ONE_PLACE = 3
 DOUBT_REACH_M = 2.5
+BACK_ROOM_M = 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,7 @@ class Driver:
         self._progress: Progress | None = None
         self._back_until_s = -math.inf
         self._doubts_left = 0
-        self._looking = False
+        self._looking_rad: float | None = None
         self._stuck_places: dict[Cell, int] = {}
 
     def head_for(self, goal: ResolvedTarget, pose: Pose) -> None:
@@ -109,7 +110,7 @@ class Driver:
         if self._goal is None or self._state is None:
             return STANDSTILL, None
         if pose.time_s < self._back_until_s:
-            return self._backing_out(), None
+            return self._backing_out(pose), None
         decision = self._field_step(pose)
         if self._arrived(pose, speed_m_s):
             self.decision = Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
@@ -123,8 +124,8 @@ class Driver:
         if self._goal.speed_m_s is not None:
             rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
         settings = self._settings.guidance
-        now = guide(self.route, pose, speed_m_s, self.evidence, rover, settings, looking=self._looking)
-        self._looking = now.motion in (Motion.LOOK, Motion.BRAKE)
+        now = guide(self.route, pose, speed_m_s, self.evidence, rover, settings, looking_rad=self._looking_rad)
+        self._looking_rad = now.setpoint.heading_rad if isinstance(now.setpoint, GuidedHeading) else None
         if self._is_stuck(pose, now):
             self._get_unstuck(pose)
         return now, decision
@@ -218,9 +219,7 @@ class Driver:
         self._stuck_places[cell] = self._stuck_places.get(cell, 0) + 1
         final = self._stuck_places[cell] >= TRIES_AT_ONE_PLACE
         penalise(self.evidence, cell, FINAL_PENALTY if final else FRESH_PENALTY)
-        behind = pose.point.moved(pose.heading_rad + math.pi, self._settings.guidance.back_out_m)
-        room_m = look_along(self.evidence, pose.point, behind, self._rover.radius_m).clear_m
-        self._back_until_s = pose.time_s + room_m / self._settings.guidance.back_out_speed_m_s
+        self._back_until_s = pose.time_s + self._settings.guidance.back_out_m / self._settings.guidance.back_out_speed_m_s
         self._state = abandon_path(self._state)
         self._progress = None
         self.route = None
@@ -232,7 +231,13 @@ class Driver:
         point = self.route.point_ahead(self.evidence.base.resolution_m)
         return pose.point.moved(pose.point.bearing_rad(point), self.evidence.base.resolution_m)
 
-    def _backing_out(self) -> Guide:
+    def _backing_out(self, pose: Pose) -> Guide:
+        """Straight back over ground that is known to be free, and not a step farther."""
         self._progress = None
         speed_m_s = self._settings.guidance.back_out_speed_m_s
+        behind = pose.point.moved(pose.heading_rad + math.pi, BACK_ROOM_M)
+        line = look_along(self.evidence, pose.point, behind, self._rover.radius_m + self._settings.guidance.clearance_m)
+        if min(line.clear_m, line.seen_m) < BACK_ROOM_M - 1e-6:
+            self._back_until_s = pose.time_s
+            return STANDSTILL
         return Guide(Motion.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)

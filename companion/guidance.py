@@ -128,20 +128,22 @@ def guide(
     rover: RoverLimits,
     settings: GuidanceSettings,
     *,
-    looking: bool = False,
+    looking_rad: float | None = None,
 ) -> Guide:
     """The setpoint and speed for this moment. ``BLOCKED`` means that not even the next piece of the route is clear.
 
-    ``looking``: the last answer was LOOK; then a longer clear reach is wanted before driving off, so that a narrow sensor
-    looks to both sides once, not at every step.
+    ``looking_rad``: the heading of the last answer if that was LOOK. It is kept until reached, and a longer clear reach is wanted
+    before driving off, so that a narrow sensor looks to both sides once, not at every step.
     """
     if _must_brake(pose, speed_m_s, evidence, rover, settings):
         return Guide(Motion.BRAKE, STOP, 0.0)
     target, reach_m, room_m = _farthest_clear(route, pose, speed_m_s, evidence, rover, settings)
     distance_m = pose.point.distance_m(route.end)
     at_end = len(route.points) - 1 - route.progress <= int(1.0 / STEP_M)
-    wanted_m = settings.reach_after_look_m if looking else settings.least_reach_m
+    wanted_m = settings.least_reach_m if looking_rad is None else settings.reach_after_look_m
     if reach_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach_m > 0.0):
+        if looking_rad is not None and not _is_turned_to(looking_rad, pose, settings):
+            return _turn_to(looking_rad, speed_m_s, settings)
         look = _look_or_blocked(route, pose, speed_m_s, evidence, rover, settings)
         if look.motion is not Motion.DRIVE or reach_m < settings.least_reach_m:
             return look
@@ -164,6 +166,10 @@ def _must_brake(
     needed_m = speed_m_s**2 / (2.0 * settings.deceleration_m_s2) + 0.1 * speed_m_s
     ahead = pose.point.moved(pose.heading_rad, needed_m)
     return look_along(evidence, pose.point, ahead, rover.radius_m + 0.05).clear_m < needed_m - 1e-6
+
+
+def _is_turned_to(bearing_rad: float, pose: Pose, settings: GuidanceSettings) -> bool:
+    return abs(wrap_pi_rad(bearing_rad - pose.heading_rad)) <= math.radians(settings.turned_deg)
 
 
 def _turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -> Guide:
@@ -247,7 +253,7 @@ def _look_or_blocked(
     unseen = _unseen_flank(pose, route.point_ahead(settings.reach_after_look_m), evidence, rover)
     view = ahead if line.seen_m < distance_m - 0.05 or unseen is None else unseen.place
     bearing = pose.point.bearing_rad(view)
-    if abs(wrap_pi_rad(bearing - pose.heading_rad)) > math.radians(settings.turned_deg):
+    if not _is_turned_to(bearing, pose, settings):
         return _turn_to(bearing, speed_m_s, settings)
     if line.clear_m >= distance_m - 0.05:
         # Looked at, and nothing there, but between the beams: creep.

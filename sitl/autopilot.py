@@ -11,6 +11,7 @@ from sitl.autopilot_commands import answer
 from sitl.autopilot_link import AUTOPILOT, Channel, new_channel
 from sitl.autopilot_modes import INFO, WARNING, run_failsafes, set_mode
 from sitl.autopilot_params import REAL32
+from sitl.autopilot_proximity import forget_stale, take_in
 from sitl.autopilot_streams import heartbeat, send_due, set_group, start_streams
 from sitl.autopilot_targets import GLOBAL_FRAMES, attitude_target, global_target, go_to, local_target
 from sitl.autopilot_vehicle import HOME_S, ORIGIN_S, POSITION_S, Mode, Vehicle
@@ -99,6 +100,7 @@ class Autopilot:
         if vehicle.time_us >= self._next_second_us:
             self._next_second_us += 1_000_000
             run_failsafes(vehicle)
+            forget_stale(vehicle)
             for channel in vehicle.channels.values():
                 for message in heartbeat(vehicle):
                     channel.send(message)
@@ -236,6 +238,10 @@ def _global(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     global_target(vehicle, message)
 
 
+def _obstacles(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    take_in(vehicle, message)
+
+
 def _attitude(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     attitude_target(vehicle, message)
 
@@ -249,6 +255,7 @@ HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
     "MISSION_ITEM": _mission_item,
     "MISSION_ITEM_INT": _mission_item,
     "MISSION_REQUEST_LIST": _mission_list,
+    "OBSTACLE_DISTANCE": _obstacles,
     "PARAM_REQUEST_LIST": _list_parameters,
     "PARAM_REQUEST_READ": _read_parameter,
     "PARAM_SET": _set_parameter,

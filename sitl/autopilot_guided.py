@@ -34,6 +34,8 @@ ARRIVED_M = 0.01
 SPEED_CHANGE_TICKS = 25
 """Changes of the top speed are taken over no more often than every 0.5 s."""
 UNLIMITED_ACCEL_M_S2 = 20.0
+AVOID_PROXIMITY = 2
+"""Bit of AVOID_ENABLE: slow down for what proximity sensors see, with half the deceleration."""
 PLAN_FROM_REST = 64
 """Bit of GUID_OPTIONS: every target is planned anew from standstill, so that quick repeats keep the rover standing."""
 
@@ -200,6 +202,9 @@ def run_waypoint(control: Any, tuning: Any, estimate: Any) -> None:
 def run_throttle(control: Any, tuning: Any, estimate: Any, speed: float) -> None:
     """Throttle for a wished speed; a wish of zero is a controlled stop."""
     speed = accel_limited(control, tuning, speed)
+    if int(tuning.avoid) & AVOID_PROXIMITY and speed > 0.0:
+        room_m = max(control.room_m - tuning.avoid_margin_m, 0.0)
+        speed = min(speed, math.sqrt(tuning.accel_max * room_m))
     if speed == 0.0:
         run_stop(control, tuning, estimate)
     else:

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_link import new_codec
+from sitl.autopilot_proximity import take_in
+from sitl.autopilot_vehicle import Vehicle
 from sitl.sensors import Lidar, RangeSensing
 
 OBSTACLE_AVOIDANCE = 196
@@ -14,11 +16,12 @@ HEARTBEAT_US = 1_000_000
 class LidarComponent:
     """Packs scans and heartbeats at the scanner's rate."""
 
-    def __init__(self, lidar: Lidar, sensing: RangeSensing, system: int) -> None:
-        """``sensing`` measures, ``system`` is the vehicle's system id."""
+    def __init__(self, lidar: Lidar, sensing: RangeSensing, vehicle: Vehicle) -> None:
+        """``sensing`` measures, ``vehicle`` hears the scans as everybody on its network does."""
         self._lidar = lidar
+        self._vehicle = vehicle
         self._sensing = sensing
-        self._codec = new_codec(OBSTACLE_AVOIDANCE, system)
+        self._codec = new_codec(OBSTACLE_AVOIDANCE, vehicle.system)
         self._interval_us = 1e6 / lidar.rate_hz
         self._scan_us = self._interval_us
         self._heartbeat_us = 0.0
@@ -45,4 +48,5 @@ class LidarComponent:
             time_us, 0, cells, round(lidar.increment_deg), round(lidar.min_m * 100), round(lidar.max_m * 100),
             lidar.increment_deg, lidar.offset_deg, 12,
         )  # fmt: skip
+        take_in(self._vehicle, message)
         return bytes(message.pack(self._codec))

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl import geodesy
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import arming_faults, base_mode
+from sitl.autopilot_proximity import echoes
 from sitl.autopilot_vehicle import (
     ALTITUDE_M,
     AUTOPILOT_MODES,
@@ -133,12 +134,13 @@ def _simstate(vehicle: Vehicle) -> list[Any]:
 
 
 def _distance_sensors(vehicle: Vehicle) -> list[Any]:
-    return [
+    wired = [
         mavlink.MAVLink_distance_sensor_message(
             _ms(vehicle), round(beam.min_m * 100), round(beam.max_m * 100), reading, 4, number, beam.orientation, 0
         )
         for number, (beam, reading) in enumerate(zip(vehicle.sensing.suite.beams, read_beams(vehicle), strict=True))
     ]
+    return wired + echoes(vehicle)
 
 
 def _rangefinder(vehicle: Vehicle) -> list[Any]:

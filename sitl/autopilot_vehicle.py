@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
@@ -67,6 +67,15 @@ class Clocks:
     armed_s: float | None = None
 
 
+@dataclass
+class Proximity:
+    """Obstacle distances the autopilot has taken in: nearest of each eighth of a turn, clockwise from ahead."""
+
+    octants_cm: list[int] = field(default_factory=list)
+    limits_cm: tuple[int, int] = (0, 0)
+    heard_s: float = -1.0
+
+
 class Vehicle:
     """State of the simulated ArduRover since it was booted."""
 
@@ -97,7 +106,7 @@ class Vehicle:
         self.texts: list[tuple[int, str]] = []
         self.rebooting = False
         self.destination: tuple[int, int] = origin
-        self.beams_cm: list[int] = []
+        self.proximity = Proximity()
 
     @property
     def time_us(self) -> int:

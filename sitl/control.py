@@ -51,7 +51,7 @@ CONTROL = np.dtype(
             "nav_speed", "nav_turn_rate",
             "desired_speed", "speed_error", "speed_integral",
             "desired_turn_rate", "steer_error", "steer_integral",
-            "throttle", "throttle_before", "steering", "left", "right",
+            "throttle", "throttle_before", "steering", "left", "right", "room_m",
         )
     ]
 )  # fmt: skip
@@ -89,6 +89,8 @@ TUNING_NAMES = {
     "slew_rate": "MOT_SLEWRATE",
     "guided_timeout_s": "GUID_TIMEOUT",
     "guided_options": "GUID_OPTIONS",
+    "avoid": "AVOID_ENABLE",
+    "avoid_margin_m": "AVOID_MARGIN",
 }
 """Fields of a tuning record and the parameters they come from."""
 
@@ -108,6 +110,7 @@ def new_control() -> Record:
         if name.endswith("_tick"):
             control[name] = NEVER
     control["task"] = COAST
+    control["room_m"] = np.inf
     return control
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from companion.clock import stopwatch_s
 from companion.grid import BASE_WEIGHT, OBSTACLE, Cell, Grid, Weights
-from companion.navigator import Action, Decision, NavState, Part, SearchKind, begin, step
+from companion.navigator import Action, Decision, Part, SearchKind, begin, step
 from companion.planning.problem import PlanResult
 from companion.planning.registry import make_planner
 from companion.searching import Searcher

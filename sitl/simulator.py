@@ -140,7 +140,7 @@ class Simulator:
         self._vehicle.estimate["heading_rad"] = rover["heading_rad"]
         self._autopilot = Autopilot(self._vehicle)
         lidar = self._sensing.suite.lidar
-        self._lidar = LidarComponent(lidar, self._sensing, self._vehicle.system) if lidar else None
+        self._lidar = LidarComponent(lidar, self._sensing, self._vehicle) if lidar else None
 
     @property
     def time_s(self) -> float:

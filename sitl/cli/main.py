@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from sitl.cli.experiment import experiment
 from sitl.cli.serve import serve
 
 app = typer.Typer(
@@ -21,6 +22,7 @@ def _commands() -> None:
 
 
 app.command()(serve)
+app.command()(experiment)
 
 
 def main() -> None:

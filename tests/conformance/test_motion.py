@@ -12,8 +12,10 @@ import pytest
 from numpy.typing import NDArray
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.simulator import SimStart, Simulator
+from sitl.world import World
 from tests.shared_data import SHARED, needs_shared
-from tests.sitl_client import Client, open_ground, ready
+from tests.sitl_client import HOME, Client, open_ground, ready
 from tests.tlog import raw_packets
 
 RECORDING = SHARED / "data" / "ardurover-4.7-transcripts" / "guided-drive.tlog"
@@ -287,3 +289,37 @@ def test_a_target_kept_while_disarmed_is_driven_to_on_arming() -> None:
     assert client.arm() == 0
     client.run_for(8.0)
     assert client.simulator.truth.north_m == pytest.approx(5.2, abs=0.3)
+
+
+def towards_a_wall(lidar: bool = True, **parameters: float) -> Client:
+    """An armed rover 9 m before a wall with a target behind it, after 15 s."""
+    obstacles = np.zeros((20, 40), dtype=np.bool_)
+    obstacles[14:16, :] = True
+    start = SimStart(5.0, 20.0, 0.0, HOME)
+    suite = "lidar-360" if lidar else "none"
+    client = ready(Simulator(World(obstacles), start, suite, noise=False, parameters=parameters))
+    client.ask(511, 132, 100_000)
+    client.drive_to(14.0, 0.0)
+    client.run_for(15.0)
+    return client
+
+
+def test_simple_avoidance_creeps_up_to_an_obstacle_and_stays_there_in_silence() -> None:
+    client = towards_a_wall(PRX1_TYPE=2)
+    assert 14.0 - client.simulator.truth.north_m == pytest.approx(2.1, abs=0.2)
+    assert not client.simulator.collisions
+    assert not client.of("MISSION_ITEM_REACHED")
+
+
+@pytest.mark.parametrize("parameters", [{"PRX1_TYPE": 0}, {"PRX1_TYPE": 2, "AVOID_ENABLE": 0}])
+def test_without_avoidance_or_without_ranges_the_rover_drives_into_it(parameters: dict[str, float]) -> None:
+    assert towards_a_wall(**parameters).simulator.collisions
+    assert towards_a_wall(lidar=False, PRX1_TYPE=2).simulator.collisions
+
+
+def test_the_echo_trap() -> None:
+    echoed = {m.id: m for m in towards_a_wall(PRX1_TYPE=2).of("DISTANCE_SENSOR")}
+    assert {number: m.orientation for number, m in echoed.items()} == {10 + octant: octant for octant in range(8)}
+    assert echoed[10].current_distance == pytest.approx(210, abs=20)
+    assert echoed[14].current_distance == echoed[14].max_distance
+    assert not towards_a_wall(PRX1_TYPE=0).of("DISTANCE_SENSOR")

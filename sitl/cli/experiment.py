@@ -1,0 +1,74 @@
+"""``rover-sitl experiment``: makes a paper's experiment again and shows the figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+from companion.mapfiles import MapError
+from sitl.experiments import kwasniewski_maps, kwasniewski_table1
+from sitl.experiments.experiment import Experiment, ExperimentError, Options, Report
+
+EXPERIMENTS: dict[str, Experiment] = {
+    kwasniewski_maps.NAME: kwasniewski_maps.run,
+    kwasniewski_table1.NAME: kwasniewski_table1.run,
+}
+EXIT_BAD_INPUT = 2
+
+
+def experiment(
+    name: Annotated[str, typer.Argument(metavar="NAME", help=f"One of: {', '.join(EXPERIMENTS)}.")],
+    runs: Annotated[int, typer.Option(min=1, help="Runs on each map.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones count up.")] = 0,
+    jobs: Annotated[int, typer.Option(min=1, help="Runs at a time; the results are the same.")] = 2,
+    maps: Annotated[Path | None, typer.Option(help="Folder with the maps; default: missions/maps.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
+    docs: Annotated[
+        Path | None, typer.Option(help="Folder whose results.md and images/ are brought up to date.")
+    ] = None,
+) -> None:
+    """Make the experiment NAME and print its tables. Exit code 2: bad input."""
+    console = Console()
+    try:
+        made = EXPERIMENTS.get(name)
+        if made is None:
+            raise ExperimentError(f"experiment {name}: unknown; known are {', '.join(EXPERIMENTS)}")
+        if json_file is not None:
+            # A place that cannot be written should show before the work, not after it.
+            json_file.parent.mkdir(parents=True, exist_ok=True)
+            json_file.open("a", encoding="utf-8").close()
+        report = _with_progress(name, made, Options(runs, seed, jobs, maps), console)
+        _put_out(report, console, json_file, docs)
+    except (ExperimentError, MapError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+    except OSError as error:
+        typer.echo(f"{error.filename}: cannot be written: {error.strerror}", err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+
+
+def _with_progress(name: str, made: Experiment, options: Options, console: Console) -> Report:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task(name, total=None)
+
+        def advance(done: int, total: int) -> None:
+            progress.update(task, completed=done, total=total)
+
+        return made(options, advance)
+
+
+def _put_out(report: Report, console: Console, json_file: Path | None, docs: Path | None) -> None:
+    for table in report.tables():
+        console.print(table)
+    if json_file is not None:
+        json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+        typer.echo(f"figures: {json_file}")
+    if docs is not None:
+        for file in report.write_docs(docs):
+            typer.echo(f"written: {file}")

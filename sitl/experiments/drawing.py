@@ -1,0 +1,67 @@
+"""How the experiments' pictures look."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from companion.grid import OBSTACLE, Cell, Grid
+
+BLUE, RED, GREEN, ORANGE, GREY = "#0072b2", "#d1495b", "#009e73", "#e69f00", "#8a8f98"
+WALL, UNSEEN, GROUND = (0.20, 0.22, 0.26), (0.78, 0.80, 0.83), (0.985, 0.985, 0.975)
+
+STYLE = {
+    "font.size": 9,
+    "axes.titlesize": 10,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": GREY,
+    "axes.grid": False,
+    "legend.frameon": False,
+    "figure.dpi": 110,
+}
+
+
+def four_panels(width_in: float, height_in: float) -> tuple[Figure, list[Any]]:
+    """A figure of two by two panels."""
+    with mpl.rc_context(STYLE):
+        figure = Figure(figsize=(width_in, height_in), layout="constrained")
+        return figure, list(figure.subplots(2, 2).flat)
+
+
+def save(figure: Figure, file: Path) -> Path:
+    """Write the picture (the format follows from the suffix), without the date and version that would change it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    with mpl.rc_context(STYLE):
+        figure.savefig(file, metadata={"Software": None})
+    return file
+
+
+def draw_map(panel: Any, grid: Grid, seen: NDArray[np.bool_] | None = None) -> None:
+    """The ground, north up; obstacles dark, those not in ``seen`` (shape (height, width)) light."""
+    obstacle = grid.weights >= OBSTACLE
+    picture = np.empty((*grid.weights.shape, 3))
+    picture[:] = GROUND
+    picture[obstacle] = WALL
+    if seen is not None:
+        picture[obstacle & ~seen] = UNSEEN
+    panel.imshow(picture, origin="lower", interpolation="nearest")
+    panel.set_xticks(range(0, grid.width, 20))
+    panel.set_yticks(range(0, grid.height, 10))
+    panel.tick_params(length=2, colors=GREY, labelsize=7)
+    for spine in panel.spines.values():
+        spine.set_visible(True)
+        spine.set_linewidth(0.6)
+
+
+def draw_ends(panel: Any, start: Cell, target: Cell) -> None:
+    """Start as a green disc, target as an orange square."""
+    panel.plot(*start, marker="o", markersize=7, color=GREEN, markeredgecolor="white", clip_on=False, zorder=5)
+    panel.plot(*target, marker="s", markersize=7, color=ORANGE, markeredgecolor="white", clip_on=False, zorder=5)

@@ -1,0 +1,81 @@
+"""What every experiment takes and gives, and the maps they share."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import version
+from os import cpu_count
+from pathlib import Path
+from typing import Protocol
+
+from rich.table import Table
+
+from companion.grid import Cell, Grid
+from companion.mapfiles import load_map
+
+START, TARGET = Cell(0, 24), Cell(98, 24)
+"""Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""
+
+
+class ExperimentError(Exception):
+    """An experiment that cannot be made; the text is one line with place and remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """How much of an experiment to do. Run i has the seed ``seed + i``; ``maps`` None: those of the source checkout."""
+
+    runs: int = 100
+    seed: int = 0
+    jobs: int = 2
+    maps: Path | None = None
+
+
+class Report(Protocol):
+    """What came out."""
+
+    def tables(self) -> list[Table]:
+        """For the terminal."""
+        ...
+
+    def as_json(self) -> dict[str, object]:
+        """Everything measured."""
+        ...
+
+    def write_docs(self, folder: Path) -> list[Path]:
+        """Write this experiment's part of results.md and its pictures (under images/); gives the files written."""
+        ...
+
+
+Advance = Callable[[int, int], None]
+"""Called with the runs done and the runs there are."""
+
+Experiment = Callable[[Options, Advance], Report]
+
+
+def load_maps(folder: Path | None, names: tuple[str, ...]) -> dict[str, Grid]:
+    """The named maps (NAME.png). Raises ExperimentError, or MapError for a file that is no map."""
+    given = Path(__file__).parents[2] / "missions" / "maps" if folder is None else folder
+    if not given.is_dir():
+        raise ExperimentError(f"{given}: no such folder of maps; name one with --maps (missions/maps of the source)")
+    maps = {}
+    for name in names:
+        file = given / f"{name}.png"
+        if not file.is_file():
+            raise ExperimentError(f"{file}: no such map; this experiment needs {', '.join(names)} (.png) in --maps")
+        grid = load_map(file)
+        for what, cell in (("start", START), ("target", TARGET)):
+            if grid.is_obstacle(cell):
+                raise ExperimentError(f"{file}: the {what} {tuple(cell)} is outside the map or an obstacle")
+        maps[name] = grid
+    return maps
+
+
+def where_measured() -> str:
+    """The computer and the versions that times depend on, in words."""
+    return (
+        f"{platform.machine()}, {cpu_count()} processors, Python {platform.python_version()}, "
+        f"numpy {version('numpy')}, numba {version('numba')}"
+    )

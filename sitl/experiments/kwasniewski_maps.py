@@ -1,0 +1,286 @@
+"""Kwasniewski & Gosiewski 2018, sections 5 and 6: four unknown maps, many runs on each, times and steps as histograms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from joblib import Parallel, delayed
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+from rich.table import Table
+
+from companion.grid import Grid
+from companion.planning import registry
+from companion.settings import Settings, parse_settings
+from sitl.experiments import drawing
+from sitl.experiments.experiment import START, TARGET, Advance, Options, load_maps, where_measured
+from sitl.experiments.results_page import markdown_table, write_section
+from sitl.field_level import LAYERS, STEP_LIMIT, FieldRobot, FieldRun, Outcome, drive_fields
+
+NAME = "kwasniewski-maps"
+Profile = Literal["default", "paper"]
+PROFILES: tuple[Profile, ...] = get_args(Profile)
+TITLES = {
+    "one-obstacle": "Map 1: one obstacle",
+    "clutter": "Map 2: 22 simple obstacles",
+    "rooms": "Map 3: rooms",
+    "complex": "Map 4: complex environment",
+}
+COLOURS = {"default": drawing.BLUE, "paper": drawing.ORANGE}
+RUNS_A_TASK = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """All runs of one profile on one map."""
+
+    profile: Profile
+    map_name: str
+    runs: tuple[FieldRun, ...]
+
+    def count(self, outcome: Outcome) -> int:
+        """Runs that ended so."""
+        return sum(run.outcome is outcome for run in self.runs)
+
+    def planning_ms(self) -> NDArray[np.float64]:
+        """All planning of each run."""
+        return 1e3 * np.array([run.planning_s for run in self.runs])
+
+    def field_step_p99_ms(self) -> float:
+        """99 % of all field steps were not slower."""
+        return float(1e3 * np.percentile(np.concatenate([run.step_seconds for run in self.runs]), 99))
+
+    def typical(self) -> FieldRun:
+        """The run with the median number of steps."""
+        return sorted(self.runs, key=lambda run: (run.steps, run.seed))[len(self.runs) // 2]
+
+
+@dataclass(frozen=True)
+class MapsReport:
+    """See ``experiment.Report``."""
+
+    options: Options
+    maps: dict[str, Grid]
+    series: tuple[Series, ...]
+
+    def tables(self) -> list[Table]:
+        """One row a profile and map."""
+        table = Table(title=f"{NAME}: {self.options.runs} runs a map, at most {STEP_LIMIT} steps")
+        for column in HEAD:
+            table.add_column(column, justify="left" if column in HEAD[:2] else "right")
+        for row in map(_row, self.series):
+            table.add_row(*row)
+        return [table]
+
+    def as_json(self) -> dict[str, object]:
+        """Every run's figures, in the order of their seeds."""
+        return {
+            "experiment": NAME,
+            "runs": self.options.runs,
+            "seed": self.options.seed,
+            "step_limit": STEP_LIMIT,
+            "start": list(START),
+            "target": list(TARGET),
+            "results": [_series_json(series) for series in self.series],
+        }
+
+    def write_docs(self, folder: Path) -> list[Path]:
+        """The section, an example path for each map, and the two histograms."""
+        images = folder / "images"
+        return [
+            drawing.save(self._draw_paths(), images / f"{NAME}-paths.png"),
+            drawing.save(self._draw_histograms("times"), images / f"{NAME}-times.png"),
+            drawing.save(self._draw_histograms("steps"), images / f"{NAME}-steps.png"),
+            write_section(folder, NAME, _section(self)),
+        ]
+
+    def _draw_paths(self) -> Figure:
+        figure, panels = drawing.four_panels(11.0, 6.6)
+        for panel, (name, grid) in zip(panels, self.maps.items(), strict=True):
+            series = next(s for s in self.series if s.map_name == name and s.profile == "paper")
+            run = series.typical()
+            robot = FieldRobot(grid, START, TARGET, profile_settings("paper"), run.seed)
+            robot.drive()
+            drawing.draw_map(panel, grid, seen=robot.known.weights >= 1.0)
+            _draw_track(panel, run)
+            drawing.draw_ends(panel, START, TARGET)
+            back = f", {run.return_steps} of them going back" if run.return_steps else ""
+            panel.set_title(f"{TITLES[name]}: {run.steps} steps{back}")
+        _legend(figure)
+        return figure
+
+    def _draw_histograms(self, what: Literal["times", "steps"]) -> Figure:
+        figure, panels = drawing.four_panels(11.0, 5.6)
+        for panel, name in zip(panels, self.maps, strict=True):
+            shown = [series for series in self.series if series.map_name == name]
+            values = [s.planning_ms() if what == "times" else np.array([r.steps for r in s.runs]) for s in shown]
+            bins = _bins(np.concatenate(values), whole=what == "steps")
+            for series, data in zip(shown, values, strict=True):
+                label = f"{series.profile}: median {np.median(data):.{1 if what == 'times' else 0}f}"
+                colour = COLOURS[series.profile]
+                panel.hist(np.minimum(data, bins[-1]), bins, label=label, color=colour, alpha=0.55, edgecolor="white")
+            over = sum(int((data > bins[-1]).sum()) for data in values)
+            note = f"  ({over} slower, in the last bar)" if over else ""
+            panel.set_title(TITLES[name] + note)
+            panel.set_xlabel("planning time of a run, ms" if what == "times" else "steps")
+            panel.set_ylabel("runs")
+            panel.legend(fontsize=8)
+        return figure
+
+
+HEAD = ("map", "profile", "reached", "unreachable", "step limit", "steps", "going back", "searches", "planning, ms")
+HEAD = (*HEAD, "slowest, ms", "field step p99, ms")
+
+
+def run(options: Options, advance: Advance) -> MapsReport:
+    """Make all runs. The result (but for times) does not depend on ``jobs``."""
+    maps = load_maps(options.maps, tuple(TITLES))
+    registry.warm_up()  # here, so that the workers find everything compiled
+    keys = [(profile, name) for profile in PROFILES for name in maps]
+    seeds = range(options.seed, options.seed + options.runs)
+    tasks = [
+        (key, seeds[at : at + RUNS_A_TASK]) for key in keys for at in range(0, options.runs, RUNS_A_TASK)
+    ]  # fmt: skip
+    collected: dict[tuple[Profile, str], list[FieldRun]] = {key: [] for key in keys}
+    done = 0
+    for (key, _), runs in zip(tasks, _made(tasks, maps, options.jobs), strict=True):
+        collected[key] += runs
+        done += len(runs)
+        advance(done, len(keys) * options.runs)
+    return MapsReport(options, maps, tuple(Series(*key, tuple(runs)) for key, runs in collected.items()))
+
+
+def profile_settings(profile: Profile) -> Settings:
+    """The settings of a profile."""
+    return parse_settings({"profile": profile}, "profile")
+
+
+def _made(tasks: list[tuple[tuple[Profile, str], range]], maps: dict[str, Grid], jobs: int) -> Iterable[list[FieldRun]]:
+    """The runs of each task, in the order of the tasks."""
+    calls = (delayed(_run_some)(maps[name], profile, seeds) for (profile, name), seeds in tasks)
+    made: Iterable[list[FieldRun]] = Parallel(n_jobs=jobs, return_as="generator")(calls)
+    return made
+
+
+def _run_some(truth: Grid, profile: Profile, seeds: range) -> list[FieldRun]:
+    _warm_up_once()
+    settings = profile_settings(profile)
+    return [drive_fields(truth, START, TARGET, settings, seed) for seed in seeds]
+
+
+@cache
+def _warm_up_once() -> None:
+    """Once in each worker: loading compiled code must not count as planning."""
+    registry.warm_up()
+
+
+def _row(series: Series) -> list[str]:
+    planning_ms = series.planning_ms()
+    return [
+        TITLES[series.map_name],
+        series.profile,
+        f"{series.count(Outcome.REACHED)} of {len(series.runs)}",
+        f"{series.count(Outcome.UNREACHABLE)}",
+        f"{series.count(Outcome.STEP_LIMIT)}",
+        f"{np.median([run.steps for run in series.runs]):.0f}",
+        f"{np.mean([run.return_steps for run in series.runs]):.1f}",
+        f"{np.median([run.searches for run in series.runs]):.0f}",
+        f"{np.median(planning_ms):.2f}",
+        f"{planning_ms.max():.1f}",
+        f"{series.field_step_p99_ms():.2f}",
+    ]
+
+
+def _series_json(series: Series) -> dict[str, object]:
+    return {
+        "map": series.map_name,
+        "profile": series.profile,
+        "reached": series.count(Outcome.REACHED),
+        "unreachable": series.count(Outcome.UNREACHABLE),
+        "step_limit_overruns": series.count(Outcome.STEP_LIMIT),
+        "steps": [run.steps for run in series.runs],
+        "return_steps": [run.return_steps for run in series.runs],
+        "searches": [run.searches for run in series.runs],
+        "planning_ms": [round(value, 4) for value in series.planning_ms().tolist()],
+        "planning_median_ms": float(np.median(series.planning_ms())),
+        "field_step_p99_ms": series.field_step_p99_ms(),
+    }
+
+
+def _draw_track(panel: Any, run: FieldRun) -> None:
+    """Onward blue, going back red, one line for each stretch."""
+    points = np.array(run.track, float)
+    back = np.array([part == "A" for part in run.parts])
+    at = 0
+    while at < len(back):
+        stop = at + 1
+        while stop < len(back) and back[stop] == back[at]:
+            stop += 1
+        colour = drawing.RED if back[at] else drawing.BLUE
+        panel.plot(*points[at : stop + 1].T, color=colour, linewidth=2.0, solid_capstyle="round", alpha=0.9)
+        at = stop
+
+
+def _legend(figure: Figure) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    entries = [
+        Line2D([], [], color=drawing.BLUE, linewidth=2.0, label="onward (parts B and C)"),
+        Line2D([], [], color=drawing.RED, linewidth=2.0, label="return mode (part A)"),
+        Patch(facecolor=drawing.WALL, label="obstacle, seen"),
+        Patch(facecolor=drawing.UNSEEN, label="obstacle, never seen"),
+        Line2D([], [], color=drawing.GREEN, marker="o", linestyle="", markersize=7, label="start"),
+        Line2D([], [], color=drawing.ORANGE, marker="s", linestyle="", markersize=7, label="target"),
+    ]
+    figure.legend(handles=entries, loc="outside lower center", ncols=len(entries), frameon=False, fontsize=9)
+
+
+def _bins(values: NDArray[Any], *, whole: bool) -> NDArray[np.float64]:
+    """Some 25 bars over nearly all of the values; what lies beyond (an interrupted computation) goes into the last one."""
+    low, high = float(values.min()), float(values.max())
+    if whole:
+        width = max(1, int(np.ceil((high - low + 1.0) / 25.0)))
+        return np.arange(low, high + 2.0 * width, width) - 0.5
+    return np.linspace(0.0, min(high, 3.0 * float(np.percentile(values, 95))) + 1e-9, 26)
+
+
+def _section(report: MapsReport) -> str:
+    rows = [_row(series) for series in report.series]
+    return f"""## Unknown maps (Kwaśniewski & Gosiewski 2018, sections 5 and 6)
+
+`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
+
+Start {tuple(START)}, target {tuple(TARGET)}, 100 x 50 fields, at most {STEP_LIMIT} steps, a view of {LAYERS} layers. Planning is the time of
+all searches of one run together; a field step is one call of the step function, its search included (99 % of them are not
+slower than the last column). Figures a run are medians, except going back (mean).
+
+{markdown_table(HEAD, rows)}
+
+The paper gives no table, only histograms of computing times in seconds (Python 3.6; its text names two of 189 s and 232 s on
+map 3) and says that almost all tests reached the target. Measured on {where_measured()}.
+
+![Example paths](images/{NAME}-paths.png)
+
+Each example is the run with the median number of steps in the profile `paper`.
+
+![Planning times](images/{NAME}-times.png)
+
+![Steps](images/{NAME}-steps.png)
+
+What is ours:
+
+- **The maps.** The paper's maps are not available as data. Ours (`missions/maps`) are drawn to fit its text: one obstacle; 22
+  simple obstacles placed at random; the rooms of a building; obstacles of different shapes placed at random.
+- **The view.** The paper gives a triangle with its top in the robot's field and 2x + 1 fields in layer x. We take layer 0 as the
+  robot's own field and {LAYERS} layers beyond it, in the direction of the last move (at first: towards the target), which is one of eight; on a
+  diagonal the triangle is the quadrant. The paper does not say whether obstacles hide what lies behind them: here they do.
+- **Turning.** Before a move the robot turns to the field it is about to enter and so sees it. When that field turns out
+  to be an obstacle, the step function is called once more in the same field. No diagonal step cuts an obstacle's corner.
+- **Profiles.** `paper` searches with the genetic algorithm alone; `default` has graph search behind it.
+"""

@@ -1,0 +1,245 @@
+"""Kwasniewski & Gosiewski 2018, Table 1: four known maps of growing complexity, Dijkstra and three settings of the GA."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from rich.table import Table
+
+from companion.clock import stopwatch_s
+from companion.grid import Grid
+from companion.planning import problem as planning
+from companion.planning.planner import Planner
+from companion.planning.problem import Budget, PlanningProblem
+from companion.planning.registry import make_planner, warm_up
+from companion.settings import PlannerSettings
+from sitl.experiments import drawing
+from sitl.experiments.experiment import START, TARGET, Advance, Options, load_maps, where_measured
+from sitl.experiments.plain_dijkstra import least_cost
+from sitl.experiments.results_page import markdown_table, write_section
+
+NAME = "kwasniewski-table1"
+TITLES = {"known-1": "Map 1", "known-2": "Map 2", "known-3": "Map 3", "known-4": "Map 4"}
+SHOWN = 3
+"""The paper gives three times for each setting and map."""
+
+PLAIN, DIJKSTRA = "Dijkstra, plain Python", "Dijkstra"
+BUDGETS = {
+    "GA 1": Budget(1, 500, (4,), 40),
+    "GA 2": Budget(1, 500, (4,), 100),
+    "GA 3": Budget(1, 500, (5,), 100),
+}
+NOT_FOUND = "N.F."
+
+PAPER_S: dict[str, dict[str, tuple[float | None, ...]]] = {
+    "known-1": {
+        DIJKSTRA: (43.06, 46.73, 44.02),
+        "GA 1": (0.03, 0.03, 0.03),
+        "GA 2": (0.07, 0.08, 0.07),
+        "GA 3": (0.08, 0.08, 0.08),
+    },
+    "known-2": {
+        DIJKSTRA: (42.51, 42.37, 42.24),
+        "GA 1": (0.21, 0.10, 0.18),
+        "GA 2": (0.07, 0.14, 0.14),
+        "GA 3": (0.15, 0.15, 0.15),
+    },
+    "known-3": {
+        DIJKSTRA: (42.29, 42.73, 47.78),
+        "GA 1": (1.10, 0.77, None),
+        "GA 2": (3.42, 2.10, 0.77),
+        "GA 3": (0.59, 0.59, 1.37),
+    },
+    "known-4": {
+        DIJKSTRA: (41.29, 39.54, 40.06),
+        "GA 1": (None, None, None),
+        "GA 2": (None, None, None),
+        "GA 3": (None, None, None),
+    },
+}
+"""Table 1 as printed: seconds in Python 3.6 on the authors' computer; None = not found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One search: its time, and what it found (None: nothing)."""
+
+    time_ms: float
+    path: planning.Path | None = None
+    cost: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """All searches of one method on one map."""
+
+    map_name: str
+    method: str
+    trials: tuple[Trial, ...]
+
+    @property
+    def found(self) -> int:
+        """Searches that found a path."""
+        return sum(trial.cost is not None for trial in self.trials)
+
+    @property
+    def median_ms(self) -> float:
+        """Median time of all searches, successful or not."""
+        return float(np.median([trial.time_ms for trial in self.trials]))
+
+    def first_times(self) -> str:
+        """The first three times as the paper gives them."""
+        return "  ".join(f"{t.time_ms:.3g}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN])
+
+
+@dataclass(frozen=True)
+class TableReport:
+    """See ``experiment.Report``."""
+
+    options: Options
+    maps: dict[str, Grid]
+    entries: tuple[Entry, ...]
+
+    def tables(self) -> list[Table]:
+        """One row a map and method."""
+        table = Table(title=f"{NAME}: {SHOWN} times as in the paper, success over {self.options.runs} seeds")
+        for column in HEAD:
+            table.add_column(column, justify="left" if column in HEAD[:2] else "right")
+        for row in map(_row, self.entries):
+            table.add_row(*row)
+        return [table]
+
+    def as_json(self) -> dict[str, object]:
+        """Times in milliseconds, None where nothing was found; the paper's in seconds."""
+        return {
+            "experiment": NAME,
+            "runs": self.options.runs,
+            "seed": self.options.seed,
+            "start": list(START),
+            "target": list(TARGET),
+            "results": [
+                {
+                    "map": entry.map_name,
+                    "method": entry.method,
+                    "tried": len(entry.trials),
+                    "found": entry.found,
+                    "median_ms": entry.median_ms,
+                    "first_ms": [t.time_ms if t.cost is not None else None for t in entry.trials[:SHOWN]],
+                    "costs": [trial.cost for trial in entry.trials],
+                    "paper_s": list(PAPER_S[entry.map_name].get(entry.method, ())),
+                }
+                for entry in self.entries
+            ],
+        }
+
+    def write_docs(self, folder: Path) -> list[Path]:
+        """The section and a picture of the maps with paths."""
+        picture = drawing.save(self._draw(), folder / "images" / f"{NAME}.png")
+        return [picture, write_section(folder, NAME, _section(self))]
+
+    def _draw(self) -> Figure:
+        figure, panels = drawing.four_panels(11.0, 6.6)
+        colours = {DIJKSTRA: drawing.GREY, "GA 3": drawing.BLUE}
+        for panel, (name, grid) in zip(panels, self.maps.items(), strict=True):
+            drawing.draw_map(panel, grid)
+            notes = []
+            for method, colour in colours.items():
+                entry = next(e for e in self.entries if (e.map_name, e.method) == (name, method))
+                path = next((trial.path for trial in entry.trials if trial.path is not None), None)
+                notes.append(f"{method} {f'{entry.median_ms:.2g} ms' if entry.found else 'finds nothing'}")
+                if path is not None:
+                    panel.plot(*np.array(path.cells, float).T, color=colour, linewidth=2.0, alpha=0.9)
+            drawing.draw_ends(panel, START, TARGET)
+            panel.set_title(f"{TITLES[name]}: {', '.join(notes)}")
+        handles = [Line2D([], [], color=colour, linewidth=2.0, label=method) for method, colour in colours.items()]
+        figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
+        return figure
+
+
+HEAD = ("map", "method", "3 runs here, ms", "median here, ms", "found here", "3 runs in the paper, s")
+
+
+def run(options: Options, advance: Advance) -> TableReport:
+    """Make all searches, one after the other (they are timed): ``jobs`` does not count."""
+    maps = load_maps(options.maps, tuple(TITLES))
+    warm_up()
+    settings = PlannerSettings()
+    entries = []
+    for name, grid in maps.items():
+        problem = PlanningProblem(grid.weights, START, TARGET, corner_cutting=True)
+        entries.append(Entry(name, PLAIN, _timed(lambda _, p=problem: _plain(p), range(SHOWN))))
+        dijkstra = make_planner("dijkstra", settings)
+        entries.append(Entry(name, DIJKSTRA, _timed(_planned(dijkstra, problem, Budget()), range(SHOWN))))
+        genetic = make_planner("bspline-ga", settings)
+        seeds = range(options.seed, options.seed + max(options.runs, SHOWN))
+        for method, budget in BUDGETS.items():
+            entries.append(Entry(name, method, _timed(_planned(genetic, problem, budget), seeds)))
+            advance(sum(e.method in BUDGETS for e in entries), len(BUDGETS) * len(maps))
+    return TableReport(options, maps, tuple(entries))
+
+
+def _timed(call: Callable[[int], tuple[planning.Path | None, float | None]], seeds: range) -> tuple[Trial, ...]:
+    trials = []
+    for seed in seeds:
+        began_s = stopwatch_s()
+        path, cost = call(seed)
+        trials.append(Trial(1e3 * (stopwatch_s() - began_s), path, cost))
+    return tuple(trials)
+
+
+def _planned(
+    planner: Planner, problem: PlanningProblem, budget: Budget
+) -> Callable[[int], tuple[planning.Path | None, float | None]]:
+    def call(seed: int) -> tuple[planning.Path | None, float | None]:
+        path = planner.plan(problem, budget, np.random.default_rng(seed)).path
+        return path, None if path is None else path.cost
+
+    return call
+
+
+def _plain(problem: PlanningProblem) -> tuple[planning.Path | None, float | None]:
+    return None, least_cost(problem.weights, problem.start, problem.target)
+
+
+def _paper_times(entry: Entry) -> str:
+    times = PAPER_S[entry.map_name].get(entry.method)
+    return "" if times is None else "  ".join(NOT_FOUND if t is None else f"{t:.2f}" for t in times)
+
+
+def _row(entry: Entry) -> list[str]:
+    return [
+        TITLES[entry.map_name],
+        entry.method,
+        entry.first_times(),
+        f"{entry.median_ms:.3g}",
+        f"{entry.found} of {len(entry.trials)}",
+        _paper_times(entry),
+    ]
+
+
+def _section(report: TableReport) -> str:
+    return f"""## Known maps (Kwaśniewski & Gosiewski 2018, Table 1)
+
+`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
+
+From {tuple(START)} to {tuple(TARGET)} on known maps of 100 x 50 fields. GA 1: population 40, 4 control points; GA 2: population 100, 4
+control points; GA 3: population 100, 5 control points; all with 1 to 500 epochs. {NOT_FOUND} means that the budget was spent without a
+path. Mind the units: **milliseconds here, seconds in the paper**.
+
+{markdown_table(HEAD, [_row(entry) for entry in report.entries])}
+
+Measured on {where_measured()}. Times here and there cannot be compared one to one: the paper's
+programs are Python 3.6 on a computer that is not named, ours are compiled; how much of that is Dijkstra's algorithm itself and how
+much the implementation shows the row in plain Python. The paper's point can be compared: the genetic algorithm is far faster than Dijkstra's on
+simple maps, and does not find the way through the most complex one.
+
+![The four maps](images/{NAME}.png)
+
+The paper's maps are not available as data; ours (`missions/maps/known-1` to `known-4`) are drawn to fit its text: complexity grows from one
+simple obstacle to a maze. As in the paper, and unlike everywhere else in this project, paths may cut an obstacle's corner here.
+"""

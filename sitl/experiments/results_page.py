@@ -1,0 +1,35 @@
+"""The page of results: each experiment owns one section of it and replaces that alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+HEAD = """# Results
+
+Tables and pictures on this page are written by the commands named in each section (`make results` runs them
+all); nothing is entered by hand.
+"""
+
+
+def write_section(folder: Path, name: str, text: str) -> Path:
+    """Put a section into ``folder``/results.md, in place of its former self or at the end."""
+    page = folder / "results.md"
+    folder.mkdir(parents=True, exist_ok=True)
+    before = page.read_text(encoding="utf-8") if page.exists() else HEAD
+    begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
+    section = f"{begin}\n{text.strip()}\n{end}\n"
+    if begin in before and end in before:
+        head, _, rest = before.partition(begin)
+        tail = rest.partition(end)[2].lstrip("\n")
+        after = head + section + (f"\n{tail}" if tail else "")
+    else:
+        after = f"{before.rstrip()}\n\n{section}"
+    page.write_text(after, encoding="utf-8")
+    return page
+
+
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table; the first column is text, the others are figures and stand right."""
+    lines = [head, [":--", *["--:"] * (len(head) - 1)], *rows]
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)

@@ -1,0 +1,160 @@
+"""The simulator on real sockets, its time driven by the test."""
+
+import socket
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from typer.testing import CliRunner
+
+from sitl.cli.main import app
+from sitl.server import Endpoint, ListenError, open_endpoint, serve
+from sitl.simulator import Simulator
+from tests.sitl_client import open_ground
+
+
+class Bench:
+    """A simulator with endpoints; ``run`` serves for some simulated seconds, as fast as possible."""
+
+    def __init__(self) -> None:
+        self.simulator: Simulator = open_ground()
+        self.endpoints: list[Endpoint] = []
+
+    def run(self, seconds: float) -> None:
+        goal_s = self.simulator.time_s + seconds
+        now_s = 0.0
+
+        def clock() -> float:
+            # Every look at the clock is 5 ms later: no waiting, and the same run every time.
+            nonlocal now_s
+            now_s += 0.005
+            return now_s
+
+        serve(self.simulator, self.endpoints, clock, 10.0, lambda: self.simulator.time_s < goal_s)
+
+    def open(self, url: str) -> None:
+        self.endpoints.append(open_endpoint(url, self.simulator))
+
+
+@pytest.fixture
+def bench() -> Iterator[Bench]:
+    made = Bench()
+    yield made
+    for endpoint in made.endpoints:
+        endpoint.close()
+
+
+def free_port(kind: int = socket.SOCK_STREAM) -> int:
+    with socket.socket(socket.AF_INET, kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def read_all(connection: socket.socket) -> list[Any]:
+    connection.settimeout(0.2)
+    parser, found = mavlink.MAVLink(None), []
+    try:
+        while data := connection.recv(65536):
+            found += parser.parse_buffer(data) or []
+    except TimeoutError:
+        pass
+    return found
+
+
+def request_version() -> bytes:
+    packer = mavlink.MAVLink(None, 255, 190)
+    return bytes(mavlink.MAVLink_command_long_message(1, 1, 512, 0, 148, 0, 0, 0, 0, 0, 0).pack(packer))
+
+
+def kinds(messages: list[Any]) -> set[str]:
+    return {message.get_type() for message in messages}
+
+
+def test_tcp_clients_come_and_go(bench: Bench) -> None:
+    port = free_port()
+    bench.open(f"tcp:127.0.0.1:{port}")
+    bench.run(1.0)
+    for _ in range(3):
+        with socket.create_connection(("127.0.0.1", port)) as client:
+            client.sendall(request_version())
+            bench.run(5.0)
+            assert {"HEARTBEAT", "COMMAND_ACK", "AUTOPILOT_VERSION"} <= kinds(read_all(client))
+        bench.run(1.0)
+    one = socket.create_connection(("127.0.0.1", port))
+    other = socket.create_connection(("127.0.0.1", port))
+    with one, other:
+        bench.run(5.0)
+        assert "HEARTBEAT" in kinds(read_all(one)) & kinds(read_all(other))
+
+
+def test_a_rebooting_vehicle_drops_its_tcp_clients(bench: Bench) -> None:
+    port = free_port()
+    bench.open(f"tcp:127.0.0.1:{port}")
+    packer = mavlink.MAVLink(None, 255, 190)
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        client.sendall(mavlink.MAVLink_command_long_message(1, 1, 246, 0, 1, 0, 0, 0, 0, 0, 0).pack(packer))
+        bench.run(2.0)
+        client.settimeout(1.0)
+        while client.recv(65536):
+            pass
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        bench.run(5.0)
+        assert "HEARTBEAT" in kinds(read_all(client))
+
+
+def test_udp_out_sends_first_and_hears_answers(bench: Bench) -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as partner:
+        partner.bind(("127.0.0.1", 0))
+        bench.open(f"udpout:127.0.0.1:{partner.getsockname()[1]}")
+        bench.run(2.0)
+        data, vehicle = partner.recvfrom(65536)
+        assert data[0] == 0xFD
+        read_all(partner)
+        partner.sendto(request_version(), vehicle)
+        bench.run(2.0)
+        assert "AUTOPILOT_VERSION" in kinds(read_all(partner))
+
+
+def test_udp_out_without_a_partner_goes_on(bench: Bench) -> None:
+    bench.open(f"udpout:127.0.0.1:{free_port(socket.SOCK_DGRAM)}")
+    bench.run(10.0)
+    assert bench.simulator.time_s >= 10.0
+
+
+def test_udp_in_answers_whoever_speaks(bench: Bench) -> None:
+    port = free_port(socket.SOCK_DGRAM)
+    bench.open(f"udpin:127.0.0.1:{port}")
+    for _ in range(2):
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as partner:
+            partner.sendto(request_version(), ("127.0.0.1", port))
+            bench.run(2.0)
+            assert "AUTOPILOT_VERSION" in kinds(read_all(partner))
+
+
+def test_a_port_in_use_is_one_line(bench: Bench) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        with pytest.raises(ListenError, match=r"cannot be opened.*choose another port"):
+            bench.open(f"tcp:127.0.0.1:{other.getsockname()[1]}")
+
+
+@pytest.mark.parametrize("url", ["tcp", "serial:/dev/x:57600", "tcp:127.0.0.1", "tcp:127.0.0.1:0", "udpin:x:99999"])
+def test_bad_addresses_are_told(bench: Bench, url: str) -> None:
+    with pytest.raises(ListenError, match="not an address"):
+        bench.open(url)
+
+
+def test_serve_refuses_bad_input_with_one_line_and_exit_code_2(tmp_path: Path) -> None:
+    mission = tmp_path / "open.toml"
+    mission.write_text("[grid]\nsize = [20, 20]\nhome = [1, 1]\n[[target]]\nfield = [9, 9]\n")
+    port = free_port()
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", port))
+        other.listen()
+        for arguments in ([str(tmp_path / "none.toml")], [str(mission), "--listen", f"tcp:127.0.0.1:{port}"]):
+            result = CliRunner().invoke(app, ["serve", *arguments])
+            assert result.exit_code == 2
+            assert len(result.output.strip().splitlines()) == 1
