@@ -77,7 +77,7 @@ class ThoroughSearch(SearchSettings):
     min_epochs: int = Field(10, ge=1)
     max_epochs: int = Field(40, ge=1)
     control_points: ControlPoints = Field((4, 6, 8), min_length=1)
-    population: int = Field(60, ge=12, le=3000)
+    population: int = Field(40, ge=12, le=3000)
 
 
 class NavigatorSettings(Section):

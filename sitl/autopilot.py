@@ -74,7 +74,8 @@ class Autopilot:
         for number in sorted(
             vehicle.router.forward_to(vehicle.system, target_system, target_component, channel.number)
         ):
-            vehicle.channels[number].outbox += message.get_msgbuf()
+            if number in vehicle.channels:
+                vehicle.channels[number].outbox += message.get_msgbuf()
         if vehicle.router.is_for_autopilot(vehicle.system, target_system, target_component, channel.number):
             handler = HANDLERS.get(message.get_type())
             if handler is not None:

@@ -11,6 +11,8 @@ from sitl.sensors import Lidar, RangeSensing
 
 OBSTACLE_AVOIDANCE = 196
 HEARTBEAT_US = 1_000_000
+OWN_CHANNEL = -1
+"""The scanner's place in the router: packets for it are not for the autopilot, and it answers none."""
 
 
 class LidarComponent:
@@ -20,6 +22,7 @@ class LidarComponent:
         """``sensing`` measures, ``vehicle`` hears the scans as everybody on its network does."""
         self._lidar = lidar
         self._vehicle = vehicle
+        vehicle.router.learn(vehicle.system, OBSTACLE_AVOIDANCE, OWN_CHANNEL)
         self._sensing = sensing
         self._codec = new_codec(OBSTACLE_AVOIDANCE, vehicle.system)
         self._interval_us = 1e6 / lidar.rate_hz

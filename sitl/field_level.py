@@ -90,11 +90,12 @@ def seen_from(truth: Weights, cell: Cell, view: View) -> NDArray[np.int64]:
     inside = ((cells >= 0) & (cells < (width, height))).all(axis=1)
     np.clip(lines, 0, (width - 1, height - 1), out=lines)
     hidden = (truth[lines[..., 1], lines[..., 0]] >= OBSTACLE).any(axis=1)
-    return cells[inside & ~hidden]
+    seen: NDArray[np.int64] = cells[inside & ~hidden]
+    return seen
 
 
 class FieldRobot:
-    """The robot on the ground ``truth`` with its own map, which begins empty (``known``: with what it knows)."""
+    """The robot on the ground ``truth``; its own map, ``known``, begins at the base weight everywhere."""
 
     def __init__(self, truth: Grid, start: Cell, target: Cell, settings: Settings, seed: int) -> None:
         self.truth = truth

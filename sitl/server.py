@@ -13,6 +13,8 @@ from sitl.simulator import SimLink, Simulator
 
 STEP_S = 0.02
 READ_BYTES = 65536
+DATAGRAM_BYTES = 1400
+MAVLINK_2, SIGNED = 0xFD, 1
 BACKLOG_BYTES = 1_000_000
 """A TCP client that does not read is dropped when so much is waiting for it."""
 LATE_S = 1.0
@@ -58,6 +60,22 @@ def open_endpoint(url: str, simulator: Simulator) -> Endpoint:
         raise ListenError(f"{url}: cannot be opened: {error.strerror or error}; choose another port") from error
 
 
+def datagrams(data: bytes) -> list[bytes]:
+    """The same bytes in pieces of whole packets, as many as fit into one datagram."""
+    pieces, start, at = [], 0, 0
+    while at < len(data):
+        size = data[at + 1] + (12 if data[at] == MAVLINK_2 else 8)
+        if data[at] == MAVLINK_2 and data[at + 2] & SIGNED:
+            size += 13
+        if at + size - start > DATAGRAM_BYTES and at > start:
+            pieces.append(data[start:at])
+            start = at
+        at += size
+    if start < len(data):
+        pieces.append(data[start:])
+    return pieces
+
+
 class UdpEndpoint:
     """One UDP partner: a fixed one (udpout) or whoever spoke last (udpin)."""
 
@@ -93,11 +111,10 @@ class UdpEndpoint:
             self._link.receive(data)
         if self._link.dropped:
             self._link = simulator.connect()
-        data = self._link.take()
-        for start in range(0, len(data), 1400):
+        for piece in datagrams(self._link.take()):
             if self._partner is not None:
                 with contextlib.suppress(OSError):
-                    self._socket.sendto(data[start : start + 1400], self._partner)
+                    self._socket.sendto(piece, self._partner)
 
     def close(self) -> None:
         """Close the socket."""

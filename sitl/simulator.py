@@ -207,6 +207,7 @@ class Simulator:
                 self._autopilot.receive(link.channel, data)
         if self._vehicle.rebooting:
             self._links_dropped()
+            self._parameters = self._vehicle.parameters.as_dict()
             self._boot()
 
     def _links_dropped(self) -> None:

@@ -6,6 +6,7 @@ import typer
 
 from companion.cli import mission
 from companion.cli.plan import plan
+from companion.cli.run import run
 
 app = typer.Typer(
     name="rover-companion",
@@ -15,6 +16,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+app.command()(run)
 app.command()(plan)
 app.add_typer(mission.app)
 

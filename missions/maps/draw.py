@@ -224,14 +224,17 @@ def complex_shapes() -> Mask:
 
 
 def dead_end() -> Mask:
-    """A cul-de-sac across the straight way: 30 fields deep, 15 wide, with a funnel that leads into it."""
+    """A cul-de-sac across the straight way: a funnel leads into it, and three baffles wind it up to its end."""
     world = open_ground()
-    fill(world, 32, 32, 63, 33)
-    fill(world, 32, 15, 63, 16)
-    fill(world, 62, 15, 63, 33)
+    fill(world, 30, 35, 71, 36)
+    fill(world, 30, 12, 71, 13)
+    fill(world, 70, 12, 71, 36)
     for i in range(6):
-        fill(world, 32 - i, 32 + i, 33 - i, 33 + i)
-        fill(world, 32 - i, 15 - i, 33 - i, 16 - i)
+        fill(world, 30 - i, 35 + i, 31 - i, 36 + i)
+        fill(world, 30 - i, 12 - i, 31 - i, 13 - i)
+    fill(world, 42, 20, 43, 34)
+    fill(world, 52, 14, 53, 28)
+    fill(world, 62, 20, 63, 34)
     return world
 
 
@@ -265,13 +268,11 @@ def known_2() -> Mask:
 
 
 def known_3() -> Mask:
-    """Walls with wide openings, as in a hall that is being built."""
+    """Walls with openings far to the left and right of the straight way: near the limit of a curve with 4 control points."""
     world = open_ground()
-    for x, y0, y1 in ((20, 0, 30), (40, 16, 49), (60, 0, 14), (60, 22, 49), (80, 0, 26), (80, 36, 49)):
+    for x, y0, y1 in ((28, 0, 30), (28, 44, 49), (64, 0, 4), (64, 18, 49), (85, 0, 14), (85, 30, 49)):
         fill(world, x, y0, x + 1, y1)
-    fill(world, 20, 37, 21, 49)
-    fill(world, 60, 30, 73, 31)
-    fill(world, 27, 16, 41, 17)
+    fill(world, 50, 18, 64, 19)
     return world
 
 

@@ -25,7 +25,9 @@ def experiment(
     name: Annotated[str, typer.Argument(metavar="NAME", help=f"One of: {', '.join(EXPERIMENTS)}.")],
     runs: Annotated[int, typer.Option(min=1, help="Runs on each map.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones count up.")] = 0,
-    jobs: Annotated[int, typer.Option(min=1, help="Runs at a time; the results are the same.")] = 2,
+    jobs: Annotated[
+        int, typer.Option(min=1, help="Runs at a time. Results stay the same, but they disturb each other's times.")
+    ] = 1,
     maps: Annotated[Path | None, typer.Option(help="Folder with the maps; default: missions/maps.")] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import typer
 
+from sitl.cli.drive import drive
 from sitl.cli.experiment import experiment
 from sitl.cli.serve import serve
 
@@ -21,6 +22,7 @@ def _commands() -> None:
     """Keeps ``serve`` a named command, however many there are."""
 
 
+app.command()(drive)
 app.command()(serve)
 app.command()(experiment)
 

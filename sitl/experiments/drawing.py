@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
@@ -15,33 +14,28 @@ from companion.grid import OBSTACLE, Cell, Grid
 BLUE, RED, GREEN, ORANGE, GREY = "#0072b2", "#d1495b", "#009e73", "#e69f00", "#8a8f98"
 WALL, UNSEEN, GROUND = (0.20, 0.22, 0.26), (0.78, 0.80, 0.83), (0.985, 0.985, 0.975)
 
-STYLE = {
-    "font.size": 9,
-    "axes.titlesize": 10,
-    "axes.titleweight": "bold",
-    "axes.titlelocation": "left",
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.edgecolor": GREY,
-    "axes.grid": False,
-    "legend.frameon": False,
-    "figure.dpi": 110,
-}
-
 
 def four_panels(width_in: float, height_in: float) -> tuple[Figure, list[Any]]:
     """A figure of two by two panels."""
-    with mpl.rc_context(STYLE):
-        figure = Figure(figsize=(width_in, height_in), layout="constrained")
-        return figure, list(figure.subplots(2, 2).flat)
+    figure = Figure(figsize=(width_in, height_in), layout="constrained", dpi=110)
+    panels = list(figure.subplots(2, 2).flat)
+    for panel in panels:
+        panel.tick_params(length=2, colors=GREY, labelsize=8)
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.spines[["left", "bottom"]].set_edgecolor(GREY)
+    return figure, panels
 
 
 def save(figure: Figure, file: Path) -> Path:
     """Write the picture (the format follows from the suffix), without the date and version that would change it."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    with mpl.rc_context(STYLE):
-        figure.savefig(file, metadata={"Software": None})
+    figure.savefig(file, metadata={"Software": None})
     return file
+
+
+def title(panel: Any, text: str) -> None:
+    """A panel's heading."""
+    panel.set_title(text, loc="left", fontsize=10, fontweight="bold")
 
 
 def draw_map(panel: Any, grid: Grid, seen: NDArray[np.bool_] | None = None) -> None:
@@ -55,10 +49,9 @@ def draw_map(panel: Any, grid: Grid, seen: NDArray[np.bool_] | None = None) -> N
     panel.imshow(picture, origin="lower", interpolation="nearest")
     panel.set_xticks(range(0, grid.width, 20))
     panel.set_yticks(range(0, grid.height, 10))
-    panel.tick_params(length=2, colors=GREY, labelsize=7)
-    for spine in panel.spines.values():
-        spine.set_visible(True)
-        spine.set_linewidth(0.6)
+    panel.spines[:].set_visible(True)
+    panel.spines[:].set_linewidth(0.6)
+    panel.spines[:].set_edgecolor(GREY)
 
 
 def draw_ends(panel: Any, start: Cell, target: Cell) -> None:

@@ -29,7 +29,7 @@ class Options:
 
     runs: int = 100
     seed: int = 0
-    jobs: int = 2
+    jobs: int = 1
     maps: Path | None = None
 
 

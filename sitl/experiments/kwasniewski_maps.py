@@ -19,7 +19,7 @@ from companion.planning import registry
 from companion.settings import Settings, parse_settings
 from sitl.experiments import drawing
 from sitl.experiments.experiment import START, TARGET, Advance, Options, load_maps, where_measured
-from sitl.experiments.results_page import markdown_table, write_section
+from sitl.experiments.results_page import markdown_table, terminal_table, write_section
 from sitl.field_level import LAYERS, STEP_LIMIT, FieldRobot, FieldRun, Outcome, drive_fields
 
 NAME = "kwasniewski-maps"
@@ -69,13 +69,13 @@ class MapsReport:
     series: tuple[Series, ...]
 
     def tables(self) -> list[Table]:
-        """One row a profile and map."""
-        table = Table(title=f"{NAME}: {self.options.runs} runs a map, at most {STEP_LIMIT} steps")
-        for column in HEAD:
-            table.add_column(column, justify="left" if column in HEAD[:2] else "right")
-        for row in map(_row, self.series):
-            table.add_row(*row)
-        return [table]
+        """One for each profile, a row a map."""
+        return [
+            terminal_table(
+                f"profile {profile}, times in ms", HEAD, [_row(s) for s in self.series if s.profile == profile]
+            )
+            for profile in PROFILES
+        ]
 
     def as_json(self) -> dict[str, object]:
         """Every run's figures, in the order of their seeds."""
@@ -110,7 +110,7 @@ class MapsReport:
             _draw_track(panel, run)
             drawing.draw_ends(panel, START, TARGET)
             back = f", {run.return_steps} of them going back" if run.return_steps else ""
-            panel.set_title(f"{TITLES[name]}: {run.steps} steps{back}")
+            drawing.title(panel, f"{TITLES[name]}: {run.steps} steps{back}")
         _legend(figure)
         return figure
 
@@ -120,21 +120,23 @@ class MapsReport:
             shown = [series for series in self.series if series.map_name == name]
             values = [s.planning_ms() if what == "times" else np.array([r.steps for r in s.runs]) for s in shown]
             bins = _bins(np.concatenate(values), whole=what == "steps")
-            for series, data in zip(shown, values, strict=True):
-                label = f"{series.profile}: median {np.median(data):.{1 if what == 'times' else 0}f}"
-                colour = COLOURS[series.profile]
-                panel.hist(np.minimum(data, bins[-1]), bins, label=label, color=colour, alpha=0.55, edgecolor="white")
+            digits = 1 if what == "times" else 0
+            panel.hist(
+                [np.minimum(data, bins[-1]) for data in values],
+                bins.tolist(),
+                rwidth=0.9,
+                color=[COLOURS[series.profile] for series in shown],
+                label=[f"{s.profile}: median {np.median(v):.{digits}f}" for s, v in zip(shown, values, strict=True)],
+            )
             over = sum(int((data > bins[-1]).sum()) for data in values)
-            note = f"  ({over} slower, in the last bar)" if over else ""
-            panel.set_title(TITLES[name] + note)
+            drawing.title(panel, TITLES[name] + (f" ({over} slower, in the last bar)" if over else ""))
             panel.set_xlabel("planning time of a run, ms" if what == "times" else "steps")
             panel.set_ylabel("runs")
-            panel.legend(fontsize=8)
+            panel.legend(fontsize=8, frameon=False)
         return figure
 
 
-HEAD = ("map", "profile", "reached", "unreachable", "step limit", "steps", "going back", "searches", "planning, ms")
-HEAD = (*HEAD, "slowest, ms", "field step p99, ms")
+HEAD = ("map", "reached", "over limit", "steps", "back", "searches", "planning", "slowest", "step p99")
 
 
 def run(options: Options, advance: Advance) -> MapsReport:
@@ -143,9 +145,7 @@ def run(options: Options, advance: Advance) -> MapsReport:
     registry.warm_up()  # here, so that the workers find everything compiled
     keys = [(profile, name) for profile in PROFILES for name in maps]
     seeds = range(options.seed, options.seed + options.runs)
-    tasks = [
-        (key, seeds[at : at + RUNS_A_TASK]) for key in keys for at in range(0, options.runs, RUNS_A_TASK)
-    ]  # fmt: skip
+    tasks = [(key, seeds[at : at + RUNS_A_TASK]) for key in keys for at in range(0, options.runs, RUNS_A_TASK)]
     collected: dict[tuple[Profile, str], list[FieldRun]] = {key: [] for key in keys}
     done = 0
     for (key, _), runs in zip(tasks, _made(tasks, maps, options.jobs), strict=True):
@@ -182,10 +182,8 @@ def _warm_up_once() -> None:
 def _row(series: Series) -> list[str]:
     planning_ms = series.planning_ms()
     return [
-        TITLES[series.map_name],
-        series.profile,
-        f"{series.count(Outcome.REACHED)} of {len(series.runs)}",
-        f"{series.count(Outcome.UNREACHABLE)}",
+        series.map_name,
+        f"{series.count(Outcome.REACHED)}/{len(series.runs)}",
         f"{series.count(Outcome.STEP_LIMIT)}",
         f"{np.median([run.steps for run in series.runs]):.0f}",
         f"{np.mean([run.return_steps for run in series.runs]):.1f}",
@@ -251,16 +249,19 @@ def _bins(values: NDArray[Any], *, whole: bool) -> NDArray[np.float64]:
 
 
 def _section(report: MapsReport) -> str:
-    rows = [_row(series) for series in report.series]
+    tables = "\n\n".join(
+        f"Profile `{profile}`:\n\n{markdown_table(HEAD, [_row(s) for s in report.series if s.profile == profile])}"
+        for profile in PROFILES
+    )
     return f"""## Unknown maps (Kwaśniewski & Gosiewski 2018, sections 5 and 6)
 
 `rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
 
-Start {tuple(START)}, target {tuple(TARGET)}, 100 x 50 fields, at most {STEP_LIMIT} steps, a view of {LAYERS} layers. Planning is the time of
-all searches of one run together; a field step is one call of the step function, its search included (99 % of them are not
-slower than the last column). Figures a run are medians, except going back (mean).
+Start {tuple(START)}, target {tuple(TARGET)}, 100 x 50 fields, at most {STEP_LIMIT} steps, a view of {LAYERS} layers. Steps, searches and planning
+(all searches of one run together) are medians of the runs, back (steps in return mode) is the mean; 99 % of all calls of the step
+function, searches included, took no longer than the last column. Times are in milliseconds.
 
-{markdown_table(HEAD, rows)}
+{tables}
 
 The paper gives no table, only histograms of computing times in seconds (Python 3.6; its text names two of 189 s and 232 s on
 map 3) and says that almost all tests reached the target. Measured on {where_measured()}.

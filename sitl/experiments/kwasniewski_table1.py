@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,14 +22,14 @@ from companion.settings import PlannerSettings
 from sitl.experiments import drawing
 from sitl.experiments.experiment import START, TARGET, Advance, Options, load_maps, where_measured
 from sitl.experiments.plain_dijkstra import least_cost
-from sitl.experiments.results_page import markdown_table, write_section
+from sitl.experiments.results_page import markdown_table, terminal_table, write_section
 
 NAME = "kwasniewski-table1"
 TITLES = {"known-1": "Map 1", "known-2": "Map 2", "known-3": "Map 3", "known-4": "Map 4"}
 SHOWN = 3
 """The paper gives three times for each setting and map."""
 
-PLAIN, DIJKSTRA = "Dijkstra, plain Python", "Dijkstra"
+PLAIN, DIJKSTRA = "Dijkstra (Python)", "Dijkstra"
 BUDGETS = {
     "GA 1": Budget(1, 500, (4,), 40),
     "GA 2": Budget(1, 500, (4,), 100),
@@ -65,6 +66,10 @@ PAPER_S: dict[str, dict[str, tuple[float | None, ...]]] = {
 """Table 1 as printed: seconds in Python 3.6 on the authors' computer; None = not found."""
 
 
+SearchCall = Callable[[int], tuple[planning.Path | None, float | None]]
+"""Search once with this seed: the path, where there is one to show, and its cost, None where nothing was found."""
+
+
 @dataclass(frozen=True, slots=True)
 class Trial:
     """One search: its time, and what it found (None: nothing)."""
@@ -94,7 +99,7 @@ class Entry:
 
     def first_times(self) -> str:
         """The first three times as the paper gives them."""
-        return "  ".join(f"{t.time_ms:.3g}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN])
+        return "  ".join(f"{t.time_ms:.2g}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN])
 
 
 @dataclass(frozen=True)
@@ -106,13 +111,11 @@ class TableReport:
     entries: tuple[Entry, ...]
 
     def tables(self) -> list[Table]:
-        """One row a map and method."""
-        table = Table(title=f"{NAME}: {SHOWN} times as in the paper, success over {self.options.runs} seeds")
-        for column in HEAD:
-            table.add_column(column, justify="left" if column in HEAD[:2] else "right")
-        for row in map(_row, self.entries):
-            table.add_row(*row)
-        return [table]
+        """One for each map, a row a method."""
+        return [
+            terminal_table(TITLES[name], HEAD, [_row(entry) for entry in self.entries if entry.map_name == name])
+            for name in self.maps
+        ]
 
     def as_json(self) -> dict[str, object]:
         """Times in milliseconds, None where nothing was found; the paper's in seconds."""
@@ -155,13 +158,13 @@ class TableReport:
                 if path is not None:
                     panel.plot(*np.array(path.cells, float).T, color=colour, linewidth=2.0, alpha=0.9)
             drawing.draw_ends(panel, START, TARGET)
-            panel.set_title(f"{TITLES[name]}: {', '.join(notes)}")
+            drawing.title(panel, f"{TITLES[name]}: {', '.join(notes)}")
         handles = [Line2D([], [], color=colour, linewidth=2.0, label=method) for method, colour in colours.items()]
         figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
         return figure
 
 
-HEAD = ("map", "method", "3 runs here, ms", "median here, ms", "found here", "3 runs in the paper, s")
+HEAD = ("method", "3 runs, ms", "median, ms", "found", "paper's 3 runs, s")
 
 
 def run(options: Options, advance: Advance) -> TableReport:
@@ -172,18 +175,18 @@ def run(options: Options, advance: Advance) -> TableReport:
     entries = []
     for name, grid in maps.items():
         problem = PlanningProblem(grid.weights, START, TARGET, corner_cutting=True)
-        entries.append(Entry(name, PLAIN, _timed(lambda _, p=problem: _plain(p), range(SHOWN))))
-        dijkstra = make_planner("dijkstra", settings)
-        entries.append(Entry(name, DIJKSTRA, _timed(_planned(dijkstra, problem, Budget()), range(SHOWN))))
-        genetic = make_planner("bspline-ga", settings)
         seeds = range(options.seed, options.seed + max(options.runs, SHOWN))
+        entries.append(Entry(name, PLAIN, _timed(_plain(problem), seeds[:SHOWN])))
+        dijkstra = make_planner("dijkstra", settings)
+        entries.append(Entry(name, DIJKSTRA, _timed(_planned(dijkstra, problem, Budget()), seeds)))
+        genetic = make_planner("bspline-ga", settings)
         for method, budget in BUDGETS.items():
             entries.append(Entry(name, method, _timed(_planned(genetic, problem, budget), seeds)))
             advance(sum(e.method in BUDGETS for e in entries), len(BUDGETS) * len(maps))
     return TableReport(options, maps, tuple(entries))
 
 
-def _timed(call: Callable[[int], tuple[planning.Path | None, float | None]], seeds: range) -> tuple[Trial, ...]:
+def _timed(call: SearchCall, seeds: range) -> tuple[Trial, ...]:
     trials = []
     for seed in seeds:
         began_s = stopwatch_s()
@@ -192,9 +195,7 @@ def _timed(call: Callable[[int], tuple[planning.Path | None, float | None]], see
     return tuple(trials)
 
 
-def _planned(
-    planner: Planner, problem: PlanningProblem, budget: Budget
-) -> Callable[[int], tuple[planning.Path | None, float | None]]:
+def _planned(planner: Planner, problem: PlanningProblem, budget: Budget) -> SearchCall:
     def call(seed: int) -> tuple[planning.Path | None, float | None]:
         path = planner.plan(problem, budget, np.random.default_rng(seed)).path
         return path, None if path is None else path.cost
@@ -202,8 +203,13 @@ def _planned(
     return call
 
 
-def _plain(problem: PlanningProblem) -> tuple[planning.Path | None, float | None]:
-    return None, least_cost(problem.weights, problem.start, problem.target)
+def _plain(problem: PlanningProblem) -> SearchCall:
+    def call(seed: int) -> tuple[planning.Path | None, float | None]:
+        del seed
+        cost = least_cost(problem.weights, problem.start, problem.target)
+        return None, None if cost == math.inf else cost
+
+    return call
 
 
 def _paper_times(entry: Entry) -> str:
@@ -213,16 +219,19 @@ def _paper_times(entry: Entry) -> str:
 
 def _row(entry: Entry) -> list[str]:
     return [
-        TITLES[entry.map_name],
         entry.method,
         entry.first_times(),
-        f"{entry.median_ms:.3g}",
-        f"{entry.found} of {len(entry.trials)}",
+        f"{entry.median_ms:.2g}",
+        f"{entry.found}/{len(entry.trials)}",
         _paper_times(entry),
     ]
 
 
 def _section(report: TableReport) -> str:
+    tables = "\n\n".join(
+        f"{TITLES[name]}:\n\n{markdown_table(HEAD, [_row(e) for e in report.entries if e.map_name == name])}"
+        for name in report.maps
+    )
     return f"""## Known maps (Kwaśniewski & Gosiewski 2018, Table 1)
 
 `rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
@@ -231,7 +240,7 @@ From {tuple(START)} to {tuple(TARGET)} on known maps of 100 x 50 fields. GA 1: p
 control points; GA 3: population 100, 5 control points; all with 1 to 500 epochs. {NOT_FOUND} means that the budget was spent without a
 path. Mind the units: **milliseconds here, seconds in the paper**.
 
-{markdown_table(HEAD, [_row(entry) for entry in report.entries])}
+{tables}
 
 Measured on {where_measured()}. Times here and there cannot be compared one to one: the paper's
 programs are Python 3.6 on a computer that is not named, ours are compiled; how much of that is Dijkstra's algorithm itself and how

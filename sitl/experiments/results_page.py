@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from rich import box
+from rich.table import Table
+
 HEAD = """# Results
 
 Tables and pictures on this page are written by the commands named in each section (`make results` runs them
@@ -27,6 +30,16 @@ def write_section(folder: Path, name: str, text: str) -> Path:
         after = f"{before.rstrip()}\n\n{section}"
     page.write_text(after, encoding="utf-8")
     return page
+
+
+def terminal_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """The same for the terminal, narrow enough for 80 columns."""
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for column, name in enumerate(head):
+        table.add_column(name, justify="right" if column else "left")
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

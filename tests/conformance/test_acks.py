@@ -283,6 +283,7 @@ def test_reboot() -> None:
     client = ready(open_ground())
     assert client.ask(246, 1) == FAILED
     assert client.ask(400, 0) == ACCEPTED
+    client.send(mavlink.MAVLink_param_set_message(1, 1, b"WP_SPEED", 1.5, 9))
     client.command(246, 1)
     client.run_for(0.1)
     assert client.link.dropped
@@ -291,6 +292,9 @@ def test_reboot() -> None:
     assert again.of("EKF_STATUS_REPORT")[-1].flags == 167
     assert again.arm() == ACCEPTED
     assert again.of("ATTITUDE")[0].time_boot_ms == 3000
+    again.send(mavlink.MAVLink_param_request_read_message(1, 1, b"WP_SPEED", -1))
+    again.run_for(0.1)
+    assert again.of("PARAM_VALUE")[-1].param_value == 1.5
 
 
 def test_ground_station_failsafe() -> None:

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from sitl.cli.main import app
-from sitl.server import Endpoint, ListenError, open_endpoint, serve
+from sitl.server import Endpoint, ListenError, datagrams, open_endpoint, serve
 from sitl.simulator import Simulator
 from tests.sitl_client import open_ground
 
@@ -115,6 +115,23 @@ def test_udp_out_sends_first_and_hears_answers(bench: Bench) -> None:
         partner.sendto(request_version(), vehicle)
         bench.run(2.0)
         assert "AUTOPILOT_VERSION" in kinds(read_all(partner))
+
+
+def test_datagrams_hold_whole_packets() -> None:
+    packets = [
+        request_version(),
+        bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(mavlink.MAVLink(None))),
+    ]
+    old = bytes(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(mavlink.MAVLink(None), force_mavlink1=True))
+    stream = b"".join([*packets, old] * 200)
+    pieces = datagrams(stream)
+    assert b"".join(pieces) == stream
+    assert max(map(len, pieces)) <= 1400
+    assert len(pieces) < len(stream) / 1300
+    for piece in pieces:
+        found = mavlink.MAVLink(None).parse_buffer(piece) or []
+        assert sum(len(message.get_msgbuf()) for message in found) == len(piece)
+    assert datagrams(b"") == []
 
 
 def test_udp_out_without_a_partner_goes_on(bench: Bench) -> None:

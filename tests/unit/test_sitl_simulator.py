@@ -240,3 +240,32 @@ def test_noise_on_the_line_leaves_the_link_up(chunks: list[bytes]) -> None:
         client.command(512, 148)
     client.run_for(0.1)
     assert any(m.get_type() == "COMMAND_ACK" and m.result == 0 for m in client.received)
+
+
+def test_commands_to_the_lidar_are_not_answered_by_the_autopilot() -> None:
+    simulator = open_ground(sensors="lidar-90")
+    station = Client(simulator, system=255, component=190)
+    station.send(mavlink.MAVLink_command_long_message(1, 196, 512, 0, 148, 0, 0, 0, 0, 0, 0))
+    station.run_to(0.2)
+    assert not station.of("COMMAND_ACK")
+    assert 196 in {m.get_srcComponent() for m in station.of("HEARTBEAT")}
+
+
+def test_a_sharp_new_target_is_followed_sooner_when_the_rover_was_turned_towards_it_first() -> None:
+    """A pivot keeps the old shaped motion, which must be undone afterwards; a heading target lets it start afresh."""
+
+    def seconds(turn_first: bool) -> float:
+        client = ready(open_ground(parameters={"WP_SPEED": 2.0, "WP_RADIUS": 1.0}))
+        client.drive_to(100.0, 0.0)
+        client.run_for(6.0)
+        began_s, turn_m = client.simulator.time_s, client.simulator.truth.north_m
+        while turn_first and abs(client.simulator.truth.heading_rad) < 2.5:
+            client.drive_at(0.0, mask=2559, yaw=3.0)
+            client.run_for(0.1)
+        client.drive_to(turn_m - 20.0, 0.0)
+        while client.simulator.truth.speed_m_s < 0.5 or abs(client.simulator.truth.heading_rad) < 2.5:
+            client.run_for(0.1)
+            assert client.simulator.time_s < began_s + 20.0
+        return client.simulator.time_s - began_s
+
+    assert seconds(turn_first=True) < seconds(turn_first=False) - 2.0
