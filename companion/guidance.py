@@ -151,10 +151,20 @@ def guide(
     error = abs(wrap_pi_rad(bearing - pose.heading_rad))
     beside_m = clearance_m(evidence, pose.point, settings.slow_within_m + rover.radius_m) - rover.radius_m
     close = beside_m < settings.slow_within_m
-    if close and error > math.radians(settings.turn_first_deg) and pose.point.distance_m(target) > 0.5:
-        # Near something the rover must not drive an arc while it turns.
-        return _turn_to(bearing, speed_m_s, settings)
+    if error > _turn_first_rad(close, looking_rad is not None, settings) and pose.point.distance_m(target) > 0.5:
+        return _turn_to(bearing, speed_m_s if close else 0.0, settings)
     return Guide(Motion.DRIVE, GuidedPosition(target), _speed_limit(min(beside_m, room_m), error, rover, settings))
+
+
+def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> float:
+    """The bearing error from which the rover turns on the spot instead of driving an arc, which it must not near something.
+
+    A position far to the side would make the autopilot pivot too, but with its old target still winding up behind the scenes; so
+    a heading is given first, until the rest is small.
+    """
+    if turning:
+        return math.radians(settings.turn_until_close_deg if close else settings.turn_until_deg)
+    return math.radians(settings.turn_first_close_deg if close else settings.turn_first_deg)
 
 
 def _must_brake(

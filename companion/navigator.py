@@ -195,7 +195,7 @@ def _mend_past(
     """The way back is blocked: search for the nearest past field that can be reached, and go back through there."""
     here = state.past[-1]
     free = [i for i in range(len(state.past) - 2, -1, -1) if not grid.is_obstacle(state.past[i])]
-    tries = free[:2] + free[2 :: max(1, len(free) // BACKTRACK_TRIES)]
+    tries = free[:2] + free[2 :: max(1, len(free) // BACKTRACK_TRIES)] + free[-1:]
     for i in dict.fromkeys(tries):
         result = search(SearchKind.THOROUGH, here, state.past[i])
         searches = (*searches, SearchKind.THOROUGH)

@@ -127,9 +127,10 @@ class GuidanceSettings(Section):
     )
     least_reach_m: float = Field(0.4, gt=0.0, description="less clear way than this is no way")
     look_ahead_m: float = Field(1.0, gt=0.0, description="the place to turn to when the way has not been seen")
-    turn_first_deg: float = Field(
-        45.0, gt=0.0, le=180.0, description="turn on the spot before driving off at a larger angle"
-    )
+    turn_first_deg: float = Field(60.0, gt=0.0, le=180.0, description="turn on the spot first when the target is farther aside")
+    turn_until_deg: float = Field(40.0, gt=0.0, le=180.0, description="... until it is less than this aside")
+    turn_first_close_deg: float = Field(45.0, gt=0.0, le=180.0, description="turn_first_deg with something close beside")
+    turn_until_close_deg: float = Field(15.0, gt=0.0, le=180.0, description="turn_until_deg with something close beside")
     roll_out_m_s: float = Field(0.3, ge=0.0, description="faster than this the rover first brakes straight, then turns on the spot")
     reach_after_look_m: float = Field(2.5, gt=0.0, description="having turned to look, drive off when so much is clear")
     flanks_seen_m: float = Field(0.6, ge=0.0, description="ground at the rover's flanks must be seen so far beyond the stopping distance")

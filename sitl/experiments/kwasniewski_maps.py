@@ -72,7 +72,7 @@ class MapsReport:
         """One for each profile, a row a map."""
         return [
             terminal_table(
-                f"profile {profile}, times in ms", HEAD, [_row(s) for s in self.series if s.profile == profile]
+                f"{NAME}, profile {profile}, times in ms", HEAD, [_row(s) for s in self.series if s.profile == profile]
             )
             for profile in PROFILES
         ]
@@ -136,7 +136,7 @@ class MapsReport:
         return figure
 
 
-HEAD = ("map", "reached", "over limit", "steps", "back", "searches", "planning", "slowest", "step p99")
+HEAD = ("map", "reached", "limit", "steps", "back", "searches", "plan", "max", "p99")
 
 
 def run(options: Options, advance: Advance) -> MapsReport:
@@ -257,9 +257,10 @@ def _section(report: MapsReport) -> str:
 
 `rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
 
-Start {tuple(START)}, target {tuple(TARGET)}, 100 x 50 fields, at most {STEP_LIMIT} steps, a view of {LAYERS} layers. Steps, searches and planning
-(all searches of one run together) are medians of the runs, back (steps in return mode) is the mean; 99 % of all calls of the step
-function, searches included, took no longer than the last column. Times are in milliseconds.
+Start {tuple(START)}, target {tuple(TARGET)}, 100 x 50 fields, at most {STEP_LIMIT} steps, a view of {LAYERS} layers. Steps, searches and plan (all
+searches of one run together) are medians of the runs, max is the slowest run, back (steps in return mode) is the mean, limit
+counts the runs that reached the limit of steps; 99 % of all calls of the step function, searches included, took no longer than p99. Times
+are in milliseconds.
 
 {tables}
 

@@ -99,7 +99,7 @@ class Entry:
 
     def first_times(self) -> str:
         """The first three times as the paper gives them."""
-        return "  ".join(f"{t.time_ms:.2g}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN])
+        return " ".join(f"{t.time_ms:.2g}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN])
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,9 @@ class TableReport:
     def tables(self) -> list[Table]:
         """One for each map, a row a method."""
         return [
-            terminal_table(TITLES[name], HEAD, [_row(entry) for entry in self.entries if entry.map_name == name])
+            terminal_table(
+                f"{NAME}, {TITLES[name]}", HEAD, [_row(entry) for entry in self.entries if entry.map_name == name]
+            )
             for name in self.maps
         ]
 
@@ -164,7 +166,7 @@ class TableReport:
         return figure
 
 
-HEAD = ("method", "3 runs, ms", "median, ms", "found", "paper's 3 runs, s")
+HEAD = ("method", "3 runs, ms", "median", "found", "paper's 3, s")
 
 
 def run(options: Options, advance: Advance) -> TableReport:
@@ -214,7 +216,7 @@ def _plain(problem: PlanningProblem) -> SearchCall:
 
 def _paper_times(entry: Entry) -> str:
     times = PAPER_S[entry.map_name].get(entry.method)
-    return "" if times is None else "  ".join(NOT_FOUND if t is None else f"{t:.2f}" for t in times)
+    return "" if times is None else " ".join(NOT_FOUND if t is None else f"{t:.2f}" for t in times)
 
 
 def _row(entry: Entry) -> list[str]:
@@ -227,7 +229,21 @@ def _row(entry: Entry) -> list[str]:
     ]
 
 
+def _ratios(report: TableReport) -> tuple[float, float]:
+    """Median of Dijkstra over that of GA 1 on the first map: in the paper, and here."""
+    paper = PAPER_S["known-1"]
+    theirs = float(np.median(np.array(paper[DIJKSTRA], float)) / np.median(np.array(paper["GA 1"], float)))
+    here = {entry.method: entry.median_ms for entry in report.entries if entry.map_name == "known-1"}
+    return theirs, here[DIJKSTRA] / here["GA 1"]
+
+
+def _found_in_maze(report: TableReport) -> str:
+    entries = [entry for entry in report.entries if entry.map_name == "known-4" and entry.method in BUDGETS]
+    return f"{sum(entry.found for entry in entries)} of {sum(len(entry.trials) for entry in entries)}"
+
+
 def _section(report: TableReport) -> str:
+    theirs, ours = _ratios(report)
     tables = "\n\n".join(
         f"{TITLES[name]}:\n\n{markdown_table(HEAD, [_row(e) for e in report.entries if e.map_name == name])}"
         for name in report.maps
@@ -243,9 +259,9 @@ path. Mind the units: **milliseconds here, seconds in the paper**.
 {tables}
 
 Measured on {where_measured()}. Times here and there cannot be compared one to one: the paper's
-programs are Python 3.6 on a computer that is not named, ours are compiled; how much of that is Dijkstra's algorithm itself and how
-much the implementation shows the row in plain Python. The paper's point can be compared: the genetic algorithm is far faster than Dijkstra's on
-simple maps, and does not find the way through the most complex one.
+programs are Python 3.6 on a computer that is not named, ours are compiled (the row in plain Python shows how much of the paper's 40 s
+belongs to its implementation). What can be compared: on map 1 the paper's Dijkstra takes {theirs:.0f} times as long as its
+GA 1, ours {ours:.1f} times; on map 4 the paper's three settings found a path in 0 of 9 runs, ours in {_found_in_maze(report)}.
 
 ![The four maps](images/{NAME}.png)
 

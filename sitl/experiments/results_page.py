@@ -34,9 +34,9 @@ def write_section(folder: Path, name: str, text: str) -> Path:
 
 def terminal_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     """The same for the terminal, narrow enough for 80 columns."""
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     for column, name in enumerate(head):
-        table.add_column(name, justify="right" if column else "left")
+        table.add_column(name, justify="right" if column else "left", no_wrap=True)
     for row in rows:
         table.add_row(*row)
     return table

@@ -87,13 +87,24 @@ def test_clutter_has_22_simple_obstacles_and_complex_18() -> None:
     assert ndimage.label(world("one-obstacle"), EIGHT)[1] == 1
 
 
-def test_the_dead_end_is_deeper_than_the_rover_sees_and_straight_ahead() -> None:
+def test_the_dead_end_winds_and_is_deeper_than_the_rover_sees() -> None:
     obstacles = world("dead-end")
-    assert not obstacles[24, :62].any() and obstacles[24, 62]
-    inside = obstacles[17:32, 32:62]
-    assert not inside.any()
-    assert obstacles[16, 32:64].all() and obstacles[32, 32:64].all()
-    assert inside.shape[0] >= 10 and inside.shape[1] > 2 * 4.5
+    assert not obstacles[24, :42].any() and obstacles[24, 70]
+    walls = obstacles[12, 30:72].all() and obstacles[36, 30:72].all() and obstacles[12:37, 71].all()
+    assert walls and not obstacles[14:35, 30:42].any()
+    # From its inmost part the only way out is the way in: with the mouth closed nothing outside is reached.
+    stopped = ~obstacles
+    stopped[14:35, 30] = False
+    assert joined(~obstacles, (24, 68), (24, 98))
+    assert not joined(stopped, (24, 68), (24, 98))
+    # Each baffle makes it wind: in steps along rows and columns the way out is far longer than the 38 to the mouth.
+    reached = np.zeros_like(obstacles)
+    reached[24, 68] = True
+    steps = 0
+    while not reached[14:35, 30].any():
+        reached = ndimage.binary_dilation(reached) & ~obstacles
+        steps += 1
+    assert steps > 50
 
 
 def test_the_straight_way_is_blocked_wherever_something_is_to_be_avoided() -> None:
