@@ -76,6 +76,7 @@ class Driver:
         self._back_until_s = -math.inf
         self._doubts_left = 0
         self._looking_rad: float | None = None
+        self._braking = False
         self._stuck_places: dict[Cell, int] = {}
 
     def head_for(self, goal: ResolvedTarget, pose: Pose) -> None:
@@ -124,7 +125,17 @@ class Driver:
         if self._goal.speed_m_s is not None:
             rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
         settings = self._settings.guidance
-        now = guide(self.route, pose, speed_m_s, self.evidence, rover, settings, looking_rad=self._looking_rad)
+        now = guide(
+            self.route,
+            pose,
+            speed_m_s,
+            self.evidence,
+            rover,
+            settings,
+            looking_rad=self._looking_rad,
+            braking=self._braking,
+        )
+        self._braking = now.motion is Motion.BRAKE
         self._looking_rad = now.setpoint.heading_rad if isinstance(now.setpoint, GuidedHeading) else None
         if self._is_stuck(pose, now):
             self._get_unstuck(pose)
@@ -219,7 +230,9 @@ class Driver:
         self._stuck_places[cell] = self._stuck_places.get(cell, 0) + 1
         final = self._stuck_places[cell] >= TRIES_AT_ONE_PLACE
         penalise(self.evidence, cell, FINAL_PENALTY if final else FRESH_PENALTY)
-        self._back_until_s = pose.time_s + self._settings.guidance.back_out_m / self._settings.guidance.back_out_speed_m_s
+        self._back_until_s = (
+            pose.time_s + self._settings.guidance.back_out_m / self._settings.guidance.back_out_speed_m_s
+        )
         self._state = abandon_path(self._state)
         self._progress = None
         self.route = None

@@ -129,17 +129,22 @@ def guide(
     settings: GuidanceSettings,
     *,
     looking_rad: float | None = None,
+    braking: bool = False,
 ) -> Guide:
     """The setpoint and speed for this moment. ``BLOCKED`` means that not even the next piece of the route is clear.
 
     ``looking_rad``: the heading of the last answer if that was LOOK. It is kept until reached, and a longer clear reach is wanted
     before driving off, so that a narrow sensor looks to both sides once, not at every step.
     """
-    if _must_brake(pose, speed_m_s, evidence, rover, settings):
+    needed_m = braking_distance_m(speed_m_s, settings)
+    if _would_touch(pose, speed_m_s, needed_m, evidence, rover, settings):
         return Guide(Motion.BRAKE, STOP, 0.0)
     target, reach_m, room_m = _farthest_clear(route, pose, speed_m_s, evidence, rover, settings)
     distance_m = pose.point.distance_m(route.end)
     at_end = len(route.points) - 1 - route.progress <= int(1.0 / STEP_M)
+    rolling = speed_m_s > settings.roll_out_m_s
+    if rolling and reach_m < min(needed_m + (settings.brake_on_m if braking else 0.0), distance_m - 0.1):
+        return Guide(Motion.BRAKE, STOP, 0.0)
     wanted_m = settings.least_reach_m if looking_rad is None else settings.reach_after_look_m
     if reach_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach_m > 0.0):
         if looking_rad is not None and not _is_turned_to(looking_rad, pose, settings):
@@ -167,13 +172,12 @@ def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> f
     return math.radians(settings.turn_first_close_deg if close else settings.turn_first_deg)
 
 
-def _must_brake(
-    pose: Pose, speed_m_s: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
+def _would_touch(
+    pose: Pose, speed_m_s: float, needed_m: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
 ) -> bool:
-    """Whether the rover, going on as it does, would touch something before it could stop."""
+    """Whether the rover, going straight on, would touch something before it could stop."""
     if speed_m_s <= settings.roll_out_m_s:
         return False
-    needed_m = speed_m_s**2 / (2.0 * settings.deceleration_m_s2) + 0.1 * speed_m_s
     ahead = pose.point.moved(pose.heading_rad, needed_m)
     return look_along(evidence, pose.point, ahead, rover.radius_m + 0.05).clear_m < needed_m - 1e-6
 
@@ -189,8 +193,13 @@ def _turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -
     return Guide(Motion.LOOK, GuidedHeading(bearing_rad), settings.min_speed_m_s)
 
 
+def braking_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
+    """Distance from the stop command to standing still."""
+    return speed_m_s * settings.brake_delay_s + speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
+
+
 def stopping_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
-    """Distance from deciding to stop to standing still."""
+    """Distance from something coming into sight to standing still."""
     return speed_m_s * settings.latency_s + speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
 
 

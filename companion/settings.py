@@ -111,7 +111,7 @@ class MappingSettings(Section):
     hit_depth_m: float = Field(
         0.05, ge=0.0, description="a surface is entered this deep, so that noise does not fill the free side"
     )
-    soft_cost: float = Field(0.3, ge=0.0, lt=0.5, description="weight added beside obstacles")
+    soft_cost: float = Field(0.4, ge=0.0, lt=0.5, description="weight added beside obstacles")
     soft_reach_m: float = Field(2.0, ge=0.0, description="how far from an obstacle the soft cost reaches")
     max_yaw_rate_deg_s: float = Field(120.0, gt=0.0, description="scans taken while turning faster are not used")
 
@@ -138,7 +138,9 @@ class GuidanceSettings(Section):
     turn_cost: float = Field(0.45, ge=0.0, description="weight added to fields behind the rover when it plans")
     turn_reach_m: float = Field(6.0, ge=0.0, description="how far behind")
     slow_within_m: float = Field(0.6, gt=0.0, description="obstacles nearer than this beside the rover slow it down")
-    deceleration_m_s2: float = Field(1.0, gt=0.0, description="what the rover brakes with")
+    deceleration_m_s2: float = Field(0.8, gt=0.0, description="what the rover brakes with")
+    brake_delay_s: float = Field(0.25, ge=0.0, description="from the stop command to braking")
+    brake_on_m: float = Field(0.7, ge=0.0, description="braking goes on until the way is clear so far beyond the braking distance")
     latency_s: float = Field(0.4, ge=0.0, description="from seeing to braking")
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
     change_after_s: float = Field(
