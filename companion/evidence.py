@@ -10,6 +10,8 @@ import math
 import numpy as np
 from numba import njit
 
+DIAGONAL = math.sqrt(2.0)
+
 
 @njit(cache=True, nogil=True)
 def cast_scan(
@@ -60,30 +62,42 @@ def weigh(
 ):  # fmt: skip
     """Weights of the fields x0 <= x < x1, y0 <= y < y1. ``s``: evidence cells along a field; reach of soft cost in fields."""
     height, width = base.shape
-    half = s / 2.0
-    reach = int(math.ceil(max(radius_cells - half, 0.0)))
     for fy in range(y0, y1):
         for fx in range(x0, x1):
-            weight = base[fy, fx] + penalty[fy, fx]
-            blocked = weight >= 1.0
-            for y in range(max(0, fy * s - reach), min(height * s, fy * s + s + reach)):
-                for x in range(max(0, fx * s - reach), min(width * s, fx * s + s + reach)):
-                    if log_odds[y, x] >= occupied_at:
-                        distance = math.hypot(x + 0.5 - fx * s - half, y + 0.5 - fy * s - half)
-                        inside = fx * s <= x < fx * s + s and fy * s <= y < fy * s + s
-                        blocked = blocked or inside or distance < radius_cells
-            weights[fy, fx] = 1.0 if blocked else weight
+            weights[fy, fx] = min(base[fy, fx] + penalty[fy, fx], 1.0)
+    reach = int(math.ceil(radius_cells))
+    for y in range(max(0, y0 * s - reach), min(height * s, y1 * s + reach)):
+        for x in range(max(0, x0 * s - reach), min(width * s, x1 * s + reach)):
+            if log_odds[y, x] >= occupied_at:
+                for fy in range(max(y0, (y - reach) // s), min(y1, (y + reach) // s + 1)):
+                    for fx in range(max(x0, (x - reach) // s), min(x1, (x + reach) // s + 1)):
+                        distance = math.hypot(x + 0.5 - (fx + 0.5) * s, y + 0.5 - (fy + 0.5) * s)
+                        if distance < radius_cells or (x // s == fx and y // s == fy):
+                            weights[fy, fx] = 1.0
+    # Distance to the nearest obstacle field by two sweeps of a chamfer mask; beyond the window what was known before counts.
     n = int(math.ceil(soft_reach))
+    left = max(0, x0 - n)
+    low = max(0, y0 - n)
+    right = min(width, x1 + n)
+    high = min(height, y1 + n)
+    far = soft_reach + 1.0
+    gap = np.full((high - low + 2, right - left + 2), far)
+    for y in range(low, high):
+        for x in range(left, right):
+            if weights[y, x] >= 1.0:
+                gap[y - low + 1, x - left + 1] = 0.0
+    for y in range(1, gap.shape[0] - 1):
+        for x in range(1, gap.shape[1] - 1):
+            near = min(min(gap[y, x - 1], gap[y - 1, x]) + 1.0, min(gap[y - 1, x - 1], gap[y - 1, x + 1]) + DIAGONAL)
+            gap[y, x] = min(gap[y, x], near)
+    for y in range(gap.shape[0] - 2, 0, -1):
+        for x in range(gap.shape[1] - 2, 0, -1):
+            near = min(min(gap[y, x + 1], gap[y + 1, x]) + 1.0, min(gap[y + 1, x + 1], gap[y + 1, x - 1]) + DIAGONAL)
+            gap[y, x] = min(gap[y, x], near)
     for fy in range(y0, y1):
         for fx in range(x0, x1):
-            if weights[fy, fx] >= 1.0:
-                continue
-            nearest = soft_reach + 1.0
-            for y in range(max(0, fy - n), min(height, fy + n + 1)):
-                for x in range(max(0, fx - n), min(width, fx + n + 1)):
-                    if weights[y, x] >= 1.0:
-                        nearest = min(nearest, math.hypot(x - fx, y - fy))
-            if nearest <= soft_reach:
+            nearest = gap[fy - low + 1, fx - left + 1]
+            if weights[fy, fx] < 1.0 and nearest <= soft_reach:
                 extra = soft_cost * (1.0 - (nearest - 1.0) / soft_reach)
                 weights[fy, fx] = max(weights[fy, fx], min(weights[fy, fx] + extra, max_soft))
 

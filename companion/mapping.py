@@ -59,7 +59,7 @@ class Line:
 
 def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> EvidenceMap:
     """A map without evidence. On very large grids the evidence raster is coarser, to spare memory."""
-    subdivisions = settings.subdivisions
+    subdivisions = max(1, round(base.resolution_m / settings.evidence_m))
     while subdivisions > 1 and base.width * base.height * subdivisions**2 > MAX_EVIDENCE_CELLS:
         subdivisions -= 1
     shape = (base.height * subdivisions, base.width * subdivisions)
