@@ -161,6 +161,9 @@ def test_return_mode_searches_every_second_or_third_field_at_random():
     assert set(gaps) == {2, 3}
     # Equal chances: five standard deviations of so many throws of a coin.
     assert abs(gaps.count(2) / len(gaps) - 0.5) < 2.5 / np.sqrt(len(gaps))
+    # Independent ones: a gap equals the one before it in half of the cases, too.
+    same = sum(a == b for a, b in pairwise(gaps))
+    assert abs(same / len(gaps) - 0.5) < 2.5 / np.sqrt(len(gaps))
     first = [gaps_between_searches(seed, 8)[0] for seed in range(100)]
     assert abs(first.count(2) - 50) < 25, "the very first choice depends on the seed, too"
     assert gaps_between_searches(3) == gaps_between_searches(3) != gaps_between_searches(4)
@@ -262,6 +265,26 @@ def test_exploring_follows_the_current_path_and_looks_for_a_better_one_every_fiv
             looked.append(x)
     assert looked == [5, 10, 15] and set(search.kinds) == {BETTER}
     assert state.past == row[:19]
+
+
+def test_looking_again_from_the_same_field_does_not_bring_the_look_for_a_better_path_nearer():
+    state = exploring(3, since_better=3)
+    for _ in range(5):
+        state, decision = step(state, ground(), ROW[3], unused)
+        assert decision.part is Part.EXPLORE
+
+
+def test_a_new_path_is_followed_for_five_fields_before_the_next_look():
+    state = exploring(1, since_better=4)
+    blocked = ground("..........", "..........", ".....#....")
+    found = path((2, 0), (3, 1), (4, 1), (5, 1), (6, 1), (7, 1), (8, 1), (9, 0))
+    state, decision = step(state, blocked, ROW[2], Scripted(found))
+    assert decision.part is Part.SEARCH
+    for x in (3, 4, 5, 6):
+        state, decision = step(state, blocked, Cell(x, 1), unused)
+    search = Scripted(NEVER)
+    step(state, blocked, Cell(7, 1), search)
+    assert search.kinds == [BETTER]
 
 
 def test_the_number_of_fields_between_looks_is_a_setting():
