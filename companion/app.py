@@ -11,7 +11,7 @@ from companion.clock import Clock, stopwatch_s
 from companion.commands import Say, SetMode
 from companion.driver import STANDSTILL, Driver
 from companion.frames import LocalFrame, Pose
-from companion.grid import Grid
+from companion.grid import Grid, inflated
 from companion.guidance import Guide, RoverLimits
 from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable, plan_itinerary
 from companion.mapping import EvidenceMap, forget, integrate, new_map
@@ -210,6 +210,7 @@ class Companion:
     def _open_map(self, grid: Grid, targets: tuple[ResolvedTarget, ...], pose: Pose) -> None:
         """The map, and who drives on it."""
         rover = self._mission.rover
+        grid = grid.with_weights(inflated(grid.weights, rover.radius_m / grid.resolution_m))
         self.evidence = new_map(grid, rover.radius_m, self._settings.mapping)
         assert self.vehicle.scan is not None
         limits = RoverLimits(rover.radius_m, rover.cruise_speed_m_s, self.vehicle.scan.scan.max_range_m)

@@ -57,10 +57,8 @@ def cast_scan(
 
 
 @njit(cache=True, nogil=True)
-def weigh(
-    log_odds, base, penalty, weights, s, x0, y0, x1, y1, occupied_at, radius_cells, soft_reach, soft_cost, max_soft
-):  # fmt: skip
-    """Weights of the fields x0 <= x < x1, y0 <= y < y1. ``s``: evidence cells along a field; reach of soft cost in fields."""
+def weigh(log_odds, base, penalty, weights, s, x0, y0, x1, y1, occupied_at, radius_cells):
+    """Weights of the fields x0 <= x < x1, y0 <= y < y1, obstacles among them. ``s``: evidence cells along a field."""
     height, width = base.shape
     for fy in range(y0, y1):
         for fx in range(x0, x1):
@@ -74,7 +72,15 @@ def weigh(
                         distance = math.hypot(x + 0.5 - (fx + 0.5) * s, y + 0.5 - (fy + 0.5) * s)
                         if distance < radius_cells or (x // s == fx and y // s == fy):
                             weights[fy, fx] = 1.0
-    # Distance to the nearest obstacle field by two sweeps of a chamfer mask; beyond the window what was known before counts.
+
+
+@njit(cache=True, nogil=True)
+def soften(weights, x0, y0, x1, y1, soft_reach, soft_cost, max_soft):
+    """Raise the weights of the free fields x0 <= x < x1, y0 <= y < y1 near obstacles; reach in fields.
+
+    Two sweeps of a chamfer mask give the distances; beyond the window what was known before counts.
+    """
+    height, width = weights.shape
     n = int(math.ceil(soft_reach))
     left = max(0, x0 - n)
     low = max(0, y0 - n)

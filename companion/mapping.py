@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.evidence import cast_scan, first_unseen, look, nearest, weigh
+from companion.evidence import cast_scan, first_unseen, look, nearest, soften, weigh
 from companion.frames import NedPoint, Pose
 from companion.grid import Cell, Grid
 from companion.scan import RangeScan
@@ -206,9 +206,9 @@ def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
     """Recompute the weights of the fields x0 <= x < x1, y0 <= y < y1 from the evidence."""
     base = evidence.base
     settings = evidence.settings
-    weigh(
-        evidence.log_odds, base.weights, evidence.penalty, evidence.grid.weights, evidence.subdivisions,
-        max(x0, 0), max(y0, 0), min(x1, base.width), min(y1, base.height), settings.occupied_at,
-        evidence.rover_radius_m / evidence.evidence_m, settings.soft_reach_m / base.resolution_m,
-        settings.soft_cost, MAX_SOFT_WEIGHT,
-    )  # fmt: skip
+    x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, base.width), min(y1, base.height)
+    weights, reach = evidence.grid.weights, settings.soft_reach_m / base.resolution_m
+    radius = evidence.rover_radius_m / evidence.evidence_m
+    penalty, s = evidence.penalty, evidence.subdivisions
+    weigh(evidence.log_odds, base.weights, penalty, weights, s, x0, y0, x1, y1, settings.occupied_at, radius)
+    soften(weights, x0, y0, x1, y1, reach, settings.soft_cost, MAX_SOFT_WEIGHT)

@@ -110,7 +110,8 @@ class SitlSpec:
 class Mission:
     """Everything that a mission file says. ``notes`` tells people what was understood beyond the targets.
 
-    Ground is passable inside all of ``keep_in`` and outside each of ``keep_out``.
+    ``prior_map`` is a known map, its field size where the file has none (None: the grid's), and where its outer south-west
+    corner lies from home (None: as the file says, or on the grid). Ground is passable inside all of ``keep_in`` and outside each of ``keep_out``.
     """
 
     name: str
@@ -121,6 +122,8 @@ class Mission:
     keep_in: tuple[Area, ...] = ()
     weighted: tuple[WeightedArea, ...] = ()
     prior_map: Path | None = None
+    prior_resolution_m: float | None = None
+    prior_corner: HomePoint | None = None
     planned_home: GeoPoint | None = None
     sitl: SitlSpec | None = None
     source: Path | None = None

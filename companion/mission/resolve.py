@@ -162,8 +162,11 @@ def _prior_map(mission: Mission, home: NedPoint) -> Grid | None:
     path = mission.prior_map
     if path is None:
         return None
-    prior = load_map(path, mission.grid.resolution_m)
-    if path.suffix.lower() in (".yaml", ".yml"):
+    prior = load_map(path, mission.prior_resolution_m or mission.grid.resolution_m)
+    if mission.prior_corner is not None:
+        place = mission.prior_corner
+        corner = NedPoint(home.north_m + place.north_m, home.east_m + place.east_m)
+    elif path.suffix.lower() in (".yaml", ".yml"):
         corner = prior.south_west
         corner = NedPoint(home.north_m + corner.north_m, home.east_m + corner.east_m)
     elif mission.grid.home is not None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class Path:
     @property
     def length_fields(self) -> float:
         """Length in fields; a diagonal step is sqrt 2."""
-        return sum(math.hypot(b.x - a.x, b.y - a.y) for a, b in zip(self.cells, self.cells[1:], strict=False))
+        return sum(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(self.cells))
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -84,5 +85,5 @@ def path_cost(weights: Weights, cells: tuple[Cell, ...]) -> float:
     """Sum over the steps of length (1 or sqrt 2) times the weight of the field entered (at least MIN_WEIGHT)."""
     return sum(
         math.hypot(b.x - a.x, b.y - a.y) * max(float(weights[b.y, b.x]), MIN_WEIGHT)
-        for a, b in zip(cells, cells[1:], strict=False)
+        for a, b in pairwise(cells)
     )

@@ -13,12 +13,12 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from companion.app import Status
-from companion.grid import Cell
 from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
-from companion.mission.mission import GridSpec, Mission, MissionError, SitlSpec, Target
+from companion.mission.mission import Mission, MissionError, SitlSpec
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError, load_settings
+from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
 from sitl.picture import save_picture
 from sitl.scenario import scenario_from_mission
@@ -97,37 +97,15 @@ def _mission(
             raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
         return load_mission(mission_file)
     ground = load_map(world, resolution_m)
-
-    def field_at(text: str, option: str) -> Cell:
-        try:
-            x, y = (int(part) for part in text.split(","))
-        except ValueError:
-            raise MissionError(f"{option} {text}: not two whole numbers X,Y") from None
-        cell = Cell(x, ground.height - 1 - y if top_left else y)
-        if not ground.contains(cell):
-            raise MissionError(f"{option} {text}: outside the map of {ground.width} x {ground.height} fields")
-        if ground.is_obstacle(cell):
-            raise MissionError(f"{option} {text}: this field of {world} is an obstacle")
-        return cell
-
-    sitl = SitlSpec(world=world, resolution_m=resolution_m)
+    begin = field_at(ground, start, "--start", top_left=top_left) if start else None
     if mission_file is not None:
         if target is not None:
             raise MissionError("drive: --target goes with --world alone; the mission has its own targets")
-        mission = load_mission(mission_file)
-        sitl = replace(mission.sitl or sitl, world=world, resolution_m=resolution_m)
-        sitl = replace(sitl, start=field_at(start, "--start") if start else sitl.start)
-        return replace(mission, sitl=sitl, prior_map=world if prior else mission.prior_map)
-    if start is None or target is None:
+        return mission_in_world(load_mission(mission_file), world, ground, begin, prior=prior)
+    if begin is None or target is None:
         raise MissionError("drive: --world without a mission needs --start X,Y and --target X,Y")
-    begin = field_at(start, "--start")
-    return Mission(
-        name=world.stem,
-        targets=(Target("target", field_at(target, "--target")),),
-        grid=GridSpec(ground.resolution_m, (ground.width, ground.height), begin),
-        prior_map=world if prior else None,
-        sitl=replace(sitl, start=begin),
-    )
+    end = field_at(ground, target, "--target", top_left=top_left)
+    return mission_on_map(world, ground, begin, end, prior=prior)
 
 
 def _run_with_progress(run: Drive, console: Console) -> Report:
