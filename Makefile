@@ -1,35 +1,51 @@
-PYTHON ?= $(shell command -v python3.11 || command -v python3.12 || command -v python3.13 || command -v python3)
+# First set-up: make demo, make test. Everything lives in .venv; nothing is installed once it is there.
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+KERNELS := $(VENV)/.kernels
+SOURCES := $(shell find companion sitl -name '*.py')
+CANDIDATES := python3.11 python3.12 python3.13 python3.14 python3 python
 
 .PHONY: demo test lint bench results clean
 
-# One set-up for everything: a virtual environment with the pinned versions, made once and then used without a network.
-$(READY): pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit("rover-companion needs Python 3.11 or newer, this is " + sys.version.split()[0]) if sys.version_info < (3, 11) else None'
-	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]'
-	touch $(READY)
+demo: $(KERNELS)
+	@$(BIN)/rover-sitl drive missions/rooms.toml --image out/rooms.png --map out/rooms-map
 
-demo: $(READY)
-	$(BIN)/rover-sitl drive missions/rooms.toml --image out/rooms.png --map out/rooms-map
-
-test: $(READY) lint
+test: $(KERNELS) lint
 	$(BIN)/python -m pytest -n 2 --dist loadgroup
 
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
-	$(BIN)/lint-imports
+	$(BIN)/lint-imports --no-cache
 
-bench: $(READY)
+bench: $(KERNELS)
 	$(BIN)/python -m pytest tests/bench --override-ini addopts= -q -s --benchmark-columns=median,min,max,rounds
 
-results: $(READY)
+results: $(KERNELS)
 	$(BIN)/rover-sitl experiment kwasniewski-table1 --docs docs
 	$(BIN)/rover-sitl experiment kwasniewski-maps --docs docs
 
+# A virtual environment with the versions of constraints.txt, made once and from then on used without a network.
+# PYTHON=... chooses the interpreter; otherwise the first one that works is taken.
+$(READY): pyproject.toml constraints.txt
+	@for python in $(or $(PYTHON),$(CANDIDATES)); do \
+	  if "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+	    echo "setting up $(VENV) with $$("$$python" --version) (once, some minutes) ..."; \
+	    "$$python" -m venv $(VENV) && \
+	    $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]' && \
+	    touch $(READY); exit; \
+	  fi; \
+	done; \
+	echo "rover-companion needs Python 3.11 or newer with its venv module; tried: $(or $(PYTHON),$(CANDIDATES))" >&2; exit 1
+
+# numba keeps compiled kernels beside their sources, but looks only at the file a kernel is in, not at the files it calls
+# into. So when any source is newer than the last look, all kernels are compiled anew.
+$(KERNELS): $(READY) $(SOURCES)
+	@find companion sitl tests \( -name '*.nbi' -o -name '*.nbc' \) -delete
+	@touch $(KERNELS)
+
 clean:
-	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	find companion sitl tests missions -name __pycache__ -prune -exec rm -rf {} +

@@ -109,7 +109,7 @@ def soften(weights, x0, y0, x1, y1, soft_reach, soft_cost, max_soft):
 
 
 @njit(cache=True, nogil=True)
-def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, occupied_at):
+def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, radius, occupied_at):
     """How far a disc of this half width can go from (x0, y0) towards (x1, y1), and how far the line has been seen; in cells."""
     height, width = log_odds.shape
     length = math.hypot(x1 - x0, y1 - y0)
@@ -132,6 +132,7 @@ def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, occupied_at):
         d += 0.5
     # An obstacle may fill its whole evidence cell, not only the middle.
     half_width += 0.5
+    radius = min(radius + 0.5, half_width)
     clear = length
     r = int(math.ceil(half_width)) + 1
     left = max(0, int(min(x0, x0 + dx * length)) - r)
@@ -146,8 +147,9 @@ def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, occupied_at):
             py = y + 0.5 - y0
             along = px * dx + py * dy
             across = abs(px * dy - py * dx)
-            # What is nearer than the wanted room already must not come nearer still; so the rover can leave a wall.
-            room = min(half_width, math.hypot(px, py) - 0.1)
+            # What is nearer than the wanted room already must not come nearer still (so the rover can leave a wall), and
+            # nothing may come within its radius.
+            room = max(min(half_width, math.hypot(px, py) - 0.1), radius)
             if across >= room or along <= 0.0:
                 continue
             # The rover is a disc: it touches before its middle is level with the obstacle.

@@ -254,7 +254,7 @@ def _farthest_with(
 
 def _unseen_flank(pose: Pose, point: NedPoint, evidence: EvidenceMap, rover: RoverLimits) -> Unseen | None:
     """Where the rover's flanks would enter unseen ground on the way to a point."""
-    return unseen_beside(evidence, pose.point, point, 0.8 * rover.radius_m, rover.radius_m + evidence.evidence_m)
+    return unseen_beside(evidence, pose.point, point, rover.radius_m + 0.05, rover.radius_m + 0.2)
 
 
 def _look_or_blocked(

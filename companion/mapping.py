@@ -146,7 +146,7 @@ def look_along(evidence: EvidenceMap, start: NedPoint, end: NedPoint, half_width
         evidence.log_odds, evidence.base.weights, evidence.penalty, evidence.subdivisions,
         (start.east_m - corner.east_m) * scale, (start.north_m - corner.north_m) * scale,
         (end.east_m - corner.east_m) * scale, (end.north_m - corner.north_m) * scale,
-        half_width_m * scale, evidence.settings.occupied_at,
+        half_width_m * scale, evidence.rover_radius_m * scale, evidence.settings.occupied_at,
     )  # fmt: skip
     return Line(clear / scale, seen / scale)
 

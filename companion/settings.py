@@ -122,7 +122,7 @@ class GuidanceSettings(Section):
     horizon_m: float = Field(8.0, gt=0.0, description="a target is never farther than this along the route")
     clearance_m: float = Field(0.15, ge=0.0, description="kept beside the rover's radius when speed is chosen")
     clearances: tuple[tuple[float, float], ...] = Field(
-        ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5), (0.0, 0.3)),
+        ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5), (0.12, 0.3)),
         description="room kept beside the rover's radius, tried in turn; the next one when the reach is less than the second figure, metres",
     )
     least_reach_m: float = Field(0.4, gt=0.0, description="less clear way than this is no way")
