@@ -276,7 +276,9 @@ def _look_or_blocked(
         return _turn_to(bearing, speed_m_s, settings)
     if line.clear_m >= distance_m - 0.05:
         # Looked at, and nothing there, but between the beams: creep.
-        return Guide(Motion.DRIVE, GuidedPosition(ahead), settings.min_speed_m_s)
+        creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
+        bearing = pose.point.bearing_rad(ahead)
+        return Guide(Motion.DRIVE, GuidedPosition(pose.point.moved(bearing, creep_m)), settings.min_speed_m_s)
     return Guide(Motion.BLOCKED, STOP, 0.0)
 
 

@@ -77,7 +77,7 @@ def unsafe_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings)
         ("autopilot heartbeat", vehicle.heartbeat, settings.heartbeat_s),
         ("position", vehicle.position, settings.stale_s),
         ("attitude", vehicle.attitude, settings.stale_s),
-        ("range data", vehicle.scan, settings.stale_s),
+        ("range data ahead", vehicle.scan_ahead, settings.stale_s),
         ("EKF status", vehicle.ekf, settings.stale_s),
     )
     for name, event, limit_s in ages:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+AHEAD_RAD = np.radians(20.0)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RangeScan:
@@ -24,3 +26,9 @@ class RangeScan:
     max_range_m: float
     beam_width_rad: float
     source: str
+
+    @property
+    def looks_ahead(self) -> bool:
+        """Whether a reading that is not unknown lies within AHEAD_RAD of straight ahead."""
+        turned = np.abs((self.bearing_rad + np.pi) % (2.0 * np.pi) - np.pi)
+        return bool(np.any((turned <= AHEAD_RAD) & ~np.isnan(self.range_m)))

@@ -58,26 +58,26 @@ ControlPoints = tuple[Annotated[int, Field(ge=3, le=64)], ...]
 class SearchSettings(Section):
     """One kind of search by the navigator: numbers of control points tried one after the other, epochs for each."""
 
-    min_epochs: int = Field(1, ge=1)
-    max_epochs: int = Field(100, ge=1)
+    min_epochs: int = Field(1, ge=1, description="evolved at least, even when a path was found")
+    max_epochs: int = Field(100, ge=1, description="then the next number of control points")
     control_points: ControlPoints = Field((4,), min_length=1, description="tried one after the other")
-    population: int = Field(30, ge=12, le=3000)
+    population: int = Field(30, ge=12, le=3000, description="chromosomes")
 
 
 class QuickSearch(SearchSettings):
     """Parts A and B: a quick look."""
 
-    min_epochs: int = Field(5, ge=1)
-    max_epochs: int = Field(50, ge=1)
+    min_epochs: int = Field(5, ge=1, description="evolved at least, even when a path was found")
+    max_epochs: int = Field(50, ge=1, description="then the next number of control points")
 
 
 class ThoroughSearch(SearchSettings):
     """Part C: for quality, with more control points as it gets harder."""
 
-    min_epochs: int = Field(10, ge=1)
-    max_epochs: int = Field(40, ge=1)
-    control_points: ControlPoints = Field((4, 6, 8), min_length=1)
-    population: int = Field(40, ge=12, le=3000)
+    min_epochs: int = Field(10, ge=1, description="evolved at least, even when a path was found")
+    max_epochs: int = Field(40, ge=1, description="then the next number of control points")
+    control_points: ControlPoints = Field((4, 6, 8), min_length=1, description="tried one after the other")
+    population: int = Field(40, ge=12, le=3000, description="chromosomes")
 
 
 class NavigatorSettings(Section):
@@ -149,7 +149,7 @@ class GuidanceSettings(Section):
     min_speed_m_s: float = Field(0.5, gt=0.0, description="never asked to go slower than this")
     stuck_after_s: float = Field(6.0, gt=0.0, description="no progress for so long: back out and plan anew")
     back_out_m: float = Field(0.8, ge=0.0, description="how far to back out")
-    back_out_speed_m_s: float = Field(0.4, gt=0.0)
+    back_out_speed_m_s: float = Field(0.4, gt=0.0, description="how fast to back out")
     arrival_m: float = Field(0.5, gt=0.0, description="a target is reached within this distance")
 
 
@@ -168,17 +168,21 @@ class LinkSettings(Section):
     setpoint: Literal["local", "global", "mission-item", "reposition"] = Field(
         "local", description="SET_POSITION_TARGET_LOCAL_NED | _GLOBAL_INT | MISSION_ITEM_INT current=2 | DO_REPOSITION"
     )
-    position_rate_hz: float = Field(10.0, gt=0.0, le=50.0)
-    attitude_rate_hz: float = Field(20.0, gt=0.0, le=50.0)
-    range_rate_hz: float = Field(10.0, gt=0.0, le=50.0)
+    position_rate_hz: float = Field(10.0, gt=0.0, le=50.0, description="asked for: LOCAL_POSITION_NED")
+    attitude_rate_hz: float = Field(20.0, gt=0.0, le=50.0, description="asked for: ATTITUDE")
+    range_rate_hz: float = Field(
+        10.0, gt=0.0, le=50.0, description="asked for: DISTANCE_SENSOR and RANGEFINDER, where there are any"
+    )
     tick_hz: float = Field(20.0, ge=5.0, le=100.0, description="the companion's own loop")
-    component_id: int = Field(191, ge=1, le=255)
+    component_id: int = Field(191, ge=1, le=255, description="the companion's own; its system id is the vehicle's")
 
 
 class Settings(Section):
     """All settings. ``profile = "paper"`` uses the genetic algorithm alone, as the paper does."""
 
-    profile: Literal["default", "paper"] = "default"
+    profile: Literal["default", "paper"] = Field(
+        "default", description="`paper`: the genetic algorithm alone, without graph search behind it"
+    )
     planner: PlannerSettings = PlannerSettings()
     navigator: NavigatorSettings = NavigatorSettings()
     mapping: MappingSettings = MappingSettings()

@@ -173,6 +173,8 @@ class VehicleState:
     origin: OriginSeen | None = None
     home: HomeSeen | None = None
     scan: RangeSeen | None = None
+    scan_ahead: RangeSeen | None = None
+    """The newest range data that says something about straight ahead: without it the rover would drive blind."""
     target: TargetSeen | None = None
     prearm: PrearmSeen | None = None
     jump_m: float = 0.0
@@ -222,7 +224,7 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
         case HomeSeen():
             return replace(state, home=event)
         case RangeSeen():
-            return replace(state, scan=event)
+            return replace(state, scan=event, scan_ahead=event if event.scan.looks_ahead else state.scan_ahead)
         case TargetSeen():
             return replace(state, target=event)
         case PrearmSeen():

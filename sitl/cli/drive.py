@@ -24,6 +24,7 @@ from sitl.picture import save_picture
 from sitl.scenario import scenario_from_mission
 
 EXIT_BAD_INPUT = 2
+LINE_EVERY_S = 60.0
 
 
 def drive(
@@ -109,21 +110,36 @@ def _mission(
 
 
 def _run_with_progress(run: Drive, console: Console) -> Report:
+    """Show one line that changes; where there is no terminal (a log file, CI), a new line now and then instead."""
+    if not console.is_terminal:
+        return _run_with_lines(run, console)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
     with Progress(*columns, console=console) as progress:
         task = progress.add_task(run.mission.name, total=None, state="")
-
-        def observe(status: Status) -> None:
-            part = status.decision.part.value if status.decision else "-"
-            state = f"{status.time_s:6.1f} s  {status.doing}  {status.target}  part {part}  step {status.steps}"
-            goal = run.companion.itinerary.goal if run.companion.itinerary else None
-            if goal is not None and status.pose is not None:
-                state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
-            progress.update(task, state=state)
-
-        report = run.run(observe)
+        report = run.run(lambda status: progress.update(task, state=_state(run, status)))
         progress.update(task, total=1, completed=1, state=report.outcome)
     return report
+
+
+def _run_with_lines(run: Drive, console: Console) -> Report:
+    next_s = 0.0
+
+    def observe(status: Status) -> None:
+        nonlocal next_s
+        if status.time_s >= next_s:
+            next_s = status.time_s + LINE_EVERY_S
+            console.print(f"{run.mission.name}: {_state(run, status)}", soft_wrap=True, markup=False, highlight=False)
+
+    return run.run(observe)
+
+
+def _state(run: Drive, status: Status) -> str:
+    part = status.decision.part.value if status.decision else "-"
+    state = f"{status.time_s:6.1f} s  {status.doing}  {status.target}  part {part}  step {status.steps}"
+    goal = run.companion.itinerary.goal if run.companion.itinerary else None
+    if goal is not None and status.pose is not None:
+        state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
+    return state
 
 
 def _print_summary(report: Report, console: Console) -> None:

@@ -55,6 +55,7 @@ def test_sealed_target_is_reported_and_the_rover_comes_back(suite: str) -> None:
 def test_dead_end_needs_the_way_back() -> None:
     report = driven("dead-end.toml", settings=parse_settings({"profile": "paper"}, "test"))
     assert report.exit_code == 0
+    assert report.return_steps > 0
 
 
 def test_same_seed_same_run() -> None:

@@ -42,6 +42,7 @@ def vehicle(now_s: float = 10.0, mode: int = GUIDED, *, armed: bool = True, ekf:
         attitude=AttitudeSeen(now_s, now_s, 0.0, 0.0),
         ekf=EkfStatusSeen(now_s, ekf),
         scan=RangeSeen(now_s, SCAN),
+        scan_ahead=RangeSeen(now_s, SCAN),
         origin=OriginSeen(now_s, PLACE),
         home=HomeSeen(now_s, PLACE),
     )
@@ -129,7 +130,7 @@ def test_whatever_happens_setpoints_go_out_only_while_guided_and_armed(story):
             assert good
 
 
-@pytest.mark.parametrize("name", ["heartbeat", "position", "attitude", "scan", "ekf"])
+@pytest.mark.parametrize("name", ["heartbeat", "position", "attitude", "scan_ahead", "ekf"])
 def test_what_is_missing_or_stale_is_unsafe(name):
     good = vehicle(10.0)
     assert unsafe_reason(good, 10.9, SETTINGS) == ""
@@ -155,7 +156,7 @@ def test_the_ekf_must_have_a_position(flags, ok):
         (replace(vehicle(), origin=None), True, "origin and home", None),
         (replace(vehicle(), home=None), True, "origin and home", None),
         (vehicle(ekf=0), True, "good data (EKF", None),
-        (replace(vehicle(), scan=None), True, "range data", None),
+        (replace(vehicle(), scan_ahead=None), True, "range data", None),
         (vehicle(mode=MANUAL, armed=False), False, "GUIDED", SetMode(GUIDED)),
         (vehicle(mode=HOLD, armed=False), False, "GUIDED", SetMode(GUIDED)),
         (vehicle(mode=HOLD), False, "GUIDED", SetMode(GUIDED)),

@@ -27,7 +27,7 @@ from companion.vehicle import (
 )
 
 PLACE = GeoPoint(-35.0, 149.0)
-SCAN = RangeScan(1.0, np.zeros(1), np.ones(1), 0.2, 8.0, 0.1, "test")
+SCAN = RangeScan(1.0, np.full(1, np.pi), np.ones(1), 0.2, 8.0, 0.1, "behind")
 
 
 @pytest.mark.parametrize(
@@ -50,6 +50,16 @@ def test_the_newest_is_kept(event: Event, name: str) -> None:
     assert getattr(state, name) is event
     others = {field for field in VehicleState.__slots__ if field not in (name, "parameters", "jump_m")}
     assert all(getattr(state, other) is None for other in others)
+
+
+@pytest.mark.parametrize(
+    ("bearing_deg", "range_m", "counts"),
+    [(0.0, 3.0, True), (-15.0, np.inf, True), (355.0, 3.0, True), (45.0, 3.0, False), (0.0, np.nan, False)],
+)
+def test_range_data_ahead_is_told_from_the_rest(bearing_deg: float, range_m: float, counts: bool) -> None:
+    scan = RangeScan(1.0, np.radians([bearing_deg]), np.array([range_m]), 0.2, 8.0, 0.1, "test")
+    state = fold(VehicleState(), RangeSeen(1.0, scan))
+    assert (state.scan_ahead is not None) == counts
 
 
 @pytest.mark.parametrize("event", [AckSeen(1.0, 176, 0), TextSeen(1.0, 6, "hello")])
