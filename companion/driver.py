@@ -75,6 +75,9 @@ class Driver:
         self._progress: Progress | None = None
         self._back_until_s = -math.inf
         self._doubts_left = 0
+        self._seed = int(searcher.rng.integers(2**63))
+        self._epoch = 0
+        self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
         self._looking_rad: float | None = None
         self._braking = False
         self._stuck_places: dict[Cell, int] = {}
@@ -82,9 +85,9 @@ class Driver:
     def head_for(self, goal: ResolvedTarget, pose: Pose) -> None:
         """Begin a leg from here."""
         self._goal = goal
-        self._runner.take()
+        self._epoch += 1
         cell = self.evidence.base.cell_at(pose.point)
-        seed = int(self.searcher.rng.integers(2**63))
+        seed = (self._seed + self._epoch) % 2**63
         self._state = begin(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
         self.route = None
         self.decision = None
@@ -156,9 +159,10 @@ class Driver:
             if cell != state.past[-1]:
                 self.tally.steps += 1
                 self.tally.return_steps += 1 if state.returning else 0
+            self._pending = self._epoch
             self._runner.start(lambda: step(state, grid, cell, search))
         result = self._runner.take()
-        if result is None:
+        if result is None or self._pending != self._epoch:
             return None
         if self._is_doubtful(result[1]) and doubt(self.evidence, pose.point, DOUBT_REACH_M):
             self._doubts_left -= 1
@@ -233,6 +237,7 @@ class Driver:
         self._back_until_s = (
             pose.time_s + self._settings.guidance.back_out_m / self._settings.guidance.back_out_speed_m_s
         )
+        self._epoch += 1
         self._state = abandon_path(self._state)
         self._progress = None
         self.route = None

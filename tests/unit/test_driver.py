@@ -1,0 +1,128 @@
+"""The driver beside a navigator that takes its time, and a rover that does not move."""
+
+import numpy as np
+
+from companion.commands import GuidedPosition, GuidedVelocity
+from companion.driver import Driver
+from companion.frames import NedPoint, Pose
+from companion.grid import empty_grid
+from companion.guidance import RoverLimits
+from companion.mapping import EvidenceMap, integrate, new_map
+from companion.mission.mission import OnBlocked
+from companion.mission.resolve import ResolvedTarget
+from companion.navigator import Decision, NavState
+from companion.planning.registry import make_planner
+from companion.scan import RangeScan
+from companion.searching import Searcher
+from companion.settings import Settings
+from companion.stepping import InlineRunner, StepCall, StepRunner, ThreadRunner
+
+SETTINGS = Settings()
+
+
+class LateRunner:
+    """Hands a result over only when told to."""
+
+    def __init__(self) -> None:
+        self.call: StepCall | None = None
+        self.ready = False
+
+    @property
+    def busy(self) -> bool:
+        return self.call is not None
+
+    def start(self, call: StepCall) -> None:
+        self.call = call
+
+    def take(self) -> tuple[NavState, Decision] | None:
+        if not self.ready or self.call is None:
+            return None
+        call, self.call, self.ready = self.call, None, False
+        return call()
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
+def target(north_m: float, east_m: float) -> ResolvedTarget:
+    point = NedPoint(north_m, east_m)
+    return ResolvedTarget("t", point, empty_grid(40, 40).cell_at(point), 0.0, OnBlocked.SKIP, None)
+
+
+def seen_map(pose: Pose) -> EvidenceMap:
+    evidence = new_map(empty_grid(40, 40), 0.35, SETTINGS.mapping)
+    bearings = np.radians(np.arange(0.0, 360.0, 5.0))
+    scan = RangeScan(0.0, bearings, np.full(72, np.inf), 0.2, 8.0, np.radians(5.0), "test")
+    integrate(evidence, pose, scan, 1)
+    return evidence
+
+
+def driver(runner: StepRunner, pose: Pose) -> Driver:
+    planner = make_planner("hybrid", SETTINGS.planner)
+    searcher = Searcher(planner, SETTINGS.navigator, np.random.default_rng(1))
+    return Driver(seen_map(pose), RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, runner)
+
+
+def at(time_s: float, heading_rad: float = 0.0) -> Pose:
+    return Pose(20.5, 20.5, heading_rad, time_s)
+
+
+def test_the_rover_stands_until_the_first_decision() -> None:
+    runner = LateRunner()
+    drive = driver(runner, at(0.0))
+    drive.head_for(target(30.5, 20.5), at(0.0))
+    assert drive.update(at(0.05), 0.0)[0].setpoint == GuidedVelocity(0.0, 0.0)
+    runner.ready = True
+    guide, decision = drive.update(at(0.1), 0.0)
+    assert decision is not None
+    assert isinstance(guide.setpoint, GuidedPosition)
+    assert guide.setpoint.point.north_m > 22.0
+
+
+def test_a_step_begun_for_the_last_leg_does_not_steer_the_next_one() -> None:
+    runner = LateRunner()
+    drive = driver(runner, at(0.0))
+    drive.head_for(target(30.5, 20.5), at(0.0))
+    drive.update(at(0.05), 0.0)
+    assert runner.busy
+    drive.leave()
+    drive.head_for(target(10.5, 20.5), at(0.1))
+    runner.ready = True
+    assert drive.update(at(0.15), 0.0)[1] is None
+    drive.update(at(0.2), 0.0)
+    runner.ready = True
+    _, decision = drive.update(at(0.25), 0.0)
+    assert decision is not None
+    assert decision.path[-1].y == 10
+
+
+def test_a_rover_that_does_not_get_on_backs_out_and_plans_anew() -> None:
+    drive = driver(InlineRunner(), at(0.0))
+    drive.head_for(target(30.5, 20.5), at(0.0))
+    setpoints = [drive.update(at(0.05 * tick), 0.0)[0].setpoint for tick in range(300)]
+    backwards = [s for s in setpoints if isinstance(s, GuidedVelocity) and s.forward_m_s < 0.0]
+    assert backwards
+    assert drive.tally.stuck >= 1
+    assert isinstance(setpoints[20], GuidedPosition)
+    assert drive.evidence.penalty.max() > 0.0
+
+
+def test_the_thread_gives_the_same_decision() -> None:
+    inline = driver(InlineRunner(), at(0.0))
+    inline.head_for(target(30.5, 20.5), at(0.0))
+    _, wanted = inline.update(at(0.05), 0.0)
+    runner = ThreadRunner()
+    try:
+        threaded = driver(runner, at(0.0))
+        threaded.head_for(target(30.5, 20.5), at(0.0))
+        decision = None
+        for _ in range(2000):
+            decision = threaded.update(at(0.05), 0.0)[1]
+            if decision is not None:
+                break
+            np.linalg.eigvals(np.ones((30, 30)))  # give the thread a moment without a clock
+        assert decision is not None
+        assert wanted is not None
+        assert decision.path == wanted.path
+    finally:
+        runner.close()
