@@ -47,5 +47,5 @@ $(KERNELS): $(READY) $(SOURCES)
 	@touch $(KERNELS)
 
 clean:
-	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks
+	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
 	find companion sitl tests missions -name __pycache__ -prune -exec rm -rf {} +

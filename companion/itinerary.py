@@ -42,6 +42,11 @@ class Itinerary:
     give_up_s: float | None = None
 
     @property
+    def ended(self) -> bool:
+        """Whether there is nowhere left to go."""
+        return self.leg in (Leg.DONE, Leg.HOLD)
+
+    @property
     def goal(self) -> ResolvedTarget:
         """Where the rover is heading now."""
         return self.home if self.leg is Leg.HOME or self.index >= len(self.targets) else self.targets[self.index]
@@ -50,6 +55,11 @@ class Itinerary:
 def plan_itinerary(targets: tuple[ResolvedTarget, ...], home: ResolvedTarget) -> Itinerary:
     """The itinerary at the start of a mission."""
     return Itinerary(targets, home, (TargetStatus.PENDING,) * len(targets))
+
+
+def relaid(itinerary: Itinerary, targets: tuple[ResolvedTarget, ...], home: ResolvedTarget) -> Itinerary:
+    """The same progress with every place where it lies now: the local frame has moved."""
+    return replace(itinerary, targets=targets, home=home)
 
 
 def on_reached(itinerary: Itinerary, now_s: float) -> Itinerary:

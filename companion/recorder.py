@@ -26,6 +26,9 @@ class RecordError(Exception):
 class DecisionLog(Protocol):
     """Takes the navigator's decisions."""
 
+    problem: str
+    """Why the record has ended early; empty while all is well."""
+
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
         """One decision on the way to a target; ``time_s`` is the companion's clock."""
         ...

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from companion.settings import SafetySettings
 from companion.vehicle import RoverMode, VehicleState
+
+HOLD_AGAIN_S = 2.0
+"""A heartbeat that still shows GUIDED so long after our HOLD means that HOLD never arrived."""
 
 
 class Control(StrEnum):
@@ -26,6 +30,8 @@ class Watch:
     control: Control = Control.NOBODY
     unsafe_since_s: float | None = None
     hold_sent: bool = False
+    hold_s: float = math.inf
+    """When HOLD was sent."""
 
 
 class Reaction(StrEnum):
@@ -45,29 +51,39 @@ class Verdict:
     reason: str = ""
 
 
-def check(watch: Watch, vehicle: VehicleState, now_s: float, settings: SafetySettings) -> tuple[Watch, Verdict]:
-    """One tick of latch and watchdogs.
+def latched(control: Control, vehicle: VehicleState) -> Control:
+    """Who drives, by the mode: GUIDED is the companion's; a rover that leaves GUIDED has been taken by a person."""
+    if vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.GUIDED:
+        return Control.COMPANION
+    return Control.NOBODY if control is Control.NOBODY else Control.PERSON
+
+
+def check(
+    watch: Watch, vehicle: VehicleState, now_s: float, settings: SafetySettings, doubt: str = ""
+) -> tuple[Watch, Verdict]:
+    """One tick of latch and watchdogs. ``doubt``: a reason of the caller's own why the rover must not move.
 
     Setpoints may be sent only on DRIVE and STOP. Unsafe for longer than ``hold_after_s``: HOLD once, then silence until a
     person puts the vehicle back into GUIDED.
     """
-    guided = vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.GUIDED
-    armed = vehicle.heartbeat is not None and vehicle.heartbeat.armed
-    if not guided:
-        control = Control.NOBODY if watch.control is Control.NOBODY else Control.PERSON
+    control = latched(watch.control, vehicle)
+    heartbeat = vehicle.heartbeat
+    if heartbeat is None or control is not Control.COMPANION:
         return Watch(control), Verdict(Reaction.SILENT, "" if control is Control.NOBODY else "mode is not GUIDED")
     if watch.hold_sent:
         # The heartbeat may still show GUIDED just after our own HOLD: wait until it has been seen to leave GUIDED.
+        if heartbeat.armed and heartbeat.time_s >= watch.hold_s + HOLD_AGAIN_S:
+            return replace(watch, hold_s=now_s), Verdict(Reaction.HOLD, "the first HOLD was not taken")
         return watch, Verdict(Reaction.SILENT, "waiting for HOLD")
-    watch = replace(watch, control=Control.COMPANION)
-    if not armed:
+    watch = replace(watch, control=control)
+    if not heartbeat.armed:
         return replace(watch, unsafe_since_s=None), Verdict(Reaction.SILENT, "disarmed")
-    reason = unsafe_reason(vehicle, now_s, settings)
+    reason = unsafe_reason(vehicle, now_s, settings) or doubt
     if not reason:
         return replace(watch, unsafe_since_s=None), Verdict(Reaction.DRIVE)
     since_s = now_s if watch.unsafe_since_s is None else watch.unsafe_since_s
     if now_s - since_s >= settings.hold_after_s:
-        return Watch(Control.PERSON, since_s, hold_sent=True), Verdict(Reaction.HOLD, reason)
+        return Watch(Control.PERSON, since_s, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, reason)
     return replace(watch, unsafe_since_s=since_s), Verdict(Reaction.STOP, reason)
 
 
@@ -84,7 +100,7 @@ def unsafe_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings)
         if event is None:
             return f"no {name}"
         if now_s - event.time_s > limit_s:
-            return f"{name} silent for {now_s - event.time_s:.1f} s"
+            return f"{name} silent for over {limit_s:g} s"
     if not vehicle.ekf_ok:
         return "EKF has no position"
     return ""

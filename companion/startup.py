@@ -5,11 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from companion.commands import Arm, Command, SetMode
-from companion.safety import unsafe_reason
+from companion.safety import Control, unsafe_reason
 from companion.settings import SafetySettings
 from companion.vehicle import RoverMode, VehicleState
 
 ASK_AGAIN_S = 3.0
+"""A command that has not worked is given again after so long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,10 +21,18 @@ class StartStep:
     command: Command | None = None
 
 
-def start_step(vehicle: VehicleState, now_s: float, settings: SafetySettings, *, arm: bool) -> StartStep:
+def start_step(
+    vehicle: VehicleState,
+    now_s: float,
+    settings: SafetySettings,
+    *,
+    arm: bool,
+    control: Control = Control.NOBODY,
+) -> StartStep:
     """What stands between now and driving.
 
-    GUIDED is set only on a rover that nobody drives (disarmed, or in HOLD); arming only if told to (``arm``).
+    GUIDED is set only on a rover that nobody drives (disarmed, or in HOLD), and never on one that a person has just taken
+    out of GUIDED (``control``); arming only if told to (``arm``).
     """
     if vehicle.heartbeat is None:
         return StartStep("the autopilot's heartbeat")
@@ -33,6 +42,8 @@ def start_step(vehicle: VehicleState, now_s: float, settings: SafetySettings, *,
     if reason:
         return StartStep(f"good data ({reason})")
     if vehicle.heartbeat.mode != RoverMode.GUIDED:
+        if control is Control.PERSON:
+            return StartStep("a person to set GUIDED (somebody has taken the rover)")
         if vehicle.heartbeat.armed and vehicle.heartbeat.mode != RoverMode.HOLD:
             return StartStep("a person to set GUIDED (somebody is driving)")
         return StartStep("GUIDED", SetMode(RoverMode.GUIDED))

@@ -14,6 +14,9 @@ from sitl.sensors import suite_named
 from sitl.simulator import SimStart, Simulator
 from sitl.world import World
 
+SOMEWHERE = GeoPoint(53.1325, 23.1688)
+"""Where the rover stands on earth when no place in the mission says."""
+
 
 class ScenarioError(Exception):
     """A mission that cannot be simulated; the text is one line with file, place and remedy."""
@@ -86,12 +89,12 @@ def _middle(cell: Cell, resolution_m: float) -> tuple[float, float]:
 
 def _home(mission: Mission, spec: SitlSpec) -> GeoPoint:
     """Where on earth the rover starts: as said for the simulator, as planned, or at the first target."""
-    if spec.home != SitlSpec().home:
+    if spec.home is not None:
         return spec.home
     if mission.planned_home is not None:
         return mission.planned_home
     places = [target.place for target in mission.targets if isinstance(target.place, GeoPoint)]
-    return places[0] if places else spec.home
+    return places[0] if places else SOMEWHERE
 
 
 def with_parameters(scenario: Scenario, changes: dict[str, float]) -> Scenario:

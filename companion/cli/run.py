@@ -9,19 +9,20 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
-from rich.status import Status as Spinner
 
-from companion.app import Companion, Status
+from companion.app import Companion
+from companion.cli.live import Live
 from companion.clock import WallClock
 from companion.itinerary import TargetStatus
-from companion.mapfiles import MapError
+from companion.mapfiles import MapError, save_ros_map
+from companion.mapping import known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
-from companion.mavlink.transport import LinkError, open_link
+from companion.mavlink.transport import ByteLink, LinkError, open_link
 from companion.mission.load import load_mission
-from companion.mission.mission import MissionError
+from companion.mission.mission import Mission, MissionError
 from companion.recorder import NullRecorder, Recorder, RecordError
-from companion.settings import SettingsError, load_settings
+from companion.settings import Settings, SettingsError, load_settings
 from companion.stepping import ThreadRunner
 from companion.warmup import warm_up
 
@@ -30,34 +31,55 @@ EXIT_REACHED, EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED = 0, 2, 3, 130
 
 def run(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.")],
-    connect: Annotated[str, typer.Option(help="udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT or serial:DEVICE:BAUD")],
+    connect: Annotated[
+        str,
+        typer.Option(help="udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or serial:DEVICE:BAUD"),
+    ],
     arm: Annotated[bool, typer.Option("--arm", help="Arm the motors; otherwise wait for a person to do it.")] = False,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of the genetic algorithm.")] = 0,
-    record: Annotated[Path | None, typer.Option(help="Directory for the record of this run.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Directory for the record and the map of this run.")] = None,
 ) -> None:
     """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 130: stopped by a signal."""
     console = Console(stderr=True)
     try:
-        settings = load_settings(settings_file)
-        mission = load_mission(mission_file)
-        with console.status("compiling the planner (once a machine) ..."):
-            warm_up(settings)
-        link = open_link(connect)
-        recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
+        with _StopSignals() as stop:
+            settings = load_settings(settings_file)
+            mission = load_mission(mission_file)
+            recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
+            link = open_link(connect)
+            with console.status("compiling the planner (once a machine) ..."):
+                warm_up(settings)
+            link.read()  # what piled up meanwhile is old
+            missed = _drive(mission, settings, link, recorder, console, stop, record, seed=seed, arm=arm)
     except (SettingsError, MissionError, MapError, LinkError, RecordError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    clock, runner = WallClock(), ThreadRunner()
+    if stop.asked:
+        raise typer.Exit(EXIT_STOPPED)
+    raise typer.Exit(EXIT_MISSED if missed else EXIT_REACHED)
+
+
+def _drive(
+    mission: Mission,
+    settings: Settings,
+    link: ByteLink,
+    recorder: Recorder | NullRecorder,
+    console: Console,
+    stop: _StopSignals,
+    record: Path | None,
+    *,
+    seed: int,
+    arm: bool,
+) -> bool:
+    """Drive to the end, close everything, and say what came of it. Returns whether a target was missed."""
+    runner = ThreadRunner()
     autopilot = AutopilotLink(link, Codec(settings.link), settings.link, recorder)
-    companion = Companion(autopilot, clock, mission, settings, runner, recorder, seed=seed, arm=arm)
-    stopped = _stop_on_signals(companion)
+    companion = Companion(autopilot, WallClock(), mission, settings, runner, recorder, seed=seed, arm=arm)
+    stop.listener = companion
     try:
-        with console.status("connecting") as spinner:
-            companion.run(lambda status: _show(spinner, status))
-    except MissionError as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(EXIT_BAD_INPUT) from error
+        with Live(console, mission.name) as live:
+            companion.run(live.show)
     finally:
         companion.close()
         runner.close()
@@ -65,28 +87,43 @@ def run(
         recorder.close()
     for name, status in companion.statuses():
         typer.echo(f"{name}: {status}")
-    if stopped:
-        raise typer.Exit(EXIT_STOPPED)
-    missed = any(status is not TargetStatus.REACHED for _, status in companion.statuses())
-    raise typer.Exit(EXIT_MISSED if missed else EXIT_REACHED)
+    if record is not None:
+        _save_map(companion, record)
+        if recorder.problem:
+            typer.echo(recorder.problem, err=True)
+    return any(status is not TargetStatus.REACHED for _, status in companion.statuses())
 
 
-def _show(spinner: Spinner, status: Status) -> None:
-    part = f"part {status.decision.part}" if status.decision else ""
-    where = f"north {status.pose.north_m:.1f} m, east {status.pose.east_m:.1f} m" if status.pose else ""
-    spinner.update(
-        f"{status.doing}: {status.target} [{status.targets_reached}/{status.targets}] {where} {part} steps {status.steps}"
-    )
+def _save_map(companion: Companion, directory: Path) -> None:
+    """What was mapped, as ``map.yaml`` and ``map.pgm``; a full disk does not spoil the run's own result."""
+    if companion.evidence is None:
+        return
+    try:
+        save_ros_map(companion.evidence.grid, directory / "map", known=known_fields(companion.evidence))
+        typer.echo(f"map: {directory / 'map.yaml'}")
+    except MapError as error:
+        typer.echo(str(error), err=True)
 
 
-def _stop_on_signals(companion: Companion) -> list[int]:
-    """SIGINT and SIGTERM end the run: the rover is stopped first. Returns a list that receives the signal's number."""
-    received: list[int] = []
+class _StopSignals:
+    """SIGINT and SIGTERM end the run in good order: the rover is stopped first. Before it has begun they end it at once."""
 
-    def stop(number: int, frame: FrameType | None) -> None:
-        received.append(number)
-        companion.stop()
+    def __init__(self) -> None:
+        self.asked = False
+        self.listener: Companion | None = None
 
-    signal.signal(signal.SIGINT, stop)
-    signal.signal(signal.SIGTERM, stop)
-    return received
+    def __enter__(self) -> _StopSignals:
+        """Take the signals over."""
+        self._before = {number: signal.signal(number, self._stop) for number in (signal.SIGINT, signal.SIGTERM)}
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Give them back."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+
+    def _stop(self, number: int, frame: FrameType | None) -> None:
+        self.asked = True
+        if self.listener is None:
+            raise SystemExit(EXIT_STOPPED)
+        self.listener.stop()

@@ -110,6 +110,10 @@ class AutopilotLink:
         for command, repetition in self._acks.due(now_s):
             self._write(command, now_s, repetition)
 
+    def ask_places(self) -> None:
+        """Have origin and home told again at the next ``service``."""
+        self._places_s = -math.inf
+
     def close(self) -> None:
         """Let go of the line."""
         self._link.close()

@@ -35,6 +35,11 @@ class RateFault:
     wanted_hz: float
     measured_hz: float
 
+    @property
+    def name(self) -> str:
+        """The message's name."""
+        return str(mavlink.mavlink_map[self.message_id].msgname)
+
 
 def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
     """What the companion needs of ArduRover, which sends everything at 1 Hz unasked.

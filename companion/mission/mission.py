@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
@@ -95,7 +95,8 @@ class SitlSpec:
     """What only the simulator reads.
 
     ``world``: map file; ``resolution_m``: its field size where it has none of its own (None: the mission's);
-    ``start``: the field of the world where the rover stands; heading clockwise from north.
+    ``start``: the field of the world where the rover stands; heading clockwise from north;
+    ``home``: where on earth that is (None: the planned home, else the first target in degrees, else somewhere).
     """
 
     world: Path | None = None
@@ -103,7 +104,7 @@ class SitlSpec:
     start: Cell | None = None
     heading_deg: float = 90.0
     sensors: str = "lidar-90"
-    home: GeoPoint = field(default_factory=lambda: GeoPoint(53.1325, 23.1688))
+    home: GeoPoint | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -251,7 +251,7 @@ def _sitl(table: SitlTable, folder: Path) -> SitlSpec:
         start=None if table.start is None else Cell(*table.start),
         heading_deg=table.heading_deg,
         sensors=table.sensors,
-        home=SitlSpec().home if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
+        home=None if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy import ndimage
 
-from companion.frames import LocalFrame, NedPoint
+from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.grid import OBSTACLE, Cell, inflated
 from companion.mapfiles import load_map
 from companion.mission.load import load_mission
@@ -127,7 +127,7 @@ def test_drawing_again_gives_the_same_pictures(tmp_path: Path) -> None:
 def test_toml_missions_lie_on_their_worlds(path: Path) -> None:
     mission = load_mission(path)
     assert mission.sitl is not None and mission.sitl.start in (None, mission.grid.home)
-    result = resolve(mission, LocalFrame(mission.sitl.home), NedPoint(0.0, 0.0))
+    result = resolve(mission, LocalFrame(GeoPoint(53.0, 23.0)), NedPoint(0.0, 0.0))
     assert (result.grid.width, result.grid.height, result.home_cell) == (100, 50, Cell(0, 24))
     if mission.sitl.world is not None:
         ground = load_map(mission.sitl.world)

@@ -8,7 +8,7 @@ from PIL import Image
 from companion.frames import GeoPoint
 from companion.grid import Cell
 from companion.mission.mission import GridSpec, Mission, RoverSpec, SitlSpec, Target
-from sitl.scenario import ScenarioError, scenario_from_mission, with_parameters
+from sitl.scenario import SOMEWHERE, ScenarioError, scenario_from_mission, with_parameters
 
 
 @pytest.fixture
@@ -60,6 +60,8 @@ def test_a_mission_in_latitude_and_longitude_drives_on_open_ground_from_its_plan
     assert not scenario.world.obstacles.any()
     explicit = SitlSpec(home=GeoPoint(49.0, 19.0))
     assert scenario_from_mission(replace(lonely, planned_home=planned, sitl=explicit)).start.home == explicit.home
+    usual = SitlSpec(home=SOMEWHERE)
+    assert scenario_from_mission(replace(lonely, planned_home=planned, sitl=usual)).start.home == SOMEWHERE
 
 
 @pytest.mark.parametrize(

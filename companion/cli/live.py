@@ -1,0 +1,63 @@
+"""What a run shows while it goes on: one line that changes on a terminal, a new line for every change elsewhere."""
+
+from __future__ import annotations
+
+from types import TracebackType
+
+from rich.console import Console
+from rich.status import Status as Spinner
+
+from companion.app import Status
+
+UPDATE_S = 0.25
+
+
+class Live:
+    """A context manager; ``show`` takes the companion's status after every tick."""
+
+    def __init__(self, console: Console, name: str) -> None:
+        self._console = console
+        self._name = name
+        self._spinner = Spinner("connecting", console=console, refresh_per_second=4.0) if console.is_terminal else None
+        self._shown = ""
+        self._updated_s = -UPDATE_S
+
+    def __enter__(self) -> Live:
+        """Begin to show."""
+        if self._spinner is not None:
+            self._spinner.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Leave the terminal as it was."""
+        if self._spinner is not None:
+            self._spinner.stop()
+
+    def show(self, status: Status) -> None:
+        """Show what is new."""
+        for text in status.news:
+            self._print(text)
+        if self._spinner is None:
+            line = f"{status.doing}{f': {status.target}' if status.target else ''}"
+            if line != self._shown:
+                self._shown = line
+                self._print(line)
+        elif status.time_s - self._updated_s >= UPDATE_S:
+            self._updated_s = status.time_s
+            self._spinner.update(_line(status))
+
+    def _print(self, text: str) -> None:
+        self._console.print(f"{self._name}: {text}", soft_wrap=True, markup=False, highlight=False)
+
+
+def _line(status: Status) -> str:
+    parts = [f"{status.doing}"]
+    if status.target:
+        parts.append(f"{status.target} [{status.targets_reached}/{status.targets}]".replace("[", r"\["))
+    if status.pose is not None:
+        parts.append(f"north {status.pose.north_m:.1f} m, east {status.pose.east_m:.1f} m")
+    if status.decision is not None:
+        parts.append(f"part {status.decision.part}")
+    return "  ".join([*parts, f"steps {status.steps}"])

@@ -1,0 +1,65 @@
+"""What people are told: at the ground station, and where the companion runs. Nothing twice in a row."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from companion.frames import Pose
+from companion.mavlink.rates import RateFault
+from companion.navigator import Decision
+
+FAULT_AFTER_S = 5.0
+"""A message rate that is too low for a moment is not worth a word."""
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What a person wants to see while it drives. ``news``: what was said, by the autopilot as well, in this tick."""
+
+    time_s: float
+    doing: str
+    pose: Pose | None
+    decision: Decision | None
+    target: str
+    targets_reached: int
+    targets: int
+    steps: int
+    news: tuple[str, ...] = ()
+
+
+@dataclass
+class Reporter:
+    """Keeps what has been said."""
+
+    said: list[str]
+    doing: str = "connecting"
+    news: list[str] = field(default_factory=list)
+    _slow_since_s: dict[int, float] = field(default_factory=dict)
+    _told: set[str] = field(default_factory=set)
+
+    def say(self, text: str) -> bool:
+        """Note a text for the ground station; False when it is what was said last."""
+        if self.said and self.said[-1] == text:
+            return False
+        self.said.append(text)
+        self.news.append(text)
+        return True
+
+    def note(self, text: str) -> None:
+        """Note a text for those who watch the companion itself."""
+        self.news.append(text)
+
+    def faults(self, rates: tuple[RateFault, ...], problem: str, now_s: float) -> list[str]:
+        """What is to be said of messages that come too seldom for some time, and of a record that has ended; each once."""
+        slow = {fault.message_id: self._slow_since_s.get(fault.message_id, now_s) for fault in rates}
+        self._slow_since_s = slow
+        texts = {
+            f"{fault.name} too seldom": f"{fault.name}: {fault.measured_hz:.1f} Hz instead of {fault.wanted_hz:g}"
+            for fault in rates
+            if now_s - slow[fault.message_id] >= FAULT_AFTER_S
+        }
+        if problem:
+            texts[problem] = problem
+        new = [text for what, text in texts.items() if what not in self._told]
+        self._told.update(texts)
+        return new
