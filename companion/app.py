@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
@@ -13,8 +14,9 @@ from companion.commands import Command, Say, SetMode
 from companion.driver import STANDSTILL, Driver
 from companion.guidance import Guide, RoverLimits
 from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable
-from companion.laying import Laid, apart_m, lay, lay_again
-from companion.mapping import EvidenceMap, forget, integrate
+from companion.laying import Laid, apart_m, from_home, lay, lay_again
+from companion.mapfiles import save_ros_map
+from companion.mapping import EvidenceMap, forget, integrate, known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import EncodeError
 from companion.mission.mission import Mission
@@ -121,6 +123,16 @@ class Companion:
     def evidence(self) -> EvidenceMap | None:
         """The map; None before the mission has begun."""
         return None if self._laid is None else self._laid.evidence
+
+    def save_map(self, path_without_suffix: Path) -> bool:
+        """Write what has been mapped as a ROS map (.yaml and .pgm), its place in metres from home.
+
+        False when the mission has not begun. Raises MapError when it cannot be written.
+        """
+        if self._laid is None:
+            return False
+        save_ros_map(from_home(self._laid), path_without_suffix, known=known_fields(self._laid.evidence))
+        return True
 
     def run(self, observe: Callable[[Status], None] = lambda status: None) -> Outcome:
         """Tick until the mission has ended."""

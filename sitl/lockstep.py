@@ -8,12 +8,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from pathlib import Path
 
 from companion.app import Companion, Status
 from companion.clock import stopwatch_s
-from companion.mapfiles import save_ros_map
-from companion.mapping import known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
@@ -137,12 +134,6 @@ class Drive:
         self.report.wall_time_s = stopwatch_s() - began_s
         self._sum_up()
         return self.report
-
-    def save_map(self, stem: Path) -> None:
-        """Write what the companion has mapped as a ROS map (``stem``.yaml and ``stem``.pgm)."""
-        evidence = self.companion.evidence
-        if evidence is not None:
-            save_ros_map(evidence.grid, stem, known=known_fields(evidence))
 
     def _note_track(self) -> None:
         truth = self.simulator.truth

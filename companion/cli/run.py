@@ -14,8 +14,7 @@ from companion.app import Companion
 from companion.cli.live import Live
 from companion.clock import WallClock
 from companion.itinerary import TargetStatus
-from companion.mapfiles import MapError, save_ros_map
-from companion.mapping import known_fields
+from companion.mapfiles import MapError
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import ByteLink, LinkError, open_link
@@ -96,11 +95,9 @@ def _drive(
 
 def _save_map(companion: Companion, directory: Path) -> None:
     """What was mapped, as ``map.yaml`` and ``map.pgm``; a full disk does not spoil the run's own result."""
-    if companion.evidence is None:
-        return
     try:
-        save_ros_map(companion.evidence.grid, directory / "map", known=known_fields(companion.evidence))
-        typer.echo(f"map: {directory / 'map.yaml'}")
+        if companion.save_map(directory / "map"):
+            typer.echo(f"map: {directory / 'map.yaml'}")
     except MapError as error:
         typer.echo(str(error), err=True)
 

@@ -73,7 +73,7 @@ def drive(
         save_picture(run, image)
         console.print(f"picture: {image}")
     if map_stem is not None:
-        run.save_map(map_stem)
+        run.companion.save_map(map_stem)
         console.print(f"map:     {map_stem}.yaml")
     if json_file is not None:
         json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")

@@ -57,10 +57,11 @@ def experiment(
 def _with_progress(name: str, made: Experiment, options: Options, console: Console) -> Report:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console) as progress:
-        task = progress.add_task(name, total=None)
+        # Nothing is shown before there is anything to show: a bad folder of maps gets its one line only.
+        task = progress.add_task(name, total=None, visible=False)
 
         def advance(done: int, total: int) -> None:
-            progress.update(task, completed=done, total=total)
+            progress.update(task, completed=done, total=total, visible=True)
 
         return made(options, advance)
 

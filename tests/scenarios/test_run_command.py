@@ -1,0 +1,169 @@
+"""``rover-companion run`` as people meet it: what it says, how it ends, and what the rover does then."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import time
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from companion.cli.main import app
+from companion.mapfiles import load_map
+from companion.mission.load import load_mission
+from tests.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard
+from tests.served import finished, mission_path, process, served, wait_until
+
+
+def assert_one_line(text: str) -> None:
+    assert len(text.strip().splitlines()) == 1 and "Traceback" not in text
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"mission": "none.toml"}, ["none.toml"]),
+        ({"text": "[grid]\nresolution = 1.0\n"}, ["yard.toml", "resolution", "resolution_m"]),
+        ({"text": "[[target\n"}, ["yard.toml", "TOML"]),
+        ({"settings": "[safety]\nstale = 2.0\n"}, ["settings.toml", "safety.stale", "stale_s"]),
+        ({"settings": "[safety]\nstale_s = -2.0\n"}, ["settings.toml", "safety.stale_s", "greater than 0"]),
+        ({"connect": "bluetooth:1"}, ["bluetooth:1", "udpin:HOST:PORT"]),
+        ({"connect": "udpin:127.0.0.1:no"}, ["'no' is not a port"]),
+        ({"connect": "tcp:no.such.host.invalid:5760"}, ["no.such.host.invalid", "check the name"]),
+        ({"connect": "serial:/dev/none:57600"}, ["/dev/none"]),
+        ({"record": "yard.toml/record"}, ["yard.toml/record", "cannot record here", "choose"]),
+    ],
+    ids=["mission", "mission key", "not toml", "settings key", "value", "link", "port", "host", "device", "record"],
+)
+def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path, change: dict[str, str], said: list[str]) -> None:
+    path = mission_path(yard(tmp_path))
+    if "text" in change:
+        path.write_text(change["text"])
+    arguments = [
+        "run",
+        str(tmp_path / change.get("mission", path.name)),
+        "--connect",
+        change.get("connect", "tcp:127.0.0.1:9"),
+    ]
+    if "settings" in change:
+        (tmp_path / "settings.toml").write_text(change["settings"])
+        arguments += ["--settings", str(tmp_path / "settings.toml")]
+    if "record" in change:
+        arguments += ["--record", str(tmp_path / change["record"])]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2, result.output
+    assert_one_line(result.stderr)
+    assert all(word in result.stderr for word in said), result.stderr
+
+
+@pytest.mark.parametrize(("scheme", "kind"), [("udpin", socket.SOCK_DGRAM), ("tcpin", socket.SOCK_STREAM)])
+def test_a_port_in_use_is_one_line_and_exit_code_2(tmp_path: Path, scheme: str, kind: int) -> None:
+    path = mission_path(yard(tmp_path))
+    with socket.socket(socket.AF_INET, kind) as taken:
+        taken.bind(("127.0.0.1", 0))
+        if kind == socket.SOCK_STREAM:
+            taken.listen()
+        port = taken.getsockname()[1]
+        result = CliRunner().invoke(app, ["run", str(path), "--connect", f"{scheme}:127.0.0.1:{port}"])
+    assert result.exit_code == 2
+    assert_one_line(result.stderr)
+    assert str(port) in result.stderr and "stop the other program" in result.stderr
+
+
+def test_a_peer_that_is_not_there_is_waited_for_until_ctrl_c(tmp_path: Path) -> None:
+    path = mission_path(yard(tmp_path))
+    with socket.socket() as closed:
+        closed.bind(("127.0.0.1", 0))  # bound, not listening: connections are refused
+        url = f"tcp:127.0.0.1:{closed.getsockname()[1]}"
+        with process("companion", "run", path, "--connect", url) as run:
+            assert run.stderr is not None
+            line = run.stderr.readline()
+            while "waiting" not in line:
+                assert line
+                line = run.stderr.readline()
+            assert url in line and "not connected" in line
+            time.sleep(1.0)
+            assert run.poll() is None
+            run.send_signal(signal.SIGINT)
+            began_s = time.monotonic()
+            code, out, err = finished(run, 10.0)
+    assert time.monotonic() - began_s < 2.0
+    assert code == 130
+    assert out == "gate: pending\n"
+    assert "Traceback" not in err
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.Signals) -> None:
+    mission = yard(tmp_path)
+    record = tmp_path / "record"
+    with (
+        served(mission) as world,
+        process("companion", "run", mission_path(mission), "--connect", world.url, "--arm", "--record", record) as run,
+    ):
+        wait_until(lambda: world.simulator.truth.speed_m_s > 1.0, 40.0)
+        run.send_signal(number)
+        began_s = time.monotonic()
+        code, out, err = finished(run, 10.0)
+        assert time.monotonic() - began_s < 2.0
+        assert world.mode() == HOLD
+        wait_until(lambda: world.simulator.truth.speed_m_s < 0.05, 3.0)
+        driven_m = world.simulator.driven_m
+        time.sleep(2.0)
+        assert world.simulator.driven_m - driven_m < 0.05
+        assert world.simulator.collisions == ()
+    assert code == 130
+    assert "gate: pending" in out and "Traceback" not in err
+    assert load_map(record / "map.yaml").width == 24
+
+
+def test_a_companion_that_is_killed_leaves_the_rover_on_ground_it_had_seen(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    with (
+        served(mission) as world,
+        process("companion", "run", mission_path(mission), "--connect", world.url, "--arm") as run,
+    ):
+        wait_until(lambda: world.simulator.driven_m > 2.0, 40.0)
+        run.kill()
+        finished(run, 5.0)
+        time.sleep(1.0)
+        wait_until(lambda: world.simulator.truth.speed_m_s < 0.05, 12.0)
+        time.sleep(1.0)
+        assert world.simulator.truth.speed_m_s < 0.05
+        assert world.simulator.collisions == ()
+
+
+def test_the_pilot_wins_and_the_autopilot_is_quoted(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    with served(mission) as world, process("companion", "run", mission_path(mission), "--connect", world.url) as run:
+        assert run.stderr is not None
+        lines = iter(run.stderr.readline, "")
+        assert any("a person to arm" in line for line in lines)
+        world.pilot(ARM, 1)
+        wait_until(lambda: world.simulator.driven_m > 1.0, 20.0)
+        world.pilot(SET_MODE, 1, MANUAL)
+        assert any("mode is not GUIDED" in line for line in lines)
+        time.sleep(2.0)
+        assert world.mode() == MANUAL
+        world.pilot(SET_MODE, 1, GUIDED)
+        code, out, _ = finished(run, 60.0)
+        assert world.simulator.collisions == ()
+    assert (code, out) == (0, "gate: reached\n")
+
+
+def test_a_target_that_the_prior_map_shows_walled_in_is_missed_with_exit_code_3(tmp_path: Path) -> None:
+    path = mission_path(yard(tmp_path, sealed=True))
+    path.write_text(path.read_text().replace('name = "Yard"', 'name = "Yard"\nprior_map = "yard.png"', 1))
+    mission = load_mission(path)
+    record = tmp_path / "record"
+    with (
+        served(mission) as world,
+        process("companion", "run", path, "--connect", world.url, "--arm", "--record", record) as run,
+    ):
+        code, out, err = finished(run, 60.0)
+        assert world.simulator.driven_m < 1.0, "it knew"
+    assert code == 3, err
+    assert "gate: unreachable" in out and "Traceback" not in err
+    assert load_map(record / "map.yaml").weights[9, 13] >= 1.0
