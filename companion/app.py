@@ -12,21 +12,19 @@ import numpy as np
 from companion.clock import Clock, stopwatch_s
 from companion.commands import Command, Say, SetMode
 from companion.driver import STANDSTILL, Driver
-from companion.guidance import Guide, RoverLimits
-from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable
-from companion.laying import Laid, apart_m, from_home, lay, lay_again
+from companion.guidance import Guide
+from companion.itinerary import Itinerary, TargetStatus
+from companion.laying import apart_m, from_home, lay
 from companion.mapfiles import save_ros_map
-from companion.mapping import EvidenceMap, forget, integrate, known_fields
+from companion.mapping import EvidenceMap, known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import EncodeError
 from companion.mission.mission import Mission
-from companion.navigator import Action, Decision
 from companion.outbox import Outbox
-from companion.planning.registry import make_planner
+from companion.pursuit import Pursuit
 from companion.recorder import DecisionLog
 from companion.reporting import Reporter, Status
 from companion.safety import Control, Reaction, Watch, check, latched
-from companion.searching import Searcher
 from companion.settings import Settings
 from companion.startup import ASK_AGAIN_S, start_step
 from companion.stepping import StepRunner
@@ -48,8 +46,8 @@ INFO, WARNING = 6, 4
 STEPS_KEPT = 100_000
 HAND_OVER_S = 1.5
 """So long the companion stays, after its last command, to see that the rover is in HOLD."""
-ORIGIN_MOVED_M = 0.2
 HOME_MOVED_M = 2.0
+BEGIN_AGAIN_S = 2.0
 ASK_PLACES_S = 0.5
 """While it is doubtful where the rover is, the origin is asked for this often,"""
 SETTLED_S = 0.4
@@ -90,10 +88,8 @@ class Companion:
     ) -> None:
         self.vehicle = VehicleState()
         self.outcome = Outcome()
-        self.driver: Driver | None = None
-        self.itinerary: Itinerary | None = None
         self.watch = Watch()
-        self._laid: Laid | None = None
+        self._pursuit: Pursuit | None = None
         self._autopilot = autopilot
         self._clock = clock
         self._mission = mission
@@ -102,11 +98,12 @@ class Companion:
         self._log = log
         self._rng = np.random.default_rng(seed)
         self._arm = arm
+        self._was_armed = False
+        self._mission_checked = False
         self._outbox = Outbox(settings.guidance)
         self._reporter = Reporter(self.outcome.said)
         self._next_tick_s = clock.now_s()
-        self._scans = 0
-        self._asked_s = -np.inf
+        self._asked_s = self._begin_again_s = self._settled_s = -np.inf
         self._doubt = ""
         self._doubt_s = 0.0
         self._stopped = False
@@ -122,16 +119,26 @@ class Companion:
     @property
     def evidence(self) -> EvidenceMap | None:
         """The map; None before the mission has begun."""
-        return None if self._laid is None else self._laid.evidence
+        return None if self._pursuit is None else self._pursuit.evidence
+
+    @property
+    def driver(self) -> Driver | None:
+        """Who drives; None before the mission has begun."""
+        return None if self._pursuit is None else self._pursuit.driver
+
+    @property
+    def itinerary(self) -> Itinerary | None:
+        """Progress through the targets; None before the mission has begun."""
+        return None if self._pursuit is None else self._pursuit.itinerary
 
     def save_map(self, path_without_suffix: Path) -> bool:
         """Write what has been mapped as a ROS map (.yaml and .pgm), its place in metres from home.
 
         False when the mission has not begun. Raises MapError when it cannot be written.
         """
-        if self._laid is None:
+        if self._pursuit is None:
             return False
-        save_ros_map(from_home(self._laid), path_without_suffix, known=known_fields(self._laid.evidence))
+        save_ros_map(from_home(self._pursuit.laid), path_without_suffix, known=known_fields(self._pursuit.evidence))
         return True
 
     def run(self, observe: Callable[[Status], None] = lambda status: None) -> Outcome:
@@ -147,7 +154,9 @@ class Companion:
         self._clock.sleep_until_s(self._next_tick_s)
         now_s = self._clock.now_s()
         if now_s - self._next_tick_s > 1.0:
-            self._next_tick_s = now_s  # after a stall (a suspended computer), do not catch up tick by tick
+            # After a stall (a suspended computer) do not catch up tick by tick, and do not believe what piled up meanwhile.
+            self._next_tick_s = now_s
+            self._settled_s = now_s + SETTLED_S
         began_s = stopwatch_s()
         self._reporter.news.clear()
         for event in self._autopilot.poll(now_s):
@@ -174,22 +183,22 @@ class Companion:
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
-        if self.itinerary is None:
+        if self._pursuit is None:
             return [(target.name, TargetStatus.PENDING) for target in self._mission.targets]
-        return [(t.name, status) for t, status in zip(self.itinerary.targets, self.itinerary.statuses, strict=True)]
+        return self._pursuit.statuses()
 
     def status(self) -> Status:
         """A picture of this moment."""
-        reached = sum(status is TargetStatus.REACHED for status in self.itinerary.statuses) if self.itinerary else 0
+        now_s, pursuit = self._clock.now_s(), self._pursuit
         return Status(
-            time_s=self._clock.now_s(),
+            time_s=now_s,
             doing=self._reporter.doing,
-            pose=self.vehicle.pose_at(self._clock.now_s()),
-            decision=self.driver.decision if self.driver else None,
-            target=self.itinerary.goal.name if self.itinerary and not self.itinerary.ended else "",
-            targets_reached=reached,
+            pose=self.vehicle.pose_at(now_s),
+            decision=pursuit.driver.decision if pursuit else None,
+            target=pursuit.itinerary.goal.name if pursuit and not pursuit.itinerary.ended else "",
+            targets_reached=pursuit.reached if pursuit else 0,
             targets=len(self._mission.targets),
-            steps=self.driver.tally.steps if self.driver else 0,
+            steps=pursuit.driver.tally.steps if pursuit else 0,
             news=tuple(self._reporter.news),
         )
 
@@ -197,18 +206,21 @@ class Companion:
 
     def _act(self, now_s: float) -> None:
         """Judge who may drive and whether it is safe; then drive, stop, or be silent."""
-        if self.itinerary is None and not self._begin(now_s):
-            return
+        if self._pursuit is None:
+            self._pursuit = self._begin(now_s)
+            if self._pursuit is None:
+                return
         if self._doubt and now_s - self._asked_s >= ASK_PLACES_S:
             self._asked_s = now_s
             self._autopilot.ask_places()
         before = self.watch.control
-        self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, self._doubt)
+        doubt = self._doubt or ("the companion stood still" if now_s < self._settled_s else "")
+        self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, doubt)
         if verdict.reaction is Reaction.DRIVE:
             if self._stopped or before is not Control.COMPANION:
                 self._start_afresh()
             self._stopped = False
-            self._command(self._drive(now_s), now_s)
+            self._drive(self._pursuit, now_s)
             return
         if not self._stopped:
             self._start_afresh()
@@ -225,26 +237,41 @@ class Companion:
                 if before is Control.COMPANION:
                     self._tell(f"Companion silent: {verdict.reason}", WARNING)
 
-    def _begin(self, now_s: float) -> bool:
-        """Everything before the first metre; True once the rover may be driven and the mission lies on the map."""
+    def _begin(self, now_s: float) -> Pursuit | None:
+        """Everything before the first metre; once the rover may be driven, the mission on the map."""
         self.watch = Watch(latched(self.watch.control, self.vehicle))
-        step = start_step(self.vehicle, now_s, self._settings.safety, arm=self._arm, control=self.watch.control)
+        if now_s < self._begin_again_s:
+            return None
+        self._check_mission(now_s)
+        heartbeat = self.vehicle.heartbeat
+        self._was_armed = self._was_armed or (heartbeat is not None and heartbeat.armed)
+        # Whoever disarms the rover does not want it armed again by itself.
+        arm = self._arm and not self._was_armed
+        step = start_step(self.vehicle, now_s, self._settings.safety, arm=arm, control=self.watch.control)
         if step.missing:
             self._wait_for(step.missing)
             if step.command is not None and now_s - self._asked_s > ASK_AGAIN_S:
                 self._asked_s = now_s
                 self._send(step.command, now_s)
-            return False
-        pose = self.vehicle.pose_at(now_s)
-        assert pose is not None and self.vehicle.origin is not None and self.vehicle.home is not None
-        origin, home = self.vehicle.origin.point, self.vehicle.home.point
-        laid = lay(self._mission, self._settings.mapping, origin, home, pose)
+            return None
+        vehicle, pose = self.vehicle, self.vehicle.pose_at(now_s)
+        assert pose is not None and vehicle.origin is not None and vehicle.home is not None and vehicle.scan is not None
+        laid = lay(self._mission, self._settings.mapping, vehicle.origin.point, vehicle.home.point, pose)
         if not laid.evidence.base.contains(laid.evidence.base.cell_at(pose.point)):
             self._wait_for("the rover to stand on the mission's grid")
-            return False
-        self._take_ground(laid)
+            self._begin_again_s = now_s + BEGIN_AGAIN_S
+            return None
         self._tell(f"Companion: {self._mission.name}, {len(laid.itinerary.targets)} targets", INFO)
-        return True
+        sight_m = vehicle.scan.scan.max_range_m
+        return Pursuit(self._mission, self._settings, laid, sight_m, self._runner, self._log, self._tell, self._rng)
+
+    def _check_mission(self, now_s: float) -> None:
+        """Whether the mission can be laid out at all comes out before anybody arms. Raises MissionError."""
+        vehicle, pose = self.vehicle, self.vehicle.pose_at(now_s)
+        if self._mission_checked or vehicle.origin is None or vehicle.home is None or pose is None:
+            return
+        self._mission_checked = True
+        lay(self._mission, self._settings.mapping, vehicle.origin.point, vehicle.home.point, pose)
 
     def _wait_for(self, what: str) -> None:
         if what == "the autopilot's heartbeat":
@@ -253,124 +280,65 @@ class Companion:
                 what += f" (heard a vehicle of type {self._autopilot.codec.refused_type}, which is no ArduPilot rover)"
         self._reporter.doing = f"waiting for {what}"
 
-    def _take_ground(self, laid: Laid) -> None:
-        """A map and who drives on it; what has been counted so far is kept."""
-        self._laid, self.itinerary = laid, laid.itinerary
-        self._runner.drop()
-        assert self.vehicle.scan is not None
-        rover = self._mission.rover
-        limits = RoverLimits(rover.radius_m, rover.cruise_speed_m_s, self.vehicle.scan.scan.max_range_m)
-        if self.driver is None:
-            planner = make_planner(self._settings.navigator.planner, self._settings.planner)
-            searcher = Searcher(planner, self._settings.navigator, self._rng)
-            self.driver = Driver(laid.evidence, limits, self._settings, searcher, self._runner)
-            return
-        tally = self.driver.tally
-        self.driver = Driver(laid.evidence, limits, self._settings, self.driver.searcher, self._runner)
-        self.driver.tally = tally
-
     # Listening ---------------------------------------------------------------------------------------------------
 
     def _take_in(self, event: Event) -> None:
         """Scans go into the map; a position that jumps, or an origin that moves, makes the map worthless."""
+        if isinstance(event, TextSeen) and event.severity <= WARNING:
+            self._reporter.note(f"autopilot: {event.text}")
+        if self._pursuit is None:
+            return
         match event:
-            case TextSeen() if event.severity <= WARNING:
-                self._reporter.note(f"autopilot: {event.text}")
             case RangeSeen() if not self._doubt:
-                self._map(event)
-            case LocalPositionSeen() if self.vehicle.jump_m > self._settings.safety.jump_m and self._laid is not None:
+                pose, attitude = self.vehicle.pose_at(event.time_s), self.vehicle.attitude
+                if pose is not None and attitude is not None:
+                    self._pursuit.map_scan(pose, attitude.yaw_rate_rad_s, event.scan)
+            case LocalPositionSeen() if self.vehicle.jump_m > self._settings.safety.jump_m:
                 if not self._doubt:
                     self._tell(f"Position jumped {self.vehicle.jump_m:.1f} m: map forgotten", WARNING)
                 self._doubt, self._doubt_s = "position jumped", event.time_s
-            case OriginSeen() if self._laid is not None:
-                self._find_ground(event, self._laid)
-            case HomeSeen() if self._laid is not None and apart_m(event.point, self._laid.home) > HOME_MOVED_M:
-                self._tell("Home has moved; the mission stays where it began", WARNING)
+            case OriginSeen():
+                self._find_ground(event, self._pursuit)
+            case HomeSeen() if apart_m(event.point, self._pursuit.laid.home) > HOME_MOVED_M:
+                self._tell_once("Home has moved; the mission stays where it began")
             case _:
                 pass
 
-    def _map(self, event: RangeSeen) -> None:
-        evidence, attitude = self.evidence, self.vehicle.attitude
-        pose = self.vehicle.pose_at(event.time_s)
-        if evidence is None or attitude is None or pose is None:
-            return
-        if abs(attitude.yaw_rate_rad_s) <= np.radians(self._settings.mapping.max_yaw_rate_deg_s):
-            self._scans += 1
-            integrate(evidence, pose, event.scan, self._scans)
-
-    def _find_ground(self, event: OriginSeen, laid: Laid) -> None:
+    def _find_ground(self, event: OriginSeen, pursuit: Pursuit) -> None:
         """The origin as it is now: after a jump this tells whether the frame has moved or only the rover's place in it."""
-        moved_m = apart_m(event.point, laid.origin)
-        if moved_m > ORIGIN_MOVED_M:
-            assert self.itinerary is not None
-            self._tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", WARNING)
-            self._take_ground(lay_again(laid, self.itinerary, self._mission, self._settings.mapping, event.point))
+        if pursuit.follow_origin(event.point):
             self._doubt, self._doubt_s = "EKF origin moved", event.time_s
         elif self._doubt and event.time_s - self._doubt_s >= SETTLED_S:
-            forget(laid.evidence)
+            pursuit.forget_map()
             self._doubt = ""
             self._start_afresh()
 
     # Driving -----------------------------------------------------------------------------------------------------
 
-    def _drive(self, now_s: float) -> Guide:
-        """What to do for the mission now."""
-        assert self.itinerary is not None and self.driver is not None
-        self.itinerary = on_time(self.itinerary, now_s)
-        if self.itinerary.ended:
-            return self._finish(now_s)
+    def _drive(self, pursuit: Pursuit, now_s: float) -> None:
+        """One tick on the way."""
         pose = self.vehicle.pose_at(now_s)
         assert pose is not None
-        if self.itinerary.leg in (Leg.STAY, Leg.WAIT):
-            self._reporter.doing = "holding" if self.itinerary.leg is Leg.STAY else "waiting for the way to clear"
-            self.driver.pause()
-            return STANDSTILL
-        if self.driver.goal is not self.itinerary.goal:
-            self._tell(f"Heading for {self.itinerary.goal.name}", INFO)
-            self._runner.drop()
-            self.driver.head_for(self.itinerary.goal, pose)
-        self._reporter.doing = "driving"
-        guide, decision = self.driver.update(pose, self.vehicle.speed_m_s)
-        if decision is not None:
-            self._take_decision(decision, now_s)
-        return guide
-
-    def _take_decision(self, decision: Decision, now_s: float) -> None:
-        assert self.itinerary is not None and self.driver is not None
-        goal = self.itinerary.goal
-        self._log.write_decision(now_s, goal.name, decision)
-        if decision.action is Action.REACHED:
-            self._tell(f"Reached {goal.name}", INFO)
-            self.itinerary = on_reached(self.itinerary, now_s)
-        elif decision.action is Action.UNREACHABLE:
-            self._tell(f"Unreachable: {goal.name} ({decision.reason})", WARNING)
-            navigator = self._settings.navigator
-            self.itinerary = on_unreachable(self.itinerary, now_s, navigator.wait_retry_s, navigator.wait_limit_s)
-        if decision.action in (Action.REACHED, Action.UNREACHABLE):
-            self.driver.leave()
-
-    def _finish(self, now_s: float) -> Guide:
-        """The mission has ended: stand, and hand over in HOLD."""
-        assert self.itinerary is not None
-        self.outcome.targets = self.statuses()
-        reached = sum(status is TargetStatus.REACHED for status in self.itinerary.statuses)
-        self._tell(f"Mission ended: {reached} of {len(self.itinerary.targets)} targets reached", INFO)
+        guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s)
+        self._reporter.doing = pursuit.doing
+        if guide is not None:
+            self._command(guide, now_s)
+            return
+        self.outcome.targets = pursuit.statuses()
+        self._tell(f"Mission ended: {pursuit.reached} of {len(self.outcome.targets)} targets reached", INFO)
         self._hand_over(now_s, "done")
-        return STANDSTILL
 
     def _start_afresh(self) -> None:
         """What was sent before counts for nothing, and the rover may be moved: the leg begins again where it then is."""
         self._outbox.reset()
-        self._runner.drop()
-        if self.driver is not None:
-            self.driver.leave()
+        if self._pursuit is not None:
+            self._pursuit.driver.leave()
 
     # Speaking ----------------------------------------------------------------------------------------------------
 
     def _command(self, guide: Guide, now_s: float) -> None:
-        if self._leave_at_s is None:
-            for command in self._outbox.due(guide, now_s, self._autopilot.target_confirmed):
-                self._send(command, now_s)
+        for command in self._outbox.due(guide, now_s, self._autopilot.target_confirmed):
+            self._send(command, now_s)
 
     def _send(self, command: Command, now_s: float) -> None:
         """Say it; what cannot be said (degrees, while the autopilot has no origin) leaves the rover standing instead."""
@@ -391,6 +359,8 @@ class Companion:
         if heartbeat.armed:
             self._send(STANDSTILL.setpoint, now_s)
         self._send(SetMode(RoverMode.HOLD), now_s)
+        if why != "done":
+            self._tell(f"Companion: {why}, HOLD", WARNING)
 
     def _is_handed_over(self, now_s: float) -> bool:
         """Whether the rover has left GUIDED, or has said that it will, or time is up."""
@@ -403,11 +373,16 @@ class Companion:
 
     def _tell_of_faults(self, now_s: float) -> None:
         """What a person should know though it stops nothing, once each."""
-        if self._laid is not None:
+        if self._pursuit is not None:
             for text in self._reporter.faults(self._autopilot.rate_faults, self._log.problem, now_s):
-                self._tell(text, WARNING)
+                self._tell_once(text)
 
     def _tell(self, text: str, severity: int) -> None:
-        """Say it to the ground station, once."""
+        """Say it to the ground station, not twice in a row."""
         if self._reporter.say(text):
             self._autopilot.send(Say(severity, text), self._clock.now_s())
+
+    def _tell_once(self, text: str) -> None:
+        """Say what goes on being so only the first time."""
+        if text not in self.outcome.said:
+            self._tell(text, WARNING)

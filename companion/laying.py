@@ -45,9 +45,7 @@ def from_home(laid: Laid) -> Grid:
     """The map as it is, with its place in metres from home: what ``prior_map`` expects of a saved map."""
     grid = laid.evidence.grid
     home, corner = LocalFrame(laid.origin).to_ned(laid.home), grid.south_west
-    return Grid(
-        grid.weights, grid.resolution_m, NedPoint(corner.north_m - home.north_m, corner.east_m - home.east_m)
-    )
+    return Grid(grid.weights, grid.resolution_m, NedPoint(corner.north_m - home.north_m, corner.east_m - home.east_m))
 
 
 def apart_m(here: GeoPoint, there: GeoPoint) -> float:

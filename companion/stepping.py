@@ -30,10 +30,6 @@ class StepRunner(Protocol):
         """The result, once; None while it is not there."""
         ...
 
-    def drop(self) -> None:
-        """Nobody wants the result of the step under way any more."""
-        ...
-
     def close(self) -> None:
         """End the thread, if there is one."""
         ...
@@ -58,10 +54,6 @@ class InlineRunner:
         """The result, once."""
         result, self._result = self._result, None
         return result
-
-    def drop(self) -> None:
-        """Forget the result."""
-        self._result = None
 
     def close(self) -> None:
         """Nothing to end."""
@@ -89,12 +81,6 @@ class ThreadRunner:
             return None
         future, self._future = self._future, None
         return future.result()
-
-    def drop(self) -> None:
-        """Forget the step; if it has begun it runs to its end unheard, and the next one waits for it."""
-        if self._future is not None:
-            self._future.cancel()
-        self._future = None
 
     def close(self) -> None:
         """Do not wait for a step that nobody will take."""

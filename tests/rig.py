@@ -99,7 +99,8 @@ Change = Callable[[Any], Any]
 
 
 class Rig:
-    """One run. ``change`` is the line from the vehicle to the companion; ``cut`` cuts the line both ways."""
+    """One run. ``change`` is the line from the vehicle to the companion, message by message, ``garble`` the same in bytes;
+    ``lose`` says whether a packet of the companion is lost; ``cut`` cuts the line both ways."""
 
     def __init__(
         self,
@@ -117,7 +118,11 @@ class Rig:
         self.simulator = scenario_from_mission(mission).simulator(seed)
         self.simulator.advance_to_s(late_s)
         self.change: Change | None = None
+        self.garble: Callable[[bytes], bytes] | None = None
+        self.lose: Callable[[], bool] | None = None
         self.cut = False
+        self.stall_s = 0.0
+        """The companion's computer stands still for so long, once."""
         self.sent: list[Sent] = []
         self.beyond_m: list[float] = []
         """How far each guided position reached beyond the ground seen free, in metres."""
@@ -128,10 +133,16 @@ class Rig:
         self._pilot = self.simulator.connect()
         self._pilot_mav = mavlink.MAVLink(None, 255, 190)
         self._up, self._down = mavlink.MAVLink(None), mavlink.MAVLink(None)
+        self.recorder = NullRecorder()
+        self._arm, self._seed = arm, seed
+        self.restart_companion(mission)
+
+    def restart_companion(self, mission: Mission) -> None:
+        """A companion that knows nothing yet takes the place of the one before."""
         near, self._far = MemoryLink.pair()
-        self.link = AutopilotLink(near, Codec(settings.link), settings.link, NullRecorder())
+        self.link = AutopilotLink(near, Codec(self.settings.link), self.settings.link, self.recorder)
         self.companion = Companion(
-            self.link, self, mission, settings, InlineRunner(), NullRecorder(), seed=seed, arm=arm
+            self.link, self, mission, self.settings, InlineRunner(), self.recorder, seed=self._seed, arm=self._arm
         )
         self._watch_positions()
 
@@ -141,18 +152,20 @@ class Rig:
         return self._now_s
 
     def sleep_until_s(self, time_s: float) -> None:
+        time_s, self.stall_s = time_s + self.stall_s, 0.0
         said = self._far.read()
         for message in self._up.parse_buffer(said) or []:
             self.sent.append(Sent(self._now_s, self._mode, self._armed, message))
-        if not self.cut:
-            self._vehicle.receive(said)
+            if not self.cut and not (self.lose is not None and self.lose()):
+                self._vehicle.receive(bytes(message.get_msgbuf()))
         self.simulator.advance_to_s(time_s)
         self._pilot.take()
         heard = self._vehicle.take()
         if self._vehicle.dropped:
             self._vehicle, self._pilot = self.simulator.connect(), self.simulator.connect()
         if not self.cut:
-            self._far.write(self._delivered(heard))
+            data = self._delivered(heard)
+            self._far.write(data if self.garble is None else self.garble(data))
         self._now_s = time_s
 
     def _delivered(self, heard: bytes) -> bytes:

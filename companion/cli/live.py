@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+import contextlib
+import os
 from types import TracebackType
 
 from rich.console import Console
+from rich.markup import escape
 from rich.status import Status as Spinner
 
 from companion.app import Status
 
 UPDATE_S = 0.25
+
+
+class LiveConsole(Console):
+    """Standard error, for as long as somebody reads it."""
+
+    def on_broken_pipe(self) -> None:
+        """The reader has gone (rich itself would end the program here): the rover is driven on unseen."""
+        self.quiet = True
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, self.file.fileno())
+        os.close(nowhere)
 
 
 class Live:
@@ -21,6 +35,7 @@ class Live:
         self._spinner = Spinner("connecting", console=console, refresh_per_second=4.0) if console.is_terminal else None
         self._shown = ""
         self._updated_s = -UPDATE_S
+        self._broken = False
 
     def __enter__(self) -> Live:
         """Begin to show."""
@@ -33,10 +48,19 @@ class Live:
     ) -> None:
         """Leave the terminal as it was."""
         if self._spinner is not None:
-            self._spinner.stop()
+            with contextlib.suppress(OSError):
+                self._spinner.stop()
 
     def show(self, status: Status) -> None:
-        """Show what is new."""
+        """Show what is new. A terminal that has gone, or a full disk under a log file, does not end the run."""
+        if self._broken:
+            return
+        try:
+            self._show(status)
+        except OSError:
+            self._broken = True
+
+    def _show(self, status: Status) -> None:
         for text in status.news:
             self._print(text)
         if self._spinner is None:
@@ -55,7 +79,7 @@ class Live:
 def _line(status: Status) -> str:
     parts = [f"{status.doing}"]
     if status.target:
-        parts.append(f"{status.target} [{status.targets_reached}/{status.targets}]".replace("[", r"\["))
+        parts.append(escape(f"{status.target} [{status.targets_reached}/{status.targets}]"))
     if status.pose is not None:
         parts.append(f"north {status.pose.north_m:.1f} m, east {status.pose.east_m:.1f} m")
     if status.decision is not None:

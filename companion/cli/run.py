@@ -11,7 +11,8 @@ import typer
 from rich.console import Console
 
 from companion.app import Companion
-from companion.cli.live import Live
+from companion.cli.inputs import usable_settings
+from companion.cli.live import Live, LiveConsole
 from companion.clock import WallClock
 from companion.itinerary import TargetStatus
 from companion.mapfiles import MapError
@@ -21,10 +22,11 @@ from companion.mavlink.transport import ByteLink, LinkError, open_link
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
 from companion.recorder import NullRecorder, Recorder, RecordError
-from companion.settings import Settings, SettingsError, load_settings
+from companion.settings import Settings, SettingsError
 from companion.stepping import ThreadRunner
 from companion.warmup import warm_up
 
+STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 EXIT_REACHED, EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED = 0, 2, 3, 130
 
 
@@ -40,10 +42,10 @@ def run(
     record: Annotated[Path | None, typer.Option(help="Directory for the record and the map of this run.")] = None,
 ) -> None:
     """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 130: stopped by a signal."""
-    console = Console(stderr=True)
+    console = LiveConsole(stderr=True)
     try:
         with _StopSignals() as stop:
-            settings = load_settings(settings_file)
+            settings = usable_settings(settings_file)
             mission = load_mission(mission_file)
             recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
             link = open_link(connect)
@@ -103,7 +105,10 @@ def _save_map(companion: Companion, directory: Path) -> None:
 
 
 class _StopSignals:
-    """SIGINT and SIGTERM end the run in good order: the rover is stopped first. Before it has begun they end it at once."""
+    """SIGINT, SIGTERM and a closed terminal end the run in good order: the rover is stopped first.
+
+    Before it has begun they end it at once.
+    """
 
     def __init__(self) -> None:
         self.asked = False
@@ -111,7 +116,7 @@ class _StopSignals:
 
     def __enter__(self) -> _StopSignals:
         """Take the signals over."""
-        self._before = {number: signal.signal(number, self._stop) for number in (signal.SIGINT, signal.SIGTERM)}
+        self._before = {number: signal.signal(number, self._stop) for number in STOPPING}
         return self
 
     def __exit__(self, *_: object) -> None:

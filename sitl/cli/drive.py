@@ -13,15 +13,16 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from companion.app import Status
+from companion.cli.inputs import OutputError, usable_settings, writable
 from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError, SitlSpec
 from companion.recorder import NullRecorder, Recorder, RecordError
-from companion.settings import SettingsError, load_settings
+from companion.settings import SettingsError
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
 from sitl.picture import save_picture
-from sitl.scenario import scenario_from_mission
+from sitl.scenario import ScenarioError, scenario_from_mission
 
 EXIT_BAD_INPUT = 2
 LINE_EVERY_S = 60.0
@@ -52,19 +53,19 @@ def drive(
     """
     console = Console()
     try:
-        settings = load_settings(settings_file)
+        settings = usable_settings(settings_file)
         mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
         if sensors is not None:
             mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=sensors))
         scenario = scenario_from_mission(mission)
         recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
-        for output in (image, json_file, map_stem):
-            if output is not None:
-                output.parent.mkdir(parents=True, exist_ok=True)
+        writable(image)
+        writable(json_file)
+        writable(map_stem, ".yaml")
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
         report = _run_with_progress(run, console)
-    except (SettingsError, MissionError, MapError, RecordError, OSError) as error:
+    except (SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     recorder.close()

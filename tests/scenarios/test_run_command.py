@@ -95,7 +95,7 @@ def test_a_peer_that_is_not_there_is_waited_for_until_ctrl_c(tmp_path: Path) -> 
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
 def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.Signals) -> None:
     mission = yard(tmp_path)
     record = tmp_path / "record"
@@ -153,13 +153,17 @@ def test_the_pilot_wins_and_the_autopilot_is_quoted(tmp_path: Path) -> None:
     assert (code, out) == (0, "gate: reached\n")
 
 
-def test_a_target_that_the_prior_map_shows_walled_in_is_missed_with_exit_code_3(tmp_path: Path) -> None:
-    path = mission_path(yard(tmp_path, sealed=True))
+def walled_in(folder: Path) -> Path:
+    """A mission whose only target is known to be unreachable from the start."""
+    path = mission_path(yard(folder, sealed=True))
     path.write_text(path.read_text().replace('name = "Yard"', 'name = "Yard"\nprior_map = "yard.png"', 1))
-    mission = load_mission(path)
-    record = tmp_path / "record"
+    return path
+
+
+def test_a_target_that_the_prior_map_shows_walled_in_is_missed_with_exit_code_3(tmp_path: Path) -> None:
+    path, record = walled_in(tmp_path), tmp_path / "record"
     with (
-        served(mission) as world,
+        served(load_mission(path)) as world,
         process("companion", "run", path, "--connect", world.url, "--arm", "--record", record) as run,
     ):
         code, out, err = finished(run, 60.0)
@@ -167,3 +171,28 @@ def test_a_target_that_the_prior_map_shows_walled_in_is_missed_with_exit_code_3(
     assert code == 3, err
     assert "gate: unreachable" in out and "Traceback" not in err
     assert load_map(record / "map.yaml").weights[9, 13] >= 1.0
+
+
+def test_whoever_reads_its_messages_may_go_away(tmp_path: Path) -> None:
+    path = walled_in(tmp_path)
+    with (
+        served(load_mission(path)) as world,
+        process("companion", "run", path, "--connect", world.url, "--arm") as run,
+    ):
+        assert run.stderr is not None and run.stdout is not None
+        assert "waiting" in run.stderr.readline()
+        run.stderr.close()
+        assert run.stdout.read() == "gate: unreachable\n"
+        assert run.wait(timeout=10.0) == 3
+
+
+def test_a_mission_that_cannot_be_laid_out_ends_before_anybody_arms(tmp_path: Path) -> None:
+    """Only on the spot it turns out that the rover begins within a fence."""
+    path = mission_path(yard(tmp_path))
+    path.write_text(path.read_text() + "[[keep_out]]\nnorth_m = 0.0\neast_m = 0.0\nradius_m = 2.0\n")
+    with served(load_mission(path)) as world:
+        with process("companion", "run", path, "--connect", world.url, "--arm") as run:
+            code, out, err = finished(run, 30.0)
+        assert not any(m.base_mode & 128 for m in world.heard() if m.get_type() == "HEARTBEAT")
+    assert (code, out) == (2, "")
+    assert "yard.toml: home" in err.splitlines()[-1] and "keep_out 1" in err and "Traceback" not in err

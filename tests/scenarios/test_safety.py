@@ -434,6 +434,7 @@ def test_stop_leaves_the_rover_standing_in_hold(rig: Rig) -> None:
     commands = [one for one in rig.sent_since(since_s) if one.moves_or_changes]
     assert commands[0].is_standstill and commands[1].command == SET_MODE
     assert rig.now_s() - since_s < 1.0
+    assert "Companion: stopped by the user, HOLD" in rig.texts()
     driven_m = rig.simulator.driven_m
     rig.simulator.advance_to_s(rig.now_s() + 3.0)
     assert rig.speed_m_s < 0.05 and rig.simulator.driven_m - driven_m < 1.2

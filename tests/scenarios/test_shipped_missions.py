@@ -79,3 +79,26 @@ def test_drive_command_writes_what_it_promises(tmp_path: Path) -> None:
     assert (tmp_path / "r.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "m.pgm").read_bytes().startswith(b"P5")
     assert (tmp_path / "rec" / "link.tlog").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--image", "/proc/none/x.png"], "cannot be written"),
+        (["--sensors", "sonar"], "known: lidar-90"),
+        (["--start", "1,1"], "go with --world"),
+    ],
+)
+def test_bad_options_of_drive_get_one_line(arguments: list[str], words: str) -> None:
+    result = CliRunner().invoke(app, ["drive", str(MISSIONS / "open.toml"), *arguments])
+    assert result.exit_code == 2
+    assert words in result.output
+    assert len(result.output.strip().splitlines()) == 1
+
+
+def test_an_unknown_planner_in_the_settings_is_named_with_its_file(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text('[navigator]\nplanner = "dijkstr"\n')
+    result = CliRunner().invoke(app, ["drive", str(MISSIONS / "open.toml"), "--settings", str(tmp_path / "s.toml")])
+    assert result.exit_code == 2
+    assert "s.toml: navigator.planner" in result.output
+    assert "dijkstra" in result.output

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.commands import Arm, SetMode
 from companion.frames import GeoPoint
-from companion.safety import Control, Reaction, Watch, check, unsafe_reason
+from companion.safety import Control, Reaction, Verdict, Watch, check, latched, unsafe_reason
 from companion.scan import RangeScan
 from companion.settings import SafetySettings
 from companion.startup import start_step
@@ -102,6 +102,43 @@ def test_after_our_own_hold_a_person_gives_the_rover_back():
     ):
         watch, verdict = check(watch, seen, seen.heartbeat.time_s, SETTINGS)
         assert verdict.reaction is reaction
+
+
+def test_a_hold_that_was_lost_is_sent_again_when_the_vehicle_is_heard_again():
+    watch, _ = check(LONG_STOPPED, UNSAFE, 10.0, SETTINGS)
+    silent = vehicle(10.0)
+    for now_s in (11.0, 15.0, 30.0):
+        watch, verdict = check(watch, silent, now_s, SETTINGS)
+        assert verdict.reaction is Reaction.SILENT, "nobody there"
+    watch, verdict = check(watch, vehicle(31.0), 31.0, SETTINGS)
+    assert verdict.reaction is Reaction.HOLD
+    watch, verdict = check(watch, vehicle(31.1), 31.1, SETTINGS)
+    assert verdict.reaction is Reaction.SILENT
+    watch, verdict = check(watch, vehicle(32.0, HOLD), 32.0, SETTINGS)
+    assert (watch, verdict.reaction) == (THEIRS, Reaction.SILENT)
+
+
+def test_a_doubt_of_the_callers_own_stops_and_holds():
+    watch, verdict = check(OURS, vehicle(), 10.0, SETTINGS, "position jumped")
+    assert verdict == Verdict(Reaction.STOP, "position jumped")
+    assert check(watch, vehicle(11.0), 11.0, SETTINGS)[1].reaction is Reaction.DRIVE
+    watch, verdict = check(watch, vehicle(12.0), 12.0, SETTINGS, "position jumped")
+    assert verdict == Verdict(Reaction.HOLD, "position jumped")
+
+
+@pytest.mark.parametrize("control", list(Control))
+def test_the_latch_follows_the_mode(control):
+    assert latched(control, VehicleState()) is (Control.NOBODY if control is Control.NOBODY else Control.PERSON)
+    assert latched(control, vehicle()) is Control.COMPANION
+    assert latched(control, vehicle(mode=HOLD)) is (Control.NOBODY if control is Control.NOBODY else Control.PERSON)
+
+
+@pytest.mark.parametrize("mode", [MANUAL, HOLD])
+@pytest.mark.parametrize("armed", [True, False])
+def test_a_rover_that_a_person_took_out_of_guided_is_not_put_back(mode, armed):
+    seen = vehicle(mode=mode, armed=armed)
+    step = start_step(seen, 10.0, SETTINGS, arm=True, control=Control.PERSON)
+    assert step.command is None and "a person to set GUIDED" in step.missing
 
 
 def test_a_short_gap_stops_and_does_not_hold():

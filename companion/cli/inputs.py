@@ -1,0 +1,38 @@
+"""What several commands check before anything moves: settings that can be used, files that can be written."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from companion.planning.registry import UnknownPlannerError, make_planner
+from companion.settings import Settings, SettingsError, load_settings
+
+
+class OutputError(Exception):
+    """A file that cannot be written; the text is one line with file, reason and remedy."""
+
+
+def usable_settings(path: Path | None) -> Settings:
+    """The settings of a file (None: the defaults), with a planner that exists. Raises SettingsError."""
+    settings = load_settings(path)
+    try:
+        make_planner(settings.navigator.planner, settings.planner)
+    except UnknownPlannerError as error:
+        raise SettingsError(f"{path}: navigator.planner: {error}") from error
+    return settings
+
+
+def writable(path: Path | None, suffix: str = "") -> None:
+    """Make the directory of an output file and try the file itself, before hours are driven. Raises OutputError."""
+    if path is None:
+        return
+    path = path.with_name(path.name + suffix)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        existed = path.exists()
+        with path.open("ab"):
+            pass
+        if not existed:
+            path.unlink()
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written: {error.strerror or error}; choose another place") from error
