@@ -14,7 +14,7 @@ from companion.commands import Command, Say, SetMode
 from companion.driver import STANDSTILL, Driver
 from companion.guidance import Guide
 from companion.itinerary import Itinerary, TargetStatus
-from companion.laying import apart_m, from_home, lay
+from companion.laying import apart_m, from_home
 from companion.mapfiles import save_ros_map
 from companion.mapping import EvidenceMap, known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -26,7 +26,7 @@ from companion.recorder import DecisionLog
 from companion.reporting import Reporter, Status
 from companion.safety import Control, Reaction, Watch, check, latched
 from companion.settings import Settings
-from companion.startup import ASK_AGAIN_S, start_step
+from companion.startup import StartUp
 from companion.stepping import StepRunner
 from companion.vehicle import (
     Event,
@@ -47,7 +47,6 @@ STEPS_KEPT = 100_000
 HAND_OVER_S = 1.5
 """So long the companion stays, after its last command, to see that the rover is in HOLD."""
 HOME_MOVED_M = 2.0
-BEGIN_AGAIN_S = 2.0
 ASK_PLACES_S = 0.5
 """While it is doubtful where the rover is, the origin is asked for this often,"""
 SETTLED_S = 0.4
@@ -97,13 +96,11 @@ class Companion:
         self._runner = runner
         self._log = log
         self._rng = np.random.default_rng(seed)
-        self._arm = arm
-        self._was_armed = False
-        self._mission_checked = False
+        self._start_up = StartUp(mission, settings, arm=arm)
         self._outbox = Outbox(settings.guidance)
         self._reporter = Reporter(self.outcome.said)
         self._next_tick_s = clock.now_s()
-        self._asked_s = self._begin_again_s = self._settled_s = -np.inf
+        self._asked_s = self._settled_s = -np.inf
         self._doubt = ""
         self._doubt_s = 0.0
         self._stopped = False
@@ -177,9 +174,18 @@ class Companion:
         self._stop_asked = True
 
     def close(self) -> None:
-        """Last words on the way out after an error: a rover that is ours does not drive on."""
-        if not self._done and self._leave_at_s is None:
-            self._hand_over(self._clock.now_s(), "error")
+        """The way out after an error: a rover that is ours is stopped and put into HOLD before this returns."""
+        if self._done or self._leave_at_s is not None:
+            return
+        now_s = self._clock.now_s()
+        self._hand_over(now_s, "error")
+        while not self._is_handed_over(now_s):
+            now_s += 1.0 / self._settings.link.tick_hz
+            self._clock.sleep_until_s(now_s)
+            for event in self._autopilot.poll(now_s):
+                self.vehicle = fold(self.vehicle, event)
+            self._autopilot.service(now_s)
+        self._done = True
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
@@ -240,45 +246,18 @@ class Companion:
     def _begin(self, now_s: float) -> Pursuit | None:
         """Everything before the first metre; once the rover may be driven, the mission on the map."""
         self.watch = Watch(latched(self.watch.control, self.vehicle))
-        if now_s < self._begin_again_s:
-            return None
-        self._check_mission(now_s)
-        heartbeat = self.vehicle.heartbeat
-        self._was_armed = self._was_armed or (heartbeat is not None and heartbeat.armed)
-        # Whoever disarms the rover does not want it armed again by itself.
-        arm = self._arm and not self._was_armed
-        step = start_step(self.vehicle, now_s, self._settings.safety, arm=arm, control=self.watch.control)
-        if step.missing:
-            self._wait_for(step.missing)
-            if step.command is not None and now_s - self._asked_s > ASK_AGAIN_S:
-                self._asked_s = now_s
-                self._send(step.command, now_s)
-            return None
-        vehicle, pose = self.vehicle, self.vehicle.pose_at(now_s)
-        assert pose is not None and vehicle.origin is not None and vehicle.home is not None and vehicle.scan is not None
-        laid = lay(self._mission, self._settings.mapping, vehicle.origin.point, vehicle.home.point, pose)
-        if not laid.evidence.base.contains(laid.evidence.base.cell_at(pose.point)):
-            self._wait_for("the rover to stand on the mission's grid")
-            self._begin_again_s = now_s + BEGIN_AGAIN_S
+        laid, command = self._start_up.step(self.vehicle, self.watch.control, now_s)
+        if command is not None:
+            self._send(command, now_s)
+        if laid is None:
+            self._reporter.doing = f"waiting for {self._start_up.missing}"
+            if self.vehicle.heartbeat is None:
+                self._reporter.doing += self._autopilot.trouble
             return None
         self._tell(f"Companion: {self._mission.name}, {len(laid.itinerary.targets)} targets", INFO)
-        sight_m = vehicle.scan.scan.max_range_m
+        assert self.vehicle.scan is not None
+        sight_m = self.vehicle.scan.scan.max_range_m
         return Pursuit(self._mission, self._settings, laid, sight_m, self._runner, self._log, self._tell, self._rng)
-
-    def _check_mission(self, now_s: float) -> None:
-        """Whether the mission can be laid out at all comes out before anybody arms. Raises MissionError."""
-        vehicle, pose = self.vehicle, self.vehicle.pose_at(now_s)
-        if self._mission_checked or vehicle.origin is None or vehicle.home is None or pose is None:
-            return
-        self._mission_checked = True
-        lay(self._mission, self._settings.mapping, vehicle.origin.point, vehicle.home.point, pose)
-
-    def _wait_for(self, what: str) -> None:
-        if what == "the autopilot's heartbeat":
-            what = f"{what} on {self._autopilot.description}"
-            if self._autopilot.codec.refused_type is not None:
-                what += f" (heard a vehicle of type {self._autopilot.codec.refused_type}, which is no ArduPilot rover)"
-        self._reporter.doing = f"waiting for {what}"
 
     # Listening ---------------------------------------------------------------------------------------------------
 

@@ -125,7 +125,9 @@ def doubt(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
     x = (point.east_m - evidence.base.south_west.east_m) * scale
     y = (point.north_m - evidence.base.south_west.north_m) * scale
     reach = reach_m * scale
-    window = np.s_[max(0, int(y - reach)) : max(0, int(y + reach) + 1), max(0, int(x - reach)) : max(0, int(x + reach) + 1)]
+    window = np.s_[
+        max(0, int(y - reach)) : max(0, int(y + reach) + 1), max(0, int(x - reach)) : max(0, int(x + reach) + 1)
+    ]
     doubtful[window] |= occupied[window]
     found = bool(doubtful.any() or (evidence.penalty > 0.0).any())
     evidence.log_odds[doubtful] = 0.0
@@ -159,7 +161,9 @@ class Unseen:
     place: NedPoint
 
 
-def unseen_beside(evidence: EvidenceMap, start: NedPoint, end: NedPoint, offset_m: float, near_m: float) -> Unseen | None:
+def unseen_beside(
+    evidence: EvidenceMap, start: NedPoint, end: NedPoint, offset_m: float, near_m: float
+) -> Unseen | None:
     """Where the rover's flanks, ``offset_m`` beside the line, would enter ground nobody has looked at; None if nowhere.
 
     Nearer than ``near_m`` does not count: no sensor sees the ground right beside the rover.

@@ -95,7 +95,9 @@ class NavigatorSettings(Section):
 class MappingSettings(Section):
     """From ranges to field weights."""
 
-    evidence_m: float = Field(0.125, gt=0.0, description="side of an evidence cell; a whole number of them fills a field")
+    evidence_m: float = Field(
+        0.125, gt=0.0, description="side of an evidence cell; a whole number of them fills a field"
+    )
     hit: float = Field(0.9, gt=0.0, description="log-odds added where a beam ended")
     miss: float = Field(0.3, gt=0.0, description="log-odds removed where a beam passed")
     occupied_at: float = Field(0.6, gt=0.0, description="log-odds from which evidence counts as an obstacle")
@@ -127,20 +129,32 @@ class GuidanceSettings(Section):
     )
     least_reach_m: float = Field(0.4, gt=0.0, description="less clear way than this is no way")
     look_ahead_m: float = Field(1.0, gt=0.0, description="the place to turn to when the way has not been seen")
-    turn_first_deg: float = Field(60.0, gt=0.0, le=180.0, description="turn on the spot first when the target is farther aside")
+    turn_first_deg: float = Field(
+        60.0, gt=0.0, le=180.0, description="turn on the spot first when the target is farther aside"
+    )
     turn_until_deg: float = Field(40.0, gt=0.0, le=180.0, description="... until it is less than this aside")
-    turn_first_close_deg: float = Field(45.0, gt=0.0, le=180.0, description="turn_first_deg with something close beside")
-    turn_until_close_deg: float = Field(15.0, gt=0.0, le=180.0, description="turn_until_deg with something close beside")
-    roll_out_m_s: float = Field(0.3, ge=0.0, description="faster than this the rover first brakes straight, then turns on the spot")
+    turn_first_close_deg: float = Field(
+        45.0, gt=0.0, le=180.0, description="turn_first_deg with something close beside"
+    )
+    turn_until_close_deg: float = Field(
+        15.0, gt=0.0, le=180.0, description="turn_until_deg with something close beside"
+    )
+    roll_out_m_s: float = Field(
+        0.3, ge=0.0, description="faster than this the rover first brakes straight, then turns on the spot"
+    )
     reach_after_look_m: float = Field(2.5, gt=0.0, description="having turned to look, drive off when so much is clear")
-    flanks_seen_m: float = Field(0.6, ge=0.0, description="ground at the rover's flanks must be seen so far beyond the stopping distance")
+    flanks_seen_m: float = Field(
+        0.6, ge=0.0, description="ground at the rover's flanks must be seen so far beyond the stopping distance"
+    )
     turned_deg: float = Field(6.0, gt=0.0, description="turned to a place when it is this near to straight ahead")
     turn_cost: float = Field(0.45, ge=0.0, description="weight added to fields behind the rover when it plans")
     turn_reach_m: float = Field(6.0, ge=0.0, description="how far behind")
     slow_within_m: float = Field(0.6, gt=0.0, description="obstacles nearer than this beside the rover slow it down")
     deceleration_m_s2: float = Field(0.8, gt=0.0, description="what the rover brakes with")
     brake_delay_s: float = Field(0.25, ge=0.0, description="from the stop command to braking")
-    brake_on_m: float = Field(0.7, ge=0.0, description="braking goes on until the way is clear so far beyond the braking distance")
+    brake_on_m: float = Field(
+        0.7, ge=0.0, description="braking goes on until the way is clear so far beyond the braking distance"
+    )
     latency_s: float = Field(0.4, ge=0.0, description="from seeing to braking")
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
     change_after_s: float = Field(

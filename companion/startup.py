@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from companion.commands import Arm, Command, SetMode
+from companion.laying import Laid, lay
+from companion.mission.mission import Mission
 from companion.safety import Control, unsafe_reason
-from companion.settings import SafetySettings
+from companion.settings import SafetySettings, Settings
 from companion.vehicle import RoverMode, VehicleState
 
 ASK_AGAIN_S = 3.0
 """A command that has not worked is given again after so long."""
+LOOK_AGAIN_S = 2.0
+"""A rover that stands beside the mission's grid is looked at again after so long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,3 +55,50 @@ def start_step(
     if not vehicle.heartbeat.armed:
         return StartStep("arming", Arm()) if arm else StartStep("a person to arm (or run with --arm)")
     return StartStep("")
+
+
+class StartUp:
+    """The way there, tick by tick. ``missing`` says in words what is awaited."""
+
+    def __init__(self, mission: Mission, settings: Settings, *, arm: bool) -> None:
+        self.missing = ""
+        self._mission = mission
+        self._settings = settings
+        self._arm = arm
+        self._asked_s = -math.inf
+        self._look_again_s = -math.inf
+        self._checked = False
+
+    def step(self, vehicle: VehicleState, control: Control, now_s: float) -> tuple[Laid | None, Command | None]:
+        """The mission on the ground once the rover may be driven; until then the command to give now, if any.
+
+        Raises MissionError as soon as it is known that the mission cannot be laid out, before anybody arms.
+        """
+        if now_s < self._look_again_s:
+            return None, None
+        if not self._checked and self._lay(vehicle, now_s) is not None:
+            self._checked = True
+        # Whoever disarms the rover does not want it armed again by itself.
+        self._arm = self._arm and not (vehicle.heartbeat is not None and vehicle.heartbeat.armed)
+        step = start_step(vehicle, now_s, self._settings.safety, arm=self._arm, control=control)
+        self.missing = step.missing
+        if step.missing:
+            return None, self._due(step.command, now_s)
+        laid = self._lay(vehicle, now_s)
+        if laid is not None and laid.evidence.base.contains(laid.itinerary.home.cell):
+            return laid, None
+        self.missing = "the rover to stand on the mission's grid"
+        self._look_again_s = now_s + LOOK_AGAIN_S
+        return None, None
+
+    def _due(self, command: Command | None, now_s: float) -> Command | None:
+        if command is None or now_s - self._asked_s <= ASK_AGAIN_S:
+            return None
+        self._asked_s = now_s
+        return command
+
+    def _lay(self, vehicle: VehicleState, now_s: float) -> Laid | None:
+        pose = vehicle.pose_at(now_s)
+        if vehicle.origin is None or vehicle.home is None or pose is None:
+            return None
+        return lay(self._mission, self._settings.mapping, vehicle.origin.point, vehicle.home.point, pose)

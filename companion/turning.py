@@ -30,7 +30,9 @@ def with_turning_cost(grid: Grid, pose: Pose, settings: GuidanceSettings) -> Gri
     east = np.arange(columns.start, columns.start + window.shape[1])[None, :] - cell.x
     distance = np.hypot(north, east)
     forward = north * np.cos(pose.heading_rad) + east * np.sin(pose.heading_rad)
-    behind = np.where((distance > 0.0) & (distance <= reach), np.clip(-forward / np.maximum(distance, 1e-9), 0.0, 1.0), 0.0)
+    behind = np.where(
+        (distance > 0.0) & (distance <= reach), np.clip(-forward / np.maximum(distance, 1e-9), 0.0, 1.0), 0.0
+    )
     raised = np.maximum(np.minimum(window + settings.turn_cost * behind, MAX_WEIGHT), window)
     weights[rows, columns] = np.where(window >= OBSTACLE, window, raised)
     return grid.with_weights(weights)

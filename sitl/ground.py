@@ -61,7 +61,9 @@ def mission_in_world(mission: Mission, path: Path, ground: Grid, start: Cell | N
     sitl = mission.sitl or SitlSpec()
     begin = start or sitl.start or mission.grid.home or Cell(ground.width // 2, ground.height // 2)
     if not ground.contains(begin) or ground.is_obstacle(begin):
-        raise MissionError(f"{path}: field {begin.x},{begin.y} is no place to start from; give --start X,Y of a free field")
+        raise MissionError(
+            f"{path}: field {begin.x},{begin.y} is no place to start from; give --start X,Y of a free field"
+        )
     sitl = replace(sitl, world=path, resolution_m=ground.resolution_m, start=begin)
     corner = HomePoint(-(begin.y + 0.5) * ground.resolution_m, -(begin.x + 0.5) * ground.resolution_m)
     known = replace(mission, prior_map=path, prior_resolution_m=ground.resolution_m, prior_corner=corner)

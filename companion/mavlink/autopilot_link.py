@@ -56,6 +56,13 @@ class AutopilotLink:
         return self._link.description
 
     @property
+    def trouble(self) -> str:
+        """While no rover has been heard: where was listened, and who spoke instead."""
+        refused = self._codec.refused_type
+        other = "" if refused is None else f" (heard a vehicle of type {refused}, which is no ArduPilot rover)"
+        return f" on {self.description}{other}"
+
+    @property
     def codec(self) -> Codec:
         """For its counters."""
         return self._codec

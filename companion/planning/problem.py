@@ -83,7 +83,4 @@ class PlanResult:
 
 def path_cost(weights: Weights, cells: tuple[Cell, ...]) -> float:
     """Sum over the steps of length (1 or sqrt 2) times the weight of the field entered (at least MIN_WEIGHT)."""
-    return sum(
-        math.hypot(b.x - a.x, b.y - a.y) * max(float(weights[b.y, b.x]), MIN_WEIGHT)
-        for a, b in pairwise(cells)
-    )
+    return sum(math.hypot(b.x - a.x, b.y - a.y) * max(float(weights[b.y, b.x]), MIN_WEIGHT) for a, b in pairwise(cells))

@@ -36,7 +36,9 @@ def drive(
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
     record: Annotated[Path | None, typer.Option(help="Directory for the record of this run.")] = None,
     image: Annotated[Path | None, typer.Option(help="Write a PNG of map and track.")] = None,
-    map_stem: Annotated[Path | None, typer.Option("--map", help="Write what was mapped as STEM.yaml and STEM.pgm.")] = None,
+    map_stem: Annotated[
+        Path | None, typer.Option("--map", help="Write what was mapped as STEM.yaml and STEM.pgm.")
+    ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")] = None,
     sensors: Annotated[str | None, typer.Option(help="lidar-90, lidar-360 or beams instead of the mission's.")] = None,
     world: Annotated[Path | None, typer.Option(help="Map of the ground (image, ROS yaml, MovingAI .map).")] = None,

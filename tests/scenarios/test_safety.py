@@ -449,3 +449,19 @@ def test_stop_does_not_touch_a_rover_that_a_person_drives(rig: Rig) -> None:
     rig.companion.stop()
     rig.finish(2.0)
     assert [one for one in rig.sent_since(since_s) if one.moves_or_changes] == []
+
+
+def test_an_error_in_the_program_leaves_the_rover_standing_in_hold(rig: Rig, monkeypatch: pytest.MonkeyPatch) -> None:
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(rig.companion.driver, "update", broken)
+    with pytest.raises(ZeroDivisionError):
+        rig.run_for(1.0)
+    since_s = rig.now_s()
+    rig.companion.close()
+    assert rig.now_s() - since_s < 1.0
+    assert [one.message.param2 for one in rig.sent_since(since_s) if one.command == SET_MODE] == [HOLD]
+    rig.companion.close()
+    rig.simulator.advance_to_s(rig.now_s() + 3.0)
+    assert rig.speed_m_s < 0.05 and rig.simulator.collisions == ()

@@ -66,7 +66,14 @@ def test_same_seed_same_run() -> None:
 
 
 def test_drive_command_writes_what_it_promises(tmp_path: Path) -> None:
-    arguments = ["drive", str(MISSIONS / "one-obstacle.toml"), "--json", str(tmp_path / "r.json"), "--image", str(tmp_path / "r.png")]
+    arguments = [
+        "drive",
+        str(MISSIONS / "one-obstacle.toml"),
+        "--json",
+        str(tmp_path / "r.json"),
+        "--image",
+        str(tmp_path / "r.png"),
+    ]
     result = CliRunner().invoke(app, [*arguments, "--map", str(tmp_path / "m"), "--record", str(tmp_path / "rec")])
     assert result.exit_code == 0, result.output
     report = json.loads((tmp_path / "r.json").read_text())
