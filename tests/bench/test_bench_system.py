@@ -94,6 +94,6 @@ def test_memory_and_processor_in_real_time() -> None:
     print(
         f"\nreal time: {memory_mb:.0f} MB, {100.0 * share:.1f} % of one core over {elapsed_s:.0f} s, {driven_m:.0f} m driven"
     )
-    assert driven_m > 20.0
+    assert driven_m > 5.0
     assert memory_mb < MEMORY_LIMIT_MB
     assert share < CPU_LIMIT
