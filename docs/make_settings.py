@@ -1,4 +1,4 @@
-"""Writes ``settings.md`` from ``companion/settings.py``: ``.venv/bin/python docs/make_settings.py``.
+"""Writes ``settings.md`` from ``companion/settings/``: ``.venv/bin/python docs/make_settings.py``.
 
 A test compares the page with the models, so neither can change alone.
 """
@@ -29,7 +29,7 @@ UNITS = {
 
 INTRODUCTION = """# Settings
 
-<!-- Written by docs/make_settings.py from companion/settings.py. -->
+<!-- Written by docs/make_settings.py from companion/settings/. -->
 
 Every setting has a default, so no file is needed. To change some, write them into a TOML file and give it to any command with
 `--settings FILE`:

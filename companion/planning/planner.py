@@ -20,6 +20,10 @@ class Capabilities:
     optimal: bool = False
     random: bool = False
     smooth_curve: bool = False
+    any_angle: bool = False
+    moving_obstacles: bool = False
+    speeds: bool = False
+    turning_radius: bool = False
 
 
 class Planner(Protocol):

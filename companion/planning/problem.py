@@ -17,17 +17,46 @@ MIN_WEIGHT = 0.01
 
 
 @dataclass(frozen=True, eq=False, slots=True)
+class Mover:
+    """A moving obstacle: a disc whose centre goes along straight segments.
+
+    ``track`` has shape (n, 3): columns time in seconds from the moment of planning, rising, then x and y in fields (field
+    centres at whole numbers). Between the rows it moves evenly; before the first and after the last it stands there.
+    ``radius_fields`` has the rover's own radius in it, as the map has.
+    """
+
+    radius_fields: float
+    track: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Motion:
+    """How the vehicle moves, for planners that ask.
+
+    ``heading_rad``: at the start, 0 along +x, growing towards +y; None: any. ``turning_radius_fields``: the tightest arc it can
+    drive; 0: it turns on the spot. ``speeds_fields_s``: the slowest and the fastest it may be told to go.
+    """
+
+    heading_rad: float | None = None
+    turning_radius_fields: float = 0.0
+    speeds_fields_s: tuple[float, float] = (0.2, 2.0)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
 class PlanningProblem:
     """Find a path over ``weights`` (shape (height, width), 1 = obstacle) from ``start`` to ``target``.
 
     ``corner_cutting`` allows a diagonal step past the corner of an obstacle, as the papers do; off, both orthogonal
-    neighbours of a diagonal step must be free. Planners never write to ``weights``.
+    neighbours of a diagonal step must be free. Planners never write to ``weights``. ``movers`` and ``motion`` count only
+    for planners whose capabilities say so.
     """
 
     weights: Weights
     start: Cell
     target: Cell
     corner_cutting: bool = False
+    movers: tuple[Mover, ...] = ()
+    motion: Motion = Motion()
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,12 +85,14 @@ class Path:
     """The fields from start to target, each 8-adjacent to the one before.
 
     ``cost``: see ``path_cost``. ``curve``, if the planner has one, is the smooth line the fields came from: shape (n, 2),
-    columns x and y in fields, field centres at whole numbers.
+    columns x and y in fields, field centres at whole numbers. ``speeds_fields_s``, if the planner chooses them, has
+    shape (n - 1,): the speed from each point of the curve to the next.
     """
 
     cells: tuple[Cell, ...]
     cost: float
     curve: NDArray[np.float64] | None = None
+    speeds_fields_s: NDArray[np.float64] | None = None
 
     @property
     def length_fields(self) -> float:

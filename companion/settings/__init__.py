@@ -1,0 +1,32 @@
+"""Every setting of the companion, with its default, unit and meaning, and the file they are read from."""
+
+from companion.settings.planners import PlannerSettings
+from companion.settings.section import Section, SettingsError
+from companion.settings.settings import (
+    GuidanceSettings,
+    LinkSettings,
+    MappingSettings,
+    NavigatorSettings,
+    SafetySettings,
+    SearchSettings,
+    Settings,
+    describe_first,
+    load_settings,
+    parse_settings,
+)
+
+__all__ = [
+    "GuidanceSettings",
+    "LinkSettings",
+    "MappingSettings",
+    "NavigatorSettings",
+    "PlannerSettings",
+    "SafetySettings",
+    "SearchSettings",
+    "Section",
+    "Settings",
+    "SettingsError",
+    "describe_first",
+    "load_settings",
+    "parse_settings",
+]

@@ -1,0 +1,15 @@
+"""What every group of settings is."""
+
+from __future__ import annotations
+
+from pydantic import BaseModel, ConfigDict
+
+
+class SettingsError(Exception):
+    """A settings file that cannot be used; the text is one line with file, place and reason."""
+
+
+class Section(BaseModel):
+    """A group of settings: immutable, unknown names refused."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
