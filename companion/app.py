@@ -246,6 +246,9 @@ class Companion:
     def _begin(self, now_s: float) -> Pursuit | None:
         """Everything before the first metre; once the rover may be driven, the mission on the map."""
         self.watch = Watch(latched(self.watch.control, self.vehicle))
+        if self._autopilot.twin_heard(now_s):
+            self._reporter.doing = "waiting for another companion with the same component id to fall silent"
+            return None
         laid, command = self._start_up.step(self.vehicle, self.watch.control, now_s)
         if command is not None:
             self._send(command, now_s)
@@ -353,6 +356,8 @@ class Companion:
     def _tell_of_faults(self, now_s: float) -> None:
         """What a person should know though it stops nothing, once each."""
         if self._pursuit is not None:
+            if self._autopilot.twin_heard(now_s):
+                self._tell_once("Another companion speaks as this component: stop one of them")
             for text in self._reporter.faults(self._autopilot.rate_faults, self._log.problem, now_s):
                 self._tell_once(text)
 

@@ -53,11 +53,12 @@ class Recorder:
     """Writes a directory: ``link.tlog`` (both directions, as ground stations write it), ``decisions.jsonl``, ``meta.json`` and a
     copy of the mission file.
 
-    Raises RecordError if the directory cannot be written. Later a full disk ends the record, never the run: see ``problem``.
+    A directory that has a record keeps it: the new one goes to the same name with a number, see ``directory``. Raises
+    RecordError if the directory cannot be written. Later a full disk ends the record, never the run: see ``problem``.
     """
 
     def __init__(self, directory: Path, mission_file: Path | None, settings: Settings, seed: int) -> None:
-        self._directory = directory
+        self.directory = unused(directory)
         self._files: list[IO[bytes]] = []
         self._clock_at_start_s: float | None = None
         self._flushed_s = 0.0
@@ -66,16 +67,16 @@ class Recorder:
         self.problem = ""
         """Why the record ends early; empty while all is well."""
         try:
-            directory.mkdir(parents=True, exist_ok=True)
+            self.directory.mkdir(parents=True, exist_ok=True)
             if mission_file is not None:
-                shutil.copyfile(mission_file, directory / f"mission{mission_file.suffix}")
+                shutil.copyfile(mission_file, self.directory / f"mission{mission_file.suffix}")
             self._write_meta()
             self._packets = self._open("link.tlog")
             self._decisions = self._open("decisions.jsonl")
         except OSError as error:
             self.close()
             raise RecordError(
-                f"{directory}: cannot record here: {error.strerror or error}; choose a directory that can be written"
+                f"{self.directory}: cannot record here: {error.strerror or error}; choose a directory that can be written"
             ) from error
 
     def packet(self, time_s: float, raw: bytes) -> None:
@@ -107,7 +108,7 @@ class Recorder:
         self._files = []
 
     def _open(self, name: str) -> IO[bytes]:
-        file = (self._directory / name).open("wb")
+        file = (self.directory / name).open("wb")
         self._files.append(file)
         return file
 
@@ -128,7 +129,7 @@ class Recorder:
             self.close()
 
     def _ended(self, error: OSError) -> str:
-        return f"{self._directory}: the record has ended: {error.strerror or error}"
+        return f"{self.directory}: the record has ended: {error.strerror or error}"
 
     def _unix_us(self, time_s: float) -> int:
         first_s = time_s if self._clock_at_start_s is None else self._clock_at_start_s
@@ -136,7 +137,16 @@ class Recorder:
 
     def _write_meta(self) -> None:
         meta = {**self._meta, "clock_at_start_s": self._clock_at_start_s}
-        (self._directory / "meta.json").write_text(json.dumps(meta, indent=2) + "\n", encoding="utf-8")
+        (self.directory / "meta.json").write_text(json.dumps(meta, indent=2) + "\n", encoding="utf-8")
+
+
+def unused(directory: Path) -> Path:
+    """The directory itself, or with the first number from 2 on that has no record in it yet."""
+    candidate, number = directory, 2
+    while (candidate / "meta.json").exists():
+        candidate = directory.with_name(f"{directory.name}-{number}")
+        number += 1
+    return candidate
 
 
 def _meta(mission_file: Path | None, settings: Settings, seed: int, start_us: int) -> dict[str, object]:

@@ -54,7 +54,7 @@ class Reporter:
         slow = {fault.message_id: self._slow_since_s.get(fault.message_id, now_s) for fault in rates}
         self._slow_since_s = slow
         texts = {
-            f"{fault.name} too seldom": f"{fault.name}: {fault.measured_hz:.1f} Hz instead of {fault.wanted_hz:g}"
+            f"{fault.name} too seldom": f"{fault.name}: {fault.measured_hz:.1f} Hz instead of {fault.wanted_hz:g}, asking again"
             for fault in rates
             if now_s - slow[fault.message_id] >= FAULT_AFTER_S
         }

@@ -26,7 +26,9 @@ def field_at(ground: Grid, text: str, option: str, *, top_left: bool) -> Cell:
     if not ground.contains(cell):
         raise MissionError(f"{option} {text}: outside the map of {ground.width} x {ground.height} fields")
     if ground.is_obstacle(cell):
-        raise MissionError(f"{option} {text}: this field of the map is an obstacle")
+        raise MissionError(
+            f"{option} {text}: this field of the map is an obstacle or unknown ground (fields of {ground.resolution_m:g} m)"
+        )
     return cell
 
 

@@ -22,6 +22,16 @@ def usable_settings(path: Path | None) -> Settings:
     return settings
 
 
+PICTURES = (".png", ".jpg", ".jpeg")
+
+
+def picture(path: Path | None) -> None:
+    """Like ``writable``, for a picture, whose suffix tells its format. Raises OutputError."""
+    if path is not None and path.suffix.lower() not in PICTURES:
+        raise OutputError(f"{path}: not a suffix of a picture format, use .png")
+    writable(path)
+
+
 def writable(path: Path | None, suffix: str = "") -> None:
     """Make the directory of an output file and try the file itself, before hours are driven. Raises OutputError."""
     if path is None:

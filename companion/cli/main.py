@@ -1,31 +1,18 @@
-"""``rover-companion``: puts the commands together."""
+"""``rover-companion``: the script. Nothing heavy is imported before it has begun."""
 
 from __future__ import annotations
 
-import typer
+from collections.abc import Callable
 
-from companion.cli import mission
-from companion.cli.plan import plan
-from companion.cli.run import run
-
-app = typer.Typer(
-    name="rover-companion",
-    help="Finds a rover's way to a mission's targets through unknown ground.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-app.command()(run)
-app.command()(plan)
-app.add_typer(mission.app)
-
-
-@app.callback()
-def options() -> None:
-    """Finds a rover's way to a mission's targets through unknown ground."""
+from companion.cli.entry import start
 
 
 def main() -> None:
     """Entry point of the ``rover-companion`` script."""
-    app()
+    raise SystemExit(start("rover-companion", _commands))
+
+
+def _commands() -> Callable[..., object]:
+    from companion.cli.commands import app
+
+    return app

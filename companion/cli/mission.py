@@ -10,15 +10,16 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from companion.frames import GeoPoint
+from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.grid import OBSTACLE, Cell, Grid
 from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, Mission, MissionError, Place
+from companion.mission.resolve import resolve
 
 EXIT_BAD_INPUT = 2
 
-app = typer.Typer(name="mission", help="Mission files.", no_args_is_help=True)
+app = typer.Typer(name="mission", help="Mission files.")
 
 
 @app.callback()
@@ -34,10 +35,27 @@ def check(
     try:
         mission = load_mission(mission_file)
         maps = _maps(mission)
+        _lay_out(mission)
     except (MissionError, MapError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     show(mission, maps, Console(highlight=False))
+
+
+def _lay_out(mission: Mission) -> None:
+    """Lay the mission on the ground as at the start of a run, where the file alone says where home is.
+
+    Targets inside a fence, or a grid too large, are found now. A rover's own home may differ from the one that a
+    ground station planned with, so of a mission in degrees only what is in the file can be said. Raises MissionError.
+    """
+    degrees = any(isinstance(place, GeoPoint) for place in _all_places(mission))
+    if not degrees:
+        resolve(mission, LocalFrame(GeoPoint(0.0, 0.0)), NedPoint(0.0, 0.0))
+
+
+def _all_places(mission: Mission) -> list[Place]:
+    areas = [*mission.keep_out, *mission.keep_in, *(weighted.area for weighted in mission.weighted)]
+    return [*(target.place for target in mission.targets), *(place for area in areas for place in area.places)]
 
 
 def show(mission: Mission, maps: list[str], console: Console) -> None:
@@ -110,7 +128,8 @@ def place_text(place: Place) -> str:
         return f"{place.lat_deg:.7f}, {place.lon_deg:.7f}"
     if place.north_m == place.east_m == 0.0:
         return "home"
-    return f"{place.north_m:g} m north, {place.east_m:g} m east of home"
+    north_south = f"{abs(place.north_m):g} m {'south' if place.north_m < 0.0 else 'north'}"
+    return f"{north_south}, {abs(place.east_m):g} m {'west' if place.east_m < 0.0 else 'east'} of home"
 
 
 def area_text(area: Area) -> str:

@@ -12,7 +12,8 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from companion.cli.plan_image import ImageError, save_image
+from companion.cli.inputs import OutputError, picture
+from companion.cli.plan_image import save_image
 from companion.clock import stopwatch_s
 from companion.grid import Cell, Grid
 from companion.mapfiles import MapError, load_map
@@ -63,10 +64,11 @@ def plan(
             place_of("--start", start, grid, top_left),
             place_of("--target", target, grid, top_left),
         )
+        picture(image)
         answer = search(grid, problem, planner or settings.navigator.planner, settings, seed, top_left)
         if image is not None:
             save_image(image, grid, problem.start, problem.target, answer.result.path)
-    except (SettingsError, MapError, PlaceError, UnknownPlannerError, ImageError) as error:
+    except (SettingsError, MapError, PlaceError, UnknownPlannerError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     typer.echo(as_text(answer)) if as_json else Console().print(as_table(answer))

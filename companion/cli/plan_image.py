@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path as FilePath
 
 import numpy as np
-from PIL import Image, ImageDraw
+from PIL import Image, ImageDraw, ImageFont
 
+from companion.cli.inputs import OutputError
 from companion.grid import OBSTACLE, Cell, Grid
 from companion.planning.problem import Path
 
@@ -18,23 +19,17 @@ PATH_COLOUR, CURVE_COLOUR = (214, 60, 50), (40, 110, 200)
 START_COLOUR, TARGET_COLOUR = (30, 150, 80), (240, 140, 20)
 
 
-class ImageError(Exception):
-    """A picture that cannot be written; the text is one line with file and reason."""
-
-
 def save_image(file: FilePath, grid: Grid, start: Cell, target: Cell, path: Path | None) -> None:
-    """Draw and write a picture; the suffix tells the format. Raises ImageError."""
+    """Draw and write a picture; the suffix tells the format. Raises OutputError."""
     picture = draw(grid, start, target, path)
     try:
         picture.save(file)
     except OSError as error:
-        raise ImageError(f"{file}: cannot be written: {error.strerror or error}") from error
-    except ValueError as error:
-        raise ImageError(f"{file}: not a suffix of a picture format, use .png") from error
+        raise OutputError(f"{file}: cannot be written: {error.strerror or error}") from error
 
 
 def draw(grid: Grid, start: Cell, target: Cell, path: Path | None) -> Image.Image:
-    """Map in greys (costly ground is darker), path red, its curve blue, start green and target orange."""
+    """Map in greys (costly ground is darker), path red, its curve blue, start green and target orange; a legend below."""
     scale = max(1, SIDE_PIXELS // max(grid.width, grid.height))
     shade = (250.0 - 130.0 * np.clip(grid.weights, 0.0, 1.0)).astype(np.uint8)
     pixels = np.repeat(shade[:, :, None], 3, axis=2)
@@ -56,4 +51,23 @@ def draw(grid: Grid, start: Cell, target: Cell, path: Path | None) -> Image.Imag
     for cell, colour in ((start, START_COLOUR), (target, TARGET_COLOUR)):
         x, y = at(cell.x, cell.y)
         pen.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
-    return picture
+    return _with_legend(picture, path)
+
+
+def _with_legend(picture: Image.Image, path: Path | None) -> Image.Image:
+    """The picture with a strip below that says what the colours mean."""
+    entries = [("start", START_COLOUR), ("target", TARGET_COLOUR), ("obstacle", OBSTACLE_COLOUR)]
+    if path is not None:
+        entries.append(("path, field by field", PATH_COLOUR))
+        if path.curve is not None:
+            entries.append(("its smooth curve", CURVE_COLOUR))
+    size = max(picture.width // 60, 10)
+    font = ImageFont.load_default(size)
+    page = Image.new("RGB", (picture.width, picture.height + 2 * size), "white")
+    page.paste(picture)
+    pen, x, y = ImageDraw.Draw(page), size // 2, picture.height + size // 2
+    for name, colour in entries:
+        pen.rectangle((x, y, x + size, y + size), colour)
+        pen.text((x + 1.5 * size, y + size / 2), name, (20, 20, 20), font, anchor="lm")
+        x += int(2.5 * size + pen.textlength(name, font))
+    return page

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 from pathlib import Path
 from types import FrameType
@@ -52,7 +53,10 @@ def run(
             with console.status("compiling the planner (once a machine) ..."):
                 warm_up(settings)
             link.read()  # what piled up meanwhile is old
-            missed = _drive(mission, settings, link, recorder, console, stop, record, seed=seed, arm=arm)
+            place = recorder.directory if isinstance(recorder, Recorder) else None
+            if place != record:
+                console.print(f"{record} has a record already; this one goes to {place}", soft_wrap=True)
+            missed = _drive(mission, settings, link, recorder, console, stop, place, seed=seed, arm=arm)
     except (SettingsError, MissionError, MapError, LinkError, RecordError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -86,12 +90,13 @@ def _drive(
         runner.close()
         link.close()
         recorder.close()
-    for name, status in companion.statuses():
-        typer.echo(f"{name}: {status}")
-    if record is not None:
-        _save_map(companion, record)
-        if recorder.problem:
-            typer.echo(recorder.problem, err=True)
+    with contextlib.suppress(OSError):  # nobody reads on: the exit code still tells
+        for name, status in companion.statuses():
+            typer.echo(f"{name}: {status}")
+        if record is not None:
+            _save_map(companion, record)
+            if recorder.problem:
+                typer.echo(recorder.problem, err=True)
     return any(status is not TargetStatus.REACHED for _, status in companion.statuses())
 
 

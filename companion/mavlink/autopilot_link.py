@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -21,6 +22,8 @@ PLACES_S = 2.0
 """Origin and home are asked for this often until known,"""
 PLACES_AGAIN_S = 30.0
 """and then this often, for the autopilot says only once when it has moved them."""
+TWIN_S = 3.5
+"""Another companion's heartbeat counts for so long."""
 
 
 class PacketLog(Protocol):
@@ -49,6 +52,8 @@ class AutopilotLink:
         self._heartbeat_s = -math.inf
         self._places_s = -math.inf
         self._home_known = False
+        self._own: deque[bytes] = deque(maxlen=8)
+        self._twin_s = -math.inf
 
     @property
     def description(self) -> str:
@@ -77,6 +82,10 @@ class AutopilotLink:
         """Messages that come at less than half the rate asked for."""
         return self._rates.faults
 
+    def twin_heard(self, now_s: float) -> bool:
+        """Whether somebody else has just spoken as this very component: two companions would steer one rover."""
+        return now_s - self._twin_s < TWIN_S
+
     def last_ack(self, command: Command) -> AckSeen | None:
         """The last answer to a command of this kind (result -1: never answered); None while there is none."""
         return self._acks.last(command)
@@ -86,6 +95,8 @@ class AutopilotLink:
         events: list[Event] = []
         for packet in self._codec.packets(self._link.read()):
             self._log.packet(now_s, packet.raw)
+            if self._codec.is_own_heartbeat(packet) and packet.raw not in self._own:  # some networks send all back
+                self._twin_s = now_s
             for event in self._codec.decode_packet(packet, now_s):
                 self._note(event)
                 events.append(event)
@@ -148,3 +159,5 @@ class AutopilotLink:
         for raw in self._codec.encode_packets(command, repetition):
             self._log.packet(now_s, raw)
             self._link.write(raw)
+            if isinstance(command, Heartbeat):
+                self._own.append(raw)

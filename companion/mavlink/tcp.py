@@ -6,8 +6,8 @@ import select
 import socket
 
 from companion.clock import Clock
-from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, LinkError, OutBuffer
-from companion.mavlink.udp import resolve
+from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, OutBuffer
+from companion.mavlink.udp import cannot_listen, resolve
 
 CONNECT_TIMEOUT_S = 5.0
 UNACKNOWLEDGED_LIMIT_MS = 5000
@@ -155,9 +155,7 @@ class TcpServerLink:
             self._listener.listen(1)
         except OSError as error:
             self._listener.close()
-            raise LinkError(
-                f"{self._name}: cannot listen: {error.strerror}; stop the other program or choose another port"
-            ) from error
+            raise cannot_listen(self._name, error) from error
 
     @property
     def description(self) -> str:

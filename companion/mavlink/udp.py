@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import socket
 from typing import Any
 
@@ -19,6 +20,14 @@ def resolve(host: str, port: int, kind: socket.SocketKind, what: str) -> tuple[s
     except (OSError, UnicodeError) as error:
         raise LinkError(f"{what}: host '{host}' is not known; check the name or use its number ({error})") from error
     return family, address
+
+
+def cannot_listen(what: str, error: OSError) -> LinkError:
+    """The address exists on this computer but is taken, or does not exist on it at all."""
+    remedy = "stop the other program or choose another port"
+    if error.errno == errno.EADDRNOTAVAIL:
+        remedy = "this computer has no such address, 0.0.0.0 listens on all it has"
+    return LinkError(f"{what}: cannot listen: {error.strerror}; {remedy}")
 
 
 class UdpLink:
@@ -40,9 +49,7 @@ class UdpLink:
                 self._socket.bind(address)
             except OSError as error:
                 self._socket.close()
-                raise LinkError(
-                    f"{self._name}: cannot listen: {error.strerror}; stop the other program or choose another port"
-                ) from error
+                raise cannot_listen(self._name, error) from error
 
     @property
     def description(self) -> str:

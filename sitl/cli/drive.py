@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from companion.app import Status
-from companion.cli.inputs import OutputError, usable_settings, writable
+from companion.cli.inputs import OutputError, picture, usable_settings, writable
 from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError, SitlSpec
@@ -40,7 +40,7 @@ def drive(
         Path | None, typer.Option("--map", help="Write what was mapped as STEM.yaml and STEM.pgm.")
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")] = None,
-    sensors: Annotated[str | None, typer.Option(help="lidar-90, lidar-360 or beams instead of the mission's.")] = None,
+    sensors: Annotated[str | None, typer.Option(help="lidar-90, lidar-360 or beams; default: the mission's.")] = None,
     world: Annotated[Path | None, typer.Option(help="Map of the ground (image, ROS yaml, MovingAI .map).")] = None,
     start: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to start from.")] = None,
     target: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to reach.")] = None,
@@ -59,9 +59,10 @@ def drive(
         mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
         if sensors is not None:
             mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=sensors))
+        _refuse_blind(mission)
         scenario = scenario_from_mission(mission)
         recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
-        writable(image)
+        picture(image)
         writable(json_file)
         writable(map_stem, ".yaml")
         with console.status("compiling (once a machine) ..."):
@@ -78,9 +79,18 @@ def drive(
     if map_stem is not None:
         run.companion.save_map(map_stem)
         console.print(f"map:     {map_stem}.yaml")
+    if isinstance(recorder, Recorder):
+        console.print(f"record:  {recorder.directory}")
     if json_file is not None:
         json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
     raise typer.Exit(report.exit_code)
+
+
+def _refuse_blind(mission: Mission) -> None:
+    if mission.sitl is not None and mission.sitl.sensors == "none":
+        raise MissionError(
+            "sensors none: the companion does not drive without range data; none is for rover-sitl serve"
+        )
 
 
 def _mission(
@@ -154,8 +164,8 @@ def _print_summary(report: Report, console: Console) -> None:
         "collisions": f"{report.collisions}",
         "driven": f"{report.distance_m:.1f} m in {report.driving_time_s:.0f} s ({speed:.2f} m/s)",
         "steps": f"{report.steps} fields, {report.return_steps} of them going back, {report.searches} searches",
-        "stuck": f"{report.stuck} times",
-        "planning": f"{1e3 * report.planning_time_s:.1f} ms in all; 99 % of ticks within {report.tick_p99_ms:.2f} ms",
+        "stuck": "never" if report.stuck == 0 else f"{report.stuck} x",
+        "planning": f"{1e3 * report.planning_time_s:.1f} ms in all; 99 % of rounds (20 a second) within {report.tick_p99_ms:.2f} ms",
         "time": f"{report.sim_time_s:.0f} s simulated in {report.wall_time_s:.1f} s "
         f"({report.sim_time_s / max(report.wall_time_s, 1e-9):.0f} times real time)",
         "compilation": f"{report.compile_time_s:.1f} s (kept for the next run)",

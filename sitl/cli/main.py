@@ -1,32 +1,18 @@
-"""``rover-sitl``: puts the commands together."""
+"""``rover-sitl``: the script. Nothing heavy is imported before it has begun."""
 
 from __future__ import annotations
 
-import typer
+from collections.abc import Callable
 
-from sitl.cli.drive import drive
-from sitl.cli.experiment import experiment
-from sitl.cli.serve import serve
-
-app = typer.Typer(
-    name="rover-sitl",
-    help="A light rover simulator that speaks ArduRover's MAVLink.",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-
-@app.callback()
-def _commands() -> None:
-    """Keeps ``serve`` a named command, however many there are."""
-
-
-app.command()(drive)
-app.command()(serve)
-app.command()(experiment)
+from companion.cli.entry import start
 
 
 def main() -> None:
     """Entry point of the ``rover-sitl`` script."""
-    app()
+    raise SystemExit(start("rover-sitl", _commands))
+
+
+def _commands() -> Callable[..., object]:
+    from sitl.cli.commands import app
+
+    return app

@@ -33,6 +33,11 @@ def save(figure: Figure, file: Path) -> Path:
     return file
 
 
+def figures(value: float) -> str:
+    """A number with two significant figures and no exponent."""
+    return f"{float(f'{value:.2g}'):g}" if abs(value) < 1e5 else f"{value:.0f}"
+
+
 def title(panel: Any, text: str) -> None:
     """A panel's heading."""
     panel.set_title(text, loc="left", fontsize=10, fontweight="bold")

@@ -99,7 +99,7 @@ class Entry:
 
     def first_times(self) -> str:
         """The first three times as the paper gives them."""
-        return " ".join(f"{t.time_ms:.2g}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN])
+        return " ".join(f"{drawing.figures(t.time_ms)}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN])
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ class TableReport:
         return figure
 
 
-HEAD = ("method", "3 runs, ms", "median", "found", "paper's 3, s")
+HEAD = ("method", "first 3, ms", "median", "found", "paper's 3, s")
 
 
 def run(options: Options, advance: Advance) -> TableReport:
@@ -223,7 +223,7 @@ def _row(entry: Entry) -> list[str]:
     return [
         entry.method,
         entry.first_times(),
-        f"{entry.median_ms:.2g}",
+        drawing.figures(entry.median_ms),
         f"{entry.found}/{len(entry.trials)}",
         _paper_times(entry),
     ]

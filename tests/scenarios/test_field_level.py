@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from sitl.cli.main import app
+from sitl.cli.commands import app
 
 ROOT = Path(__file__).resolve().parents[2]
 RUNS = 6

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from companion.cli.main import app
+from companion.cli.commands import app
 from companion.mapfiles import load_map
 from companion.mission.load import load_mission
 from tests.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard

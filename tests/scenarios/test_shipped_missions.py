@@ -11,7 +11,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import SitlSpec
 from companion.recorder import NullRecorder
 from companion.settings import Settings, parse_settings
-from sitl.cli.main import app
+from sitl.cli.commands import app
 from sitl.lockstep import Drive, Report
 from sitl.scenario import scenario_from_mission
 

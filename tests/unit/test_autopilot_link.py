@@ -279,3 +279,14 @@ class TestReadBack:
         assert bench.link.target_confirmed is None
         bench.link.service(20.0)
         assert bench.link.target_confirmed is None
+
+
+def test_another_companion_is_noticed_and_our_own_echo_is_not() -> None:
+    bench, twin = Bench(), Station(1, 191)
+    bench.link.service(1.0)
+    bench.hear(1.1, bench.far.read())
+    assert not bench.link.twin_heard(1.2), "a network that sends everything back is no second companion"
+    for _ in range(20):
+        raw = twin.heartbeat(kind=18, autopilot=8)
+    bench.hear(2.0, raw)
+    assert bench.link.twin_heard(2.1) and not bench.link.twin_heard(6.0)

@@ -14,8 +14,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-import companion.cli.main
-import sitl.cli.main
+import companion.cli.commands
+import sitl.cli.commands
 from companion.settings import parse_settings
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,7 +25,7 @@ PAGES = [
     ROOT / "missions" / "README.md",
     *sorted((ROOT / "docs").glob("*.md")),
 ]
-APPS = {"rover-companion": companion.cli.main.app, "rover-sitl": sitl.cli.main.app}
+APPS = {"rover-companion": companion.cli.commands.app, "rover-sitl": sitl.cli.commands.app}
 FORBIDDEN = re.compile(r"/work\b|/root\b|/tmp\b|/home/", re.IGNORECASE)
 
 pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))

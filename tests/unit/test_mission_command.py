@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from companion.cli.main import app
+from companion.cli.commands import app
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 
@@ -54,3 +54,16 @@ def test_a_bad_world_is_found_too(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["mission", "check", str(path)])
     assert result.exit_code == 2
     assert result.output.count("\n") == 1 and "w.png: header" in result.output
+
+
+@pytest.mark.parametrize(
+    ("north_m", "reason"), [(30.0, "target 1 'target 1': lies in"), (30000.0, "are more than 4000000")]
+)
+def test_a_mission_that_could_never_begin_is_refused(tmp_path: Path, north_m: float, reason: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(
+        f"[[target]]\nnorth_m = {north_m}\neast_m = 0\n[[keep_out]]\nnorth_m = 30\neast_m = 0\nradius_m = 4\n"
+    )
+    result = CliRunner().invoke(app, ["mission", "check", str(path)])
+    assert result.exit_code == 2 and result.output.count("\n") == 1
+    assert str(path) in result.output and reason in result.output

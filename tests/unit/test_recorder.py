@@ -126,3 +126,13 @@ def test_no_record_takes_everything() -> None:
     recorder.write_decision(0.0, "x", DECISION)
     recorder.close()
     assert recorder.problem == ""
+
+
+def test_an_earlier_record_is_kept(tmp_path: Path, mission: Path) -> None:
+    places = []
+    for seed in range(3):
+        recorder = Recorder(tmp_path / "run", mission, Settings(), seed)
+        recorder.close()
+        places.append(recorder.directory)
+    assert [place.name for place in places] == ["run", "run-2", "run-3"]
+    assert [json.loads((place / "meta.json").read_text())["seed"] for place in places] == [0, 1, 2]

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
-from sitl.cli.main import app
+from sitl.cli.commands import app
 from sitl.server import Endpoint, ListenError, datagrams, open_endpoint, serve
 from sitl.simulator import Simulator
 from tests.sitl_client import open_ground

@@ -1,0 +1,25 @@
+"""The commands of ``rover-companion``."""
+
+from __future__ import annotations
+
+import typer
+
+from companion.cli import mission
+from companion.cli.plan import plan
+from companion.cli.run import run
+
+app = typer.Typer(
+    name="rover-companion",
+    help="Finds a rover's way to a mission's targets through unknown ground.",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+app.command()(run)
+app.command()(plan)
+app.add_typer(mission.app)
+
+
+@app.callback()
+def options() -> None:
+    """Finds a rover's way to a mission's targets through unknown ground."""

@@ -1,0 +1,41 @@
+"""How a script begins and ends, whatever its commands: interrupts and wrong usage in one line."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable
+from typing import cast
+
+EXIT_USAGE, EXIT_STOPPED = 2, 130
+
+
+def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
+    """Load the commands and run one; the exit code.
+
+    Loading them imports the compiler and takes most of a second, in which an interrupt must not end in a traceback.
+    """
+    try:
+        return _run(name, load())
+    except KeyboardInterrupt:
+        return EXIT_STOPPED
+
+
+def _run(name: str, commands: Callable[..., object]) -> int:
+    import typer
+
+    # typer brings a click of its own and does not name the class that all wrong usage has in common.
+    usage_error = cast(type[typer.BadParameter], typer.BadParameter.__base__)
+    try:
+        code = commands(prog_name=name, standalone_mode=False)
+    except typer.Abort:
+        return EXIT_STOPPED
+    except usage_error as error:
+        where = error.ctx.command_path if error.ctx is not None else name
+        print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)
+        return EXIT_USAGE
+    except BrokenPipeError:
+        # The reader has what it wanted (`... | head`). Python would complain once more when it flushes at the end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 1
+    return code if isinstance(code, int) else 0

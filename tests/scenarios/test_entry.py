@@ -1,0 +1,45 @@
+"""How the scripts begin and end: wrong usage and an interrupt during the imports."""
+
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+SCRIPTS = {"rover-companion": "companion", "rover-sitl": "sitl"}
+
+
+def command(name: str, *arguments: str) -> list[str]:
+    return [sys.executable, "-c", f"from {SCRIPTS[name]}.cli.main import main; main()", *arguments]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (("rover-sitl", "drive", "--seed", "-1"), "'--seed'"),
+        (("rover-sitl", "fly"), "No such command 'fly'"),
+        (("rover-sitl",), "Missing command"),
+        (("rover-companion", "run", "missions/open.toml"), "Missing option '--connect'"),
+        (("rover-sitl", "drive", "missions/open.toml", "--sensors", "none"), "does not drive without range data"),
+        (("rover-sitl", "drive", "missions/open.toml", "--image", "open.doc"), "not a suffix of a picture format"),
+    ],
+)
+def test_wrong_usage_gets_one_line_and_exit_code_2(arguments: tuple[str, ...], what: str) -> None:
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert done.stdout == "" and done.stderr.count("\n") == 1 and what in done.stderr
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_an_interrupt_while_it_loads_is_no_traceback(name: str) -> None:
+    quiet = 0
+    for delay_s in (0.15, 0.3, 0.45):
+        arguments = command(name, "--help")
+        with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            time.sleep(delay_s)
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=30)
+        # Before our first line runs, the interpreter itself may still be starting: that is not ours.
+        quiet += "cli/" not in errors and process.returncode in (0, 130)
+    assert quiet >= 1
