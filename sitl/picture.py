@@ -72,10 +72,10 @@ def _draw_map(axes: Axes, run: Drive) -> None:
     picture: NDArray[np.float64] = np.zeros((grid.height, grid.width, 4))
     picture[known_fields(evidence)] = (0.85, 0.93, 0.82, 0.6)
     picture[grid.weights >= OBSTACLE] = (0.15, 0.15, 0.15, 0.85)
-    closed = (evidence.base.weights >= OBSTACLE) & ~known_fields(evidence)
+    closed = evidence.base.weights >= OBSTACLE
     if closed.any():
         picture[closed] = (0.80, 0.62, 0.40, 0.75)
-        axes.plot([], [], "s", color="#cc9e66", label="closed: fence or known map")
+        axes.plot([], [], "s", color="#cc9e66", label="closed from the start: fence or known map")
     axes.imshow(picture, origin="lower", extent=extent, interpolation="nearest")
     axes.plot([], [], "s", color="#262626", label="obstacle in the companion's map")
     axes.plot([], [], "s", color="#dcefd8", label="seen free")

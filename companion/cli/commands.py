@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 from companion.cli import mission
+from companion.cli.bench import bench
 from companion.cli.plan import plan
 from companion.cli.run import run
 
@@ -17,6 +18,7 @@ app = typer.Typer(
 
 app.command()(run)
 app.command()(plan)
+app.command()(bench)
 app.add_typer(mission.app)
 
 

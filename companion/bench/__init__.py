@@ -1,0 +1,1 @@
+"""Planners and their peers on the same maps in one run."""

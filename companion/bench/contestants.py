@@ -1,0 +1,55 @@
+"""Who takes part: our planners, and what others have installed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from companion.grid import Cell, Weights
+from companion.planning.planner import Planner
+from companion.planning.problem import Budget, PlanningProblem
+from companion.planning.raster import CellArray, as_array
+from companion.planning.registry import make_planner
+from companion.settings import PlannerSettings
+
+Found = Callable[[], CellArray] | None
+"""How to get the fields of the path found, outside the time that is measured; None: nothing found."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contestant:
+    """One way to search. ``solve(weights, start, target, seed)`` is what is timed, all preparations for a new map included.
+
+    ``random``: the seed matters. ``most_fields``: larger maps are not tried, as they would take hours or all memory. ``note``: what a
+    reader must know to compare it fairly.
+    """
+
+    name: str
+    solve: Callable[[Weights, Cell, Cell, int], Found]
+    random: bool = False
+    ours: bool = False
+    most_fields: int = 100_000_000
+    note: str = ""
+
+
+def our_planner(name: str, settings: PlannerSettings, budget: Budget) -> Contestant:
+    """A planner of the registry, made anew for every search (some remember). Raises UnknownPlannerError."""
+    capabilities = make_planner(name, settings).capabilities
+
+    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+        planner: Planner = make_planner(name, settings)
+        path = planner.plan(PlanningProblem(weights, start, target), budget, np.random.default_rng(seed)).path
+        return None if path is None else lambda: as_array(path.cells)
+
+    notes = []
+    if capabilities.smooth_curve:
+        notes.append("smooth curve")
+    if capabilities.any_angle:
+        notes.append("any angle")
+    if capabilities.optimal:
+        notes.append("optimal")
+    elif capabilities.proves_no_path:
+        notes.append("complete")
+    return Contestant(name, solve, capabilities.random, ours=True, note=", ".join(notes))

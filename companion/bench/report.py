@@ -1,0 +1,82 @@
+"""The figures as tables for people and as data."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from dataclasses import asdict
+from os import cpu_count
+
+from companion.bench.cases import Case
+from companion.bench.contestants import Contestant
+from companion.bench.measure import Entry, Limits
+
+PACKAGES = (
+    "rover-companion",
+    "numpy",
+    "numba",
+    "scipy",
+    "scikit-image",
+    "tcod",
+    "nano-astar",
+    "pyastar2d",
+    "pathfinding",
+    "pathplanning",
+    "networkx",
+    "ompl",
+)
+
+
+def where() -> str:
+    """The computer and the versions that the times depend on."""
+    versions = ", ".join(f"{name} {version}" for name in PACKAGES if (version := _version(name)))
+    return f"{platform.machine()}, {cpu_count()} processors, Python {platform.python_version()}; {versions}"
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+
+
+def short(value: float) -> str:
+    """Two significant figures, no exponent."""
+    return f"{float(f'{value:.2g}'):g}" if value < 1e5 else f"{value:.0f}"
+
+
+def head(scales: list[int]) -> list[str]:
+    """Column names of ``rows``."""
+    times = [f"{f'x{scale} ' if len(scales) > 1 else ''}ms (p99)" for scale in scales]
+    return ["planner", *times, "cost / best", "found", "MB", "remarks"]
+
+
+def rows(entries: list[Entry], contestants: list[Contestant], case: str, scales: list[int]) -> list[list[str]]:
+    """One row for each contestant that was measured on this map, fastest at the smallest size first."""
+    table = []
+    for contestant in contestants:
+        own = {e.scale: e for e in entries if (e.contestant, e.case) == (contestant.name, case)}
+        if not own:
+            continue
+        shown = [own.get(scale) for scale in scales]
+        times = [f"{short(e.median_ms)} ({short(e.p99_ms)})" if e else "-" for e in shown]
+        ratios = " ".join("-" if e is None else "none" if e.ratio is None else f"{e.ratio:.3f}" for e in shown)
+        found = " ".join(f"{e.found}/{e.runs}" if e else "-" for e in shown)
+        memory = " ".join("-" if e is None or e.memory_mb is None else f"{e.memory_mb:.0f}" for e in shown)
+        faults = sorted({_fault_text(fault) for e in own.values() for fault in e.faults})
+        remarks = "; ".join(([contestant.note] if contestant.note else []) + faults)
+        first = next(e for e in shown if e)
+        table.append((first.scale, first.median_ms, [contestant.name, *times, ratios, found, memory, remarks]))
+    return [row for _, _, row in sorted(table, key=lambda entry: entry[:2])]
+
+
+def _fault_text(fault: str) -> str:
+    return {"corner cut": "cuts corners", "obstacle": "touches obstacles"}.get(fault, fault)
+
+
+def as_json(entries: list[Entry], cases: list[Case], limits: Limits) -> dict[str, object]:
+    """Everything measured, and what it was measured with."""
+    maps = [
+        {"name": case.name, "scale": case.scale, "fields": case.fields, "problems": len(case.ends)} for case in cases
+    ]
+    return {"where": where(), "limits": asdict(limits), "maps": maps, "entries": [asdict(entry) for entry in entries]}

@@ -1,0 +1,127 @@
+"""``rover-companion bench``: every planner and its installed peers on the same maps, in one run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from companion.bench.cases import Case, map_case, paper_cases
+from companion.bench.contestants import Contestant, our_planner
+from companion.bench.measure import Entry, Limits, measure
+from companion.bench.movingai import ScenarioFileError
+from companion.bench.page import write_page
+from companion.bench.peers import installed_peers
+from companion.bench.report import as_json, head, rows
+from companion.cli.inputs import OutputError, usable_settings, writable
+from companion.mapfiles import MapError
+from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
+from companion.searching import budget_of
+from companion.settings import Settings, SettingsError
+
+EXIT_BAD_INPUT = 2
+
+
+class BenchError(ValueError):
+    """An option that makes no sense; the text is one line."""
+
+
+def bench(
+    map_files: Annotated[
+        list[Path] | None, typer.Argument(metavar="[MAP]...", help="MovingAI maps with scenario files beside them.")
+    ] = None,
+    sizes: Annotated[
+        str, typer.Option(help="Sizes of the four shipped maps, times 100 x 50; empty: none.")
+    ] = "1,4,16,40",
+    planners: Annotated[str, typer.Option(help="Names, commas between them; default: all of ours.")] = "",
+    peers: Annotated[bool, typer.Option(help="Other libraries too, those that are installed.")] = True,
+    seeds: Annotated[int, typer.Option(min=1, help="Searches of a random planner on each map.")] = 100,
+    seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
+    problems: Annotated[int, typer.Option(min=1, help="Problems of a scenario file.")] = 20,
+    cell_s: Annotated[float, typer.Option(min=0.1, help="Seconds for one planner on one map.")] = 10.0,
+    maps: Annotated[Path | None, typer.Option(help="Folder with the four maps; default: missions/maps.")] = None,
+    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
+    json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
+    docs: Annotated[Path | None, typer.Option(help="Folder whose benchmarks.md and images/ are written.")] = None,
+) -> None:
+    """Compare planners on the four shipped maps, grown to several sizes, and on MAPs. Exit code 2: bad input."""
+    console = Console()
+    try:
+        settings = usable_settings(settings_file)
+        writable(json_file)
+        cases = _cases(map_files or [], sizes, maps, problems)
+        contestants = _contestants(planners, settings, console, peers=peers)
+        limits = Limits(seeds, seed, cell_s)
+        with console.status("compiling (once a machine) ..."):
+            warm_up()
+        entries = _with_progress(contestants, cases, limits, console)
+    except (SettingsError, MapError, ScenarioFileError, UnknownPlannerError, OutputError, BenchError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+    for table in _tables(entries, contestants, cases):
+        console.print(table)
+    if json_file is not None:
+        json_file.write_text(json.dumps(as_json(entries, cases, limits), indent=2) + "\n", encoding="utf-8")
+    if docs is not None:
+        command = f"rover-companion bench --sizes {sizes} --seeds {seeds} --seed {seed} --docs docs"
+        for file in write_page(docs, command, entries, contestants, cases, limits):
+            console.print(f"written: {file}")
+
+
+def _cases(files: list[Path], sizes: str, maps: Path | None, problems: int) -> list[Case]:
+    try:
+        scales = tuple(sorted({int(size) for size in sizes.split(",") if size}))
+    except ValueError:
+        raise BenchError(f"--sizes {sizes}: whole numbers with commas are needed, as in 1,4,16") from None
+    if any(not 1 <= scale <= 100 for scale in scales):
+        raise BenchError(f"--sizes {sizes}: from 1 to 100")
+    folder = maps or Path(__file__).parents[2] / "missions" / "maps"
+    cases = paper_cases(folder, scales) if scales else []
+    cases += [map_case(file, problems) for file in files]
+    if not cases:
+        raise BenchError("nothing to measure: give --sizes or a MAP")
+    return cases
+
+
+def _contestants(planners: str, settings: Settings, console: Console, *, peers: bool) -> list[Contestant]:
+    names = [name.strip() for name in planners.split(",") if name.strip()] or list(PLANNERS)
+    # As the paper stops: with the first path, not after a number of epochs that makes a path better.
+    budget = replace(budget_of(settings.navigator.thorough), min_epochs=1)
+    contestants = [our_planner(name, settings.planner, budget) for name in names]
+    if peers:
+        others, missing = installed_peers()
+        contestants += others
+        if missing:
+            console.print(f"not installed: {', '.join(missing)} (pip install 'rover-companion\\[peers]')")
+    return contestants
+
+
+def _with_progress(contestants: list[Contestant], cases: list[Case], limits: Limits, console: Console) -> list[Entry]:
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("", total=None)
+
+        def advance(what: str, done: int, total: int) -> None:
+            progress.update(task, description=what, completed=done, total=total)
+
+        return measure(contestants, cases, limits, advance)
+
+
+def _tables(entries: list[Entry], contestants: list[Contestant], cases: list[Case]) -> list[Table]:
+    tables = []
+    for case in cases:
+        title = f"{case.name} x{case.scale}: {case.weights.shape[1]} x {case.weights.shape[0]} fields"
+        table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+        for column, name in enumerate(head([case.scale])[:-1]):
+            table.add_column(name, justify="right" if column else "left", no_wrap=True)
+        shown = [entry for entry in entries if (entry.case, entry.scale) == (case.name, case.scale)]
+        for row in rows(shown, contestants, case.name, [case.scale]):
+            table.add_row(*row[:-1])
+        tables.append(table)
+    return tables
