@@ -11,12 +11,13 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.mapfiles import MapError
-from sitl.experiments import kwasniewski_maps, kwasniewski_table1
+from sitl.experiments import kwasniewski_maps, kwasniewski_table1, navigation
 from sitl.experiments.experiment import Experiment, ExperimentError, Options, Report
 
 EXPERIMENTS: dict[str, Experiment] = {
     kwasniewski_maps.NAME: kwasniewski_maps.run,
     kwasniewski_table1.NAME: kwasniewski_table1.run,
+    navigation.NAME: navigation.run,
 }
 EXIT_BAD_INPUT = 2
 
@@ -29,6 +30,12 @@ def experiment(
         int, typer.Option(min=1, help="Runs at a time. Results stay the same, but they disturb each other's times.")
     ] = 1,
     maps: Annotated[Path | None, typer.Option(help="Folder with the maps; default: missions/maps.")] = None,
+    world: Annotated[
+        list[Path] | None,
+        typer.Option(
+            help="navigation: another map, with its MovingAI scenario file beside it; several times for several."
+        ),
+    ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
         Path | None, typer.Option(help="Folder whose results.md and images/ are brought up to date.")
@@ -44,7 +51,7 @@ def experiment(
             # A place that cannot be written should show before the work, not after it.
             json_file.parent.mkdir(parents=True, exist_ok=True)
             json_file.open("a", encoding="utf-8").close()
-        report = _with_progress(name, made, Options(runs, seed, jobs, maps), console)
+        report = _with_progress(name, made, Options(runs, seed, jobs, maps, tuple(world or ())), console)
         _put_out(report, console, json_file, docs)
     except (ExperimentError, MapError) as error:
         typer.echo(str(error), err=True)

@@ -25,12 +25,16 @@ class ExperimentError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Options:
-    """How much of an experiment to do. Run i has the seed ``seed + i``; ``maps`` None: those of the source checkout."""
+    """How much of an experiment to do. Run i has the seed ``seed + i``; ``maps`` None: those of the source checkout.
+
+    ``worlds``: maps of the user's, with scenario files beside them, for experiments that take any.
+    """
 
     runs: int = 100
     seed: int = 0
     jobs: int = 1
     maps: Path | None = None
+    worlds: tuple[Path, ...] = ()
 
 
 class Report(Protocol):
