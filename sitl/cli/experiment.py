@@ -11,13 +11,14 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.mapfiles import MapError
-from sitl.experiments import kwasniewski_maps, kwasniewski_table1, navigation
+from sitl.experiments import driving, kwasniewski_maps, kwasniewski_table1, navigation
 from sitl.experiments.experiment import Experiment, ExperimentError, Options, Report
 
 EXPERIMENTS: dict[str, Experiment] = {
     kwasniewski_maps.NAME: kwasniewski_maps.run,
     kwasniewski_table1.NAME: kwasniewski_table1.run,
     navigation.NAME: navigation.run,
+    driving.NAME: driving.run,
 }
 EXIT_BAD_INPUT = 2
 
@@ -33,7 +34,7 @@ def experiment(
     world: Annotated[
         list[Path] | None,
         typer.Option(
-            help="navigation: another map, with its MovingAI scenario file beside it; several times for several."
+            help="navigation, driving: another map, with its MovingAI scenario file beside it; several times for several."
         ),
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
