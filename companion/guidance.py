@@ -26,6 +26,8 @@ Points = NDArray[np.float64]
 
 STEP_M = 0.25
 STOP = GuidedVelocity(0.0, 0.0)
+ROLL_SHARES = (0.25, 0.5, 0.75, 1.0)
+"""Directions, as shares of a turn, that are looked along before a rolling rover begins to turn."""
 
 
 class Motion(StrEnum):
@@ -157,6 +159,7 @@ def guide(
     beside_m = clearance_m(evidence, pose.point, settings.slow_within_m + rover.radius_m) - rover.radius_m
     close = beside_m < settings.slow_within_m
     if error > _turn_first_rad(close, looking_rad is not None, settings) and pose.point.distance_m(target) > 0.5:
+        close = close or _would_touch_turning(pose, speed_m_s, bearing, evidence, rover, settings)
         return _turn_to(bearing, speed_m_s if close else 0.0, settings)
     return Guide(Motion.DRIVE, GuidedPosition(target), _speed_limit(min(beside_m, room_m), error, rover, settings))
 
@@ -180,6 +183,19 @@ def _would_touch(
         return False
     ahead = pose.point.moved(pose.heading_rad, needed_m)
     return look_along(evidence, pose.point, ahead, rover.radius_m + 0.05).clear_m < needed_m - 1e-6
+
+
+def _would_touch_turning(
+    pose: Pose, speed_m_s: float, bearing_rad: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
+) -> bool:
+    """Whether the rover, turning to the bearing while it still rolls, could touch something: it comes to stand in between."""
+    roll_m = braking_distance_m(speed_m_s, settings)
+    turn_rad = wrap_pi_rad(bearing_rad - pose.heading_rad)
+    for share in ROLL_SHARES:
+        there = pose.point.moved(pose.heading_rad + share * turn_rad, roll_m)
+        if look_along(evidence, pose.point, there, rover.radius_m + 0.05).clear_m < roll_m - 1e-6:
+            return True
+    return False
 
 
 def _is_turned_to(bearing_rad: float, pose: Pose, settings: GuidanceSettings) -> bool:

@@ -1,4 +1,4 @@
-"""The navigator's default: the genetic algorithm first, graph search when its budget is spent."""
+"""The navigator's default: the genetic algorithm's smooth curve where it is worth it, graph search behind it."""
 
 from __future__ import annotations
 
@@ -9,12 +9,19 @@ from numpy.random import Generator
 from companion.planning.bspline_ga import BsplineGa
 from companion.planning.dijkstra import Dijkstra
 from companion.planning.planner import Capabilities
-from companion.planning.problem import Budget, PlanningProblem, PlanResult, PlanStatus
+from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult
+from companion.planning.raster import as_array, plain
+from companion.planning.smoothing import smooth
 from companion.settings import PlannerSettings
 
 
 class Hybrid:
-    """Fast and smooth where the way is easy, complete where it is not: NO_PATH is a proof."""
+    """Fast and smooth where the way is easy, complete where it is not: NO_PATH is a proof.
+
+    A genetic path is taken when it costs at most ``hybrid_tolerance`` times the best possible. A dearer one leads a rover another way
+    round than the shortest that its map allows, which in unknown ground costs more than a smooth curve saves; then it is
+    the graph's path, pulled straight and rounded.
+    """
 
     name = "hybrid"
     capabilities = Capabilities(proves_no_path=True, random=True, smooth_curve=True)
@@ -22,22 +29,41 @@ class Hybrid:
     def __init__(self, settings: PlannerSettings) -> None:
         self._genetic = BsplineGa(settings)
         self._graph = Dijkstra(settings)
+        self._tolerance = settings.hybrid_tolerance
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
         """See ``Planner.plan``. FOUND or NO_PATH. Raises ValueError for a budget without sense."""
-        # A look of a few epochs finds the easy paths. Whatever is left is worth its budget only if there is a path
-        # at all: on a map of 100 x 50 fields the proof takes as long as some ten epochs, the budget thousands.
+        # A look of a few epochs finds the easy paths, and often they cannot be better: then the graph is not searched.
         look = replace(budget, control_points=budget.control_points[:1], max_epochs=budget.min_epochs)
         tried = self._genetic.plan(problem, look, rng)
-        if tried.status is PlanStatus.FOUND:
+        if self._is_good(tried, _least_cost(problem)):
             return replace(tried, planner=self.name)
-        fallback = self._graph.plan(problem, budget, rng)
-        if fallback.status is PlanStatus.NO_PATH:
-            return replace(fallback, planner=self.name, evaluations=tried.evaluations, epochs=tried.epochs)
+        graph = self._graph.plan(problem, budget, rng)
+        spent = replace(graph, planner=self.name, evaluations=tried.evaluations, epochs=tried.epochs)
+        if graph.path is None:
+            return spent
+        if self._is_good(tried, graph.path.cost):
+            return replace(tried, planner=self.name)
+        # Whatever is left of the budget is spent only where there is a path: the proof is cheaper than some ten epochs.
         full = self._genetic.plan(problem, budget, rng)
-        return replace(
-            full if full.status is PlanStatus.FOUND else fallback,
-            planner=self.name,
-            evaluations=tried.evaluations + full.evaluations,
-            epochs=tried.epochs + full.epochs,
-        )
+        evaluations, epochs = tried.evaluations + full.evaluations, tried.epochs + full.epochs
+        if self._is_good(full, graph.path.cost):
+            return replace(full, planner=self.name, evaluations=evaluations, epochs=epochs)
+        return replace(spent, path=_smoothed(problem, graph.path), evaluations=evaluations, epochs=epochs)
+
+    def _is_good(self, result: PlanResult, best: float) -> bool:
+        return result.path is not None and result.path.cost <= self._tolerance * best
+
+
+def _least_cost(problem: PlanningProblem) -> float:
+    """What no path can cost less than: the octile distance over the cheapest ground there is."""
+    (x, y), (to_x, to_y) = problem.start, problem.target
+    across, along = sorted((abs(to_x - x), abs(to_y - y)))
+    return (along + (2.0**0.5 - 1.0) * across) * max(float(problem.weights.min()), MIN_WEIGHT)
+
+
+def _smoothed(problem: PlanningProblem, path: Path) -> Path:
+    """The same fields with a curve along them; where corners may be cut the paper's rules hold, and nothing is smoothed."""
+    if problem.corner_cutting:
+        return path
+    return replace(path, curve=smooth(plain(problem.weights), as_array(path.cells)))

@@ -7,6 +7,69 @@ from pydantic import Field
 from companion.settings.section import Section
 
 
+class SedighiSettings(Section):
+    """The genetic algorithm of Sedighi et al. 2004, and of its forerunners. The paper prints the weights only."""
+
+    population: int = Field(100, ge=4, le=10_000, description="chromosomes of a generation (ours: not printed)")
+    generations: int = Field(300, ge=1, description="at most so many (ours: not printed)")
+    settled_generations: int = Field(
+        40, ge=1, description="and no more once the best path is free and has stayed the same for so many (ours)"
+    )
+    crossover_probability: float = Field(
+        0.8, ge=0.0, le=1.0, description="of a pair of parents (IV.B; ours: not printed)"
+    )
+    mutated_genes: float = Field(
+        2.0,
+        ge=0.0,
+        description="mean number in a chromosome: n times the mutation probability of each gene, of the flag and of each "
+        "switch value (IV.C; ours: not printed)",
+    )
+    length_weight: float = Field(1.0, gt=0.0, description="L of equation 1")
+    turn_weight: float = Field(2.0, ge=0.0, description="T of equation 1")
+    infeasible_factor: float = Field(
+        0.1, gt=0.0, le=1.0, description="the 0.1 of equation 2: what a path with collisions keeps of its fitness"
+    )
+
+
+class VertexSettings(Section):
+    """The genetic algorithm of Wang, Sillitoe & Mulvaney 2007."""
+
+    population: int = Field(30, ge=4, le=10_000, description="chromosomes (table II)")
+    generations: int = Field(1000, ge=1, description="at most so many, one operator each (section III)")
+    length_weight: float = Field(0.0, ge=0.0, description="w_d of equation 1: what a field of path costs")
+    time_weight: float = Field(1.0, ge=0.0, description="w_t of equation 1: what a second costs")
+    speed_levels: int = Field(
+        5, ge=1, le=100, description="so many speeds to choose from, evenly between the slowest and the fastest (II.B)"
+    )
+    safe_fields: float = Field(
+        0.5,
+        ge=0.5,
+        description="safe distance from obstacle fields (II.A). The paper has 1 m, for the robot's size; in our maps that is "
+        "in the obstacles already",
+    )
+    mover_safe_fields: float = Field(
+        1.0, ge=0.0, description="safe distance from moving obstacles, on every side of the exclusion area (II.A)"
+    )
+    mover_timing_s: float = Field(
+        1.0,
+        ge=0.0,
+        description="and so many seconds of the obstacle's way ahead and behind, and of the robot's way to both sides: how early "
+        "or late either may be (II.A gives no figure)",
+    )
+    mover_corner_rows: int = Field(
+        6, ge=1, le=1000, description="places of a moving obstacle's track whose corners are vertices (II.B; ours: not printed)"
+    )
+    shorter_side: float = Field(
+        0.75, ge=0.0, le=1.0, description="chance that repair takes the shorter way round (II.D; ours: not printed)"
+    )
+    straight_line: bool = Field(
+        True, description="one chromosome of the first population is the straight line (ours; off: all are random, as in II.B)"
+    )
+    most_genes: int = Field(
+        100_000, ge=2, description="a chromosome's greatest length, if the number of vertices + 2 is more (ours)"
+    )
+
+
 class PlannerSettings(Section):
     """The genetic algorithm of Kwasniewski & Gosiewski 2018, section 3."""
 
@@ -34,6 +97,11 @@ class PlannerSettings(Section):
         0.2, gt=0.0, description="second third: reach round the start, as a share of the smaller map dimension (3.3)"
     )
     margin_fields: int = Field(1, ge=0, description="third third: distance kept from the map's edge (3.3)")
+    hybrid_tolerance: float = Field(
+        1.03, ge=1.0, description="hybrid: a genetic path may cost so many times the best possible"
+    )
     obstacle_value: float = Field(
         100_000.0, ge=1000.0, description="VLN of 3.4: what an obstacle field adds to a path's fitness"
     )
+    sedighi: SedighiSettings = SedighiSettings()
+    vertex: VertexSettings = VertexSettings()

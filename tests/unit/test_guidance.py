@@ -151,6 +151,14 @@ def test_far_aside_it_turns_first():
     assert abs(wrap_pi_rad(answer.setpoint.heading_rad)) < math.radians(10.0)
 
 
+def test_it_does_not_turn_while_rolling_into_what_stands_in_between():
+    east = Pose(HERE.north_m, HERE.east_m, math.radians(90.0), 0.0)
+    assert told(looked(), east, speed_m_s=1.8).motion is Motion.LOOK
+    post = looked([(HERE.north_m + 1.2, HERE.east_m + 1.2, 0.15)])
+    assert told(post, east, speed_m_s=1.8).motion is Motion.BRAKE
+    assert told(post, east).motion is not Motion.BRAKE, "standing, it may turn"
+
+
 def test_obstacles_close_beside_slow_it_down_but_never_to_nothing():
     posts = [(north, 10.5 + side * 0.95, 0.1) for north in np.arange(9.0, 18.0, 0.3) for side in (-1.0, 1.0)]
     narrow = told(looked(posts, 20))

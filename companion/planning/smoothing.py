@@ -1,0 +1,132 @@
+"""A path of fields made into the smooth curve that a rover likes to drive. Compiled.
+
+Every sharp bend costs a rover a stop and a turn on the spot. So the staircase of a graph search is first pulled straight wherever the
+straight line costs no more than the fields it replaces, and what corners are left are rounded by a 2nd-degree B-spline, as wide as the
+ground beside them allows.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from companion.grid import Weights
+from companion.planning.raster import CellArray, cells_cost, first_fault, polyline
+
+ROUNDING_FIELDS = (6.0, 4.0, 2.5, 1.5, 0.75)
+"""How far from a corner its rounding begins, tried in turn."""
+SLACK = 1.02
+"""A straight line may cost so many times what it replaces: a stair is a little dearer than the line beside it."""
+SAMPLES_A_CORNER = 8
+
+
+@njit(cache=True, nogil=True)
+def straightened(weights: Weights, cells: CellArray) -> CellArray:
+    """The corners that are left when the path is pulled straight: a subset of the path's fields, ends included."""
+    count = len(cells)
+    reached = np.zeros(count)
+    for i in range(1, count):
+        reached[i] = reached[i - 1] + cells_cost(weights, cells[i - 1 : i + 1])
+    kept = np.empty((count, 2), np.int64)
+    kept[0] = cells[0]
+    used, at = 1, 0
+    ends = np.empty((2, 2), np.int64)
+    while at < count - 1:
+        # The farthest field in straight reach: doubling steps, then back one by one. Near fields always are.
+        step, far = 1, at + 1
+        while at + step < count:
+            ends[0], ends[1] = cells[at], cells[at + step]
+            if not _is_straight(weights, ends, reached[at + step] - reached[at]):
+                break
+            far = at + step
+            step *= 2
+        for i in range(min(at + step, count - 1), far, -1):
+            ends[0], ends[1] = cells[at], cells[i]
+            if _is_straight(weights, ends, reached[i] - reached[at]):
+                far = i
+                break
+        kept[used] = cells[far]
+        used += 1
+        at = far
+    return kept[:used].copy()
+
+
+@njit(cache=True, nogil=True)
+def _is_straight(weights: Weights, ends: CellArray, cost: float) -> bool:
+    """Whether the line between two fields is free and costs no more than the path between them."""
+    line = polyline(ends)
+    return bool(first_fault(weights, line, False)[0] == 0) and cells_cost(weights, line) <= SLACK * cost + 1e-9
+
+
+@njit(cache=True, nogil=True)
+def rounded(weights: Weights, corners: CellArray) -> NDArray[np.float64]:
+    """The curve through straightened corners, shape (n, 2) in fields. Corners with no room beside them stay sharp."""
+    count = len(corners)
+    points = np.empty((count * (SAMPLES_A_CORNER + 1) + 2, 2))
+    points[0, 0], points[0, 1] = corners[0, 0], corners[0, 1]
+    used = 1
+    for i in range(1, count - 1):
+        into_x, into_y = float(corners[i, 0] - corners[i - 1, 0]), float(corners[i, 1] - corners[i - 1, 1])
+        out_x, out_y = float(corners[i + 1, 0] - corners[i, 0]), float(corners[i + 1, 1] - corners[i, 1])
+        into, out = math.hypot(into_x, into_y), math.hypot(out_x, out_y)
+        written = 0
+        for rounding in ROUNDING_FIELDS:
+            reach = min(rounding, into / 2.0, out / 2.0)
+            written = _arc(points, used, corners[i], into_x / into, into_y / into, out_x / out, out_y / out, reach)
+            if _is_free(weights, points, used - 1, written + 1):
+                break
+            written = 0
+        if written == 0:
+            points[used, 0], points[used, 1] = corners[i, 0], corners[i, 1]
+            written = 1
+        used += written
+    points[used, 0], points[used, 1] = corners[-1, 0], corners[-1, 1]
+    return points[: used + 1].copy()
+
+
+@njit(cache=True, nogil=True)
+def _arc(
+    points: NDArray[np.float64],
+    used: int,
+    corner: NDArray[np.int64],
+    into_x: float,
+    into_y: float,
+    out_x: float,
+    out_y: float,
+    reach: float,
+) -> int:
+    """One span of the B-spline: from ``reach`` before the corner to as far beyond it. How many points were written."""
+    from_x, from_y = corner[0] - reach * into_x, corner[1] - reach * into_y
+    to_x, to_y = corner[0] + reach * out_x, corner[1] + reach * out_y
+    for k in range(SAMPLES_A_CORNER + 1):
+        t = k / SAMPLES_A_CORNER
+        a, b, c = (1.0 - t) * (1.0 - t), 2.0 * t * (1.0 - t), t * t
+        points[used + k, 0] = a * from_x + b * corner[0] + c * to_x
+        points[used + k, 1] = a * from_y + b * corner[1] + c * to_y
+    return SAMPLES_A_CORNER + 1
+
+
+@njit(cache=True, nogil=True)
+def _is_free(weights: Weights, points: NDArray[np.float64], used: int, written: int) -> bool:
+    """Whether nothing is wrong with the fields under these points, joined by lines."""
+    cells = np.empty((written, 2), np.int64)
+    for k in range(written):
+        cells[k, 0] = math.floor(points[used + k, 0] + 0.5)
+        cells[k, 1] = math.floor(points[used + k, 1] + 0.5)
+    return bool(first_fault(weights, polyline(cells), False)[0] == 0)
+
+
+@njit(cache=True, nogil=True)
+def smooth(weights: Weights, cells: CellArray) -> NDArray[np.float64]:
+    """The curve for a path of fields, shape (n, 2), columns x and y in fields, from its first field to its last."""
+    if len(cells) < 3:
+        return cells.astype(np.float64)
+    corners = straightened(weights, cells)
+    curve = rounded(weights, corners)
+    # Arcs begin and end between fields, so a line from one to the next may clip what the line between the corners does not.
+    return curve if _is_free(weights, curve, 0, len(curve)) else corners.astype(np.float64)
+
+

@@ -1,0 +1,89 @@
+"""Staircases made smooth."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.grid import Cell
+from companion.planning.problem import Budget, PlanningProblem
+from companion.planning.raster import FAULTS, as_array, cells_cost, first_fault, polyline
+from companion.planning.registry import make_planner
+from companion.planning.smoothing import smooth, straightened
+from companion.settings import PlannerSettings
+from tests.planning_maps import drawn, one_obstacle
+
+
+def shortest(problem: PlanningProblem):
+    path = make_planner("dijkstra", PlannerSettings()).plan(problem, Budget(), np.random.default_rng(0)).path
+    return None if path is None else as_array(path.cells)
+
+
+def fields_under(curve):
+    return polyline(np.floor(curve + 0.5).astype(np.int64))
+
+
+def sharpest_bend_deg(curve):
+    steps = np.diff(curve, axis=0)
+    steps = steps[np.hypot(*steps.T) > 1e-9]
+    headings = np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
+    return float(np.degrees(np.abs(np.diff(headings)).max())) if len(headings) > 1 else 0.0
+
+
+@st.composite
+def grounds(draw):
+    width, height = draw(st.integers(2, 24)), draw(st.integers(2, 24))
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    weights = rng.random((height, width)) if draw(st.booleans()) else np.full((height, width), 0.5)
+    weights[rng.random((height, width)) < draw(st.sampled_from([0.0, 0.15, 0.3]))] = 1.0
+    weights[0, 0] = weights[-1, -1] = 0.5
+    return PlanningProblem(weights, Cell(0, 0), Cell(width - 1, height - 1))
+
+
+@given(grounds())
+@settings(max_examples=200, deadline=None)
+def test_the_curve_is_a_path_between_the_same_ends_and_hardly_dearer(problem):
+    cells = shortest(problem)
+    if cells is None:
+        return
+    curve = smooth(problem.weights, cells)
+    assert tuple(curve[0]) == problem.start and tuple(curve[-1]) == problem.target
+    under = fields_under(curve)
+    number, at = first_fault(problem.weights, under, False)
+    assert FAULTS[number] == "none", f"{FAULTS[number]} at {at}"
+
+
+@given(grounds())
+@settings(max_examples=200, deadline=None)
+def test_pulled_straight_it_keeps_to_fields_of_the_path_and_costs_no_more(problem):
+    cells = shortest(problem)
+    if cells is None:
+        return
+    corners = straightened(problem.weights, cells)
+    on_path = {tuple(cell) for cell in cells.tolist()}
+    assert all(tuple(corner) in on_path for corner in corners.tolist())
+    assert cells_cost(problem.weights, polyline(corners)) <= 1.02 * cells_cost(problem.weights, cells) + 1e-6
+
+
+def test_a_staircase_over_open_ground_becomes_one_line():
+    weights = np.full((30, 60), 0.5)
+    curve = smooth(weights, shortest(PlanningProblem(weights, Cell(0, 3), Cell(59, 20))))
+    assert len(curve) == 2
+
+
+def test_bends_are_rounded_where_there_is_room():
+    problem = one_obstacle()
+    weights = problem.weights.copy()
+    weights[12:39, 45:56] = np.where(
+        weights[12:39, 45:56] < 1.0, 0.9, 1.0
+    )  # dear ground keeps the path away from the block
+    cells = shortest(PlanningProblem(weights, problem.start, problem.target))
+    assert sharpest_bend_deg(cells.astype(float)) == pytest.approx(45.0)
+    assert sharpest_bend_deg(smooth(weights, cells)) < 15.0
+
+
+def test_without_room_a_corner_stays():
+    weights = drawn("#####.", "#####.", "#####.", "......")
+    curve = smooth(weights, shortest(PlanningProblem(weights, Cell(0, 0), Cell(5, 3))))
+    assert [5, 0] in fields_under(curve).tolist()
+    assert sharpest_bend_deg(curve) < 45.0
