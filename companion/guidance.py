@@ -161,7 +161,9 @@ def guide(
     if error > _turn_first_rad(close, looking_rad is not None, settings) and pose.point.distance_m(target) > 0.5:
         close = close or _would_touch_turning(pose, speed_m_s, bearing, evidence, rover, settings)
         return _turn_to(bearing, speed_m_s if close else 0.0, settings)
-    return Guide(Motion.DRIVE, GuidedPosition(target), _speed_limit(min(beside_m, room_m), error, rover, settings))
+    limit_m_s = _speed_limit(min(beside_m, room_m), error, rover, settings)
+    limit_m_s = min(limit_m_s, _limit_by_heading(pose, evidence, rover, settings))
+    return Guide(Motion.DRIVE, GuidedPosition(target), limit_m_s)
 
 
 def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> float:
@@ -186,7 +188,12 @@ def _would_touch(
 
 
 def _would_touch_turning(
-    pose: Pose, speed_m_s: float, bearing_rad: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
+    pose: Pose,
+    speed_m_s: float,
+    bearing_rad: float,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: GuidanceSettings,
 ) -> bool:
     """Whether the rover, turning to the bearing while it still rolls, could touch something: it comes to stand in between."""
     roll_m = braking_distance_m(speed_m_s, settings)
@@ -305,6 +312,18 @@ def _speed_limit(beside_m: float, bearing_error_rad: float, rover: RoverLimits, 
     beside = settings.min_speed_m_s + share * max(rover.cruise_speed_m_s - settings.min_speed_m_s, 0.0)
     turning = rover.cruise_speed_m_s if bearing_error_rad < math.radians(20.0) else 2.0 * settings.min_speed_m_s
     return max(min(rover.cruise_speed_m_s, sight, beside, turning), settings.min_speed_m_s)
+
+
+def _limit_by_heading(pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings) -> float:
+    """The speed from which the rover can stop before its flanks enter unseen ground, should it go on as it points.
+
+    A target a few degrees aside is reached on an arc, and what stands beside that arc was not looked at on the way to the target.
+    """
+    ahead = pose.point.moved(pose.heading_rad, stopping_distance_m(rover.cruise_speed_m_s, settings))
+    unseen = _unseen_flank(pose, ahead, evidence, rover)
+    if unseen is None:
+        return rover.cruise_speed_m_s
+    return max(fastest_within_m(unseen.along_m, settings), settings.min_speed_m_s)
 
 
 def _densified(corners: Points) -> Points:
