@@ -28,6 +28,7 @@ from companion.safety import Control, Reaction, Watch, check, latched
 from companion.settings import Settings
 from companion.startup import StartUp
 from companion.stepping import StepRunner
+from companion.traffic import announced
 from companion.vehicle import (
     Event,
     HomeSeen,
@@ -259,8 +260,8 @@ class Companion:
             return None
         self._tell(f"Companion: {self._mission.name}, {len(laid.itinerary.targets)} targets", INFO)
         assert self.vehicle.scan is not None
-        sight_m = self.vehicle.scan.scan.max_range_m
-        return Pursuit(self._mission, self._settings, laid, sight_m, self._runner, self._log, self._tell, self._rng)
+        scan = self.vehicle.scan.scan
+        return Pursuit(self._mission, self._settings, laid, scan, self._runner, self._log, self._tell, self._rng)
 
     # Listening ---------------------------------------------------------------------------------------------------
 
@@ -301,7 +302,8 @@ class Companion:
         """One tick on the way."""
         pose = self.vehicle.pose_at(now_s)
         assert pose is not None
-        guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s)
+        others = announced(self.vehicle, pose, self._mission.rover.radius_m, self._settings.traffic)
+        guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s, others)
         self._reporter.doing = pursuit.doing
         if guide is not None:
             self._command(guide, now_s)

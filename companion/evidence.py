@@ -16,9 +16,12 @@ DIAGONAL = math.sqrt(2.0)
 @njit(cache=True, nogil=True)
 def cast_scan(
     log_odds, stamps, stamp, x0, y0, heading_rad, bearing_rad, range_cells, min_cells, max_cells, width_rad,
-    depth_cells, radius_cells, hit, miss, limit, free_limit,
+    depth_cells, kept_cells, radius_cells, hit, miss, limit, free_limit,
 ):  # fmt: skip
-    """Add one scan to the evidence. Lengths are in evidence cells, (x0, y0) is the sensor, headings clockwise from north."""
+    """Add one scan to the evidence. Lengths are in evidence cells, (x0, y0) is the sensor, headings clockwise from north.
+
+    The last ``kept_cells`` before a hit are not freed.
+    """
     height, width = log_odds.shape
     # Hits first: a cell stamped by a hit cannot be freed by another beam of the same scan.
     for i in range(bearing_rad.size):
@@ -35,7 +38,7 @@ def cast_scan(
         r = range_cells[i]
         if math.isnan(r):
             continue
-        reach = max_cells if math.isinf(r) else r - 0.5
+        reach = max_cells if math.isinf(r) else r - 0.5 - kept_cells
         rays = max(1, int(math.ceil(reach * width_rad)))
         for k in range(rays):
             angle = heading_rad + bearing_rad[i] + width_rad * ((k + 0.5) / rays - 0.5)

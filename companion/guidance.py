@@ -19,6 +19,7 @@ from companion.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Se
 from companion.frames import NedPoint, Pose, wrap_pi_rad
 from companion.grid import Cell, Grid
 from companion.mapping import EvidenceMap, Unseen, clearance_m, look_along, unseen_beside
+from companion.planning.problem import Path
 from companion.settings import GuidanceSettings
 
 Points = NDArray[np.float64]
@@ -45,6 +46,8 @@ class Route:
 
     points: Points
     progress: int = 0
+    speeds_m_s: NDArray[np.float64] | None = None
+    """The planned speed at each of the points, if the planner chooses speeds."""
 
     @property
     def end(self) -> NedPoint:
@@ -58,6 +61,11 @@ class Route:
     def point_ahead(self, distance_m: float) -> NedPoint:
         """The point so far on from the rover, along the route; at most its end."""
         return self.point(min(self.progress + round(distance_m / STEP_M), len(self.points) - 1))
+
+    @property
+    def planned_m_s(self) -> float:
+        """The planned speed where the rover is now; infinite when none was planned."""
+        return math.inf if self.speeds_m_s is None else float(self.speeds_m_s[self.progress])
 
     @property
     def left_m(self) -> float:
@@ -81,6 +89,7 @@ class RoverLimits:
     radius_m: float
     cruise_speed_m_s: float
     sight_m: float
+    narrow_sight: bool = False
     """Valid range of the sensor."""
 
 
@@ -119,7 +128,18 @@ def advanced(route: Route, pose: Pose, window_m: float = 4.0) -> Route:
     stop = min(len(route.points), route.progress + int(window_m / STEP_M) + 1)
     ahead = route.points[route.progress : stop]
     nearest = int(np.argmin((ahead[:, 0] - pose.north_m) ** 2 + (ahead[:, 1] - pose.east_m) ** 2))
-    return Route(route.points, route.progress + nearest)
+    return Route(route.points, route.progress + nearest, route.speeds_m_s)
+
+
+def with_planned_speeds(route: Route, path: Path, resolution_m: float) -> Route:
+    """The route with the speeds of the path it follows, each at its share of the whole length; unchanged without any."""
+    if path.curve is None or path.speeds_fields_s is None or len(path.speeds_fields_s) == 0:
+        return route
+    ends = np.cumsum(np.hypot(*np.diff(path.curve, axis=0).T))
+    shares = np.linspace(0.0, 1.0, len(route.points))
+    pieces = np.searchsorted(ends / max(float(ends[-1]), 1e-9), shares, side="right")
+    speeds = path.speeds_fields_s[np.minimum(pieces, len(path.speeds_fields_s) - 1)] * resolution_m
+    return Route(route.points, route.progress, np.asarray(speeds, np.float64))
 
 
 def guide(
@@ -150,7 +170,7 @@ def guide(
     wanted_m = settings.least_reach_m if looking_rad is None else settings.reach_after_look_m
     if reach_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach_m > 0.0):
         if looking_rad is not None and not _is_turned_to(looking_rad, pose, settings):
-            return _turn_to(looking_rad, speed_m_s, settings)
+            return turn_to(looking_rad, speed_m_s, settings)
         look = _look_or_blocked(route, pose, speed_m_s, evidence, rover, settings)
         if look.motion is not Motion.DRIVE or reach_m < settings.least_reach_m:
             return look
@@ -160,7 +180,7 @@ def guide(
     close = beside_m < settings.slow_within_m
     if error > _turn_first_rad(close, looking_rad is not None, settings) and pose.point.distance_m(target) > 0.5:
         close = close or _would_touch_turning(pose, speed_m_s, bearing, evidence, rover, settings)
-        return _turn_to(bearing, speed_m_s if close else 0.0, settings)
+        return turn_to(bearing, speed_m_s if close else 0.0, settings)
     limit_m_s = _speed_limit(min(beside_m, room_m), error, rover, settings)
     limit_m_s = min(limit_m_s, _limit_by_heading(pose, evidence, rover, settings))
     return Guide(Motion.DRIVE, GuidedPosition(target), limit_m_s)
@@ -209,7 +229,7 @@ def _is_turned_to(bearing_rad: float, pose: Pose, settings: GuidanceSettings) ->
     return abs(wrap_pi_rad(bearing_rad - pose.heading_rad)) <= math.radians(settings.turned_deg)
 
 
-def _turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -> Guide:
+def turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -> Guide:
     """Turn on the spot; a rover that still rolls brakes first, lest it drives an arc."""
     if speed_m_s > settings.roll_out_m_s:
         return Guide(Motion.BRAKE, STOP, 0.0)
@@ -237,10 +257,13 @@ def _farthest_clear(
 ) -> tuple[NedPoint, float, float]:
     """The farthest route point in clear sight, how far away it is, and the room kept beside the rover on the way there.
 
-    Wide clearance where there is room; less only where that leads farther.
+    Wide clearance where there is room; less only where that leads farther. A wall that thin beams have seen once stays in the map
+    where the position then was, and the position wanders: from such walls more distance is kept.
     """
     best = (pose.point, 0.0, 0.0)
     for extra_m, enough_m in settings.clearances:
+        if rover.narrow_sight and extra_m < settings.narrow_clearance_m:
+            break
         target, reach_m = _farthest_with(route, pose, speed_m_s, evidence, rover, extra_m, settings)
         if reach_m > best[1] + 0.5 or best[1] == 0.0:
             best = (target, reach_m, extra_m)
@@ -296,7 +319,7 @@ def _look_or_blocked(
     view = ahead if line.seen_m < distance_m - 0.05 or unseen is None else unseen.place
     bearing = pose.point.bearing_rad(view)
     if not _is_turned_to(bearing, pose, settings):
-        return _turn_to(bearing, speed_m_s, settings)
+        return turn_to(bearing, speed_m_s, settings)
     if line.clear_m >= distance_m - 0.05:
         # Looked at, and nothing there, but between the beams: creep.
         creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
@@ -311,7 +334,8 @@ def _speed_limit(beside_m: float, bearing_error_rad: float, rover: RoverLimits, 
     share = min(max(beside_m / settings.slow_within_m, 0.0), 1.0)
     beside = settings.min_speed_m_s + share * max(rover.cruise_speed_m_s - settings.min_speed_m_s, 0.0)
     turning = rover.cruise_speed_m_s if bearing_error_rad < math.radians(20.0) else 2.0 * settings.min_speed_m_s
-    return max(min(rover.cruise_speed_m_s, sight, beside, turning), settings.min_speed_m_s)
+    narrow = settings.narrow_speed_m_s if rover.narrow_sight else rover.cruise_speed_m_s
+    return max(min(rover.cruise_speed_m_s, sight, beside, turning, narrow), settings.min_speed_m_s)
 
 
 def _limit_by_heading(pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings) -> float:

@@ -90,7 +90,8 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
     cast_scan(
         evidence.log_odds, evidence.stamps, np.int32(stamp), x0, y0, pose.heading_rad,
         scan.bearing_rad, scan.range_m * scale, scan.min_range_m * scale, scan.max_range_m * scale, scan.beam_width_rad,
-        settings.hit_depth_m * scale, evidence.rover_radius_m * scale,
+        settings.hit_depth_m * scale, settings.narrow_kept_m * scale if scan.is_narrow else 0.0,
+        evidence.rover_radius_m * scale,
         settings.hit, settings.miss, settings.limit, settings.free_limit,
     )  # fmt: skip
     reach = math.ceil(scan.max_range_m / evidence.base.resolution_m) + 1 + _soft_reach(evidence)

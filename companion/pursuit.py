@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from companion.driver import STANDSTILL, Driver
+from companion.driver import Driver
 from companion.frames import GeoPoint, Pose
 from companion.guidance import Guide, RoverLimits
 from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable
@@ -20,6 +20,8 @@ from companion.scan import RangeScan
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.stepping import StepRunner
+from companion.tracking import Tracker
+from companion.traffic import Moving
 
 INFO, WARNING = 6, 4
 ORIGIN_MOVED_M = 0.2
@@ -30,14 +32,14 @@ Tell = Callable[[str, int], None]
 
 
 class Pursuit:
-    """Made when the rover may be driven for the first time. ``sight_m``: valid range of the sensor."""
+    """Made when the rover may be driven for the first time. ``scan``: any of its sensor, which tells how far and wide it sees."""
 
     def __init__(
         self,
         mission: Mission,
         settings: Settings,
         laid: Laid,
-        sight_m: float,
+        scan: RangeScan,
         runner: StepRunner,
         log: DecisionLog,
         tell: Tell,
@@ -53,10 +55,11 @@ class Pursuit:
         self._tell = tell
         self._scans = 0
         rover = mission.rover
-        self._limits = RoverLimits(rover.radius_m, rover.cruise_speed_m_s, sight_m)
+        self._limits = RoverLimits(rover.radius_m, rover.cruise_speed_m_s, scan.max_range_m, scan.is_narrow)
         planner = make_planner(settings.navigator.planner, settings.planner)
         searcher = Searcher(planner, settings.navigator, rng)
         self.driver = Driver(laid.evidence, self._limits, settings, searcher, runner)
+        self._tracker = Tracker(laid.evidence, settings.traffic)
 
     @property
     def evidence(self) -> EvidenceMap:
@@ -76,7 +79,9 @@ class Pursuit:
         """Take a scan into the map, unless it is smeared by turning."""
         if abs(yaw_rate_rad_s) <= np.radians(self._settings.mapping.max_yaw_rate_deg_s):
             self._scans += 1
+            self._tracker.take(pose, yaw_rate_rad_s, scan)
             integrate(self.evidence, pose, scan, self._scans)
+            self._tracker.remember(pose, scan.max_range_m)
 
     def follow_origin(self, origin: GeoPoint) -> bool:
         """Whether the autopilot has moved the origin of its frame; the mission is then laid out anew, with an empty map."""
@@ -89,27 +94,30 @@ class Pursuit:
         before = self.driver
         self.driver = Driver(self.evidence, self._limits, self._settings, before.searcher, self._runner)
         self.driver.tally = before.tally
+        self._tracker = Tracker(self.evidence, self._settings.traffic)
         return True
 
     def forget_map(self) -> None:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
+        self._tracker = Tracker(self.evidence, self._settings.traffic)
         self.driver.leave()
 
-    def drive(self, pose: Pose, speed_m_s: float, now_s: float) -> Guide | None:
-        """What to do for the mission now; None when it has ended."""
+    def drive(self, pose: Pose, speed_m_s: float, now_s: float, announced: tuple[Moving, ...] = ()) -> Guide | None:
+        """What to do for the mission now; None when it has ended. ``announced``: who has told of itself and may come near."""
+        moving = announced + self._tracker.moving(now_s)
         self.itinerary = on_time(self.itinerary, now_s)
         if self.itinerary.ended:
             return None
         if self.itinerary.leg in (Leg.STAY, Leg.WAIT):
             self.doing = "holding" if self.itinerary.leg is Leg.STAY else "waiting for the way to clear"
             self.driver.pause()
-            return STANDSTILL
+            return self.driver.standing(pose, speed_m_s, moving)
         if self.driver.goal is not self.itinerary.goal:
             self._tell(f"Heading for {self.itinerary.goal.name}", INFO)
             self.driver.head_for(self.itinerary.goal, pose)
         self.doing = "driving"
-        guide, decision = self.driver.update(pose, speed_m_s)
+        guide, decision = self.driver.update(pose, speed_m_s, moving)
         if decision is not None:
             self._take_decision(decision, now_s)
         return guide

@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 AHEAD_RAD = np.radians(20.0)
+NARROW_RAD = np.radians(30.0)
+"""A scan that covers less is a beam, not a view."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -26,6 +28,11 @@ class RangeScan:
     max_range_m: float
     beam_width_rad: float
     source: str
+
+    @property
+    def is_narrow(self) -> bool:
+        """Whether this is one thin beam, which leaves most of the rover's own width unseen."""
+        return len(self.bearing_rad) * self.beam_width_rad < NARROW_RAD
 
     @property
     def looks_ahead(self) -> bool:

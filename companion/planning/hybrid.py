@@ -7,11 +7,11 @@ from dataclasses import replace
 from numpy.random import Generator
 
 from companion.planning.bspline_ga import BsplineGa
-from companion.planning.dijkstra import Dijkstra
+from companion.planning.astar import Astar
 from companion.planning.planner import Capabilities
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult
-from companion.planning.raster import as_array, plain
-from companion.planning.smoothing import smooth
+from companion.planning.raster import as_array, as_cells, cells_cost, plain
+from companion.planning.smoothing import fields_under, smooth
 from companion.settings import PlannerSettings
 
 
@@ -28,7 +28,7 @@ class Hybrid:
 
     def __init__(self, settings: PlannerSettings) -> None:
         self._genetic = BsplineGa(settings)
-        self._graph = Dijkstra(settings)
+        self._graph = Astar(settings)
         self._tolerance = settings.hybrid_tolerance
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
@@ -63,7 +63,10 @@ def _least_cost(problem: PlanningProblem) -> float:
 
 
 def _smoothed(problem: PlanningProblem, path: Path) -> Path:
-    """The same fields with a curve along them; where corners may be cut the paper's rules hold, and nothing is smoothed."""
+    """A curve along the path, and the fields under it; where corners may be cut the paper's rules hold: nothing is smoothed."""
     if problem.corner_cutting:
         return path
-    return replace(path, curve=smooth(plain(problem.weights), as_array(path.cells)))
+    weights = plain(problem.weights)
+    curve = smooth(weights, as_array(path.cells))
+    cells = fields_under(curve)
+    return Path(as_cells(cells), cells_cost(weights, cells), curve)

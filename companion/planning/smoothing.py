@@ -14,7 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from companion.grid import Weights
-from companion.planning.raster import CellArray, cells_cost, first_fault, polyline
+from companion.planning.raster import CellArray, cells_cost, first_fault, polyline, without_loops
 
 ROUNDING_FIELDS = (6.0, 4.0, 2.5, 1.5, 0.75)
 """How far from a corner its rounding begins, tried in turn."""
@@ -76,7 +76,9 @@ def rounded(weights: Weights, corners: CellArray) -> NDArray[np.float64]:
         for rounding in ROUNDING_FIELDS:
             reach = min(rounding, into / 2.0, out / 2.0)
             written = _arc(points, used, corners[i], into_x / into, into_y / into, out_x / out, out_y / out, reach)
-            if _is_free(weights, points, used - 1, written + 1):
+            if _is_free(weights, points, used - 1, written + 1) and _is_cheap(
+                weights, points[used : used + written], corners[i]
+            ):
                 break
             written = 0
         if written == 0:
@@ -120,6 +122,27 @@ def _is_free(weights: Weights, points: NDArray[np.float64], used: int, written: 
 
 
 @njit(cache=True, nogil=True)
+def _is_cheap(weights: Weights, arc: NDArray[np.float64], corner: NDArray[np.int64]) -> bool:
+    """Whether an arc does not lead over dearer ground than the way through the corner: beside obstacles ground is dear."""
+    around = np.empty((3, 2), np.int64)
+    for axis in range(2):
+        around[0, axis] = math.floor(arc[0, axis] + 0.5)
+        around[1, axis] = corner[axis]
+        around[2, axis] = math.floor(arc[-1, axis] + 0.5)
+    return cells_cost(weights, fields_under(arc)) <= SLACK * cells_cost(weights, polyline(around)) + 1e-9
+
+
+@njit(cache=True, nogil=True)
+def fields_under(curve: NDArray[np.float64]) -> CellArray:
+    """The fields under a curve, each once."""
+    cells = np.empty((len(curve), 2), np.int64)
+    for k in range(len(curve)):
+        cells[k, 0] = math.floor(curve[k, 0] + 0.5)
+        cells[k, 1] = math.floor(curve[k, 1] + 0.5)
+    return without_loops(polyline(cells))
+
+
+@njit(cache=True, nogil=True)
 def smooth(weights: Weights, cells: CellArray) -> NDArray[np.float64]:
     """The curve for a path of fields, shape (n, 2), columns x and y in fields, from its first field to its last."""
     if len(cells) < 3:
@@ -128,5 +151,3 @@ def smooth(weights: Weights, cells: CellArray) -> NDArray[np.float64]:
     curve = rounded(weights, corners)
     # Arcs begin and end between fields, so a line from one to the next may clip what the line between the corners does not.
     return curve if _is_free(weights, curve, 0, len(curve)) else corners.astype(np.float64)
-
-

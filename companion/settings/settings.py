@@ -73,6 +73,12 @@ class MappingSettings(Section):
     hit_depth_m: float = Field(
         0.05, ge=0.0, description="a surface is entered this deep, so that noise does not fill the free side"
     )
+    narrow_kept_m: float = Field(
+        0.3,
+        ge=0.0,
+        description="a single thin beam does not free the last piece before what it hit: it looks at a wall once or twice, and as the "
+        "position wanders, later passes would rub the wall out",
+    )
     soft_cost: float = Field(0.4, ge=0.0, lt=0.5, description="weight added beside obstacles")
     soft_reach_m: float = Field(2.0, ge=0.0, description="how far from an obstacle the soft cost reaches")
     max_yaw_rate_deg_s: float = Field(120.0, gt=0.0, description="scans taken while turning faster are not used")
@@ -120,6 +126,12 @@ class GuidanceSettings(Section):
     change_after_s: float = Field(
         0.4, ge=0.0, description="a target that moved is sent not sooner than this after the last"
     )
+    narrow_clearance_m: float = Field(
+        0.3, ge=0.0, description="clearances smaller than this are not used with single thin beams"
+    )
+    narrow_speed_m_s: float = Field(
+        1.5, gt=0.0, description="never faster than this with single thin beams, between which much stays unseen"
+    )
     min_speed_m_s: float = Field(0.5, gt=0.0, description="never asked to go slower than this")
     stuck_after_s: float = Field(6.0, gt=0.0, description="no progress for so long: back out and plan anew")
     back_out_m: float = Field(0.8, ge=0.0, description="how far to back out")
@@ -134,6 +146,27 @@ class SafetySettings(Section):
     hold_after_s: float = Field(2.0, ge=0.0, description="from stop to HOLD when nothing gets better")
     heartbeat_s: float = Field(3.0, gt=0.0, description="autopilot silent for so long: stop")
     jump_m: float = Field(2.0, gt=0.0, description="a position jump larger than this is noticed")
+
+
+class TrafficSettings(Section):
+    """Things that move: other vehicles that announce themselves, and what the range sensors see moving."""
+
+    horizon_s: float = Field(20.0, gt=0.0, le=120.0, description="so far ahead planners are told where a moving thing goes")
+    stale_s: float = Field(5.0, gt=0.0, description="an announced position older than this does not count")
+    radius_m: float = Field(1.0, gt=0.0, description="of vehicles that do not tell their size")
+    level_m: float = Field(10.0, gt=0.0, description="what is so much higher or lower than the rover is not in its way")
+    reach_m: float = Field(40.0, gt=0.0, description="what stays farther away than this does not count")
+    moving_m_s: float = Field(0.3, gt=0.0, description="slower than this a thing counts as standing")
+    changed_m_s: float = Field(
+        0.5, gt=0.0, description="a planner that knows of moving things plans anew when a velocity changes by more"
+    )
+    replan_s: float = Field(2.0, ge=0.0, description="... but not sooner than this after the last time")
+    look_s: float = Field(8.0, gt=0.0, le=60.0, description="so far ahead the rover looks whether something comes across")
+    margin_m: float = Field(0.4, ge=0.0, description="room kept between the rover and something that moves")
+    drift_m_s: float = Field(0.08, ge=0.0, description="that room grows by so much a second of looking ahead")
+    patience_s: float = Field(
+        30.0, gt=0.0, description="having made way for so long without getting on, the rover counts as stuck"
+    )
 
 
 class LinkSettings(Section):
@@ -162,6 +195,7 @@ class Settings(Section):
     mapping: MappingSettings = MappingSettings()
     guidance: GuidanceSettings = GuidanceSettings()
     safety: SafetySettings = SafetySettings()
+    traffic: TrafficSettings = TrafficSettings()
     link: LinkSettings = LinkSettings()
 
 

