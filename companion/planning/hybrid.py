@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from numpy.random import Generator
 
-from companion.planning.bspline_ga import BsplineGa
 from companion.planning.astar import Astar
+from companion.planning.bspline_ga import BsplineGa
 from companion.planning.planner import Capabilities
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult
 from companion.planning.raster import as_array, as_cells, cells_cost, plain

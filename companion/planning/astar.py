@@ -1,0 +1,57 @@
+"""A* over the fields, with the octile distance to go: as cheap a path as ``dijkstra``'s, for less work. Compiled.
+
+Hart, Nilsson & Raphael 1968. What is cheapest in all is taken first, from a circular bucket queue over the quantised sum; the last in is
+the first out, so of equal ones the search goes on with that nearest the target. Costs themselves are not quantised, and a field that
+turns out to be cheaper is taken again, so the width of a bucket decides how fast, never how good.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from companion.planning.astar_kernel import search, way_back
+from companion.planning.ends import ends_free
+from companion.planning.planner import Capabilities
+from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
+from companion.planning.raster import CellArray, as_cells, cells_cost, plain
+from companion.settings import PlannerSettings
+
+Floats = NDArray[np.float64]
+
+
+@njit(cache=True, nogil=True)
+def _cheapest(
+    weights: Floats, reached: Floats, start_x: int, start_y: int, target_x: int, target_y: int, corner_cutting: bool
+) -> tuple[CellArray, float]:
+    """The fields of the cheapest path and its cost; no fields if there is none. ``reached``: one 0 for each field."""
+    width = weights.shape[1]
+    if not search(weights, reached, start_x, start_y, target_x, target_y, corner_cutting):
+        return np.empty((0, 2), np.int64), np.inf
+    cells = way_back(weights.ravel(), reached, width, target_x, target_y, corner_cutting)
+    return cells, cells_cost(weights, cells)
+
+
+class Astar:
+    """The cheapest path, or the proof that there is none."""
+
+    name = "astar"
+    capabilities = Capabilities(proves_no_path=True, optimal=True)
+
+    def __init__(self, settings: PlannerSettings) -> None:
+        del settings  # nothing to set
+
+    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
+        """See ``Planner.plan``. FOUND or NO_PATH; budget and generator are left alone."""
+        del budget, rng
+        if not ends_free(problem):
+            return PlanResult(PlanStatus.NO_PATH, None, self.name)
+        weights = plain(problem.weights)
+        # Zeros of numpy's come from the system as needed; a compiled function would write each of them.
+        reached = np.zeros(weights.size)
+        cells, cost = _cheapest(weights, reached, *problem.start, *problem.target, problem.corner_cutting)
+        if len(cells) == 0:
+            return PlanResult(PlanStatus.NO_PATH, None, self.name)
+        return PlanResult(PlanStatus.FOUND, Path(as_cells(cells), cost), self.name)
