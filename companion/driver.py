@@ -18,15 +18,19 @@ from companion.guidance import (
     route_along_cells,
     route_along_curve,
     route_is_clear,
+    with_planned_speeds,
 )
 from companion.mapping import EvidenceMap, doubt, look_along, penalise
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Action, Decision, NavState, Part, SearchKind, abandon_path, begin, is_clear, step
+from companion.planning import problem
 from companion.planning.problem import PlanResult
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.stepping import StepRunner
+from companion.traffic import Moving, motion_changed, planners_movers
 from companion.turning import with_turning_cost
+from companion.yielding import yielded
 
 STANDSTILL = Guide(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
 MOVED_M = 0.3
@@ -81,6 +85,11 @@ class Driver:
         self._looking_rad: float | None = None
         self._braking = False
         self._stuck_places: dict[Cell, int] = {}
+        self._moving: tuple[Moving, ...] = ()
+        self._planned_among: tuple[Moving, ...] = ()
+        self._replanned_s = -math.inf
+        self._yielding_s: float | None = None
+        self._aside_rad: float | None = None
 
     def head_for(self, goal: ResolvedTarget, pose: Pose) -> None:
         """Begin a leg from here."""
@@ -105,12 +114,35 @@ class Driver:
         self._state = None
         self.route = None
 
+    def standing(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> Guide:
+        """What to do where there is nothing to do: stand, and make way."""
+        return self._make_way(STANDSTILL, pose, speed_m_s, moving)
+
     def pause(self) -> None:
         """The rover stands still for a good reason: do not count it as stuck."""
         self._progress = None
 
-    def update(self, pose: Pose, speed_m_s: float) -> tuple[Guide, Decision | None]:
-        """One tick: the setpoint for now, and the navigator's decision if it has just made one."""
+    def update(
+        self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...] = ()
+    ) -> tuple[Guide, Decision | None]:
+        """One tick: the setpoint for now, and the navigator's decision if it has just made one. ``moving``: what moves about."""
+        guide, decision = self._drive(pose, speed_m_s, moving)
+        if self._goal is None or not moving or (decision is not None and decision.action is Action.REACHED):
+            return guide, decision
+        way = self._make_way(guide, pose, speed_m_s, moving)
+        self._note_yielding(pose, way is not guide)
+        return way, decision
+
+    def _make_way(self, guide: Guide, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> Guide:
+        rover, settings = self._rover, self._settings
+        way, self._aside_rad = yielded(
+            guide, self.route, pose, speed_m_s, moving, self.evidence, rover, settings, self._aside_rad
+        )
+        return way
+
+    def _drive(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> tuple[Guide, Decision | None]:
+        """The same as if nothing came across."""
+        self._moving = moving
         if self._goal is None or self._state is None:
             return STANDSTILL, None
         if pose.time_s < self._back_until_s:
@@ -127,6 +159,7 @@ class Driver:
         rover = self._rover
         if self._goal.speed_m_s is not None:
             rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
+        rover = replace(rover, cruise_speed_m_s=min(rover.cruise_speed_m_s, self.route.planned_m_s))
         settings = self._settings.guidance
         now = guide(
             self.route,
@@ -148,13 +181,15 @@ class Driver:
         """Start the navigator's step when a new field is entered or the path ahead is blocked; take its result."""
         assert self._state is not None
         cell = self.evidence.base.cell_at(pose.point)
+        self._notice_changes(pose)
         if not self._runner.busy and self.evidence.base.contains(cell) and self._step_is_due(cell):
             state = self._state
             grid = with_turning_cost(self.evidence.grid, pose, self._settings.guidance)
             weights = grid.weights
+            movers, motion = self._movers(pose), self._motion()
 
             def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
-                return self.searcher.search(weights, kind, start, target)
+                return self.searcher.search(weights, kind, start, target, movers, motion)
 
             if cell != state.past[-1]:
                 self.tally.steps += 1
@@ -172,6 +207,44 @@ class Driver:
         self._state, self.decision = result
         self._lay_route(self.decision, pose)
         return self.decision
+
+    @property
+    def _plans_among_movers(self) -> bool:
+        return self.searcher.planner.capabilities.moving_obstacles
+
+    def _movers(self, pose: Pose) -> tuple[problem.Mover, ...]:
+        """What moves, for a planner that asks."""
+        if not self._plans_among_movers:
+            return ()
+        radius_m, traffic = self._rover.radius_m, self._settings.traffic
+        return planners_movers(self._moving, self.evidence.grid, radius_m, pose.time_s, traffic)
+
+    def _motion(self) -> problem.Motion:
+        """How fast the rover may be planned to go."""
+        fastest_m_s = self._rover.cruise_speed_m_s
+        if self._goal is not None and self._goal.speed_m_s is not None:
+            fastest_m_s = self._goal.speed_m_s
+        slowest_m_s = min(self._settings.guidance.min_speed_m_s, fastest_m_s)
+        resolution_m = self.evidence.base.resolution_m
+        return problem.Motion(speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m))
+
+    def _notice_changes(self, pose: Pose) -> None:
+        """A plan made among moving things is dropped when one of them moves otherwise than it did."""
+        state, traffic = self._state, self._settings.traffic
+        if state is None or not self._plans_among_movers or pose.time_s - self._replanned_s < traffic.replan_s:
+            return
+        if not self._runner.busy and motion_changed(self._planned_among, self._moving, traffic):
+            self._replanned_s, self._planned_among = pose.time_s, self._moving
+            self._state = abandon_path(state)
+
+    def _note_yielding(self, pose: Pose, yields: bool) -> None:
+        """Who makes way is not stuck; who does so for very long is."""
+        if not yields:
+            self._yielding_s = None
+            return
+        self._yielding_s = pose.time_s if self._yielding_s is None else self._yielding_s
+        if pose.time_s - self._yielding_s < self._settings.traffic.patience_s:
+            self.pause()
 
     def _is_doubtful(self, decision: Decision) -> bool:
         """Before the first step back, or giving up, on a proof: the proof is only as good as the map."""
@@ -201,9 +274,10 @@ class Driver:
         if path is not None and path.curve is not None:
             route = route_along_curve(grid, path.curve, pose.point, end)
             if route_is_clear(route, self.evidence, self._rover.radius_m + self._settings.guidance.clearance_m):
-                self.route = route
+                self.route = with_planned_speeds(route, path, grid.resolution_m)
                 return
-        self.route = route_along_cells(grid, decision.path, pose.point, end)
+        route = route_along_cells(grid, decision.path, pose.point, end)
+        self.route = route if path is None else with_planned_speeds(route, path, grid.resolution_m)
 
     def _arrived(self, pose: Pose, speed_m_s: float) -> bool:
         assert self._goal is not None

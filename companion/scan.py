@@ -32,7 +32,7 @@ class RangeScan:
     @property
     def is_narrow(self) -> bool:
         """Whether this is one thin beam, which leaves most of the rover's own width unseen."""
-        return len(self.bearing_rad) * self.beam_width_rad < NARROW_RAD
+        return bool(len(self.bearing_rad) * self.beam_width_rad < NARROW_RAD)
 
     @property
     def looks_ahead(self) -> bool:

@@ -11,7 +11,7 @@ from companion.clock import stopwatch_s
 from companion.grid import Cell, Weights
 from companion.navigator import SearchKind
 from companion.planning.planner import Planner
-from companion.planning.problem import Budget, PlanningProblem, PlanResult
+from companion.planning.problem import Budget, Motion, Mover, PlanningProblem, PlanResult
 from companion.settings import NavigatorSettings, SearchSettings
 
 
@@ -29,13 +29,21 @@ class Searcher:
     rng: Generator
     seconds: list[float] = field(default_factory=list)
 
-    def search(self, weights: Weights, kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
+    def search(
+        self,
+        weights: Weights,
+        kind: SearchKind,
+        start: Cell,
+        target: Cell,
+        movers: tuple[Mover, ...] = (),
+        motion: Motion = Motion(),  # noqa: B008 - frozen
+    ) -> PlanResult:
         """One search over ``weights`` (not changed). The field the rover stands in is free, whatever the map says."""
         began_s = stopwatch_s()
         if weights[start.y, start.x] >= 1.0:
             weights = np.array(weights)
             weights[start.y, start.x] = 0.9
         budget = budget_of(self.settings.thorough if kind is SearchKind.THOROUGH else self.settings.quick)
-        result = self.planner.plan(PlanningProblem(weights, start, target), budget, self.rng)
+        result = self.planner.plan(PlanningProblem(weights, start, target, movers=movers, motion=motion), budget, self.rng)
         self.seconds.append(stopwatch_s() - began_s)
         return result

@@ -15,6 +15,9 @@ from companion.scan import RangeScan
 EKF_POSITION = 8 | 16
 """POS_HORIZ_REL or POS_HORIZ_ABS: one of them must be set to drive."""
 EKF_CONST_POSITION = 128
+OTHERS_KEPT = 64
+OTHERS_FORGOTTEN_S = 30.0
+"""Other vehicles are remembered for so long after they were last heard, and no more than so many of them."""
 
 
 class RoverMode(IntEnum):
@@ -66,6 +69,25 @@ class GlobalPositionSeen:
     time_s: float
     boot_s: float
     point: GeoPoint
+    altitude_m: float | None = None
+    """Above sea level."""
+
+
+@dataclass(frozen=True, slots=True)
+class OtherSeen:
+    """Somebody else told where he is: GLOBAL_POSITION_INT of another system, ADSB_VEHICLE or AIS_VESSEL.
+
+    ``seen_s``: when he was there, by the companion's clock; ``radius_m``: half his largest extent, None if not told.
+    """
+
+    time_s: float
+    name: str
+    seen_s: float
+    point: GeoPoint
+    north_m_s: float
+    east_m_s: float
+    altitude_m: float | None = None
+    radius_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -149,6 +171,7 @@ Event = (
     | LocalPositionSeen
     | AttitudeSeen
     | GlobalPositionSeen
+    | OtherSeen
     | EkfStatusSeen
     | OriginSeen
     | HomeSeen
@@ -180,6 +203,8 @@ class VehicleState:
     jump_m: float = 0.0
     """How far the last position report lay from where the velocity had led us to expect it."""
     parameters: dict[str, float] = field(default_factory=dict)
+    others: dict[str, OtherSeen] = field(default_factory=dict)
+    """Who else is about, by name."""
 
     def pose_at(self, time_s: float) -> Pose | None:
         """Position and heading carried forward to a moment with the last known velocities; None if not known yet."""
@@ -217,6 +242,8 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
             return replace(state, attitude=event)
         case GlobalPositionSeen():
             return replace(state, global_position=event)
+        case OtherSeen():
+            return replace(state, others=_with_other(state.others, event))
         case EkfStatusSeen():
             return replace(state, ekf=event)
         case OriginSeen():
@@ -233,6 +260,12 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
             return replace(state, parameters={**state.parameters, event.name: event.value})
         case _:
             return state
+
+
+def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, OtherSeen]:
+    """The newest of everybody; who has been silent for long is forgotten, and of too many those heard longest ago."""
+    kept = [one for one in others.values() if one.name != event.name and event.time_s - one.time_s < OTHERS_FORGOTTEN_S]
+    return {one.name: one for one in [*kept[-(OTHERS_KEPT - 1) :], event]}
 
 
 def _jump_m(before: LocalPositionSeen | None, now: LocalPositionSeen) -> float:

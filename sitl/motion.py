@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from sitl.autopilot_guided import run_control
 from sitl.control import LOOP_S
-from sitl.rover import drive
+from sitl.movers import Floats, Ints
+from sitl.rover import drive, meet_movers
 from sitl.world import Obstacles
 
 SUBSTEPS = 4
@@ -78,8 +79,9 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
 def run_loops(
     rovers: Any, estimates: Any, controls: Any, tunings: Any, origin: Any, noise: Any, draws: Any,
     obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
+    mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats, time_s: float,
 ) -> int:  # fmt: skip
-    """Run main loops until the draws are used up or something happened that people must be told at once.
+    """Run main loops from ``time_s`` on, until the draws are used up or something happened that people must be told at once.
 
     Returns how many loops were run (a target reached, a time-out, a new contact end the batch early).
     """
@@ -91,6 +93,9 @@ def run_loops(
         run_control(control, tuning, estimate)
         for _ in range(SUBSTEPS):
             drive(rover, obstacles, south_m, west_m, resolution_m, control.left, control.right, LOOP_S / SUBSTEPS)
+        if mover_radii_m.size > 0:
+            now_s = time_s + (loop + 1) * LOOP_S
+            meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)
         if control.arrived or control.timed_out or rover.contacts != contacts:
             return loop + 1
     return int(draws.shape[0])

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from sitl.movers import Floats, Ints, nearest_mover
 from sitl.world import Obstacles, clearance_m
 
 TOP_SPEED_M_S = 4.0
@@ -35,9 +36,14 @@ ROVER = np.dtype(
         ("radius_m", "f8"),
         ("touching", "i8"),
         ("contacts", "i8"),
+        ("struck", "i8"),
+        ("struck_m_s", "f8"),
     ]
 )
-"""The truth about the rover, world frame, heading clockwise from north; ``contacts`` counts collisions so far."""
+"""The truth about the rover, world frame, heading clockwise from north; ``contacts`` counts collisions so far.
+
+``struck``: number of the mover it touches, from 1; ``struck_m_s``: the rover's own speed when that began.
+"""
 
 RoverState = NDArray[Any]
 
@@ -83,3 +89,19 @@ def drive(
     rover.driven_m += abs(way_m)
     rover.north_m = north_m
     rover.east_m = east_m
+
+
+@njit(cache=True, nogil=True)
+def meet_movers(
+    rover: Any, rows: Floats, begins: Ints, radii_m: Floats, periods_s: Floats, time_s: float
+) -> None:
+    """Notice that a mover and the rover touch: it counts once, and stops the rover; the mover goes on."""
+    gap_m, mover = nearest_mover(rows, begins, radii_m, periods_s, time_s, rover.north_m, rover.east_m)
+    if gap_m >= rover.radius_m + RELEASE_M:
+        rover.struck = 0
+    elif gap_m < rover.radius_m and rover.struck != mover + 1:
+        rover.contacts += 1
+        rover.struck = mover + 1
+        rover.struck_m_s = rover.speed_m_s
+        rover.speed_m_s = 0.0
+        rover.accel_m_s2 = 0.0

@@ -10,6 +10,7 @@ from companion.grid import Cell, Grid
 from companion.mapfiles import load_map
 from companion.mission.mission import Mission, SitlSpec
 from sitl.motion import NoiseSettings
+from sitl.movers import Mover, timed_track
 from sitl.sensors import suite_named
 from sitl.simulator import SimStart, Simulator
 from sitl.world import World
@@ -59,6 +60,12 @@ def scenario_from_mission(mission: Mission) -> Scenario:
             f"{name}: sitl.start: a rover of {radius_m} m radius touches an obstacle of {spec.world} there; "
             "choose a free field"
         )
+    world = replace(world, movers=_movers(spec, start_m))
+    gap_m, touching = world.mover_gap_m(*start_m, 0.0)
+    if gap_m < radius_m:
+        raise ScenarioError(
+            f"{name}: sitl.movers {touching + 1}: begins where the rover stands; let it begin farther from home"
+        )
     start = SimStart(*start_m, math.radians(spec.heading_deg), _home(mission, spec))
     parameters = {"WP_SPEED": mission.rover.cruise_speed_m_s, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
     return Scenario(world, start, spec.sensors, radius_m, parameters)
@@ -81,6 +88,16 @@ def _ground(mission: Mission, spec: SitlSpec, name: str) -> tuple[World, tuple[f
             f"({grid.width} x {grid.height} fields of {grid.resolution_m} m)"
         )
     return World.from_grid(grid), start_m
+
+
+def _movers(spec: SitlSpec, home_m: tuple[float, float]) -> tuple[Mover, ...]:
+    """What moves, in the world frame; the mission counts metres from home, where the rover begins."""
+    movers = []
+    for one in spec.movers:
+        places_m = [(home_m[0] + place.north_m, home_m[1] + place.east_m) for place in one.route]
+        track = timed_track(places_m, one.speed_m_s, one.start_s, repeats=one.repeat)
+        movers.append(Mover(one.name, one.radius_m, track, one.repeat, one.announce or ""))
+    return tuple(movers)
 
 
 def _middle(cell: Cell, resolution_m: float) -> tuple[float, float]:

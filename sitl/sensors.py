@@ -75,6 +75,8 @@ class RangeSensing:
     def __init__(self, suite: SensorSuite, world: World, noise_m: float, rng: np.random.Generator) -> None:
         """``noise_m`` is the standard deviation of one range."""
         self.suite = suite
+        self.time_s = 0.0
+        """The world's time at which is measured; the simulator keeps it."""
         self._world = world
         self._noise_m = noise_m
         self._rng = rng
@@ -85,7 +87,7 @@ class RangeSensing:
         """The scanner's 72 ranges; maximum + 1 where nothing was seen."""
         lidar = self.suite.lidar
         assert lidar is not None
-        true_m = self._world.rays_m(north_m, east_m, self._lidar_rad + heading_rad, lidar.max_m)
+        true_m = self._world.rays_m(north_m, east_m, self._lidar_rad + heading_rad, lidar.max_m, self.time_s)
         seen_m = true_m + self._noise(SECTORS)
         nothing = round(lidar.max_m * 100) + 1
         cells = np.clip(np.rint(seen_m * 100.0), 0, nothing - 1)
@@ -97,7 +99,7 @@ class RangeSensing:
         if not self.suite.beams:
             return []
         reach_m = max(beam.max_m for beam in self.suite.beams)
-        true_m = self._world.rays_m(north_m, east_m, self._beam_rad + heading_rad, reach_m)
+        true_m = self._world.rays_m(north_m, east_m, self._beam_rad + heading_rad, reach_m, self.time_s)
         seen_m = true_m + self._noise(len(self.suite.beams))
         limits = [round(beam.max_m * 100) for beam in self.suite.beams]
         return [

@@ -16,6 +16,7 @@ from sitl import geodesy
 from sitl.autopilot import Autopilot
 from sitl.autopilot_lidar import LidarComponent
 from sitl.autopilot_link import Channel
+from sitl.autopilot_traffic import Traffic
 from sitl.autopilot_vehicle import Vehicle
 from sitl.control import LOOP_HZ
 from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
@@ -67,11 +68,16 @@ class Truth:
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """The rover touched an obstacle: when, and where its centre was (world frame)."""
+    """The rover touched an obstacle: when, and where its centre was (world frame).
+
+    ``mover`` is the name of what touched it if that moves, ``speed_m_s`` the rover's own speed then.
+    """
 
     time_s: float
     north_m: float
     east_m: float
+    mover: str | None = None
+    speed_m_s: float = math.nan
 
 
 class SimLink:
@@ -129,6 +135,7 @@ class Simulator:
         self._tick = 0
         self._links: list[SimLink] = []
         self._collisions: list[Collision] = []
+        self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
         self._boot()
 
     def _boot(self) -> None:
@@ -172,10 +179,11 @@ class Simulator:
 
     @property
     def clearance_m(self) -> float:
-        """Room between the rover's circle and the nearest obstacle, at most 5 m; negative never."""
+        """Room between the rover's circle and the nearest obstacle, moving or not, at most 5 m; negative never."""
         rover = self._rover[0]
         reach_m = 5.0 + float(rover["radius_m"])
-        room_m = self.world.clearance_m(float(rover["north_m"]), float(rover["east_m"]), reach_m)
+        here = (float(rover["north_m"]), float(rover["east_m"]))
+        room_m = min(self.world.clearance_m(*here, reach_m), self.world.mover_gap_m(*here, self.time_s)[0])
         return max(room_m - float(rover["radius_m"]), 0.0)
 
     def connect(self) -> SimLink:
@@ -219,6 +227,8 @@ class Simulator:
         due_us = self._autopilot.next_due_us()
         if self._lidar is not None:
             due_us = min(due_us, self._lidar.next_due_us())
+        # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
+        due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
         return max(1, math.ceil((due_us - self._vehicle.time_us) * 1e-6 * LOOP_HZ - 1e-6))
 
     def _run(self, loops: int) -> None:
@@ -231,15 +241,24 @@ class Simulator:
         done = run_loops(
             self._rover, vehicle.estimate, vehicle.control, vehicle.tuning, vehicle.origin_m, self._noise,
             self._draws[self._row : self._row + loops],
-            world.obstacles, world.south_m, world.west_m, world.resolution_m,
+            world.obstacles, world.south_m, world.west_m, world.resolution_m, *world.fleet, self.time_s,
         )  # fmt: skip
         self._row += done
         self._tick += done
+        self._sensing.time_s = self.time_s
         if int(rover["contacts"]) > contacts:
-            self._collisions.append(Collision(self.time_s, float(rover["north_m"]), float(rover["east_m"])))
+            self._collisions.append(self._collision())
+
+    def _collision(self) -> Collision:
+        rover = self._rover[0]
+        struck, here = int(rover["struck"]), (float(rover["north_m"]), float(rover["east_m"]))
+        if struck == 0:
+            return Collision(self.time_s, *here)
+        return Collision(self.time_s, *here, self.world.movers[struck - 1].name, float(rover["struck_m_s"]))
 
     def _send(self) -> None:
         self._autopilot.run_due()
+        self._traffic.send_due(self.time_s, (link.channel for link in self._links))
         if self._lidar is None:
             return
         rover = self._rover[0]

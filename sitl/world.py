@@ -7,13 +7,14 @@ north, x grows east) whose outer south-west corner may lie anywhere. Ground outs
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from companion.grid import OBSTACLE, Grid
+from sitl.movers import Fleet, Mover, fleet_of, nearest_mover, place, shorten_rays
 
 Obstacles = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -100,12 +101,17 @@ def clearance_m(
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Obstacles and where they lie: ``obstacles[y, x]``, the south-west corner of field (0, 0) in metres."""
+    """Obstacles and where they lie: ``obstacles[y, x]``, the south-west corner of field (0, 0) in metres; and what moves."""
 
     obstacles: Obstacles
     resolution_m: float = 1.0
     south_m: float = 0.0
     west_m: float = 0.0
+    movers: tuple[Mover, ...] = ()
+    fleet: Fleet = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "fleet", fleet_of(self.movers))
 
     @classmethod
     def open(cls, width_m: float = 1.0, height_m: float = 1.0) -> World:
@@ -136,17 +142,30 @@ class World:
             )
         )
 
-    def rays_m(self, north_m: float, east_m: float, bearings_rad: Floats, max_m: float) -> Floats:
-        """The shortest ray of each row of bearings (sectors x rays), ``max_m`` where nothing was hit."""
+    def rays_m(self, north_m: float, east_m: float, bearings_rad: Floats, max_m: float, time_s: float = 0.0) -> Floats:
+        """The shortest ray of each row of bearings (sectors x rays) at a moment, ``max_m`` where nothing was hit."""
         lengths_m = np.empty(bearings_rad.shape[0])
         ray_lengths(
             self.obstacles, self.south_m, self.west_m, self.resolution_m, north_m, east_m, bearings_rad, max_m,
             lengths_m,
         )  # fmt: skip
+        if self.movers:
+            rows, begins, radii_m, periods_s = self.fleet
+            shorten_rays(rows, begins, radii_m, periods_s, time_s, north_m, east_m, bearings_rad, lengths_m)
         return lengths_m
 
+    def mover_gap_m(self, north_m: float, east_m: float, time_s: float) -> tuple[float, int]:
+        """Metres from a place to the nearest mover's rim at a moment, negative inside it, and its number; inf and -1 if none."""
+        rows, begins, radii_m, periods_s = self.fleet
+        gap_m, which = nearest_mover(rows, begins, radii_m, periods_s, time_s, north_m, east_m)
+        return float(gap_m), int(which)
+
+    def mover_at(self, number: int, time_s: float) -> tuple[float, float, float, float]:
+        """Where a mover is at a moment, north and east, and its velocity."""
+        return place(self.fleet.rows, self.fleet.begins, self.fleet.periods_s, number, time_s)
+
     def clearance_m(self, north_m: float, east_m: float, reach_m: float) -> float:
-        """Metres from a place to the nearest obstacle, at most ``reach_m``."""
+        """Metres from a place to the nearest obstacle that stands, at most ``reach_m``."""
         return float(
             clearance_m(self.obstacles, self.south_m, self.west_m, self.resolution_m, north_m, east_m, reach_m)
         )

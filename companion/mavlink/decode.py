@@ -9,8 +9,9 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.frames import GeoPoint
-from companion.mavlink import ranges
+from companion.mavlink import others, ranges
 from companion.mavlink.framing import Packet
+from companion.mavlink.places import point_of
 from companion.mavlink.texts import TextAssembler
 from companion.scan import RangeScan
 from companion.vehicle import (
@@ -84,7 +85,7 @@ class Decoder:
             self._learn(packet)
         if packet.system_id != self.system_id or not self.vehicle_known:
             self.other_systems += 1
-            return []
+            return self._of_others(packet, time_s) if self.vehicle_known else []
         if packet.component_id == self.component_id or self._is_repeated(packet):
             return []
         if self._first_s is None:
@@ -94,7 +95,14 @@ class Decoder:
             return self._of_autopilot(packet, time_s)
         if packet.message_id in RANGE_MESSAGES:
             return self._range(packet, time_s)
-        return []
+        return self._of_others(packet, time_s) if packet.message_id in others.RECEIVED else []
+
+    def _of_others(self, packet: Packet, time_s: float) -> list[Event]:
+        """Where somebody else says that he is, or where a receiver has heard him."""
+        if packet.message_id not in others.READERS:
+            return []
+        event = others.READERS[packet.message_id](self._message(packet), time_s)
+        return [] if event is None else [event]
 
     def _learn(self, packet: Packet) -> None:
         """The first ArduPilot rover that is heard is ours."""
@@ -117,6 +125,8 @@ class Decoder:
         if packet.message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
             message = self._message(packet)
             return [*self._texts.add(TextSeen(time_s, message.severity, message.text), message.id, message.chunk_seq)]
+        if packet.message_id in others.RECEIVED:
+            return self._of_others(packet, time_s)
         reader = self._readers.get(packet.message_id)
         event = reader(self._message(packet), time_s) if reader is not None else None
         return [] if event is None else [event]
@@ -199,13 +209,13 @@ class Decoder:
         return AttitudeSeen(time_s, message.time_boot_ms / 1000.0, message.yaw, message.yawspeed)
 
     def _global_position(self, message: Any, time_s: float) -> Event | None:
-        point = _point(message.lat, message.lon)
+        point = point_of(message.lat, message.lon)
         if self._is_late(message) or point is None:
             return None
-        return GlobalPositionSeen(time_s, message.time_boot_ms / 1000.0, point)
+        return GlobalPositionSeen(time_s, message.time_boot_ms / 1000.0, point, message.alt / 1000.0)
 
     def _gps_origin(self, message: Any, time_s: float) -> Event | None:
-        self.origin = _point(message.latitude, message.longitude) or self.origin
+        self.origin = point_of(message.latitude, message.longitude) or self.origin
         return None if self.origin is None else OriginSeen(time_s, self.origin)
 
     def _command_ack(self, message: Any, time_s: float) -> Event | None:
@@ -221,20 +231,13 @@ class Decoder:
         return message.target_system in (0, self.system_id) and message.target_component in (0, self.component_id)
 
 
-def _point(lat_e7: int, lon_e7: int) -> GeoPoint | None:
-    """Degrees from 1e-7 degrees; None for 0/0, which is sent when there is no position, and for what is not on the earth."""
-    if (lat_e7 == 0 and lon_e7 == 0) or abs(lat_e7) > 90e7 or abs(lon_e7) > 180e7:
-        return None
-    return GeoPoint(lat_e7 / 1e7, lon_e7 / 1e7)
-
-
 def _home(message: Any, time_s: float) -> Event | None:
-    point = _point(message.latitude, message.longitude)
+    point = point_of(message.latitude, message.longitude)
     return None if point is None else HomeSeen(time_s, point)
 
 
 def _target(message: Any, time_s: float) -> Event | None:
-    point = _point(message.lat_int, message.lon_int)
+    point = point_of(message.lat_int, message.lon_int)
     return None if point is None else TargetSeen(time_s, point, message.type_mask)
 
 

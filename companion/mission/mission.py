@@ -91,6 +91,23 @@ class WeightedArea:
 
 
 @dataclass(frozen=True, slots=True)
+class MoverSpec:
+    """A disc that moves in the simulator's world: from place to place at an even speed, from ``start_s`` on.
+
+    The time counts from when the simulator is switched on. ``repeat``: from the last place back to the first, and again.
+    ``announce``: vehicle, adsb or ais, or None: it tells nobody of itself.
+    """
+
+    name: str
+    radius_m: float
+    speed_m_s: float
+    route: tuple[HomePoint, ...]
+    start_s: float = 0.0
+    repeat: bool = False
+    announce: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class SitlSpec:
     """What only the simulator reads.
 
@@ -105,6 +122,7 @@ class SitlSpec:
     heading_deg: float = 90.0
     sensors: str = "lidar-90"
     home: GeoPoint | None = None
+    movers: tuple[MoverSpec, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,6 +24,7 @@ from companion.mission.mission import (
     HomePoint,
     Mission,
     MissionError,
+    MoverSpec,
     OnBlocked,
     Place,
     RoverSpec,
@@ -167,6 +168,26 @@ class GeoTable(Table):
     lon_deg: Lon
 
 
+class MoverTable(Table):
+    """``[[sitl.movers]]``: a disc that moves in the simulator's world."""
+
+    name: Name | None = None
+    radius_m: Annotated[float, Field(gt=0.0, le=20.0)]
+    speed_m_s: Annotated[float, Field(gt=0.0, le=50.0)]
+    route_m: Annotated[list[Pair], Field(max_length=1000)]
+    start_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    repeat: bool = False
+    announce: Literal["vehicle", "adsb", "ais"] | None = None
+
+    def mover(self, number: int) -> MoverSpec:
+        """The mover. Raises ValueError when it has nowhere to go."""
+        route = tuple(HomePoint(*pair) for pair in self.route_m)
+        if len(set(route)) < 2:
+            raise ValueError("route_m needs at least two different places")
+        name = self.name or f"mover {number}"
+        return MoverSpec(name, self.radius_m, self.speed_m_s, route, self.start_s, self.repeat, self.announce)
+
+
 class SitlTable(Table):
     """``[sitl]``: a real rover ignores it."""
 
@@ -176,6 +197,7 @@ class SitlTable(Table):
     heading_deg: float = SitlSpec().heading_deg
     sensors: Name = SitlSpec().sensors
     home: GeoTable | None = None
+    movers: Annotated[list[MoverTable], Field(max_length=100)] = []
 
 
 class MissionTable(Table):
@@ -238,20 +260,23 @@ def _mission(table: MissionTable, path: Path) -> Mission:
             for i, item in enumerate(table.corridor, 1)
         ),
         prior_map=folder / table.prior_map if table.prior_map else None,
-        sitl=None if table.sitl is None else _sitl(table.sitl, folder),
+        sitl=None if table.sitl is None else _sitl(table.sitl, path),
         source=path,
         notes=(f"fences taken from {table.fence}; its targets, if any, are not used",) if fences else (),
     )
 
 
-def _sitl(table: SitlTable, folder: Path) -> SitlSpec:
+def _sitl(table: SitlTable, path: Path) -> SitlSpec:
     return SitlSpec(
-        world=folder / table.world if table.world else None,
+        world=path.parent / table.world if table.world else None,
         resolution_m=table.resolution_m,
         start=None if table.start is None else Cell(*table.start),
         heading_deg=table.heading_deg,
         sensors=table.sensors,
         home=None if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
+        movers=tuple(
+            _named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)
+        ),
     )
 
 

@@ -34,7 +34,7 @@ def least_weight(weights: Floats) -> float:
     """The least that any field costs to enter, at least MIN_WEIGHT."""
     least = OBSTACLE
     for i in range(len(weights)):
-        least = weights[i] if weights[i] < least else least  # noqa: FURB136 - min() is not vectorised
+        least = weights[i] if weights[i] < least else least  # min() would not be vectorised
     return max(least, MIN_WEIGHT)
 
 

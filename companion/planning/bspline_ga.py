@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numba import njit
 from numpy.random import Generator
@@ -11,36 +13,45 @@ from companion.grid import Weights
 from companion.planning import bspline
 from companion.planning.chance import draw_seed, seeded
 from companion.planning.ends import ends_free
-from companion.planning.ga_kernel import Task, Tuning, evolve, is_correct, large_value, way_point, way_points_for
+from companion.planning.ga_fitness import Task, Tuning, is_correct, way_point, way_points_for
+from companion.planning.ga_population import Span, evolve, vln_of
+from companion.planning.ga_turning import control_of, curve_points
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
 from companion.settings import PlannerSettings
 
-TuningValues = tuple[int, int, float, float, float, float, float, float, float, int, float]
+TuningValues = tuple[int, int, float, float, float, float, float, float, float, int, float, bool, int, float]
+Places = tuple[int, int, int, int, bool, float, float]
 Found = tuple[bool, CellArray, NDArray[np.float64], float, int, int, int]
 
 
 @njit(cache=True, nogil=True)
-def path_of(genes: CellArray, way_points: int) -> tuple[CellArray, NDArray[np.float64]]:
+def path_of(genes: CellArray, task: Task, way_points: int) -> tuple[CellArray, NDArray[np.float64]]:
     """A chromosome's fields, and its curve, about two points a field.
 
-    Where fields are visited twice the loop is cut out, and there is no curve (no rows) that would still lead round it.
+    Where fields are visited twice the loop is cut out, and there is no curve (no rows) that would still lead round it;
+    but a vehicle that cannot turn on the spot may need the loop, and it keeps its curve.
     """
-    first, basis = bspline.basis(len(genes), way_points)
-    points = np.empty((way_points, 2), np.int64)
-    for i in range(way_points):
-        points[i, 0], points[i, 1] = way_point(genes, first, basis, i)
+    control = genes.astype(np.float64)
+    if task.turning_radius > 0.0:
+        control = control_of(genes, task)
+        points = curve_points(control)
+    else:
+        first, basis = bspline.basis(len(genes), way_points)
+        points = np.empty((way_points, 2), np.int64)
+        for i in range(way_points):
+            points[i, 0], points[i, 1] = way_point(genes, first, basis, i)
     walk = polyline(points)
     cells = without_loops(walk)
-    samples = 2 * len(cells) + 1 if len(cells) == len(walk) else 0
-    return cells, bspline.curve(genes.astype(np.float64), samples)
+    samples = 2 * len(walk) + 1 if len(cells) == len(walk) or task.turning_radius > 0.0 else 0
+    return cells, bspline.curve(control, samples)
 
 
 @njit(cache=True, nogil=True)
 def search(
     weights: Weights,
-    places: tuple[int, int, int, int, bool],
+    places: Places,
     settings: TuningValues,
     control_points: NDArray[np.int64],
     population: int,
@@ -54,16 +65,16 @@ def search(
     """
     task, tuning = Task(*places), Tuning(*settings)
     state = seeded(seed)
-    height, width = weights.shape
     epochs = 0
     evaluations = 0
     for count in control_points:
-        value, genes, spent, tried = evolve(weights, task, tuning, count, population, min_epochs, max_epochs, state)
+        span = Span(population, min_epochs, max_epochs)
+        value, genes, spent, tried = evolve(weights, task, tuning, count, span, state)
         epochs += spent
         evaluations += tried
-        if is_correct(value, large_value(count, width, height, tuning)):
-            cells, curve = path_of(genes, way_points_for(count, tuning))
-            return True, cells, curve, cells_cost(weights, cells), count, epochs, evaluations
+        if is_correct(value, vln_of(weights, count, tuning)):
+            cells, curve = path_of(genes, task, way_points_for(len(genes), tuning))
+            return True, cells, curve, cells_cost(weights, cells), len(genes), epochs, evaluations
     return False, np.empty((0, 2), np.int64), np.empty((0, 2)), 0.0, 0, epochs, evaluations
 
 
@@ -71,9 +82,10 @@ class BsplineGa:
     """The genetic algorithm alone, as the paper's profile uses it. It never proves that there is no path."""
 
     name = "bspline-ga"
-    capabilities = Capabilities(random=True, smooth_curve=True)
+    capabilities = Capabilities(random=True, smooth_curve=True, turning_radius=True)
 
     def __init__(self, settings: PlannerSettings) -> None:
+        self._adaptive = settings.adaptive
         self._settings = (
             settings.way_points,
             settings.span_way_points,
@@ -86,6 +98,9 @@ class BsplineGa:
             settings.neighbourhood,
             settings.margin_fields,
             settings.obstacle_value,
+            settings.adaptive,
+            settings.most_control_points,
+            settings.number_probability,
         )
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
@@ -99,20 +114,31 @@ class BsplineGa:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
         if problem.start == problem.target:
             return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
+        counts, max_epochs = budget.control_points, budget.max_epochs
+        if self._adaptive:  # the same epochs in all, in one search
+            counts, max_epochs = counts[:1], max_epochs * len(counts)
         found, cells, curve, cost, count, epochs, evaluations = search(
             plain(problem.weights),
-            (*problem.start, *problem.target, problem.corner_cutting),
+            places_of(problem),
             self._settings,
-            np.array(budget.control_points, np.int64),
+            np.array(counts, np.int64),
             budget.population,
             budget.min_epochs,
-            budget.max_epochs,
+            max_epochs,
             seed,
         )
         if not found:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, evaluations, epochs)
         path = Path(as_cells(cells), cost, curve if len(curve) else None)
         return PlanResult(PlanStatus.FOUND, path, self.name, evaluations, epochs, count)
+
+
+def places_of(problem: PlanningProblem) -> Places:
+    """What ``Task`` is made of."""
+    motion = problem.motion
+    heading_rad = math.nan if motion.heading_rad is None else float(motion.heading_rad)
+    radius = float(motion.turning_radius_fields)
+    return (*problem.start, *problem.target, problem.corner_cutting, radius, heading_rad)
 
 
 def check_budget(budget: Budget) -> None:

@@ -10,7 +10,7 @@ from companion.planning.astar import Astar
 from companion.planning.bspline_ga import BsplineGa
 from companion.planning.planner import Capabilities
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult
-from companion.planning.raster import as_array, as_cells, cells_cost, plain
+from companion.planning.raster import SQRT2, as_array, as_cells, cells_cost, plain
 from companion.planning.smoothing import fields_under, smooth
 from companion.settings import PlannerSettings
 
@@ -59,7 +59,7 @@ def _least_cost(problem: PlanningProblem) -> float:
     """What no path can cost less than: the octile distance over the cheapest ground there is."""
     (x, y), (to_x, to_y) = problem.start, problem.target
     across, along = sorted((abs(to_x - x), abs(to_y - y)))
-    return (along + (2.0**0.5 - 1.0) * across) * max(float(problem.weights.min()), MIN_WEIGHT)
+    return (along + (SQRT2 - 1.0) * across) * max(float(problem.weights.min()), MIN_WEIGHT)
 
 
 def _smoothed(problem: PlanningProblem, path: Path) -> Path:

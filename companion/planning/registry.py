@@ -7,15 +7,20 @@ import difflib
 import numpy as np
 
 from companion.grid import BASE_WEIGHT, OBSTACLE, Cell
+from companion.planning.astar import Astar
 from companion.planning.bspline_ga import BsplineGa
 from companion.planning.dijkstra import Dijkstra, reachable_costs
+from companion.planning.dstar_lite import DstarLite
 from companion.planning.hybrid import Hybrid
+from companion.planning.monotone_ga import geisler, hermanu, sedighi
 from companion.planning.planner import Planner, PlannerFactory
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.raster import is_path
+from companion.planning.theta_star import ThetaStar
+from companion.planning.vertex_ga import vertex, vertex_plus
 from companion.settings import PlannerSettings
 
-PLANNERS: dict[str, PlannerFactory] = {"bspline-ga": BsplineGa, "hybrid": Hybrid, "dijkstra": Dijkstra}
+PLANNERS: dict[str, PlannerFactory] = {"bspline-ga": BsplineGa, "hybrid": Hybrid, "dijkstra": Dijkstra, "astar": Astar, "theta-star": ThetaStar, "dstar-lite": DstarLite, "sedighi": sedighi, "geisler": geisler, "hermanu": hermanu, "vertex": vertex, "vertex++": vertex_plus}
 
 
 class UnknownPlannerError(ValueError):

@@ -35,7 +35,15 @@ class VertexSettings(Section):
     """The genetic algorithm of Wang, Sillitoe & Mulvaney 2007."""
 
     population: int = Field(30, ge=4, le=10_000, description="chromosomes (table II)")
-    generations: int = Field(1000, ge=1, description="at most so many, one operator each (section III)")
+    generations: int = Field(
+        1000, ge=1, description="one operator each: at most so many for a feasible path, then so many to better it (table IV)"
+    )
+    populations: int = Field(
+        5,
+        ge=1,
+        description="a population without a feasible path after all its generations is given up for a new one, at most so many "
+        "in all (ours; the paper leaves the end open, II.E)",
+    )
     length_weight: float = Field(0.0, ge=0.0, description="w_d of equation 1: what a field of path costs")
     time_weight: float = Field(1.0, ge=0.0, description="w_t of equation 1: what a second costs")
     speed_levels: int = Field(
@@ -97,6 +105,15 @@ class PlannerSettings(Section):
         0.2, gt=0.0, description="second third: reach round the start, as a share of the smaller map dimension (3.3)"
     )
     margin_fields: int = Field(1, ge=0, description="third third: distance kept from the map's edge (3.3)")
+    adaptive: bool = Field(
+        False,
+        description="the number of control points is part of the chromosome: crossed, and changed by knot insertion and "
+        "removal (ours; 7 names it as the open problem). Off: the numbers of the budget, one after the other",
+    )
+    most_control_points: int = Field(16, ge=3, le=64, description="adaptive: no chromosome gets more (ours)")
+    number_probability: float = Field(
+        0.3, ge=0.0, le=1.0, description="adaptive: chance that a child gains or loses a control point (ours)"
+    )
     hybrid_tolerance: float = Field(
         1.03, ge=1.0, description="hybrid: a genetic path may cost so many times the best possible"
     )

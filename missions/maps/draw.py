@@ -252,6 +252,16 @@ def sealed() -> Mask:
 # --- the known maps of the paper's Table 1 ---------------------------------------------------------------------------
 
 
+def crossing() -> Mask:
+    """A broad street from west to east, three streets across it, a kiosk in the middle of the way."""
+    world = open_ground()
+    for x0, x1 in ((8, 18), (28, 40), (50, 62), (72, 84)):
+        fill(world, x0, 4, x1, 15)
+        fill(world, x0, 33, x1, 44)
+    fill(world, 53, 22, 57, 26)
+    return world
+
+
 def known_1() -> Mask:
     """One obstacle."""
     world = open_ground()
@@ -308,6 +318,7 @@ WORLDS: dict[str, Callable[[], Mask]] = {
     "complex": complex_shapes,
     "dead-end": dead_end,
     "sealed": sealed,
+    "crossing": crossing,
     "known-1": known_1,
     "known-2": known_2,
     "known-3": known_3,

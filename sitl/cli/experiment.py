@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.mapfiles import MapError
-from sitl.experiments import driving, kwasniewski_maps, kwasniewski_table1, navigation
+from sitl.experiments import driving, kwasniewski_maps, kwasniewski_table1, navigation, wang_table4
 from sitl.experiments.experiment import Experiment, ExperimentError, Options, Report
 
 EXPERIMENTS: dict[str, Experiment] = {
@@ -19,6 +19,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     kwasniewski_table1.NAME: kwasniewski_table1.run,
     navigation.NAME: navigation.run,
     driving.NAME: driving.run,
+    wang_table4.NAME: wang_table4.run,
 }
 EXIT_BAD_INPUT = 2
 

@@ -1,0 +1,205 @@
+"""Theta*: graph search whose path may turn at any angle. Compiled.
+
+Nash, Koenig & Tovey 2010 (Lazy Theta*). A field's predecessor need not be its neighbour, but any field in a straight line of sight. A new field
+is given its neighbour's predecessor on trust; the line is looked at only when the field's turn comes, once for each field, and if it is blocked,
+or dearer than a step from a neighbour, the best neighbour takes its place.
+
+The paper's ground is free or blocked. Here ground has weights, so a straight line costs its length times the mean weight of the
+fields under it, and is taken only where that is no dearer.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from companion.grid import OBSTACLE
+from companion.planning.astar_kernel import START_COST, STEP_X, STEP_Y, least_weight, step_cost
+from companion.planning.ends import ends_free
+from companion.planning.heap import put, take_out
+from companion.planning.planner import Capabilities
+from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult, PlanStatus
+from companion.planning.raster import (
+    HALF,
+    ONE,
+    SHIFT,
+    SQRT2,
+    CellArray,
+    as_cells,
+    cells_cost,
+    fine_steps,
+    plain,
+    polyline,
+    without_loops,
+)
+from companion.settings import PlannerSettings
+
+Floats = NDArray[np.float64]
+Fields = NDArray[np.int32]
+NO_CELLS = (0, 2)
+
+
+@njit(cache=True, nogil=True)
+def line_cost(weights: Floats, x0: int, y0: int, x1: int, y1: int, corner_cutting: bool) -> float:
+    """The cost of the straight line between two different fields, drawn as ``raster.polyline`` does; inf if it is blocked."""
+    steps, step_x, step_y = fine_steps(x1 - x0, y1 - y0)
+    fine_x, fine_y = x0 * ONE + HALF, y0 * ONE + HALF
+    last_x, last_y, total = x0, y0, 0.0
+    for _ in range(steps):
+        fine_x += step_x
+        fine_y += step_y
+        x, y = fine_x >> SHIFT, fine_y >> SHIFT
+        weight = weights[y, x]
+        if weight >= OBSTACLE:
+            return np.inf
+        cuts = max(weights[last_y, x], weights[y, last_x]) >= OBSTACLE
+        if cuts and x != last_x and y != last_y and not corner_cutting:
+            return np.inf
+        total += max(weight, MIN_WEIGHT)
+        last_x, last_y = x, y
+    return float(math.hypot(x1 - x0, y1 - y0) * total / steps)
+
+
+@njit(cache=True, nogil=True)
+def _look(weights: Floats, reached: Floats, come_from: Fields, field: int, corner_cutting: bool) -> float:
+    """Look at the line that the field was reached by on trust; put right its predecessor if need be. What it costs."""
+    width = weights.shape[1]
+    x, y, seen_from = field % width, field // width, come_from[field]
+    best = -reached[seen_from] + line_cost(weights, seen_from % width, seen_from // width, x, y, corner_cutting)
+    for i in range(8):
+        # From the field back to a neighbour; the step itself is the opposite one.
+        back = step_cost(weights, x, y, i, corner_cutting)
+        if back == np.inf:
+            continue
+        neighbour = (y + STEP_Y[i]) * width + x + STEP_X[i]
+        cost = -reached[neighbour] + max(weights[y, x], MIN_WEIGHT) * (1.0 if i < 4 else SQRT2)
+        if reached[neighbour] < 0.0 and cost < best - 1e-9:
+            best = cost
+            come_from[field] = neighbour
+    return float(best)
+
+
+@njit(cache=True, nogil=True)
+def _trusted(reached: Floats, come_from: Fields, width: int, here: int, x: int, y: int, cost: float) -> float:
+    """What the field (x, y), a step of this cost from ``here``, would cost in a straight line from where ``here`` is seen from."""
+    seen_from = come_from[here]
+    far_x, far_y = x - seen_from % width, y - seen_from // width
+    near_x, near_y = here % width - seen_from % width, here // width - seen_from // width
+    near = math.hypot(near_x, near_y)
+    step = SQRT2 if far_x != near_x and far_y != near_y else 1.0
+    line = -reached[here] + reached[seen_from] + cost
+    return float(-reached[seen_from] + line * math.hypot(far_x, far_y) / (near + step))
+
+
+@njit(cache=True, nogil=True)
+def _search(
+    weights: Floats,
+    reached: Floats,
+    come_from: Fields,
+    heap: Fields,
+    place: Fields,
+    keys: Floats,
+    start: int,
+    target: int,
+    corner_cutting: bool,
+) -> bool:
+    """Whether there is a way. Costs in ``reached`` as for A*: 0 not reached, positive on trust, negative looked at."""
+    width = weights.shape[1]
+    least = least_weight(weights.ravel())
+    target_x, target_y = target % width, target // width
+    reached[start], come_from[start] = START_COST, start
+    size = put(heap, place, keys, 0, start, 0.0, 0.0)
+    while size > 0:
+        here = heap[0]
+        size = take_out(heap, place, keys, size, here)
+        reached[here] = -_look(weights, reached, come_from, here, corner_cutting) if here != start else -START_COST
+        if here == target:
+            return True
+        x, y = here % width, here // width
+        for i in range(8):
+            step = step_cost(weights, x, y, i, corner_cutting)
+            to_x, to_y = x + STEP_X[i], y + STEP_Y[i]
+            field = to_y * width + to_x
+            if step == np.inf or reached[field] < 0.0:
+                continue
+            cost = _trusted(reached, come_from, width, here, to_x, to_y, step)
+            if reached[field] > 0.0 and cost >= reached[field]:
+                continue
+            reached[field], come_from[field] = cost, come_from[here]
+            ahead = least * math.hypot(target_x - to_x, target_y - to_y)
+            size = put(heap, place, keys, size, field, cost + ahead, -cost)
+    return False
+
+
+@njit(cache=True, nogil=True)
+def _corners(come_from: Fields, width: int, target: int) -> CellArray:
+    """The fields where the path turns, and its ends."""
+    count, here = 1, target
+    while come_from[here] != here:
+        here = come_from[here]
+        count += 1
+    corners = np.empty((count, 2), np.int64)
+    here = target
+    for i in range(count - 1, -1, -1):
+        corners[i, 0], corners[i, 1] = here % width, here // width
+        here = come_from[here]
+    return corners
+
+
+@njit(cache=True, nogil=True)
+def _any_angle(
+    weights: Floats,
+    reached: Floats,
+    come_from: Fields,
+    heap: Fields,
+    place: Fields,
+    keys: Floats,
+    start: int,
+    target: int,
+    corner_cutting: bool,
+) -> tuple[CellArray, CellArray, float]:
+    """Corners, fields and cost of the path; no fields if there is none. The arrays are zeros, one row for each field."""
+    if not _search(weights, reached, come_from, heap, place, keys, start, target, corner_cutting):
+        return np.empty(NO_CELLS, np.int64), np.empty(NO_CELLS, np.int64), np.inf
+    corners = _corners(come_from, weights.shape[1], target)
+    cells = without_loops(polyline(corners))
+    return corners, cells, cells_cost(weights, cells)
+
+
+class ThetaStar:
+    """A path of straight lines at any angle, nearly as short as can be, or the proof that there is none."""
+
+    name = "theta-star"
+    capabilities = Capabilities(proves_no_path=True, any_angle=True)
+
+    def __init__(self, settings: PlannerSettings) -> None:
+        del settings  # nothing to set
+
+    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
+        """See ``Planner.plan``. FOUND or NO_PATH; budget and generator are left alone. The curve is the corners."""
+        del budget, rng
+        if not ends_free(problem):
+            return PlanResult(PlanStatus.NO_PATH, None, self.name)
+        weights = plain(problem.weights)
+        fields, width = weights.size, weights.shape[1]
+        start, target = (cell.y * width + cell.x for cell in (problem.start, problem.target))
+        # Zeros of numpy's come from the system as needed: only what is searched is ever touched.
+        waiting, place, come_from = (np.zeros(fields, np.int32) for _ in range(3))
+        corners, cells, cost = _any_angle(
+            weights,
+            np.zeros(fields),
+            come_from,
+            waiting,
+            place,
+            np.zeros((fields, 2)),
+            start,
+            target,
+            problem.corner_cutting,
+        )
+        if len(cells) == 0:
+            return PlanResult(PlanStatus.NO_PATH, None, self.name)
+        return PlanResult(PlanStatus.FOUND, Path(as_cells(cells), cost, corners.astype(np.float64)), self.name)

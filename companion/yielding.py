@@ -1,0 +1,240 @@
+"""Making way for what moves: before the rover does what guidance says, it looks a few seconds ahead.
+
+Several things that it might do now are played through against everything that moves: go on, go on a little and then stop, stop at
+once, turn and move aside, back off. The first that keeps its distance is done; if none does, the one that comes least
+near. The rover stops before the others' way, since going on is allowed only while there still is somewhere to stop; and it
+waits there until going on is safe again.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from companion.commands import GuidedVelocity
+from companion.frames import Pose, wrap_pi_rad
+from companion.guidance import STEP_M, STOP, Guide, Motion, Route, RoverLimits, turn_to
+from companion.mapping import EvidenceMap, look_along
+from companion.settings import GuidanceSettings, Settings
+from companion.traffic import Moving
+
+Points = NDArray[np.float64]
+"""Shape (n, 2): columns north_m and east_m, one row for each of the moments looked at."""
+
+PERIOD_S = 0.2
+GO_ON_S = 0.4
+"""How long the rover goes on before it is asked again, and a little more: then it must still be able to stop."""
+TURN_RAD_S = 1.2
+"""How fast it is taken to turn on the spot."""
+TURNING_S = 5.0
+"""A rover that stands to look about goes on with that as long as nothing comes within this."""
+ASIDE_M = (2.5, 1.5)
+ASIDE_RAD = (0.5 * math.pi, -0.5 * math.pi, 0.25 * math.pi, -0.25 * math.pi)
+"""Where it might move aside to: so far, in these directions from where the other one goes."""
+ASIDE_M_S = 1.2
+OFF_M = 1.5
+"""How far it backs off at most."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Choice:
+    """Something to do, and where the rover then is at each moment; what comes after ``until_s`` does not count.
+
+    ``aside_rad``: which way it then moves aside.
+    """
+
+    guide: Guide
+    places: Points
+    until_s: float = math.inf
+    aside_rad: float | None = None
+
+
+def yielded(
+    now: Guide,
+    route: Route | None,
+    pose: Pose,
+    speed_m_s: float,
+    moving: tuple[Moving, ...],
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: Settings,
+    aside_rad: float | None = None,
+) -> tuple[Guide, float | None]:
+    """What to do instead of ``now`` because of what moves; ``now`` itself if nothing comes across.
+
+    Also which way the rover moves aside, if it does; handed in again as ``aside_rad`` it keeps to that.
+    """
+    moving = tuple(one for one in moving if _matters(one, pose, rover, settings))
+    if not moving:
+        return now, None
+    times_s = np.arange(0.0, settings.traffic.look_s + 1e-9, PERIOD_S)
+    discs = _discs(moving, pose, rover)
+    margins_m = settings.traffic.margin_m + settings.traffic.drift_m_s * times_s
+    best, best_room_m = None, -math.inf
+    for choice in _choices(now, route, pose, speed_m_s, moving, evidence, rover, settings.guidance, times_s, aside_rad):
+        room_m = least_room_m(choice.places, discs, times_s, margins_m, choice.until_s)
+        if room_m > best_room_m + 0.05:
+            best, best_room_m = choice, room_m
+        if room_m >= 0.0:
+            break
+    assert best is not None
+    return best.guide, best.aside_rad
+
+
+def _matters(one: Moving, pose: Pose, rover: RoverLimits, settings: Settings) -> bool:
+    """Whether it moves at all and the two could meet while the rover looks ahead."""
+    traffic = settings.traffic
+    reach_m = (one.speed_m_s + rover.cruise_speed_m_s) * traffic.look_s + one.radius_m + rover.radius_m
+    return one.speed_m_s >= traffic.moving_m_s and one.at(pose.time_s).distance_m(pose.point) <= reach_m
+
+
+def _discs(moving: tuple[Moving, ...], pose: Pose, rover: RoverLimits) -> Points:
+    """Rows for ``least_room_m``: place now, velocity, and how near the middles may come."""
+    rows = []
+    for one in moving:
+        here = one.at(pose.time_s)
+        rows.append((here.north_m, here.east_m, one.north_m_s, one.east_m_s, one.radius_m + rover.radius_m))
+    return np.array(rows)
+
+
+@njit(cache=True, nogil=True)
+def least_room_m(places: Points, discs: Points, times_s: Points, margins_m: Points, until_s: float) -> float:
+    """The least room beyond the margin that is left between the rover and anything that moves; negative: too little.
+
+    What is nearer than the margin already must not come nearer still.
+    """
+    least_m = math.inf
+    for row in range(discs.shape[0]):
+        north_m, east_m, north_m_s, east_m_s, touch_m = discs[row]
+        now_m = math.hypot(north_m - places[0, 0], east_m - places[0, 1]) - touch_m
+        for i in range(times_s.size):
+            time_s = times_s[i]
+            if time_s > until_s:
+                break
+            to_n, to_e = north_m + north_m_s * time_s - places[i, 0], east_m + east_m_s * time_s - places[i, 1]
+            room_m = math.hypot(to_n, to_e) - touch_m - min(margins_m[i], max(now_m - 0.02, 0.0))
+            least_m = min(least_m, room_m)
+    return least_m
+
+
+def _choices(
+    now: Guide,
+    route: Route | None,
+    pose: Pose,
+    speed_m_s: float,
+    moving: tuple[Moving, ...],
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: GuidanceSettings,
+    times_s: Points,
+    aside_rad: float | None,
+) -> Iterator[Choice]:
+    """What the rover might do, best first, worked out only when it is asked for."""
+    halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), _ahead(pose, _braked_m(speed_m_s, times_s, settings)))
+    if now.motion is Motion.DRIVE and route is not None:
+        for goes_s in (math.inf, GO_ON_S):
+            along_m = _driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
+            yield Choice(now, _along(route, pose, along_m))
+    else:
+        yield Choice(now, halt.places, TURNING_S)
+    yield halt
+    if aside_rad is not None:
+        yield from _aside(aside_rad, pose, speed_m_s, evidence, rover, settings, times_s)
+    nearest = min(moving, key=lambda one: one.at(pose.time_s).distance_m(pose.point) - one.radius_m)
+    course_rad = math.atan2(nearest.east_m_s, nearest.north_m_s)
+    for turned_rad in ASIDE_RAD:
+        bearing_rad = wrap_pi_rad(course_rad + turned_rad)
+        yield from _aside(bearing_rad, pose, speed_m_s, evidence, rover, settings, times_s)
+    yield from _off(pose, speed_m_s, evidence, rover, settings, times_s)
+
+
+def _aside(
+    bearing_rad: float,
+    pose: Pose,
+    speed_m_s: float,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: GuidanceSettings,
+    times_s: Points,
+) -> list[Choice]:
+    """Turn to a bearing and drive a little, if the ground there is free."""
+    error_rad = abs(wrap_pi_rad(bearing_rad - pose.heading_rad))
+    turns_s = error_rad / TURN_RAD_S + speed_m_s / settings.deceleration_m_s2
+    for aside_m in ASIDE_M:
+        there = pose.point.moved(bearing_rad, aside_m)
+        line = look_along(evidence, pose.point, there, rover.radius_m + settings.clearance_m)
+        if min(line.clear_m, line.seen_m) < aside_m - 0.05:
+            continue
+        after_s = np.maximum(times_s - turns_s, 0.0)
+        along_m = np.minimum(0.5 * settings.deceleration_m_s2 * after_s**2, aside_m)
+        along_m = np.minimum(along_m, min(rover.cruise_speed_m_s, ASIDE_M_S) * after_s)
+        places = _moved(_ahead(pose, _braked_m(speed_m_s, times_s, settings)), bearing_rad, along_m)
+        if error_rad > math.radians(settings.turn_until_close_deg):
+            return [Choice(turn_to(bearing_rad, speed_m_s, settings), places, aside_rad=bearing_rad)]
+        going_m_s = min(rover.cruise_speed_m_s, ASIDE_M_S)
+        going = Guide(Motion.LOOK, GuidedVelocity(going_m_s, 0.0), going_m_s)
+        return [Choice(going, places, aside_rad=bearing_rad)]
+    return []
+
+
+def _off(
+    pose: Pose,
+    speed_m_s: float,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: GuidanceSettings,
+    times_s: Points,
+) -> list[Choice]:
+    """Straight back over ground that is known to be free."""
+    behind = pose.point.moved(pose.heading_rad + math.pi, OFF_M)
+    line = look_along(evidence, pose.point, behind, rover.radius_m + settings.clearance_m)
+    free_m = min(line.clear_m, line.seen_m)
+    if free_m < 0.3 or speed_m_s > settings.roll_out_m_s + settings.back_out_speed_m_s:
+        return []
+    back_m = np.minimum(np.maximum(times_s - settings.brake_delay_s, 0.0) * settings.back_out_speed_m_s, free_m)
+    guide = Guide(Motion.LOOK, GuidedVelocity(-settings.back_out_speed_m_s, 0.0), settings.back_out_speed_m_s)
+    return [Choice(guide, _ahead(pose, -back_m))]
+
+
+def _braked_m(speed_m_s: float, times_s: Points, settings: GuidanceSettings) -> Points:
+    """How far the rover has rolled at each moment when it is stopped now."""
+    brakes_s = np.clip(times_s - settings.brake_delay_s, 0.0, speed_m_s / settings.deceleration_m_s2)
+    rolls_m = np.minimum(times_s, settings.brake_delay_s) * speed_m_s
+    return np.asarray(rolls_m + speed_m_s * brakes_s - 0.5 * settings.deceleration_m_s2 * brakes_s**2)
+
+
+def _driven_m(
+    speed_m_s: float, goal_m_s: float, goes_s: float, times_s: Points, settings: GuidanceSettings
+) -> Points:
+    """How far it has driven at each moment when it goes on at the speed it is told, and stops after ``goes_s``."""
+    rate = settings.deceleration_m_s2
+    fastest = np.minimum(goal_m_s, speed_m_s + rate * times_s) if goal_m_s > speed_m_s else np.full(times_s.shape, goal_m_s)
+    going = times_s <= goes_s
+    after_s = np.maximum(times_s - goes_s - settings.brake_delay_s, 0.0)
+    slowed = np.maximum(float(fastest[going][-1]) - rate * after_s, 0.0)
+    speeds = np.where(going, fastest, slowed)
+    return np.concatenate(([0.0], np.cumsum((speeds[1:] + speeds[:-1]) / 2.0 * PERIOD_S)))
+
+
+def _ahead(pose: Pose, along_m: Points) -> Points:
+    """Places straight ahead of the rover."""
+    return _moved(np.tile((pose.north_m, pose.east_m), (len(along_m), 1)), pose.heading_rad, along_m)
+
+
+def _moved(places: Points, bearing_rad: float, along_m: Points) -> Points:
+    return np.asarray(places + along_m[:, None] * (math.cos(bearing_rad), math.sin(bearing_rad)))
+
+
+def _along(route: Route, pose: Pose, along_m: Points) -> Points:
+    """Places on the route, from where the rover is now."""
+    last = min(len(route.points), route.progress + 2 + math.ceil(float(along_m[-1]) / STEP_M))
+    points = np.vstack(((pose.north_m, pose.east_m), route.points[route.progress + 1 : last]))
+    reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
+    return np.column_stack(
+        (np.interp(along_m, reached_m, points[:, 0]), np.interp(along_m, reached_m, points[:, 1]))
+    )
