@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from companion.frames import NedPoint, Pose
@@ -23,22 +24,40 @@ Points = NDArray[np.float64]
 
 FREE_AT = -0.5
 """Log-odds from which ground counts as seen free."""
-ROUND_M = 0.25
+ROUND_M = 0.7
 """Ground must have been free so far round a reading, and half the beam's width more: neither is where it seems to be."""
-AROUND = np.array([(0.0, 0.0), (1, 0), (0, 1), (-1, 0), (0, -1), (0.7, 0.7), (-0.7, 0.7), (0.7, -0.7), (-0.7, -0.7)])
 TOGETHER_M = 0.8
 """Readings nearer to each other than this are of one thing; a thing is found again within this of where it is expected."""
 WIDEST_M = 3.0
 """What is wider is no thing that moves but ground seen askew."""
 WINDOW_S = 1.0
-LEAST_S = 0.4
-LEAST_SIGHTINGS = 4
+LEAST_S = 0.5
+LEAST_SIGHTINGS = 5
 LOST_S = 1.0
 LEAST_RADIUS_M = 0.4
-STRAY_M = 0.2
+STRAY_M = 0.15
 """Sightings of a thing that moves evenly lie this near to a line, on average."""
+LEAST_BEAMS = 8
+"""A few thin beams cannot tell what moves from what the rover passes."""
 MAX_YAW_RATE_RAD_S = math.radians(45.0)
 """Faster than this, readings are too far from where they seem to be."""
+
+
+@njit(cache=True, nogil=True)
+def free_all_round(free: NDArray[np.bool_], places: Points, reaches: Points) -> NDArray[np.bool_]:
+    """Which places (rows of row and column, in cells) have nothing but free cells round them, in eight directions and on the way there."""
+    height, width = free.shape
+    result = np.ones(len(places), np.bool_)
+    for i in range(len(places)):
+        for k in range(25):
+            reach = reaches[i] * ((k + 7) // 8) / 3.0
+            angle = k * 0.25 * math.pi
+            row = math.floor(places[i, 0] + reach * math.cos(angle))
+            column = math.floor(places[i, 1] + reach * math.sin(angle))
+            if not (0 <= row < height and 0 <= column < width and free[row, column]):
+                result[i] = False
+                break
+    return result
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +105,7 @@ class Tracker:
 
     def take(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
         """Look through a scan that has not been taken into the map yet."""
-        if abs(yaw_rate_rad_s) > MAX_YAW_RATE_RAD_S:
+        if abs(yaw_rate_rad_s) > MAX_YAW_RATE_RAD_S or len(scan.bearing_rad) < LEAST_BEAMS:
             return
         ends, range_m = _ends(pose, scan)
         hits = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
@@ -110,28 +129,17 @@ class Tracker:
         return tuple(found)
 
     def _window(self, pose: Pose, reach_m: float) -> tuple[slice, slice]:
-        row, column = self._cells(np.array([[pose.north_m, pose.east_m]]))[0]
-        reach = math.ceil(reach_m / self._evidence.evidence_m) + 1
+        corner, cell_m = self._evidence.base.south_west, self._evidence.evidence_m
+        row = math.floor((pose.north_m - corner.north_m) / cell_m)
+        column = math.floor((pose.east_m - corner.east_m) / cell_m)
+        reach = math.ceil(reach_m / cell_m) + 1
         return slice(max(row - reach, 0), max(row + reach, 0)), slice(max(column - reach, 0), max(column + reach, 0))
-
-    def _cells(self, points: Points) -> NDArray[np.int64]:
-        """The evidence cells, row and column, of places north and east."""
-        corner = self._evidence.base.south_west
-        return np.floor((points - (corner.north_m, corner.east_m)) / self._evidence.evidence_m).astype(np.int64)
 
     def _on_free_ground(self, points: Points, round_m: Points) -> Points:
         """Those with ground round them that had all been seen free."""
-        free = np.ones(len(points), np.bool_)
-        for share in (0.5, 1.0):
-            for offset in AROUND:
-                free &= self._was_free(points + (share * round_m)[:, None] * offset)
-        return points[free]
-
-    def _was_free(self, points: Points) -> NDArray[np.bool_]:
-        cells = self._cells(points)
-        inside = ((cells >= 0) & (cells < self._free.shape)).all(axis=1)
-        cells[~inside] = 0
-        return np.asarray(self._free[cells[:, 0], cells[:, 1]] & inside)
+        corner, scale = self._evidence.base.south_west, 1.0 / self._evidence.evidence_m
+        cells = (points - (corner.north_m, corner.east_m)) * scale
+        return points[free_all_round(self._free, cells, round_m * scale)]
 
     def _follow(self, time_s: float, things: list[Sighting]) -> None:
         """Give every thing to the track that expects it nearest; what nobody expects begins a new one."""

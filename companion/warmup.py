@@ -12,6 +12,8 @@ from companion.mapping import clearance_m, integrate, look_along, new_map, penal
 from companion.planning import registry
 from companion.scan import RangeScan
 from companion.settings import Settings
+from companion.tracking import Tracker
+from companion.yielding import least_room_m
 
 
 def warm_up(settings: Settings) -> None:
@@ -25,6 +27,10 @@ def warm_up(settings: Settings) -> None:
     look_along(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.5)
     unseen_beside(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.3, 0.5)
     clearance_m(evidence, NedPoint(4.0, 4.0), 1.0)
+    view = RangeScan(0.0, np.linspace(-0.5, 0.5, 8), np.full(8, 2.0), 0.2, 4.0, 0.1, "warm-up")
+    Tracker(evidence, settings.traffic).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
+    places = np.zeros((2, 2))
+    least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]), 5.0)
     # What lives now lives to the end: a collection that walks through it would stall a tick for a tenth of a second.
     gc.collect()
     gc.freeze()

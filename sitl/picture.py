@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from sitl.lockstep import Drive
 
 PART_COLOURS = {"B": "#1f6fd6", "C": "#e07b00", "A": "#c2185b", "-": "#1f6fd6"}
+MOVER_COLOUR, MOVER_STEP_S = "#7b1fa2", 0.5
 PART_NAMES = {"B": "exploring (B)", "C": "new path (C)", "A": "returning (A)"}
 
 
@@ -33,6 +34,7 @@ def save_picture(run: Drive, path: Path) -> None:
     axes = figure.add_subplot()
     _draw_world(axes, run)
     _draw_map(axes, run)
+    _draw_movers(axes, run)
     _draw_track(axes, north, east, [p.part for p in track])
     _draw_places(axes, run)
     axes.set_aspect("equal")
@@ -79,6 +81,19 @@ def _draw_map(axes: Axes, run: Drive) -> None:
     axes.imshow(picture, origin="lower", extent=extent, interpolation="nearest")
     axes.plot([], [], "s", color="#262626", label="obstacle in the companion's map")
     axes.plot([], [], "s", color="#dcefd8", label="seen free")
+
+
+def _draw_movers(axes: Axes, run: Drive) -> None:
+    """Where the moving obstacles went, and where they were at the end of the run."""
+    from matplotlib.patches import Circle
+
+    world, ended_s = run.simulator.world, run.report.sim_time_s
+    for number, mover in enumerate(world.movers):
+        times_s = np.arange(0.0, ended_s, MOVER_STEP_S)
+        places = np.array([world.mover_at(number, float(time_s))[:2] for time_s in (*times_s, ended_s)])
+        label = "moving obstacle" if number == 0 else None
+        axes.plot(places[:, 1], places[:, 0], ":", color=MOVER_COLOUR, linewidth=1.2, label=label)
+        axes.add_patch(Circle((places[-1, 1], places[-1, 0]), mover.radius_m, color=MOVER_COLOUR))
 
 
 def _draw_track(axes: Axes, north: NDArray[np.float64], east: NDArray[np.float64], parts: list[str]) -> None:

@@ -14,7 +14,7 @@ from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.grid import OBSTACLE, Cell, Grid
 from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
-from companion.mission.mission import Area, Mission, MissionError, Place
+from companion.mission.mission import Area, Mission, MissionError, MoverSpec, Place
 from companion.mission.resolve import resolve
 
 EXIT_BAD_INPUT = 2
@@ -117,6 +117,7 @@ def _vehicle(mission: Mission) -> list[str]:
         start = f", start {place_text(sitl.start)}" if sitl.start is not None else ""
         world = "" if sitl.world else "open ground, "
         lines.append(f"simulator only: {world}heading {sitl.heading_deg:g} deg, sensors {sitl.sensors}{start}")
+        lines += [f"simulator only: {mover_text(mover)}" for mover in sitl.movers]
     return lines
 
 
@@ -130,6 +131,14 @@ def place_text(place: Place) -> str:
         return "home"
     north_south = f"{abs(place.north_m):g} m {'south' if place.north_m < 0.0 else 'north'}"
     return f"{north_south}, {abs(place.east_m):g} m {'west' if place.east_m < 0.0 else 'east'} of home"
+
+
+def mover_text(mover: MoverSpec) -> str:
+    """A moving obstacle as people read it."""
+    route = f"through {len(mover.route)} places from {place_text(mover.route[0])}"
+    again = " and round again" if mover.repeat else ""
+    tells = f"announces itself ({mover.announce})" if mover.announce else "announces nothing"
+    return f"{mover.name}, radius {mover.radius_m:g} m, moves at {mover.speed_m_s:g} m/s {route}{again}, {tells}"
 
 
 def area_text(area: Area) -> str:

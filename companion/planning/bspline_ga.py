@@ -14,7 +14,7 @@ from companion.planning import bspline
 from companion.planning.chance import draw_seed, seeded
 from companion.planning.ends import ends_free
 from companion.planning.ga_fitness import Task, Tuning, is_correct, way_point, way_points_for
-from companion.planning.ga_population import Span, evolve, vln_of
+from companion.planning.ga_population import evolve, vln_of
 from companion.planning.ga_turning import control_of, curve_points
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
@@ -68,8 +68,7 @@ def search(
     epochs = 0
     evaluations = 0
     for count in control_points:
-        span = Span(population, min_epochs, max_epochs)
-        value, genes, spent, tried = evolve(weights, task, tuning, count, span, state)
+        value, genes, spent, tried = evolve(weights, task, tuning, count, population, min_epochs, max_epochs, state)
         epochs += spent
         evaluations += tried
         if is_correct(value, vln_of(weights, count, tuning)):

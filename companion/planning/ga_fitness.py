@@ -38,7 +38,7 @@ class Tuning(NamedTuple):
     obstacle_value: float
     adaptive: bool = False
     most_control_points: int = 16
-    number_probability: float = 0.3
+    number_probability: float = 0.5
 
 
 class Task(NamedTuple):
@@ -121,11 +121,6 @@ def fitness(
     ``raster.line_into``, drawn here once more: a call for each would take longer than the line.
     """
     height, width = weights.shape
-    if limit < math.inf and max(width, height) > 4 * GLANCE_FIELDS:
-        # One obstacle more than the limit has outweighs what the target does not count.
-        enough = math.floor(limit / vln) + 1.0
-        if glance(weights, genes, first, basis, enough) >= enough:
-            return enough * vln
     total: float = -weights[genes[-1, 1], genes[-1, 0]]
     x, y = genes[0, 0], genes[0, 1]
     inside = True

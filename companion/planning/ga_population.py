@@ -16,8 +16,17 @@ from numpy.typing import NDArray
 
 from companion.grid import Weights
 from companion.planning import bspline
-from companion.planning.chance import State
-from companion.planning.ga_fitness import Task, Tuning, fitness, is_correct, large_value, way_points_for
+from companion.planning.chance import State, whole
+from companion.planning.ga_fitness import (
+    GLANCE_FIELDS,
+    Task,
+    Tuning,
+    fitness,
+    glance,
+    is_correct,
+    large_value,
+    way_points_for,
+)
 from companion.planning.ga_numbers import breed_any
 from companion.planning.ga_operators import Chromosomes, breed, scatter
 from companion.planning.ga_turning import turning_fitness
@@ -98,7 +107,7 @@ def empty_population(control_points: int, population: int, tuning: Tuning, state
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def measured(
     weights: Weights,
     genes: CellArray,
@@ -111,6 +120,11 @@ def measured(
     """A chromosome's fitness, as far as the limit."""
     if task.turning_radius > 0.0:
         return turning_fitness(weights, genes, task, vln, limit)
+    if limit < math.inf and max(weights.shape[0], weights.shape[1]) > 4 * GLANCE_FIELDS:
+        # One obstacle more than the limit has outweighs what the target does not count.
+        enough = math.floor(limit / vln) + 1.0
+        if glance(weights, genes, first, basis, enough) >= enough:
+            return enough * vln
     return fitness(weights, genes, first, basis, task.corner_cutting, vln, limit)
 
 
@@ -134,6 +148,41 @@ def copy_genes(source: CellArray, destination: CellArray, count: int) -> None:
 
 
 @njit(cache=True, nogil=True)
+def measured_any(
+    weights: Weights, people: Population, genes: CellArray, count: int, task: Task, tuning: Tuning, vln: float, limit: float
+) -> float:
+    """The same for a chromosome that uses ``count`` rows, whatever the population began with."""
+    at, used = row_of(count, tuning), way_points_for(count, tuning)
+    return measured(weights, genes[:count], people.first[at, :used], people.basis[at, :used], task, vln, limit)
+
+
+@njit(cache=True, nogil=True)
+def select_from(
+    weights: Weights,
+    people: Population,
+    crowd: Chromosomes,
+    numbers: NDArray[np.int64],
+    task: Task,
+    tuning: Tuning,
+    vln: float,
+    correct_only: bool,
+) -> None:
+    """Measure and select the first population; ``correct_only``: only to find its best correct one."""
+    ranks, values = people.ranks, people.values
+    first, basis = people.first[0], people.basis[0]
+    for i in range(len(crowd)):
+        limit = min(values[0], vln - 0.5) if correct_only else values[-1]
+        if tuning.adaptive:
+            value = measured_any(weights, people, crowd[i], numbers[i], task, tuning, vln, limit)
+        else:
+            value = measured(weights, crowd[i], first, basis, task, vln, limit)
+        if value < limit:
+            place = rank_of(ranks, values, value)
+            copy_genes(crowd[i], people.selected[place], numbers[i])
+            people.counts[place] = numbers[i]
+
+
+@njit(cache=True, nogil=True)
 def begin(
     weights: Weights, people: Population, task: Task, tuning: Tuning, control_points: int, span: Span, vln: float
 ) -> None:
@@ -143,29 +192,22 @@ def begin(
     chromosome is left at its first obstacle.
     """
     height, width = weights.shape
-    selected, ranks, values = people.selected, people.ranks, people.values
-    at, used = row_of(control_points, tuning), way_points_for(control_points, tuning)
-    first, basis = people.first[at, :used], people.basis[at, :used]
-    crowd = np.empty((span.population, control_points, 2), np.int64)
+    most = people.selected.shape[1]
+    crowd = np.empty((span.population, most, 2), np.int64)
+    numbers = np.full(span.population, control_points)
     for i in range(span.population):
+        if tuning.adaptive:
+            numbers[i] = whole(people.state, control_points, min(2 * control_points, most))
+        last = numbers[i] - 1
         crowd[i, 0, 0], crowd[i, 0, 1] = task.start_x, task.start_y
-        crowd[i, control_points - 1, 0], crowd[i, control_points - 1, 1] = task.target_x, task.target_y
-        scatter(crowd[i], i * 3 // span.population, width, height, tuning, people.state)
+        crowd[i, last, 0], crowd[i, last, 1] = task.target_x, task.target_y
+        scatter(crowd[i, : last + 1], i * 3 // span.population, width, height, tuning, people.state)
     people.spent[0], people.spent[1] = 1, span.population
     if span.min_epochs <= 1:
-        limit = vln - 0.5
-        for i in range(span.population):
-            value = measured(weights, crowd[i], first, basis, task, vln, limit)
-            if value < limit:
-                copy_genes(crowd[i], selected[rank_of(ranks, values, value)], control_points)
-                limit = value
-        if is_correct(values[0], vln):
+        select_from(weights, people, crowd, numbers, task, tuning, vln, True)
+        if is_correct(people.values[0], vln):
             return
-    for i in range(span.population):
-        limit = values[-1]
-        value = measured(weights, crowd[i], first, basis, task, vln, limit)
-        if value < limit:
-            copy_genes(crowd[i], selected[rank_of(ranks, values, value)], control_points)
+    select_from(weights, people, crowd, numbers, task, tuning, vln, False)
 
 
 @njit(cache=True, nogil=True)
@@ -197,10 +239,7 @@ def advance(
             limit = values[0] if childless or (enough and is_correct(values[0], vln)) else values[-1]
             if tuning.adaptive:
                 count = breed_any(genes, parents, parent_counts, mutation_fields, tuning, state)
-                at, used = row_of(count, tuning), way_points_for(count, tuning)
-                value = measured(
-                    weights, genes[:count], people.first[at, :used], people.basis[at, :used], task, vln, limit
-                )
+                value = measured_any(weights, people, genes, count, task, tuning, vln, limit)
             else:
                 breed(genes, parents, mutation_fields, tuning, state)
                 value = measured(weights, genes, first, basis, task, vln, limit)
@@ -220,11 +259,19 @@ def best_of(people: Population) -> CellArray:
 
 @njit(cache=True, nogil=True)
 def evolve(
-    weights: Weights, task: Task, tuning: Tuning, control_points: int, span: Span, state: State
+    weights: Weights,
+    task: Task,
+    tuning: Tuning,
+    control_points: int,
+    population: int,
+    min_epochs: int,
+    max_epochs: int,
+    state: State,
 ) -> tuple[float, CellArray, int, int]:
     """Evolve paths that begin with so many control points: (best fitness, best chromosome, epochs, evaluations)."""
     vln = vln_of(weights, control_points, tuning)
-    people = empty_population(control_points, span.population, tuning, state)
+    span = Span(population, min_epochs, max_epochs)
+    people = empty_population(control_points, population, tuning, state)
     begin(weights, people, task, tuning, control_points, span, vln)
-    advance(weights, people, task, tuning, span, vln, span.max_epochs)
+    advance(weights, people, task, tuning, span, vln, max_epochs)
     return people.values[0], best_of(people), people.spent[0], people.spent[1]

@@ -112,7 +112,7 @@ class PlannerSettings(Section):
     )
     most_control_points: int = Field(16, ge=3, le=64, description="adaptive: no chromosome gets more (ours)")
     number_probability: float = Field(
-        0.3, ge=0.0, le=1.0, description="adaptive: chance that a child gains or loses a control point (ours)"
+        0.5, ge=0.0, le=1.0, description="adaptive: chance that a child gains or loses a control point (ours)"
     )
     hybrid_tolerance: float = Field(
         1.03, ge=1.0, description="hybrid: a genetic path may cost so many times the best possible"

@@ -51,7 +51,7 @@ def assert_silent(rig: Rig, since_s: float) -> None:
 
 
 @pytest.mark.parametrize("mode", [MANUAL, HOLD, RTL])
-@pytest.mark.parametrize("metres", [0.05, 3.0, 9.0], ids=["setting off", "at speed", "behind the wall"])
+@pytest.mark.parametrize("metres", [0.05, 3.0, 10.5], ids=["setting off", "at speed", "behind the wall"])
 def test_a_mode_change_silences_the_companion_until_guided_returns(tmp_path: Path, mode: int, metres: float) -> None:
     rig = Rig(yard(tmp_path))
     rig.until_driven(metres)
@@ -236,9 +236,9 @@ def test_a_rover_whose_link_fails_stops_on_ground_it_has_seen(tmp_path: Path) ->
     assert_reached(rig)
 
 
-def test_one_lost_second_is_nothing(rig: Rig) -> None:
+def test_two_thirds_of_a_second_lost_are_nothing(rig: Rig) -> None:
     rig.cut = True
-    rig.run_for(0.8)
+    rig.run_for(0.7)
     rig.cut = False
     assert_reached(rig)
     assert not any("Stopping" in text for text in rig.texts())
@@ -419,7 +419,7 @@ def test_a_sealed_target(tmp_path: Path, on_blocked: str, statuses: list[str], e
     assert math.hypot(truth.north_m - end[0], truth.east_m - end[1]) < 1.5
     assert bool(waited) == (on_blocked == "wait")
     if waited:
-        pauses = [b - a for a, b in pairwise(waited) if b - a > 1.0]
+        pauses = [b - a for a, b in pairwise(waited) if b - a > 1.5 * TICK_S]
         assert len(waited) == pytest.approx((len(pauses) + 1) * 3.0 / TICK_S, abs=2 * len(pauses) + 2), "3 s each"
         unreachable = sum("Unreachable" in text for text in rig.texts())
         assert unreachable >= 2, "tried again, then given up"

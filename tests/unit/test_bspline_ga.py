@@ -7,18 +7,9 @@ from companion.grid import Cell
 from companion.planning import bspline
 from companion.planning.bspline_ga import BsplineGa
 from companion.planning.chance import seeded
-from companion.planning.ga_kernel import (
-    Task,
-    Tuning,
-    breed,
-    evolve,
-    fitness,
-    is_correct,
-    large_value,
-    scatter,
-    way_point,
-    way_points_for,
-)
+from companion.planning.ga_fitness import Task, Tuning, fitness, is_correct, large_value, way_point, way_points_for
+from companion.planning.ga_operators import breed, scatter
+from companion.planning.ga_population import evolve
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
 from companion.planning.raster import first_fault, polyline
 from companion.settings import PlannerSettings
