@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from companion.clock import Clock, stopwatch_s
-from companion.commands import Command, Say, SetMode
+from companion.commands import Arm, Command, Say, SetMode
 from companion.driver import STANDSTILL, Driver
 from companion.guidance import Guide
 from companion.itinerary import Itinerary, TargetStatus
@@ -47,6 +47,8 @@ INFO, WARNING = 6, 4
 STEPS_KEPT = 100_000
 HAND_OVER_S = 1.5
 """So long the companion stays, after its last command, to see that the rover is in HOLD."""
+NOT_FOLLOWED_S = 5.0
+"""People are told when the autopilot's read-back has shown another target for so long."""
 HOME_MOVED_M = 2.0
 ASK_PLACES_S = 0.5
 """While it is doubtful where the rover is, the origin is asked for this often,"""
@@ -104,6 +106,7 @@ class Companion:
         self._asked_s = self._settled_s = -np.inf
         self._doubt = ""
         self._doubt_s = 0.0
+        self._followed_s = clock.now_s()
         self._stopped = False
         self._stop_asked = False
         self._leave_at_s: float | None = None
@@ -253,6 +256,9 @@ class Companion:
         laid, command = self._start_up.step(self.vehicle, self.watch.control, now_s)
         if command is not None:
             self._send(command, now_s)
+        refused = self._autopilot.last_ack(Arm())
+        if refused is not None and refused.result != 0 and self._start_up.missing == "arming":
+            self._tell_once(f"The autopilot refuses to arm (result {refused.result})")
         if laid is None:
             self._reporter.doing = f"waiting for {self._start_up.missing}"
             if self.vehicle.heartbeat is None:
@@ -260,7 +266,7 @@ class Companion:
             return None
         self._tell(f"Companion: {self._mission.name}, {len(laid.itinerary.targets)} targets", INFO)
         assert self.vehicle.scan is not None
-        scan = self.vehicle.scan.scan
+        scan = (self.vehicle.scan_ahead or self.vehicle.scan).scan
         return Pursuit(self._mission, self._settings, laid, scan, self._runner, self._log, self._tell, self._rng)
 
     # Listening ---------------------------------------------------------------------------------------------------
@@ -360,6 +366,10 @@ class Companion:
         if self._pursuit is not None:
             if self._autopilot.twin_heard(now_s):
                 self._tell_once("Another companion speaks as this component: stop one of them")
+            if self._autopilot.target_confirmed is not False:
+                self._followed_s = now_s
+            elif now_s - self._followed_s > NOT_FOLLOWED_S:
+                self._tell_once("The autopilot follows another target than the one sent")
             for text in self._reporter.faults(self._autopilot.rate_faults, self._log.problem, now_s):
                 self._tell_once(text)
 

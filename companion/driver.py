@@ -122,9 +122,7 @@ class Driver:
         """The rover stands still for a good reason: do not count it as stuck."""
         self._progress = None
 
-    def update(
-        self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...] = ()
-    ) -> tuple[Guide, Decision | None]:
+    def update(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...] = ()) -> tuple[Guide, Decision | None]:
         """One tick: the setpoint for now, and the navigator's decision if it has just made one. ``moving``: what moves about."""
         guide, decision = self._drive(pose, speed_m_s, moving)
         if self._goal is None or not moving or (decision is not None and decision.action is Action.REACHED):

@@ -335,7 +335,7 @@ def _speed_limit(beside_m: float, bearing_error_rad: float, rover: RoverLimits, 
     beside = settings.min_speed_m_s + share * max(rover.cruise_speed_m_s - settings.min_speed_m_s, 0.0)
     turning = rover.cruise_speed_m_s if bearing_error_rad < math.radians(20.0) else 2.0 * settings.min_speed_m_s
     narrow = settings.narrow_speed_m_s if rover.narrow_sight else rover.cruise_speed_m_s
-    return max(min(rover.cruise_speed_m_s, sight, beside, turning, narrow), settings.min_speed_m_s)
+    return min(max(min(sight, beside, turning, narrow), settings.min_speed_m_s), rover.cruise_speed_m_s)
 
 
 def _limit_by_heading(pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings) -> float:
@@ -347,7 +347,7 @@ def _limit_by_heading(pose: Pose, evidence: EvidenceMap, rover: RoverLimits, set
     unseen = _unseen_flank(pose, ahead, evidence, rover)
     if unseen is None:
         return rover.cruise_speed_m_s
-    return max(fastest_within_m(unseen.along_m, settings), settings.min_speed_m_s)
+    return min(max(fastest_within_m(unseen.along_m, settings), settings.min_speed_m_s), rover.cruise_speed_m_s)
 
 
 def _densified(corners: Points) -> Points:

@@ -44,6 +44,8 @@ class Searcher:
             weights = np.array(weights)
             weights[start.y, start.x] = 0.9
         budget = budget_of(self.settings.thorough if kind is SearchKind.THOROUGH else self.settings.quick)
-        result = self.planner.plan(PlanningProblem(weights, start, target, movers=movers, motion=motion), budget, self.rng)
+        result = self.planner.plan(
+            PlanningProblem(weights, start, target, movers=movers, motion=motion), budget, self.rng
+        )
         self.seconds.append(stopwatch_s() - began_s)
         return result

@@ -36,7 +36,11 @@ LEAST_SIGHTINGS = 5
 LOST_S = 1.0
 LEAST_RADIUS_M = 0.4
 STRAY_M = 0.15
-"""Sightings of a thing that moves evenly lie this near to a line, on average."""
+"""Sightings of a thing that moves evenly lie this near to a line, on average, and half a beam's width more."""
+SURE = 2.5
+"""A velocity counts when it is so many times its own standard error."""
+DOUBT_M = 0.25
+"""Added to the radius of what is only seen: neither its place nor its size is exact."""
 LEAST_BEAMS = 8
 """A few thin beams cannot tell what moves from what the rover passes."""
 MAX_YAW_RATE_RAD_S = math.radians(45.0)
@@ -68,6 +72,7 @@ class Sighting:
     north_m: float
     east_m: float
     radius_m: float
+    blur_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,8 +82,8 @@ class Track:
     number: int
     sightings: tuple[Sighting, ...]
 
-    def motion(self) -> tuple[Moving, float] | None:
-        """Its place and velocity by least squares, and how far the sightings stray from that; None before it is known."""
+    def motion(self) -> tuple[Moving, bool] | None:
+        """Its place and velocity by least squares, and whether that is to be believed; None before it has been seen long enough."""
         time_s = np.array([one.time_s for one in self.sightings])
         if len(time_s) < LEAST_SIGHTINGS or time_s[-1] - time_s[0] < LEAST_S:
             return None
@@ -88,9 +93,12 @@ class Track:
         fitted = places.mean(axis=0) + since[:, None] * velocity
         stray_m = float(np.sqrt(((places - fitted) ** 2).sum(axis=1).mean()))
         newest = NedPoint(float(fitted[-1, 0]), float(fitted[-1, 1]))
-        radius_m = max(one.radius_m for one in self.sightings)
+        radius_m = max(one.radius_m for one in self.sightings) + DOUBT_M
+        blur_m = sum(one.blur_m for one in self.sightings) / len(self.sightings)
+        error_m_s = max(stray_m, 0.03) / math.sqrt(float(since @ since))
         north_m_s, east_m_s = (float(part) for part in velocity)
-        return Moving(f"seen {self.number}", float(time_s[-1]), newest, north_m_s, east_m_s, radius_m), stray_m
+        moving = Moving(f"seen {self.number}", float(time_s[-1]), newest, north_m_s, east_m_s, radius_m)
+        return moving, stray_m <= STRAY_M + blur_m and moving.speed_m_s >= SURE * error_m_s
 
 
 class Tracker:
@@ -110,7 +118,7 @@ class Tracker:
         ends, range_m = _ends(pose, scan)
         hits = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
         if len(hits) or self._tracks:
-            self._follow(pose.time_s, _things(hits, pose))
+            self._follow(pose.time_s, _things(hits, pose, scan.beam_width_rad))
 
     def remember(self, pose: Pose, reach_m: float) -> None:
         """Note what a scan just taken into the map has shown to be free."""
@@ -123,8 +131,8 @@ class Tracker:
         for track in self._tracks:
             motion = track.motion()
             if motion is not None and now_s - motion[0].time_s <= LOST_S:
-                moving, stray_m = motion
-                if moving.speed_m_s >= self._settings.moving_m_s and stray_m <= STRAY_M:
+                moving, believed = motion
+                if believed and moving.speed_m_s >= self._settings.moving_m_s:
                     found.append(moving)
         return tuple(found)
 
@@ -178,7 +186,7 @@ def _ends(pose: Pose, scan: RangeScan) -> tuple[Points, Points]:
     return np.column_stack((north_m, east_m)), range_m
 
 
-def _things(points: Points, pose: Pose) -> list[Sighting]:
+def _things(points: Points, pose: Pose, beam_width_rad: float) -> list[Sighting]:
     """Readings that lie together, as discs: their middle lies behind what is seen of them."""
     groups: list[list[Points]] = []
     for point in points:
@@ -199,5 +207,6 @@ def _things(points: Points, pose: Pose) -> list[Sighting]:
         behind_m = 0.7 * radius_m
         north_m = float(middle[0]) + behind_m * math.cos(away_rad)
         east_m = float(middle[1]) + behind_m * math.sin(away_rad)
-        things.append(Sighting(pose.time_s, north_m, east_m, radius_m))
+        blur_m = 0.5 * beam_width_rad * math.dist(middle, (pose.north_m, pose.east_m))
+        things.append(Sighting(pose.time_s, north_m, east_m, radius_m, blur_m))
     return things

@@ -40,7 +40,9 @@ class Moving:
         return NedPoint(self.point.north_m + self.north_m_s * since_s, self.point.east_m + self.east_m_s * since_s)
 
 
-def announced(vehicle: VehicleState, pose: Pose, rover_radius_m: float, settings: TrafficSettings) -> tuple[Moving, ...]:
+def announced(
+    vehicle: VehicleState, pose: Pose, rover_radius_m: float, settings: TrafficSettings
+) -> tuple[Moving, ...]:
     """Who has told of itself lately, is on our level, and comes near enough within the horizon to matter.
 
     What claims to be where the rover itself is, is the rover: its own transponder, heard again.
@@ -51,9 +53,7 @@ def announced(vehicle: VehicleState, pose: Pose, rover_radius_m: float, settings
     found = []
     for other in vehicle.others.values():
         radius_m = other.radius_m if other.radius_m is not None else settings.radius_m
-        moving = Moving(
-            other.name, other.seen_s, frame.to_ned(other.point), other.north_m_s, other.east_m_s, radius_m
-        )
+        moving = Moving(other.name, other.seen_s, frame.to_ned(other.point), other.north_m_s, other.east_m_s, radius_m)
         fresh = pose.time_s - other.seen_s <= settings.stale_s
         own = moving.at(pose.time_s).distance_m(pose.point) < rover_radius_m
         if fresh and not own and _on_our_level(other, vehicle, settings) and _comes_near(moving, pose, settings):

@@ -242,18 +242,25 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
             return replace(state, attitude=event)
         case GlobalPositionSeen():
             return replace(state, global_position=event)
-        case OtherSeen():
-            return replace(state, others=_with_other(state.others, event))
         case EkfStatusSeen():
             return replace(state, ekf=event)
-        case OriginSeen():
-            return replace(state, origin=event)
-        case HomeSeen():
-            return replace(state, home=event)
         case RangeSeen():
             return replace(state, scan=event, scan_ahead=event if event.scan.looks_ahead else state.scan_ahead)
         case TargetSeen():
             return replace(state, target=event)
+        case _:
+            return _fold_seldom(state, event)
+
+
+def _fold_seldom(state: VehicleState, event: Event) -> VehicleState:
+    """What comes once, or by the way."""
+    match event:
+        case OriginSeen():
+            return replace(state, origin=event)
+        case HomeSeen():
+            return replace(state, home=event)
+        case OtherSeen():
+            return replace(state, others=_with_other(state.others, event))
         case PrearmSeen():
             return replace(state, prearm=event)
         case ParameterSeen():

@@ -13,7 +13,7 @@ from companion.planning import registry
 from companion.scan import RangeScan
 from companion.settings import Settings
 from companion.tracking import Tracker
-from companion.yielding import least_room_m
+from companion.yielding import first_near, least_room_m
 
 
 def warm_up(settings: Settings) -> None:
@@ -31,6 +31,7 @@ def warm_up(settings: Settings) -> None:
     Tracker(evidence, settings.traffic).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
     places = np.zeros((2, 2))
     least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]), 5.0)
+    first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
     # What lives now lives to the end: a collection that walks through it would stall a tick for a tenth of a second.
     gc.collect()
     gc.freeze()

@@ -1,8 +1,8 @@
 """Making way for what moves: before the rover does what guidance says, it looks a few seconds ahead.
 
 Several things that it might do now are played through against everything that moves: go on, go on a little and then stop, stop at
-once, turn and move aside, back off. The first that keeps its distance is done; if none does, the one that comes least
-near. The rover stops before the others' way, since going on is allowed only while there still is somewhere to stop; and it
+once, turn and move aside, back off. The first that keeps its distance is done; if none does, the one that goes well for
+longest. The rover stops before the others' way, since going on is allowed only while there still is somewhere to stop; and it
 waits there until going on is safe again.
 """
 
@@ -27,8 +27,12 @@ Points = NDArray[np.float64]
 """Shape (n, 2): columns north_m and east_m, one row for each of the moments looked at."""
 
 PERIOD_S = 0.2
-GO_ON_S = 0.4
-"""How long the rover goes on before it is asked again, and a little more: then it must still be able to stop."""
+GO_ON_S = (math.inf, 0.4, 1.5, 3.0)
+"""How long the rover might go on before it stops: 0.4 s is a little more than until it is asked again, the others get it past something."""
+MARGIN_SHARES = (1.0, 0.5)
+"""Rather less of the margin than out of the way altogether."""
+NEAR_M = 0.15
+"""Where nothing keeps its distance, what keeps from coming so near for longest is done."""
 TURN_RAD_S = 1.2
 """How fast it is taken to turn on the spot."""
 TURNING_S = 5.0
@@ -75,14 +79,21 @@ def yielded(
     times_s = np.arange(0.0, settings.traffic.look_s + 1e-9, PERIOD_S)
     discs = _discs(moving, pose, rover)
     margins_m = settings.traffic.margin_m + settings.traffic.drift_m_s * times_s
-    best, best_room_m = None, -math.inf
-    for choice in _choices(now, route, pose, speed_m_s, moving, evidence, rover, settings.guidance, times_s, aside_rad):
-        room_m = least_room_m(choice.places, discs, times_s, margins_m, choice.until_s)
-        if room_m > best_room_m + 0.05:
-            best, best_room_m = choice, room_m
-        if room_m >= 0.0:
-            break
-    assert best is not None
+
+    def room_m(choice: Choice, share: float) -> float:
+        return least_room_m(choice.places, discs, times_s, share * margins_m, choice.until_s)
+
+    on_the_way = list(_on_the_way(now, route, pose, speed_m_s, settings.guidance, times_s))
+    for share in MARGIN_SHARES:
+        for choice in on_the_way:
+            if room_m(choice, share) >= 0.0:
+                return choice.guide, None
+    choices = on_the_way
+    for choice in _out_of_the_way(pose, speed_m_s, moving, evidence, rover, settings.guidance, times_s, aside_rad):
+        if room_m(choice, MARGIN_SHARES[-1]) >= 0.0:
+            return choice.guide, choice.aside_rad
+        choices.append(choice)
+    best = max(choices, key=lambda choice: first_near(choice.places, discs, times_s, NEAR_M))
     return best.guide, best.aside_rad
 
 
@@ -122,9 +133,37 @@ def least_room_m(places: Points, discs: Points, times_s: Points, margins_m: Poin
     return least_m
 
 
-def _choices(
-    now: Guide,
-    route: Route | None,
+@njit(cache=True, nogil=True)
+def first_near(places: Points, discs: Points, times_s: Points, near_m: float) -> tuple[float, float]:
+    """When anything that moves first comes within ``near_m`` of the rover (inf: never), and the least room there is at any time."""
+    first_s, least_m = math.inf, math.inf
+    for row in range(discs.shape[0]):
+        north_m, east_m, north_m_s, east_m_s, touch_m = discs[row]
+        for i in range(times_s.size):
+            to_n = north_m + north_m_s * times_s[i] - places[i, 0]
+            to_e = east_m + east_m_s * times_s[i] - places[i, 1]
+            room_m = math.hypot(to_n, to_e) - touch_m
+            least_m = min(least_m, room_m)
+            if room_m < near_m and times_s[i] < first_s:
+                first_s = times_s[i]
+    return first_s, least_m
+
+
+def _on_the_way(
+    now: Guide, route: Route | None, pose: Pose, speed_m_s: float, settings: GuidanceSettings, times_s: Points
+) -> Iterator[Choice]:
+    """Going on, going on a little, stopping."""
+    halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), _ahead(pose, _braked_m(speed_m_s, times_s, settings)))
+    if now.motion is Motion.DRIVE and route is not None:
+        for goes_s in GO_ON_S:
+            along_m = _driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
+            yield Choice(now, _along(route, pose, along_m))
+    else:
+        yield Choice(now, halt.places, TURNING_S)
+    yield halt
+
+
+def _out_of_the_way(
     pose: Pose,
     speed_m_s: float,
     moving: tuple[Moving, ...],
@@ -134,15 +173,7 @@ def _choices(
     times_s: Points,
     aside_rad: float | None,
 ) -> Iterator[Choice]:
-    """What the rover might do, best first, worked out only when it is asked for."""
-    halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), _ahead(pose, _braked_m(speed_m_s, times_s, settings)))
-    if now.motion is Motion.DRIVE and route is not None:
-        for goes_s in (math.inf, GO_ON_S):
-            along_m = _driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
-            yield Choice(now, _along(route, pose, along_m))
-    else:
-        yield Choice(now, halt.places, TURNING_S)
-    yield halt
+    """Where the rover might make off to, best first, worked out only when it is asked for."""
     if aside_rad is not None:
         yield from _aside(aside_rad, pose, speed_m_s, evidence, rover, settings, times_s)
     nearest = min(moving, key=lambda one: one.at(pose.time_s).distance_m(pose.point) - one.radius_m)
@@ -208,12 +239,12 @@ def _braked_m(speed_m_s: float, times_s: Points, settings: GuidanceSettings) -> 
     return np.asarray(rolls_m + speed_m_s * brakes_s - 0.5 * settings.deceleration_m_s2 * brakes_s**2)
 
 
-def _driven_m(
-    speed_m_s: float, goal_m_s: float, goes_s: float, times_s: Points, settings: GuidanceSettings
-) -> Points:
+def _driven_m(speed_m_s: float, goal_m_s: float, goes_s: float, times_s: Points, settings: GuidanceSettings) -> Points:
     """How far it has driven at each moment when it goes on at the speed it is told, and stops after ``goes_s``."""
     rate = settings.deceleration_m_s2
-    fastest = np.minimum(goal_m_s, speed_m_s + rate * times_s) if goal_m_s > speed_m_s else np.full(times_s.shape, goal_m_s)
+    fastest = (
+        np.minimum(goal_m_s, speed_m_s + rate * times_s) if goal_m_s > speed_m_s else np.full(times_s.shape, goal_m_s)
+    )
     going = times_s <= goes_s
     after_s = np.maximum(times_s - goes_s - settings.brake_delay_s, 0.0)
     slowed = np.maximum(float(fastest[going][-1]) - rate * after_s, 0.0)
@@ -235,6 +266,4 @@ def _along(route: Route, pose: Pose, along_m: Points) -> Points:
     last = min(len(route.points), route.progress + 2 + math.ceil(float(along_m[-1]) / STEP_M))
     points = np.vstack(((pose.north_m, pose.east_m), route.points[route.progress + 1 : last]))
     reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    return np.column_stack(
-        (np.interp(along_m, reached_m, points[:, 0]), np.interp(along_m, reached_m, points[:, 1]))
-    )
+    return np.column_stack((np.interp(along_m, reached_m, points[:, 0]), np.interp(along_m, reached_m, points[:, 1])))

@@ -67,7 +67,9 @@ def fleet_of(movers: tuple[Mover, ...]) -> Fleet:
 
 
 @njit(cache=True, nogil=True)
-def place(rows: Floats, begins: Ints, periods_s: Floats, mover: int, time_s: float) -> tuple[float, float, float, float]:
+def place(
+    rows: Floats, begins: Ints, periods_s: Floats, mover: int, time_s: float
+) -> tuple[float, float, float, float]:
     """Where a mover is, north and east, and its velocity."""
     low, high = begins[mover], begins[mover + 1] - 1
     if periods_s[mover] > 0.0 and time_s > rows[low, 0]:

@@ -92,9 +92,7 @@ def drive(
 
 
 @njit(cache=True, nogil=True)
-def meet_movers(
-    rover: Any, rows: Floats, begins: Ints, radii_m: Floats, periods_s: Floats, time_s: float
-) -> None:
+def meet_movers(rover: Any, rows: Floats, begins: Ints, radii_m: Floats, periods_s: Floats, time_s: float) -> None:
     """Notice that a mover and the rover touch: it counts once, and stops the rover; the mover goes on."""
     gap_m, mover = nearest_mover(rows, begins, radii_m, periods_s, time_s, rover.north_m, rover.east_m)
     if gap_m >= rover.radius_m + RELEASE_M:

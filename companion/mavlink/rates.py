@@ -16,15 +16,22 @@ ENOUGH = 0.5
 """Less than this share of what was asked for is asked for again."""
 LONGEST_WAIT_S = 30.0
 SLOW_HZ = 2.0
+HEARTBEAT_HZ = 5.0
+"""Mode and arming are known only from it: at the 1 Hz that comes unasked, a pilot could be overlooked for a second."""
 
 
 @dataclass(frozen=True, slots=True)
 class WantedRate:
-    """A message that is to come at a rate. ``always`` False: it comes only under conditions, so that none at all is no fault."""
+    """A message that is to come at a rate.
+
+    ``always`` False: it comes only under conditions, so that none at all is no fault. ``told`` False: asked for again
+    while it is too seldom, but nobody need hear of it.
+    """
 
     message_id: int
     rate_hz: float
     always: bool = True
+    told: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,16 +52,17 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
     """What the companion needs of ArduRover, which sends everything at 1 Hz unasked.
 
     OBSTACLE_DISTANCE is not asked for: ArduRover refuses to stream it, it comes from the lidar's own driver. The read-back of the
-    target comes only while there is one, DISTANCE_SENSOR and RANGEFINDER only with a rangefinder.
+    target comes only while there is one (not while it turns or brakes), DISTANCE_SENSOR and RANGEFINDER only with a rangefinder.
     """
     return (
+        WantedRate(mavlink.MAVLINK_MSG_ID_HEARTBEAT, HEARTBEAT_HZ, told=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, settings.position_rate_hz),
         WantedRate(mavlink.MAVLINK_MSG_ID_ATTITUDE, settings.attitude_rate_hz),
         WantedRate(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, SLOW_HZ),
         WantedRate(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, SLOW_HZ),
         WantedRate(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_RANGEFINDER, settings.range_rate_hz, always=False),
-        WantedRate(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, SLOW_HZ, always=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, SLOW_HZ, always=False, told=False),
     )
 
 
@@ -81,10 +89,11 @@ class RateKeeper:
             return [RequestRate(rate.message_id, rate.rate_hz) for rate in self._wanted]
         if now_s - self._began_s < WINDOW_S:
             return []
-        faults = [self._fault(rate, now_s - self._began_s, counts) for rate in self._wanted]
-        self.faults = tuple(fault for fault in faults if fault is not None)
+        found = [(rate, self._fault(rate, now_s - self._began_s, counts)) for rate in self._wanted]
+        faults = [(rate, fault) for rate, fault in found if fault is not None]
+        self.faults = tuple(fault for rate, fault in faults if rate.told)
         self._begin(now_s, counts)
-        return [RequestRate(fault.message_id, fault.wanted_hz) for fault in self.faults if self._may_ask(fault, now_s)]
+        return [RequestRate(fault.message_id, fault.wanted_hz) for _, fault in faults if self._may_ask(fault, now_s)]
 
     def _begin(self, now_s: float, counts: Mapping[int, int]) -> None:
         self._began_s, self._counts = now_s, dict(counts)

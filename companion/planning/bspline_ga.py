@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numba import njit
 from numpy.random import Generator
@@ -14,15 +12,15 @@ from companion.planning import bspline
 from companion.planning.chance import draw_seed, seeded
 from companion.planning.ends import ends_free
 from companion.planning.ga_fitness import Task, Tuning, is_correct, way_point, way_points_for
+from companion.planning.ga_islands import Archipelago, evolve_islands
 from companion.planning.ga_population import evolve, vln_of
+from companion.planning.ga_tuples import Lives, Places, TuningValues, places_of, tuning_of
 from companion.planning.ga_turning import control_of, curve_points
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
 from companion.settings import PlannerSettings
 
-TuningValues = tuple[int, int, float, float, float, float, float, float, float, int, float, bool, int, float]
-Places = tuple[int, int, int, int, bool, float, float]
 Found = tuple[bool, CellArray, NDArray[np.float64], float, int, int, int]
 
 
@@ -77,6 +75,31 @@ def search(
     return False, np.empty((0, 2), np.int64), np.empty((0, 2)), 0.0, 0, epochs, evaluations
 
 
+def search_islands(
+    weights: Weights,
+    places: Places,
+    settings: TuningValues,
+    control_points: NDArray[np.int64],
+    lives: Lives,
+    archipelago: Archipelago,
+    seed: int,
+) -> Found:
+    """The same search on islands."""
+    task, tuning = Task(*places), Tuning(*settings)
+    rng = np.random.default_rng(seed)
+    epochs = 0
+    evaluations = 0
+    for count in control_points.tolist():
+        seeds = np.array([draw_seed(rng) for _ in range(archipelago.islands)], np.int64)
+        correct, genes, spent, tried = evolve_islands(weights, places, settings, count, lives, archipelago, seeds)
+        epochs += spent
+        evaluations += tried
+        if correct:
+            cells, curve = path_of(genes, task, way_points_for(len(genes), tuning))
+            return True, cells, curve, cells_cost(weights, cells), len(genes), epochs, evaluations
+    return False, np.empty((0, 2), np.int64), np.empty((0, 2)), 0.0, 0, epochs, evaluations
+
+
 class BsplineGa:
     """The genetic algorithm alone, as the paper's profile uses it. It never proves that there is no path."""
 
@@ -84,23 +107,8 @@ class BsplineGa:
     capabilities = Capabilities(random=True, smooth_curve=True, turning_radius=True)
 
     def __init__(self, settings: PlannerSettings) -> None:
-        self._adaptive = settings.adaptive
-        self._settings = (
-            settings.way_points,
-            settings.span_way_points,
-            settings.mixing,
-            settings.selected_share,
-            settings.mutation_probability,
-            settings.mutation_range,
-            settings.line_probability,
-            settings.line_range,
-            settings.neighbourhood,
-            settings.margin_fields,
-            settings.obstacle_value,
-            settings.adaptive,
-            settings.most_control_points,
-            settings.number_probability,
-        )
+        self._settings = tuning_of(settings)
+        self._archipelago = Archipelago(settings.islands, settings.migrate_every, settings.threads)
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
         """See ``Planner.plan``. FOUND or BUDGET_SPENT.
@@ -113,31 +121,19 @@ class BsplineGa:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
         if problem.start == problem.target:
             return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
-        counts, max_epochs = budget.control_points, budget.max_epochs
-        if self._adaptive:  # the same epochs in all, in one search
-            counts, max_epochs = counts[:1], max_epochs * len(counts)
-        found, cells, curve, cost, count, epochs, evaluations = search(
-            plain(problem.weights),
-            places_of(problem),
-            self._settings,
-            np.array(counts, np.int64),
-            budget.population,
-            budget.min_epochs,
-            max_epochs,
-            seed,
-        )
+        found, cells, curve, cost, count, epochs, evaluations = self._search(problem, budget, seed)
         if not found:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, evaluations, epochs)
         path = Path(as_cells(cells), cost, curve if len(curve) else None)
         return PlanResult(PlanStatus.FOUND, path, self.name, evaluations, epochs, count)
 
-
-def places_of(problem: PlanningProblem) -> Places:
-    """What ``Task`` is made of."""
-    motion = problem.motion
-    heading_rad = math.nan if motion.heading_rad is None else float(motion.heading_rad)
-    radius = float(motion.turning_radius_fields)
-    return (*problem.start, *problem.target, problem.corner_cutting, radius, heading_rad)
+    def _search(self, problem: PlanningProblem, budget: Budget, seed: int) -> Found:
+        lives = (budget.population, budget.min_epochs, budget.max_epochs)
+        counts = np.array(budget.control_points, np.int64)
+        common = (plain(problem.weights), places_of(problem), self._settings, counts)
+        if self._archipelago.islands > 1:
+            return search_islands(*common, lives, self._archipelago, seed)
+        return search(*common, *lives, seed)
 
 
 def check_budget(budget: Budget) -> None:

@@ -36,7 +36,7 @@ def between(genes: CellArray, control_points: int, place: float, axis: int) -> f
     i = min(max(int(at), 0), control_points - 2)
     low, high = abscissa(i, control_points), abscissa(i + 1, control_points)
     share = (place - low) / (high - low)
-    return genes[i, axis] * (1.0 - share) + genes[i + 1, axis] * share
+    return float(genes[i, axis] * (1.0 - share) + genes[i + 1, axis] * share)
 
 
 @njit(cache=True, nogil=True)
@@ -91,7 +91,7 @@ def breed_any(
     if b >= a:
         b += 1
     better, other = min(a, b), max(a, b)
-    count = math.floor(tuning.mixing * counts[better] + (1.0 - tuning.mixing) * counts[other] + 0.5)
+    count: int = math.floor(tuning.mixing * counts[better] + (1.0 - tuning.mixing) * counts[other] + 0.5)
     genes[0, 0], genes[0, 1] = parents[better, 0, 0], parents[better, 0, 1]
     for i in range(1, count):
         place = abscissa(i, count)

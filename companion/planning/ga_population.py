@@ -131,7 +131,7 @@ def measured(
 @njit(cache=True, nogil=True)
 def rank_of(ranks: NDArray[np.int64], values: NDArray[np.float64], value: float) -> int:
     """Makes room for a chromosome among the selected (3.5) and says where; the last one drops out. Needs value < values[-1]."""
-    place = ranks[-1]
+    place: int = ranks[-1]
     rank = len(values) - 1
     while rank > 0 and values[rank - 1] > value:
         values[rank], ranks[rank] = values[rank - 1], ranks[rank - 1]
@@ -149,7 +149,14 @@ def copy_genes(source: CellArray, destination: CellArray, count: int) -> None:
 
 @njit(cache=True, nogil=True)
 def measured_any(
-    weights: Weights, people: Population, genes: CellArray, count: int, task: Task, tuning: Tuning, vln: float, limit: float
+    weights: Weights,
+    people: Population,
+    genes: CellArray,
+    count: int,
+    task: Task,
+    tuning: Tuning,
+    vln: float,
+    limit: float,
 ) -> float:
     """The same for a chromosome that uses ``count`` rows, whatever the population began with."""
     at, used = row_of(count, tuning), way_points_for(count, tuning)

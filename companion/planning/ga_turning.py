@@ -108,7 +108,7 @@ def turning_fitness(weights: Weights, genes: CellArray, task: Task, vln: float, 
     Stops early once it has reached ``limit``.
     """
     control = control_of(genes, task)
-    total = vln * too_sharp(control, task.turning_radius)
+    total: float = vln * too_sharp(control, task.turning_radius)
     if total >= limit:
         return total
     points = curve_points(control)

@@ -36,23 +36,26 @@ class Hybrid:
         # A look of a few epochs finds the easy paths, and often they cannot be better: then the graph is not searched.
         look = replace(budget, control_points=budget.control_points[:1], max_epochs=budget.min_epochs)
         tried = self._genetic.plan(problem, look, rng)
-        if self._is_good(tried, _least_cost(problem)):
+        if self._is_good(problem, tried, _least_cost(problem)):
             return replace(tried, planner=self.name)
         graph = self._graph.plan(problem, budget, rng)
         spent = replace(graph, planner=self.name, evaluations=tried.evaluations, epochs=tried.epochs)
         if graph.path is None:
             return spent
-        if self._is_good(tried, graph.path.cost):
+        if self._is_good(problem, tried, graph.path.cost):
             return replace(tried, planner=self.name)
         # Whatever is left of the budget is spent only where there is a path: the proof is cheaper than some ten epochs.
         full = self._genetic.plan(problem, budget, rng)
         evaluations, epochs = tried.evaluations + full.evaluations, tried.epochs + full.epochs
-        if self._is_good(full, graph.path.cost):
+        if self._is_good(problem, full, graph.path.cost):
             return replace(full, planner=self.name, evaluations=evaluations, epochs=epochs)
         return replace(spent, path=_smoothed(problem, graph.path), evaluations=evaluations, epochs=epochs)
 
-    def _is_good(self, result: PlanResult, best: float) -> bool:
-        return result.path is not None and result.path.cost <= self._tolerance * best
+    def _is_good(self, problem: PlanningProblem, result: PlanResult, best: float) -> bool:
+        if result.path is None:
+            return False
+        # A vehicle that cannot turn on the spot could not drive the graph's path, however cheap.
+        return problem.motion.turning_radius_fields > 0.0 or result.path.cost <= self._tolerance * best
 
 
 def _least_cost(problem: PlanningProblem) -> float:

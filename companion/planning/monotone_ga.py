@@ -12,13 +12,14 @@ from numpy.random import Generator
 from companion.grid import Weights
 from companion.planning.chance import draw_seed, seeded
 from companion.planning.ends import ends_free
-from companion.planning.monotone_kernel import ONE_FLAG, ROW_WISE, SWITCHING, Tuning, evolve, square_over, summed
+from companion.planning.monotone_evolution import ONE_FLAG, ROW_WISE, SWITCHING, Tuning, evolve
+from companion.planning.monotone_kernel import square_over, summed
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
 from companion.settings import PlannerSettings
 
-TuningValues = tuple[int, int, int, int, float, float, float, float, float]
+TuningValues = tuple[int, int, int, int, int, float, float, float, float, float]
 
 
 @njit(cache=True, nogil=True)
@@ -49,6 +50,7 @@ class MonotoneGa:
             freedom,
             own.population,
             own.generations,
+            own.most_genes,
             own.settled_generations,
             own.crossover_probability,
             own.mutated_genes,

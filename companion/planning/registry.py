@@ -20,7 +20,19 @@ from companion.planning.theta_star import ThetaStar
 from companion.planning.vertex_ga import vertex, vertex_plus
 from companion.settings import PlannerSettings
 
-PLANNERS: dict[str, PlannerFactory] = {"bspline-ga": BsplineGa, "hybrid": Hybrid, "dijkstra": Dijkstra, "astar": Astar, "theta-star": ThetaStar, "dstar-lite": DstarLite, "sedighi": sedighi, "geisler": geisler, "hermanu": hermanu, "vertex": vertex, "vertex++": vertex_plus}
+PLANNERS: dict[str, PlannerFactory] = {
+    "bspline-ga": BsplineGa,
+    "hybrid": Hybrid,
+    "dijkstra": Dijkstra,
+    "astar": Astar,
+    "theta-star": ThetaStar,
+    "dstar-lite": DstarLite,
+    "sedighi": sedighi,
+    "geisler": geisler,
+    "hermanu": hermanu,
+    "vertex": vertex,
+    "vertex++": vertex_plus,
+}
 
 
 class UnknownPlannerError(ValueError):
@@ -50,4 +62,5 @@ def warm_up() -> None:
         result = make_planner(name, settings).plan(problem, Budget(), rng)
         if result.path is not None:
             is_path(weights, result.path.cells)
+    make_planner("bspline-ga", PlannerSettings(islands=2)).plan(problem, Budget(), rng)
     reachable_costs(weights, problem.start)

@@ -10,8 +10,11 @@ from companion.settings.section import Section
 class SedighiSettings(Section):
     """The genetic algorithm of Sedighi et al. 2004, and of its forerunners. The paper prints the weights only."""
 
-    population: int = Field(100, ge=4, le=10_000, description="chromosomes of a generation (ours: not printed)")
-    generations: int = Field(300, ge=1, description="at most so many (ours: not printed)")
+    population: int = Field(200, ge=4, le=10_000, description="chromosomes of a generation (ours: not printed)")
+    generations: int = Field(1000, ge=1, description="at most so many (ours: not printed)")
+    most_genes: int = Field(
+        40_000_000, ge=1, description="genes that may be tried in all: on large maps there are fewer generations (ours)"
+    )
     settled_generations: int = Field(
         40, ge=1, description="and no more once the best path is free and has stayed the same for so many (ours)"
     )
@@ -19,7 +22,7 @@ class SedighiSettings(Section):
         0.8, ge=0.0, le=1.0, description="of a pair of parents (IV.B; ours: not printed)"
     )
     mutated_genes: float = Field(
-        2.0,
+        1.5,
         ge=0.0,
         description="mean number in a chromosome: n times the mutation probability of each gene, of the flag and of each "
         "switch value (IV.C; ours: not printed)",
@@ -36,7 +39,9 @@ class VertexSettings(Section):
 
     population: int = Field(30, ge=4, le=10_000, description="chromosomes (table II)")
     generations: int = Field(
-        1000, ge=1, description="one operator each: at most so many for a feasible path, then so many to better it (table IV)"
+        1000,
+        ge=1,
+        description="one operator each: at most so many for a feasible path, then so many to better it (table IV)",
     )
     populations: int = Field(
         5,
@@ -65,13 +70,17 @@ class VertexSettings(Section):
         "or late either may be (II.A gives no figure)",
     )
     mover_corner_rows: int = Field(
-        6, ge=1, le=1000, description="places of a moving obstacle's track whose corners are vertices (II.B; ours: not printed)"
+        6,
+        ge=1,
+        le=1000,
+        description="places of a moving obstacle's track whose corners are vertices (II.B; ours: not printed)",
     )
     shorter_side: float = Field(
         0.75, ge=0.0, le=1.0, description="chance that repair takes the shorter way round (II.D; ours: not printed)"
     )
     straight_line: bool = Field(
-        True, description="one chromosome of the first population is the straight line (ours; off: all are random, as in II.B)"
+        True,
+        description="one chromosome of the first population is the straight line (ours; off: all are random, as in II.B)",
     )
     most_genes: int = Field(
         100_000, ge=2, description="a chromosome's greatest length, if the number of vertices + 2 is more (ours)"
@@ -108,11 +117,21 @@ class PlannerSettings(Section):
     adaptive: bool = Field(
         False,
         description="the number of control points is part of the chromosome: crossed, and changed by knot insertion and "
-        "removal (ours; 7 names it as the open problem). Off: the numbers of the budget, one after the other",
+        "removal (ours; 7 names it as the open problem). Each number of the budget then begins a search with so many to twice "
+        "as many",
     )
     most_control_points: int = Field(16, ge=3, le=64, description="adaptive: no chromosome gets more (ours)")
     number_probability: float = Field(
         0.5, ge=0.0, le=1.0, description="adaptive: chance that a child gains or loses a control point (ours)"
+    )
+    islands: int = Field(
+        1, ge=1, le=64, description="populations that evolve side by side; 1: the paper's algorithm (ours)"
+    )
+    migrate_every: int = Field(
+        10, ge=1, description="after so many epochs each island sends its best to the next (ours)"
+    )
+    threads: int = Field(
+        2, ge=1, le=64, description="islands at a time. Changes the time that a search takes, never its result"
     )
     hybrid_tolerance: float = Field(
         1.03, ge=1.0, description="hybrid: a genetic path may cost so many times the best possible"

@@ -151,7 +151,9 @@ class SafetySettings(Section):
 class TrafficSettings(Section):
     """Things that move: other vehicles that announce themselves, and what the range sensors see moving."""
 
-    horizon_s: float = Field(20.0, gt=0.0, le=120.0, description="so far ahead planners are told where a moving thing goes")
+    horizon_s: float = Field(
+        20.0, gt=0.0, le=120.0, description="so far ahead planners are told where a moving thing goes"
+    )
     stale_s: float = Field(5.0, gt=0.0, description="an announced position older than this does not count")
     radius_m: float = Field(1.0, gt=0.0, description="of vehicles that do not tell their size")
     level_m: float = Field(10.0, gt=0.0, description="what is so much higher or lower than the rover is not in its way")
@@ -161,7 +163,9 @@ class TrafficSettings(Section):
         0.5, gt=0.0, description="a planner that knows of moving things plans anew when a velocity changes by more"
     )
     replan_s: float = Field(2.0, ge=0.0, description="... but not sooner than this after the last time")
-    look_s: float = Field(8.0, gt=0.0, le=60.0, description="so far ahead the rover looks whether something comes across")
+    look_s: float = Field(
+        8.0, gt=0.0, le=60.0, description="so far ahead the rover looks whether something comes across"
+    )
     margin_m: float = Field(0.4, ge=0.0, description="room kept between the rover and something that moves")
     drift_m_s: float = Field(0.08, ge=0.0, description="that room grows by so much a second of looking ahead")
     patience_s: float = Field(

@@ -107,7 +107,7 @@ def _mission(
     if world is None:
         if mission_file is None:
             raise MissionError("drive: give a MISSION file, or --world MAP with --start X,Y and --target X,Y")
-        if start or target or top_left or prior or resolution_m:
+        if start or target or top_left or prior or resolution_m is not None:
             raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
         return load_mission(mission_file)
     ground = load_map(world, resolution_m)

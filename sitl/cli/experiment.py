@@ -11,15 +11,25 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.mapfiles import MapError
-from sitl.experiments import driving, kwasniewski_maps, kwasniewski_table1, navigation, wang_table4
+from sitl.experiments import (
+    adaptive_control_points,
+    driving,
+    kwasniewski_maps,
+    kwasniewski_table1,
+    navigation,
+    sedighi_table1,
+    wang_table4,
+)
 from sitl.experiments.experiment import Experiment, ExperimentError, Options, Report
 
 EXPERIMENTS: dict[str, Experiment] = {
+    adaptive_control_points.NAME: adaptive_control_points.run,
     kwasniewski_maps.NAME: kwasniewski_maps.run,
     kwasniewski_table1.NAME: kwasniewski_table1.run,
     navigation.NAME: navigation.run,
     driving.NAME: driving.run,
     wang_table4.NAME: wang_table4.run,
+    sedighi_table1.NAME: sedighi_table1.run,
 }
 EXIT_BAD_INPUT = 2
 
@@ -31,7 +41,9 @@ def experiment(
     jobs: Annotated[
         int, typer.Option(min=1, help="Runs at a time. Results stay the same, but they disturb each other's times.")
     ] = 1,
-    maps: Annotated[Path | None, typer.Option(help="Folder with the maps; default: missions/maps.")] = None,
+    maps: Annotated[
+        Path | None, typer.Option(help="Folder with the maps; default: missions/maps. sedighi-table1: more grids.")
+    ] = None,
     world: Annotated[
         list[Path] | None,
         typer.Option(

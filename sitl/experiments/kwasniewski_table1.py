@@ -99,7 +99,9 @@ class Entry:
 
     def first_times(self) -> str:
         """The first three times as the paper gives them."""
-        return " ".join(f"{drawing.figures(t.time_ms)}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN])
+        return " ".join(
+            f"{drawing.figures(t.time_ms)}" if t.cost is not None else NOT_FOUND for t in self.trials[:SHOWN]
+        )
 
 
 @dataclass(frozen=True)

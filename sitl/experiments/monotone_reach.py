@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.grid import OBSTACLE
 from companion.planning.problem import PlanningProblem
@@ -29,22 +30,22 @@ def fewest_switches(problem: PlanningProblem, kinds: Iterable[int] = (ROWS, COLU
         following: Places = {}
         for (x, y, kind), switches in places.items():
             for to_kind, spent in ((kind, switches), (1 - kind, switches + 1)):
-                for to in _vertices(gene, to_kind, side) if gene < side - 1 else [tuple(problem.target)]:
-                    here = (*to, to_kind)
-                    if spent < following.get(here, side) and _joined(free, (x, y), to):
+                for to_x, to_y in _vertices(gene, to_kind, side) if gene < side - 1 else (problem.target,):
+                    here = (to_x, to_y, to_kind)
+                    if spent < following.get(here, side) and _joined(free, (x, y), (to_x, to_y)):
                         following[here] = spent
         places = following
     return min(places.values(), default=None)
 
 
-def _vertices(gene: int, kind: int, side: int) -> list[tuple[int, int]]:
+def _vertices(gene: int, kind: int, side: int) -> Sequence[tuple[int, int]]:
     """Where a gene's vertex can be; genes count rows from the top and columns from the left."""
     if kind == ROWS:
         return [(x, side - 1 - gene) for x in range(side)]
     return [(gene, y) for y in range(side)]
 
 
-def _joined(free: np.ndarray, here: tuple[int, int], there: tuple[int, ...]) -> bool:
+def _joined(free: NDArray[np.bool_], here: tuple[int, int], there: tuple[int, int]) -> bool:
     """Whether one of the two ways of a horizontal and a vertical line is free."""
     (x, y), (to_x, to_y) = here, there
     columns, rows = slice(min(x, to_x), max(x, to_x) + 1), slice(min(y, to_y), max(y, to_y) + 1)

@@ -105,18 +105,18 @@ DRAWINGS = {
         ........#.
     """,
     "SPSet08": """
-        .#..........
-        .#..........
-        .#.#######..
-        .#.#........
-        .#.#........
-        .#.#..######
-        .#.#....#...
-        .#.#....#.#.
-        .#.#....#.#.
-        ...#......#.
-        ...#......#.
-        ...#......#.
+        ..#.........
+        ..#.........
+        ..#.........
+        ..#..#####..
+        ..#..#......
+        ..#..#......
+        .....#..####
+        .....#......
+        .....#....#.
+        .....#....#.
+        .....#....#.
+        .....#....#.
     """,
 }
 
@@ -150,9 +150,9 @@ def given_spaces(folder: Path) -> dict[str, PlanningProblem]:
             first, *rows = file.read_text(encoding="utf-8").split()
         except (OSError, ValueError):
             continue
-        if first.isdecimal() and len(rows) == int(first) > 0 and all(len(row) == len(rows) for row in rows):
-            if set("".join(rows)) <= {"0", "1"}:
-                spaces[file.stem] = crossing(weights_of(rows, "1"))
+        square = first.isdecimal() and int(first) == len(rows) > 0 and all(len(row) == len(rows) for row in rows)
+        if square and set("".join(rows)) <= {"0", "1"}:
+            spaces[file.stem] = crossing(weights_of(rows, "1"))
     if not spaces:
         raise ExperimentError(f"{folder}: no grids (*.txt: the number of rows, then as many rows of 0 and 1)")
     return spaces

@@ -13,6 +13,7 @@ from companion.planning.registry import PLANNERS, make_planner
 from companion.settings import PlannerSettings
 
 BUDGET = Budget(min_epochs=2, max_epochs=15, control_points=(4, 6), population=18)
+SETTINGS = PlannerSettings.model_validate({"sedighi": {"population": 20, "generations": 40}})
 EIGHT, FOUR = np.ones((3, 3)), None
 
 
@@ -46,7 +47,7 @@ def reachable(problem: PlanningProblem) -> bool:
 @given(problem=problems(), seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=300, deadline=None)
 def test_contract(name, problem, seed):
-    planner = make_planner(name, PlannerSettings())
+    planner = make_planner(name, SETTINGS)
     before = problem.weights.copy()
     result = planner.plan(problem, BUDGET, np.random.default_rng(seed))
     again = planner.plan(problem, BUDGET, np.random.default_rng(seed))
@@ -79,10 +80,9 @@ def test_contract(name, problem, seed):
 @settings(max_examples=100, deadline=None)
 def test_nothing_is_cheaper_than_an_optimal_planner(problem, seed):
     results = {
-        name: make_planner(name, PlannerSettings()).plan(problem, BUDGET, np.random.default_rng(seed))
-        for name in PLANNERS
+        name: make_planner(name, SETTINGS).plan(problem, BUDGET, np.random.default_rng(seed)) for name in PLANNERS
     }
-    optimal = [name for name in PLANNERS if make_planner(name, PlannerSettings()).capabilities.optimal]
+    optimal = [name for name in PLANNERS if make_planner(name, SETTINGS).capabilities.optimal]
     assert optimal
     for result in results.values():
         if result.path is not None:

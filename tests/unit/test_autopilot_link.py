@@ -80,6 +80,7 @@ def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, f
     """Let messages come at these rates; returns when which rate was asked for."""
     asked = []
     makers = {
+        0: lambda ms: bench.rover.heartbeat(),
         30: lambda ms: bench.rover.pack(mavlink.MAVLink_attitude_message(ms, 0, 0, 0.5, 0, 0, 0)),
         32: bench.rover.local_position,
         33: lambda ms: bench.rover.pack(mavlink.MAVLink_global_position_int_message(ms, 1, 1, 0, 0, 0, 0, 0, 0)),
@@ -98,13 +99,13 @@ def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, f
 
 def test_rates_that_arrive_are_not_asked_for_again() -> None:
     bench = Bench()
-    assert feed_rates(bench, 0.05, 20.0, {30: 20.0, 32: 10.0, 33: 2.0, 193: 2.0}) == []
+    assert feed_rates(bench, 0.05, 20.0, {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 2.0}) == []
     assert bench.link.rate_faults == ()
 
 
 def test_a_rate_that_falls_is_asked_for_again_with_growing_pauses() -> None:
     bench = Bench()
-    asked = feed_rates(bench, 0.05, 90.0, {30: 20.0, 32: 1.0, 33: 2.0, 193: 2.0})
+    asked = feed_rates(bench, 0.05, 90.0, {0: 5.0, 30: 20.0, 32: 1.0, 33: 2.0, 193: 2.0})
     times = [time_s for time_s, message_id in asked if message_id == 32]
     assert {message_id for _, message_id in asked} == {32}
     pauses = [later - earlier for earlier, later in pairwise(times)]
@@ -116,10 +117,16 @@ def test_a_rate_that_falls_is_asked_for_again_with_growing_pauses() -> None:
 
 def test_missing_range_data_is_no_fault_but_slow_range_data_is() -> None:
     bench = Bench()
-    steady = {30: 20.0, 32: 10.0, 33: 2.0, 193: 2.0}
+    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 2.0}
     assert feed_rates(bench, 0.05, 10.0, steady) == []
     asked = feed_rates(bench, 10.0, 20.0, {**steady, 132: 1.0})
     assert {message_id for _, message_id in asked} == {132}
+
+
+def test_seldom_heartbeats_are_asked_for_again_but_nobody_is_told() -> None:
+    bench = Bench()
+    asked = feed_rates(bench, 0.05, 20.0, {0: 1.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 2.0})
+    assert {message_id for _, message_id in asked} == {0} and bench.link.rate_faults == ()
 
 
 def test_a_command_is_repeated_twice_and_then_given_up() -> None:

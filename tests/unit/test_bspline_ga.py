@@ -9,7 +9,7 @@ from companion.planning.bspline_ga import BsplineGa
 from companion.planning.chance import seeded
 from companion.planning.ga_fitness import Task, Tuning, fitness, is_correct, large_value, way_point, way_points_for
 from companion.planning.ga_operators import breed, scatter
-from companion.planning.ga_population import evolve
+from companion.planning.ga_population import evolve, measured
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
 from companion.planning.raster import first_fault, polyline
 from companion.settings import PlannerSettings
@@ -229,6 +229,41 @@ def test_more_epochs_find_the_preferred_ground():
         return np.mean([sum(weights[y, x] for x, y in plan.path.cells[1:-1]) for plan in plans])
 
     assert mean_sum(40) < 0.8 * mean_sum(1)
+
+
+def test_paths_keep_off_soft_cost_where_there_is_room():
+    """A block with dearer fields round it: with room they are left alone, in a tunnel of them they are crossed."""
+    problem = one_obstacle()
+    weights = problem.weights
+    soft = np.zeros(weights.shape, bool)
+    soft[11:40, 44:57] = True
+    weights[soft & (weights < 1.0)] = 0.95
+
+    def soft_share(min_epochs):
+        plans = [ga().plan(problem, Budget(min_epochs, 500), np.random.default_rng(seed)) for seed in range(60)]
+        return np.mean([sum(soft[y, x] for x, y in plan.path.cells) for plan in plans])
+
+    # Straight past the block there are 13 soft fields.
+    assert soft_share(40) < 3.0 < soft_share(1)
+    weights[:11, 40:60] = weights[40:, 40:60] = 0.95
+    assert soft_share(40) >= 10.0
+
+
+@settings(deadline=None, max_examples=60)
+@given(st.integers(0, 10_000), st.sampled_from([0.5, 1.5, 3.5]))
+def test_a_glance_at_a_large_map_rejects_only_what_the_whole_sum_would(seed, obstacles):
+    rng = np.random.default_rng(seed)
+    weights = np.full((600, 1200), 0.5)
+    for x in range(200, 1100, 300):
+        weights[rng.integers(0, 400) :, x : x + 60] = 1.0
+    genes = np.array([(3, 300), *rng.integers((0, 0), (1200, 600), (2, 2)), (1190, 300)])
+    weights[300, [3, 1190]] = 0.5
+    first, basis = bspline.basis(4, 5)
+    limit = obstacles * VLN
+    task = Task(3, 300, 1190, 300, False)
+    whole = fitness(weights, genes, first, basis, False, VLN, np.inf)
+    value = measured(weights, genes, first, basis, task, VLN, limit)
+    assert value == whole if whole < limit else value >= limit
 
 
 def test_more_control_points_solve_what_fewer_cannot():

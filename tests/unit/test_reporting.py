@@ -24,7 +24,9 @@ def test_a_low_rate_is_told_once_and_only_when_it_lasts() -> None:
     assert reporter.faults((SLOW,), "", 0.0) == []
     assert reporter.faults((), "", 3.0) == []
     assert reporter.faults((SLOW,), "", 4.0) == []
-    assert reporter.faults((SLOW,), "", 4.0 + FAULT_AFTER_S) == ["LOCAL_POSITION_NED: 1.0 Hz instead of 10, asking again"]
+    assert reporter.faults((SLOW,), "", 4.0 + FAULT_AFTER_S) == [
+        "LOCAL_POSITION_NED: 1.0 Hz instead of 10, asking again"
+    ]
     assert reporter.faults((RateFault(32, 10.0, 2.0),), "", 30.0) == []
     assert reporter.faults((), "the record has ended", 31.0) == ["the record has ended"]
     assert reporter.faults((), "the record has ended", 32.0) == []

@@ -1,0 +1,43 @@
+"""What the genetic algorithm's kernels are called with: plain tuples, since named ones take the dispatcher microseconds."""
+
+from __future__ import annotations
+
+import math
+
+from companion.planning.problem import PlanningProblem
+from companion.settings import PlannerSettings
+
+Places = tuple[int, int, int, int, bool, float, float]
+"""The fields of ``ga_fitness.Task``."""
+TuningValues = tuple[int, int, float, float, float, float, float, float, float, int, float, bool, int, float]
+"""The fields of ``ga_fitness.Tuning``."""
+Lives = tuple[int, int, int]
+"""The fields of ``ga_population.Span``."""
+
+
+def places_of(problem: PlanningProblem) -> Places:
+    """What ``Task`` is made of."""
+    motion = problem.motion
+    heading_rad = math.nan if motion.heading_rad is None else float(motion.heading_rad)
+    radius = float(motion.turning_radius_fields)
+    return (*problem.start, *problem.target, problem.corner_cutting, radius, heading_rad)
+
+
+def tuning_of(settings: PlannerSettings) -> TuningValues:
+    """What ``Tuning`` is made of."""
+    return (
+        settings.way_points,
+        settings.span_way_points,
+        settings.mixing,
+        settings.selected_share,
+        settings.mutation_probability,
+        settings.mutation_range,
+        settings.line_probability,
+        settings.line_range,
+        settings.neighbourhood,
+        settings.margin_fields,
+        settings.obstacle_value,
+        settings.adaptive,
+        settings.most_control_points,
+        settings.number_probability,
+    )

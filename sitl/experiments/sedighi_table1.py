@@ -1,0 +1,251 @@
+"""Sedighi et al. 2004, Table 1: eight search spaces, three genotypes, how often each finds a way across."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path as FilePath
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from rich.table import Table
+
+from companion.clock import stopwatch_s
+from companion.grid import Grid, empty_grid
+from companion.planning.problem import Budget, Path, PlanningProblem
+from companion.planning.registry import make_planner, warm_up
+from companion.settings import PlannerSettings
+from sitl.experiments import drawing
+from sitl.experiments.experiment import Advance, Options, where_measured
+from sitl.experiments.monotone_reach import COLUMNS, ROWS, fewest_switches
+from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.sedighi_spaces import DRAWINGS, given_spaces, own_spaces
+
+NAME = "sedighi-table1"
+METHODS = ("geisler", "hermanu", "sedighi")
+PAPER_RUNS = 15
+PAPER_PERCENT = {
+    "SPSet01": ("100", "93.3", "93.3"),
+    "SPSet02": ("0.00", "86.7", "100"),
+    "SPSet03": ("73", "86.7", "100"),
+    "SPSet04": ("53", "80", "100"),
+    "SPSet05": ("0.00", "100", "100"),
+    "SPSet06": ("0.00", "20", "100"),
+    "SPSet07": ("0.00", "0.00", "86.7"),
+    "SPSet08": ("0.00", "0.00", "73.3"),
+}
+"""As printed, in the order of METHODS."""
+
+HEAD = ("space", "switches", *METHODS)
+TIME_HEAD = ("space", "n", *(f"{method}, ms" for method in METHODS), "length", "turns")
+
+
+@dataclass(frozen=True, slots=True)
+class Trial:
+    """One search."""
+
+    time_ms: float
+    generations: int
+    path: Path | None
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """All searches of one method in one search space."""
+
+    space: str
+    method: str
+    trials: tuple[Trial, ...]
+
+    def percent(self, runs: int) -> float:
+        """Success rate of the first runs."""
+        return 100.0 * float(np.mean([trial.path is not None for trial in self.trials[:runs]]))
+
+    @property
+    def median_ms(self) -> float:
+        """Median time of all searches, successful or not."""
+        return float(np.median([trial.time_ms for trial in self.trials]))
+
+    def paths(self) -> list[Path]:
+        """What was found."""
+        return [trial.path for trial in self.trials if trial.path is not None]
+
+
+@dataclass(frozen=True)
+class TableReport:
+    """See ``experiment.Report``."""
+
+    options: Options
+    spaces: dict[str, PlanningProblem]
+    entries: tuple[Entry, ...]
+
+    def of(self, space: str) -> list[Entry]:
+        """One space's entries, in the order of METHODS."""
+        return [entry for entry in self.entries if entry.space == space]
+
+    def tables(self) -> list[Table]:
+        """Success and times."""
+        return [
+            terminal_table(f"{NAME}, success in % (paper's in brackets)", HEAD, self._success(self.spaces)),
+            terminal_table(f"{NAME}, median times; sedighi's median path", TIME_HEAD, self._times(self.spaces)),
+        ]
+
+    def as_json(self) -> dict[str, object]:
+        """Times in milliseconds, success in percent."""
+        return {
+            "experiment": NAME,
+            "runs": self.options.runs,
+            "seed": self.options.seed,
+            "paper_percent": {name: dict(zip(METHODS, row, strict=True)) for name, row in PAPER_PERCENT.items()},
+            "results": [
+                {
+                    "space": entry.space,
+                    "method": entry.method,
+                    "success_percent": entry.percent(len(entry.trials)),
+                    "found": [trial.path is not None for trial in entry.trials],
+                    "median_ms": entry.median_ms,
+                    "generations": [trial.generations for trial in entry.trials],
+                    "lengths": [path.length_fields for path in entry.paths()],
+                    "turns": [turns(path) for path in entry.paths()],
+                }
+                for entry in self.entries
+            ],
+        }
+
+    def write_docs(self, folder: FilePath) -> list[FilePath]:
+        """The section and a picture of the eight spaces."""
+        picture = drawing.save(self._draw(), folder / "images" / f"{NAME}.png")
+        return [picture, write_section(folder, NAME, _section(self))]
+
+    def _success(self, names: dict[str, PlanningProblem]) -> list[list[str]]:
+        rows = []
+        for name in names:
+            paper = PAPER_PERCENT.get(name, ("",) * len(METHODS))
+            rates = [_rates(entry, theirs) for entry, theirs in zip(self.of(name), paper, strict=True)]
+            rows.append([name, _switches(self.spaces[name]), *rates])
+        return rows
+
+    def _times(self, names: dict[str, PlanningProblem]) -> list[list[str]]:
+        rows = []
+        for name in names:
+            entries = self.of(name)
+            found = entries[-1].paths()
+            path = ["", ""]
+            if found:
+                path = [f"{np.median([p.length_fields for p in found]):g}", f"{np.median([turns(p) for p in found]):g}"]
+            side = str(len(self.spaces[name].weights))
+            rows.append([name, side, *(f"{e.median_ms:.1f}" for e in entries), *path])
+        return rows
+
+    def _draw(self) -> Figure:
+        figure = Figure(figsize=(11.0, 6.2), layout="constrained", dpi=110)
+        colours = {"hermanu": drawing.ORANGE, "sedighi": drawing.BLUE}
+        for panel, name in zip(figure.subplots(2, 4).flat, DRAWINGS, strict=True):
+            problem = self.spaces[name]
+            drawing.draw_map(panel, _grid(problem))
+            panel.set_xticks([])
+            panel.set_yticks([])
+            for entry in self.of(name):
+                if entry.method in colours and entry.paths():
+                    # Beside each other where both take the same way.
+                    aside = 0.12 if entry.method == "hermanu" else -0.12
+                    line = np.array(entry.paths()[0].cells, float).T + aside
+                    panel.plot(*line, color=colours[entry.method], linewidth=2.0)
+            drawing.draw_ends(panel, problem.start, problem.target)
+            drawing.title(panel, name)
+        handles = [Line2D([], [], color=colour, linewidth=2.0, label=method) for method, colour in colours.items()]
+        figure.legend(handles=handles, loc="outside lower center", ncols=2, frameon=False)
+        return figure
+
+
+def turns(path: Path) -> int:
+    """Changes of direction along a path."""
+    steps = np.diff(np.array(path.cells, int).reshape(-1, 2), axis=0)
+    return int((steps[1:] != steps[:-1]).any(axis=1).sum())
+
+
+def run(options: Options, advance: Advance) -> TableReport:
+    """Make all searches, one after the other (they are timed): ``jobs`` does not count. ``maps``: a folder of more grids."""
+    spaces = own_spaces() | ({} if options.maps is None else given_spaces(options.maps))
+    warm_up()
+    entries: list[Entry] = []
+    for name, problem in spaces.items():
+        for method in METHODS:
+            entries.append(Entry(name, method, _searched(method, problem, options)))
+            advance(len(entries), len(spaces) * len(METHODS))
+    return TableReport(options, spaces, tuple(entries))
+
+
+def _searched(method: str, problem: PlanningProblem, options: Options) -> tuple[Trial, ...]:
+    planner = make_planner(method, PlannerSettings())
+    trials = []
+    for seed in range(options.seed, options.seed + options.runs):
+        rng = np.random.default_rng(seed)
+        begin = stopwatch_s()
+        result = planner.plan(problem, Budget(), rng)
+        trials.append(Trial(1e3 * (stopwatch_s() - begin), result.epochs, result.path))
+    return tuple(trials)
+
+
+def _grid(problem: PlanningProblem) -> Grid:
+    height, width = problem.weights.shape
+    return empty_grid(width, height, 1.0).with_weights(problem.weights)
+
+
+def _switches(problem: PlanningProblem) -> str:
+    """Fewest switches of a path begun row-wise, and of one begun column-wise."""
+    counts = [fewest_switches(problem, (kind,)) for kind in (ROWS, COLUMNS)]
+    return " / ".join("-" if count is None else str(count) for count in counts)
+
+
+def _rates(entry: Entry, paper: str) -> str:
+    """Of the first 15 runs, as the paper; of all, if they are more; and the paper's as printed."""
+    ours = f"{entry.percent(PAPER_RUNS):.1f}"
+    more = f", {entry.percent(len(entry.trials)):g}" if len(entry.trials) > PAPER_RUNS else ""
+    return f"{ours}{more}{f' ({paper})' if paper else ''}"
+
+
+def _slowest(report: TableReport) -> float:
+    return max(trial.time_ms for entry in report.entries if entry.method == "sedighi" for trial in entry.trials)
+
+
+def _given(report: TableReport) -> str:
+    names = {name: problem for name, problem in report.spaces.items() if name not in DRAWINGS}
+    if not names:
+        return ""
+    return f"""
+The same for grids given with `--maps FOLDER` (text files: the number of rows, then as many rows of 0 and 1):
+
+{markdown_table(HEAD, report._success(names))}
+
+{markdown_table(TIME_HEAD, report._times(names))}
+"""
+
+
+def _section(report: TableReport) -> str:
+    own = {name: report.spaces[name] for name in DRAWINGS}
+    runs = len(report.entries[0].trials)
+    return f"""## Search spaces (Sedighi et al. 2004, Table 1)
+
+`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed}{" --maps FOLDER" if _given(report) else ""} --docs docs`
+
+From the upper left to the lower right corner, every planner with its default settings. Success in per cent: of the first
+{min(runs, PAPER_RUNS)} runs (the paper makes {PAPER_RUNS}), then of all {runs}, in brackets the paper's figure as printed. Switches: the fewest
+with which any chromosome can write down a free path, begun row-wise / begun column-wise, found by trying everything; `geisler` needs
+a 0 on the left, `hermanu` a 0 on either side, `sedighi` has up to 2. - means that no chromosome crosses this space, however many switches it had.
+
+{markdown_table(HEAD, report._success(own))}
+
+Median times of all runs, and length (fields) and turns of the median path of `sedighi`; n is the side of the square:
+
+{markdown_table(TIME_HEAD, report._times(own))}
+{_given(report)}
+The paper prints no times. Here no search of `sedighi` took longer than {_slowest(report):.0f} ms. Measured on
+{where_measured()}.
+
+![The eight search spaces](images/{NAME}.png)
+
+The paper's search spaces are not available as data; these are ours, drawn to fit its text: 01 can be crossed row-wise only, 07 and 08 need both
+kinds of movement. A success rate depends on the space as much as on the method, so the figures beside each other say that the three
+genotypes fail and succeed in the same places, not that one program is better than the other.
+"""
