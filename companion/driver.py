@@ -157,7 +157,8 @@ class Driver:
         rover = self._rover
         if self._goal.speed_m_s is not None:
             rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
-        rover = replace(rover, cruise_speed_m_s=min(rover.cruise_speed_m_s, self.route.planned_m_s))
+        planned_m_s = max(self.route.planned_m_s, self._settings.guidance.min_speed_m_s)
+        rover = replace(rover, cruise_speed_m_s=min(rover.cruise_speed_m_s, planned_m_s))
         settings = self._settings.guidance
         now = guide(
             self.route,

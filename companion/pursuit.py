@@ -21,7 +21,7 @@ from companion.searching import Searcher
 from companion.settings import Settings
 from companion.stepping import StepRunner
 from companion.tracking import Tracker
-from companion.traffic import Moving
+from companion.traffic import Moving, merged
 
 INFO, WARNING = 6, 4
 ORIGIN_MOVED_M = 0.2
@@ -105,7 +105,7 @@ class Pursuit:
 
     def drive(self, pose: Pose, speed_m_s: float, now_s: float, announced: tuple[Moving, ...] = ()) -> Guide | None:
         """What to do for the mission now; None when it has ended. ``announced``: who has told of itself and may come near."""
-        moving = announced + self._tracker.moving(now_s)
+        moving = merged(announced, self._tracker.moving(now_s), now_s)
         self.itinerary = on_time(self.itinerary, now_s)
         if self.itinerary.ended:
             return None

@@ -18,6 +18,9 @@ from companion.settings import TrafficSettings
 from companion.vehicle import OtherSeen, VehicleState
 
 
+SAME_M = 1.2
+
+
 @dataclass(frozen=True, slots=True)
 class Moving:
     """A disc that was at ``point`` (local frame) at ``time_s`` and goes on evenly."""
@@ -59,6 +62,12 @@ def announced(
         if fresh and not own and _on_our_level(other, vehicle, settings) and _comes_near(moving, pose, settings):
             found.append(moving)
     return tuple(found)
+
+
+def merged(told: tuple[Moving, ...], seen: tuple[Moving, ...], now_s: float) -> tuple[Moving, ...]:
+    """All that moves; what is seen where somebody announces himself is he, and he knows his motion better."""
+    alone = [one for one in seen if all(one.at(now_s).distance_m(other.at(now_s)) > SAME_M for other in told)]
+    return (*told, *alone)
 
 
 def motion_changed(planned: tuple[Moving, ...], now: tuple[Moving, ...], settings: TrafficSettings) -> bool:

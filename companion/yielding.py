@@ -1,8 +1,8 @@
 """Making way for what moves: before the rover does what guidance says, it looks a few seconds ahead.
 
 Several things that it might do now are played through against everything that moves: go on, go on a little and then stop, stop at
-once, turn and move aside, back off. The first that keeps its distance is done; if none does, the one that goes well for
-longest. The rover stops before the others' way, since going on is allowed only while there still is somewhere to stop; and it
+once, turn and move aside, back off. The first that keeps its distance is done; if none does, the one that leaves the most
+room, and if all would touch something, the one that goes well for longest. The rover stops before the others' way, since going on is allowed only while there still is somewhere to stop; and it
 waits there until going on is safe again.
 """
 
@@ -31,8 +31,9 @@ GO_ON_S = (math.inf, 0.4, 1.5, 3.0)
 """How long the rover might go on before it stops: 0.4 s is a little more than until it is asked again, the others get it past something."""
 MARGIN_SHARES = (1.0, 0.5)
 """Rather less of the margin than out of the way altogether."""
+STRAIGHT_S = 1.0
 NEAR_M = 0.15
-"""Where nothing keeps its distance, what keeps from coming so near for longest is done."""
+"""Where everything would touch something in the end, what keeps from coming so near for longest is done."""
 TURN_RAD_S = 1.2
 """How fast it is taken to turn on the spot."""
 TURNING_S = 5.0
@@ -93,7 +94,12 @@ def yielded(
         if room_m(choice, MARGIN_SHARES[-1]) >= 0.0:
             return choice.guide, choice.aside_rad
         choices.append(choice)
-    best = max(choices, key=lambda choice: first_near(choice.places, discs, times_s, NEAR_M))
+
+    def worth(choice: Choice) -> tuple[bool, float, float]:
+        first_s, least_m = first_near(choice.places, discs, times_s, NEAR_M)
+        return (True, least_m, 0.0) if least_m >= 0.0 else (False, first_s, least_m)
+
+    best = max(choices, key=worth)
     return best.guide, best.aside_rad
 
 
@@ -174,6 +180,7 @@ def _out_of_the_way(
     aside_rad: float | None,
 ) -> Iterator[Choice]:
     """Where the rover might make off to, best first, worked out only when it is asked for."""
+    yield from _straight_on(pose, speed_m_s, evidence, rover, settings, times_s)
     if aside_rad is not None:
         yield from _aside(aside_rad, pose, speed_m_s, evidence, rover, settings, times_s)
     nearest = min(moving, key=lambda one: one.at(pose.time_s).distance_m(pose.point) - one.radius_m)
@@ -182,6 +189,24 @@ def _out_of_the_way(
         bearing_rad = wrap_pi_rad(course_rad + turned_rad)
         yield from _aside(bearing_rad, pose, speed_m_s, evidence, rover, settings, times_s)
     yield from _off(pose, speed_m_s, evidence, rover, settings, times_s)
+
+
+def _straight_on(
+    pose: Pose,
+    speed_m_s: float,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: GuidanceSettings,
+    times_s: Points,
+) -> list[Choice]:
+    """Straight past, and stop then: a way that has just been laid anew may turn off before what comes across."""
+    along_m = _driven_m(speed_m_s, speed_m_s, STRAIGHT_S, times_s, settings)
+    length_m = float(along_m[-1])
+    there = pose.point.moved(pose.heading_rad, length_m)
+    line = look_along(evidence, pose.point, there, rover.radius_m + settings.clearance_m)
+    if speed_m_s <= settings.roll_out_m_s or min(line.clear_m, line.seen_m) < length_m - 0.05:
+        return []
+    return [Choice(Guide(Motion.LOOK, GuidedVelocity(speed_m_s, 0.0), speed_m_s), _ahead(pose, along_m))]
 
 
 def _aside(
