@@ -17,8 +17,8 @@ from companion.planning.problem import Mover
 from companion.settings import TrafficSettings
 from companion.vehicle import OtherSeen, VehicleState
 
-
 SAME_M = 1.2
+"""What is seen so near to where somebody says he is, is he."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,6 +46,11 @@ class Traffic:
         self._due_s = {number: 0.05 * i for i, number in enumerate(self._talkers)}
         self._heartbeat_s = dict.fromkeys(vehicles, 0.0)
 
+    @property
+    def talks(self) -> bool:
+        """Whether anything announces itself."""
+        return bool(self._talkers)
+
     def next_due_s(self) -> float:
         """Time of the next packet; inf when nobody talks."""
         return min(self._due_s.values(), default=math.inf)

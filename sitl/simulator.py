@@ -227,8 +227,9 @@ class Simulator:
         due_us = self._autopilot.next_due_us()
         if self._lidar is not None:
             due_us = min(due_us, self._lidar.next_due_us())
-        # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
-        due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
+        if self._traffic.talks:
+            # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
+            due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
         return max(1, math.ceil((due_us - self._vehicle.time_us) * 1e-6 * LOOP_HZ - 1e-6))
 
     def _run(self, loops: int) -> None:
@@ -258,7 +259,8 @@ class Simulator:
 
     def _send(self) -> None:
         self._autopilot.run_due()
-        self._traffic.send_due(self.time_s, (link.channel for link in self._links))
+        if self._traffic.talks:
+            self._traffic.send_due(self.time_s, (link.channel for link in self._links))
         if self._lidar is None:
             return
         rover = self._rover[0]
