@@ -14,8 +14,10 @@ from companion.planning.dstar_lite import DstarLite
 from companion.planning.hybrid import Hybrid
 from companion.planning.monotone_ga import geisler, hermanu, sedighi
 from companion.planning.planner import Planner, PlannerFactory
+from companion.planning.prm import Prm
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.raster import is_path
+from companion.planning.segment_ga import SegmentGa
 from companion.planning.theta_star import ThetaStar
 from companion.planning.vertex_ga import vertex, vertex_plus
 from companion.settings import PlannerSettings
@@ -32,6 +34,8 @@ PLANNERS: dict[str, PlannerFactory] = {
     "hermanu": hermanu,
     "vertex": vertex,
     "vertex++": vertex_plus,
+    "achour": SegmentGa,
+    "prm": Prm,
 }
 
 

@@ -87,6 +87,50 @@ class VertexSettings(Section):
     )
 
 
+class AchourSettings(Section):
+    """The genetic algorithm of Achour & Chaalal 2011."""
+
+    samples: int = Field(500, ge=1, le=100_000, description="M: free fields drawn for an attempt (V, VI)")
+    neighbours: int = Field(
+        5,
+        ge=1,
+        le=100,
+        description="B: so many segments, to the nearest samples in sight, are a generation's parents (VI)",
+    )
+    iterations: int = Field(
+        500, ge=1, le=100_000, description="an attempt that is longer is given up (ours: the paper says finite)"
+    )
+    attempts: int = Field(5, ge=1, le=10_000, description="each with new samples; environment 4 needed so many (VII)")
+    unit_fields: float = Field(
+        1.0,
+        gt=0.0,
+        description="fields in the unit of length of equations 4 to 6; the paper's environments are some 20 units wide",
+    )
+    shorten: bool = Field(
+        True, description="nodes between two that see each other are left out of the path found (ours)"
+    )
+
+
+class PrmSettings(Section):
+    """The probabilistic roadmap of Achour & Chaalal 2011, section IV."""
+
+    samples: int = Field(500, ge=1, le=10_000, description="M: drawn at first, and as many in each further round (VI)")
+    neighbours: int = Field(5, ge=1, le=100, description="B: each node is linked with so many, the nearest (IV, VI)")
+    rounds: int = Field(
+        4,
+        ge=0,
+        le=100,
+        description="of extra samples in difficult regions (IV prints one, but table I has up to 2043 nodes)",
+    )
+    reach: float = Field(
+        1.0,
+        gt=0.0,
+        description="how far from a difficult node extra samples lie, in mean distances between samples (ours: not printed)",
+    )
+    weight_x: float = Field(1.0, gt=0.0, description="weight of x in the weighted L-infinity norm (IV; not printed)")
+    weight_y: float = Field(1.0, gt=0.0, description="weight of y (IV; not printed)")
+
+
 class PlannerSettings(Section):
     """The genetic algorithm of Kwasniewski & Gosiewski 2018, section 3."""
 
@@ -141,3 +185,5 @@ class PlannerSettings(Section):
     )
     sedighi: SedighiSettings = SedighiSettings()
     vertex: VertexSettings = VertexSettings()
+    achour: AchourSettings = AchourSettings()
+    prm: PrmSettings = PrmSettings()
