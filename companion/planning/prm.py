@@ -42,7 +42,7 @@ def queried(problem: PlanningProblem, settings: PrmSettings, seed: int) -> Query
         settings.weight_y,
         problem.corner_cutting,
     )
-    return Query(*search(plain(problem.weights), tuple(problem.start), tuple(problem.target), effort, seed))
+    return Query(*search(plain(problem.weights), tuple(problem.start), tuple(problem.target), effort, seed))  # type: ignore[arg-type]
 
 
 class Prm:

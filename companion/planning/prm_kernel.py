@@ -41,7 +41,9 @@ EffortValues = tuple[int, int, int, float, float, float, bool]
 @njit(cache=True, nogil=True)
 def distance(nodes: CellArray, a: int, b: int, effort: Effort) -> float:
     """The weighted L-infinity norm between two nodes."""
-    return max(effort.weight_x * abs(nodes[a, 0] - nodes[b, 0]), effort.weight_y * abs(nodes[a, 1] - nodes[b, 1]))
+    return float(
+        max(effort.weight_x * abs(nodes[a, 0] - nodes[b, 0]), effort.weight_y * abs(nodes[a, 1] - nodes[b, 1]))
+    )
 
 
 @njit(cache=True, nogil=True)

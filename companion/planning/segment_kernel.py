@@ -62,7 +62,7 @@ def fitness(x: int, y: int, final_x: int, final_y: int, task: Task) -> float:
 @njit(cache=True, nogil=True)
 def is_among(points: CellArray, x: int, y: int) -> bool:
     """Whether a field is one of these."""
-    for i in range(len(points)):
+    for i in range(len(points)):  # noqa: SIM110 - compiled
         if points[i, 0] == x and points[i, 1] == y:
             return True
     return False
