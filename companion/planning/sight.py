@@ -28,7 +28,7 @@ def sees(weights: Weights, x0: int, y0: int, x1: int, y1: int, corner_cutting: b
         x, y = fine_x >> SHIFT, fine_y >> SHIFT
         if weights[y, x] >= OBSTACLE:
             return False
-        if not corner_cutting and x != last_x and y != last_y:
+        if not corner_cutting and x != last_x and y != last_y:  # noqa: SIM102 - two plain tests
             if weights[last_y, x] >= OBSTACLE or weights[y, last_x] >= OBSTACLE:
                 return False
         last_x, last_y = x, y
