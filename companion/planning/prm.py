@@ -38,6 +38,7 @@ def queried(problem: PlanningProblem, settings: PrmSettings, seed: int) -> Query
         settings.neighbours,
         settings.rounds,
         settings.reach,
+        settings.difficult_share,
         settings.weight_x,
         settings.weight_y,
         problem.corner_cutting,

@@ -17,7 +17,7 @@ from companion.grid import OBSTACLE, Weights
 from companion.planning.chance import State, seeded, uniform, whole
 from companion.planning.heap import put, take_out
 from companion.planning.raster import CellArray
-from companion.planning.sight import sees
+from companion.planning.sight import DRAWS_A_SAMPLE, sees
 
 Ints = NDArray[np.int32]
 Floats = NDArray[np.float64]
@@ -30,12 +30,13 @@ class Effort(NamedTuple):
     neighbours: int
     rounds: int
     reach: float
+    difficult_share: float
     weight_x: float
     weight_y: float
     corner_cutting: bool
 
 
-EffortValues = tuple[int, int, int, float, float, float, bool]
+EffortValues = tuple[int, int, int, float, float, float, float, bool]
 
 
 @njit(cache=True, nogil=True)
@@ -47,16 +48,18 @@ def distance(nodes: CellArray, a: int, b: int, effort: Effort) -> float:
 
 
 @njit(cache=True, nogil=True)
-def link(nodes: CellArray, near: Ints, first: int, effort: Effort) -> None:
-    """Write the B nearest nodes, seen or not, of every node from ``first`` on into ``near``; -1 where there are no more."""
-    most = near.shape[1]
+def link(nodes: CellArray, blocked: NDArray[np.bool_], effort: Effort) -> Ints:
+    """The B nearest of every node, seen or not, leaving out nodes known to be blocked; -1 where there are no more."""
+    most = effort.neighbours
+    near = np.full((len(nodes), most), -1, np.int32)
     lengths = np.empty(most)
-    for a in range(first, len(nodes)):
+    for a in range(len(nodes)):
         count = 0
-        near[a] = -1
+        if blocked[a]:
+            continue
         for b in range(len(nodes)):
             length = distance(nodes, a, b, effort)
-            if length == 0.0 or (count == most and length >= lengths[count - 1]):
+            if length == 0.0 or blocked[b] or (count == most and length >= lengths[count - 1]):
                 continue
             at = min(count, most - 1)
             while at > 0 and lengths[at - 1] > length:
@@ -66,6 +69,7 @@ def link(nodes: CellArray, near: Ints, first: int, effort: Effort) -> None:
             lengths[at] = length
             near[a, at] = b
             count = min(count + 1, most)
+    return near
 
 
 @njit(cache=True, nogil=True)
@@ -92,7 +96,14 @@ def edges_of(near: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 @njit(cache=True, nogil=True)
-def query(weights: Weights, nodes: CellArray, near: Ints, tried: NDArray[np.int64], effort: Effort) -> Ints:
+def query(
+    weights: Weights,
+    nodes: CellArray,
+    near: Ints,
+    blocked: NDArray[np.bool_],
+    tried: NDArray[np.int64],
+    effort: Effort,
+) -> Ints:
     """Lazy A*: each node's predecessor on the best way from the start, -1 where none is known; the start is its own.
 
     An edge waits at the price it would have and is looked at only when its turn comes: first the node it leads to, then the line. ``tried``
@@ -118,7 +129,8 @@ def query(weights: Weights, nodes: CellArray, near: Ints, tried: NDArray[np.int6
             edge = heap[0]
             size = take_out(heap, place, keys, size, edge)
             a, b = come_from[edge], lead_to[edge]
-            if parent[b] >= 0 or weights[nodes[b, 1], nodes[b, 0]] >= OBSTACLE:
+            blocked[b] = weights[nodes[b, 1], nodes[b, 0]] >= OBSTACLE
+            if parent[b] >= 0 or blocked[b]:
                 continue
             tried[a, 0] += 1
             tried[b, 0] += 1
@@ -141,23 +153,33 @@ def sample_anywhere(shape: tuple[int, int], nodes: CellArray, state: State) -> N
 
 @njit(cache=True, nogil=True)
 def sample_difficult(
-    shape: tuple[int, int], nodes: CellArray, tried: NDArray[np.int64], reach: float, new: CellArray, state: State
+    weights: Weights,
+    nodes: CellArray,
+    tried: NDArray[np.int64],
+    reach: float,
+    share: float,
+    new: CellArray,
+    state: State,
 ) -> None:
     """Fill ``new`` with fields around the nodes whose lines were blocked, the more the larger the share of them.
 
     ``reach``: how far to each side. Where no line was blocked there is no difficult region, and the fields are anywhere.
     """
-    height, width = shape
+    height, width = weights.shape
     shares = tried[:, 1] / np.maximum(tried[:, 0], 1)
     heaped = np.cumsum(shares)
     if heaped[-1] <= 0.0:
-        sample_anywhere(shape, new, state)
+        sample_anywhere(weights.shape, new, state)
         return
-    for i in range(len(new)):
+    sample_anywhere(weights.shape, new, state)
+    for i in range(int(share * len(new))):
         seed = min(np.searchsorted(heaped, uniform(state) * heaped[-1], side="right"), len(nodes) - 1)
-        for axis, size in ((0, width), (1, height)):
-            middle, side = nodes[seed, axis], math.ceil(reach)
-            new[i, axis] = whole(state, max(middle - side, 0), min(middle + side, size - 1))
+        for _ in range(DRAWS_A_SAMPLE):
+            for axis, size in ((0, width), (1, height)):
+                middle, side = nodes[seed, axis], math.ceil(reach)
+                new[i, axis] = whole(state, max(middle - side, 0), min(middle + side, size - 1))
+            if weights[new[i, 1], new[i, 0]] < OBSTACLE:
+                break
 
 
 @njit(cache=True, nogil=True)
@@ -172,22 +194,23 @@ def search(
     shape = weights.shape
     reach = effort.reach * math.sqrt(shape[0] * shape[1] / effort.samples)
     nodes = np.empty((2 + effort.samples * (1 + effort.rounds), 2), np.int64)
-    near = np.empty((len(nodes), effort.neighbours), np.int32)
+    blocked = np.zeros(len(nodes), np.bool_)
     nodes[0, 0], nodes[0, 1] = start
     nodes[1, 0], nodes[1, 1] = target
     sample_anywhere(shape, nodes[2 : 2 + effort.samples], state)
-    known, looked = 0, 0
+    looked = 0
     for done in range(effort.rounds + 1):
         used = 2 + effort.samples * (1 + done)
-        link(nodes[:used], near, known, effort)
-        known = used
         tried = np.zeros((used, 2), np.int64)
-        parent = query(weights, nodes[:used], near[:used], tried, effort)
+        near = link(nodes[:used], blocked[:used], effort)
+        parent = query(weights, nodes[:used], near, blocked, tried, effort)
         looked += tried[:, 0].sum() // 2
         if parent[1] >= 0:
             return _way(nodes, parent), used - 2, done, looked
         if done < effort.rounds:
-            sample_difficult(shape, nodes[:used], tried, reach, nodes[used : used + effort.samples], state)
+            sample_difficult(
+                weights, nodes[:used], tried, reach, effort.difficult_share, nodes[used : used + effort.samples], state
+            )
     return np.empty((0, 2), np.int64), used - 2, effort.rounds, looked
 
 

@@ -123,9 +123,12 @@ class PrmSettings(Section):
         description="of extra samples in difficult regions (IV prints one, but table I has up to 2043 nodes)",
     )
     reach: float = Field(
-        1.0,
+        2.0,
         gt=0.0,
         description="how far from a difficult node extra samples lie, in mean distances between samples (ours: not printed)",
+    )
+    difficult_share: float = Field(
+        0.5, ge=0.0, le=1.0, description="share of the extra samples that lie there; the others lie anywhere (ours)"
     )
     weight_x: float = Field(1.0, gt=0.0, description="weight of x in the weighted L-infinity norm (IV; not printed)")
     weight_y: float = Field(1.0, gt=0.0, description="weight of y (IV; not printed)")
