@@ -14,7 +14,7 @@ from companion.commands import Arm, Command, Say, SetMode
 from companion.driver import STANDSTILL, Driver
 from companion.guidance import Guide
 from companion.itinerary import Itinerary, TargetStatus
-from companion.laying import apart_m, from_home
+from companion.laying import from_home
 from companion.mapfiles import save_ros_map
 from companion.mapping import EvidenceMap, known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -29,17 +29,8 @@ from companion.settings import Settings
 from companion.startup import StartUp
 from companion.stepping import StepRunner
 from companion.traffic import announced
-from companion.vehicle import (
-    Event,
-    HomeSeen,
-    LocalPositionSeen,
-    OriginSeen,
-    RangeSeen,
-    RoverMode,
-    TextSeen,
-    VehicleState,
-    fold,
-)
+from companion.vehicle import Event, RangeSeen, RoverMode, TextSeen, VehicleState, fold
+from companion.whereabouts import Whereabouts
 
 __all__ = ["Companion", "Outcome", "Status"]
 
@@ -49,11 +40,6 @@ HAND_OVER_S = 1.5
 """So long the companion stays, after its last command, to see that the rover is in HOLD."""
 NOT_FOLLOWED_S = 5.0
 """People are told when the autopilot's read-back has shown another target for so long."""
-HOME_MOVED_M = 2.0
-ASK_PLACES_S = 0.5
-"""While it is doubtful where the rover is, the origin is asked for this often,"""
-SETTLED_S = 0.4
-"""and an answer counts that comes so long after the doubt arose: position and origin then speak of the same frame."""
 
 
 @dataclass
@@ -103,9 +89,7 @@ class Companion:
         self._outbox = Outbox(settings.guidance)
         self._reporter = Reporter(self.outcome.said)
         self._next_tick_s = clock.now_s()
-        self._asked_s = self._settled_s = -np.inf
-        self._doubt = ""
-        self._doubt_s = 0.0
+        self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
         self._followed_s = clock.now_s()
         self._stopped = False
         self._stop_asked = False
@@ -157,7 +141,7 @@ class Companion:
         if now_s - self._next_tick_s > 1.0:
             # After a stall (a suspended computer) do not catch up tick by tick, and do not believe what piled up meanwhile.
             self._next_tick_s = now_s
-            self._settled_s = now_s + SETTLED_S
+            self._whereabouts.stalled(now_s)
         began_s = stopwatch_s()
         self._reporter.news.clear()
         for event in self._autopilot.poll(now_s):
@@ -220,11 +204,10 @@ class Companion:
             self._pursuit = self._begin(now_s)
             if self._pursuit is None:
                 return
-        if self._doubt and now_s - self._asked_s >= ASK_PLACES_S:
-            self._asked_s = now_s
+        if self._whereabouts.must_ask(now_s):
             self._autopilot.ask_places()
         before = self.watch.control
-        doubt = self._doubt or ("the companion stood still" if now_s < self._settled_s else "")
+        doubt = self._whereabouts.reason(now_s)
         self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, doubt)
         if verdict.reaction is Reaction.DRIVE:
             if self._stopped or before is not Control.COMPANION:
@@ -277,30 +260,11 @@ class Companion:
             self._reporter.note(f"autopilot: {event.text}")
         if self._pursuit is None:
             return
-        match event:
-            case RangeSeen() if not self._doubt:
-                pose, attitude = self.vehicle.pose_at(event.time_s), self.vehicle.attitude
-                if pose is not None and attitude is not None:
-                    self._pursuit.map_scan(pose, attitude.yaw_rate_rad_s, event.scan)
-            case LocalPositionSeen() if self.vehicle.jump_m > self._settings.safety.jump_m:
-                if not self._doubt:
-                    self._tell(f"Position jumped {self.vehicle.jump_m:.1f} m: map forgotten", WARNING)
-                self._doubt, self._doubt_s = "position jumped", event.time_s
-            case OriginSeen():
-                self._find_ground(event, self._pursuit)
-            case HomeSeen() if apart_m(event.point, self._pursuit.laid.home) > HOME_MOVED_M:
-                self._tell_once("Home has moved; the mission stays where it began")
-            case _:
-                pass
-
-    def _find_ground(self, event: OriginSeen, pursuit: Pursuit) -> None:
-        """The origin as it is now: after a jump this tells whether the frame has moved or only the rover's place in it."""
-        if pursuit.follow_origin(event.point):
-            self._doubt, self._doubt_s = "EKF origin moved", event.time_s
-        elif self._doubt and event.time_s - self._doubt_s >= SETTLED_S:
-            pursuit.forget_map()
-            self._doubt = ""
-            self._start_afresh()
+        if isinstance(event, RangeSeen) and not self._whereabouts.position_doubted:
+            pose, attitude = self.vehicle.pose_at(event.time_s), self.vehicle.attitude
+            if pose is not None and attitude is not None:
+                self._pursuit.map_scan(pose, attitude.yaw_rate_rad_s, event.scan)
+        self._whereabouts.take_in(event, self.vehicle, self._pursuit)
 
     # Driving -----------------------------------------------------------------------------------------------------
 

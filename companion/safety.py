@@ -103,4 +103,6 @@ def unsafe_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings)
             return f"{name} silent for over {limit_s:g} s"
     if not vehicle.ekf_ok:
         return "EKF has no position"
+    if vehicle.frozen:
+        return "position stands still while the velocity says otherwise"
     return ""

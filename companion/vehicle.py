@@ -15,6 +15,11 @@ from companion.scan import RangeScan
 EKF_POSITION = 8 | 16
 """POS_HORIZ_REL or POS_HORIZ_ABS: one of them must be set to drive."""
 EKF_CONST_POSITION = 128
+RECKONED_M = 1.5
+FROZEN_SHARE = 0.2
+"""Where the velocity says that the rover has gone so far, its position must have moved by more than this share of it."""
+RECKONED_S = 10.0
+"""Slower than this nothing is concluded: the position wanders."""
 OTHERS_KEPT = 64
 OTHERS_FORGOTTEN_S = 30.0
 """Other vehicles are remembered for so long after they were last heard, and no more than so many of them."""
@@ -185,6 +190,15 @@ Event = (
 
 
 @dataclass(frozen=True, slots=True)
+class Reckoned:
+    """Where the velocity has led from a position report on, in metres."""
+
+    since: LocalPositionSeen
+    north_m: float = 0.0
+    east_m: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleState:
     """The newest of everything; ``None`` until first heard."""
 
@@ -202,6 +216,10 @@ class VehicleState:
     prearm: PrearmSeen | None = None
     jump_m: float = 0.0
     """How far the last position report lay from where the velocity had led us to expect it."""
+    frozen: bool = False
+    """The velocity says that the rover moves and the position does not: kept until a person sets GUIDED again."""
+    reckoned: Reckoned | None = None
+    """The check for that, under way."""
     parameters: dict[str, float] = field(default_factory=dict)
     others: dict[str, OtherSeen] = field(default_factory=dict)
     """Who else is about, by name."""
@@ -235,9 +253,9 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
     """The state after one more event."""
     match event:
         case HeartbeatSeen():
-            return replace(state, heartbeat=event)
+            return _with_heartbeat(state, event)
         case LocalPositionSeen():
-            return replace(state, position=event, jump_m=_jump_m(state.position, event))
+            return _with_position(state, event)
         case AttitudeSeen():
             return replace(state, attitude=event)
         case GlobalPositionSeen():
@@ -273,6 +291,29 @@ def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, Oth
     """The newest of everybody; who has been silent for long is forgotten, and of too many those heard longest ago."""
     kept = [one for one in others.values() if one.name != event.name and event.time_s - one.time_s < OTHERS_FORGOTTEN_S]
     return {one.name: one for one in [*kept[-(OTHERS_KEPT - 1) :], event]}
+
+
+def _with_heartbeat(state: VehicleState, event: HeartbeatSeen) -> VehicleState:
+    """Mode and arming; whoever sets GUIDED anew has looked after the position."""
+    set_anew = state.heartbeat is not None and state.heartbeat.mode != RoverMode.GUIDED == event.mode
+    return replace(state, heartbeat=event, frozen=state.frozen and not set_anew)
+
+
+def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:
+    """The position, compared with the last one and, over a longer way, with where the velocity has led."""
+    before, reckoned = state.position, state.reckoned
+    state = replace(state, position=now, jump_m=_jump_m(before, now))
+    if before is None or reckoned is None or not 0.0 <= now.boot_s - reckoned.since.boot_s <= RECKONED_S:
+        return replace(state, reckoned=Reckoned(now))
+    elapsed_s = now.boot_s - before.boot_s
+    north_m = reckoned.north_m + (before.north_m_s + now.north_m_s) / 2.0 * elapsed_s
+    east_m = reckoned.east_m + (before.east_m_s + now.east_m_s) / 2.0 * elapsed_s
+    led_m = math.hypot(north_m, east_m)
+    if led_m < RECKONED_M:
+        return replace(state, reckoned=Reckoned(reckoned.since, north_m, east_m))
+    moved_m = math.hypot(now.north_m - reckoned.since.north_m, now.east_m - reckoned.since.east_m)
+    frozen = state.frozen or moved_m < FROZEN_SHARE * led_m
+    return replace(state, reckoned=Reckoned(now), frozen=frozen)
 
 
 def _jump_m(before: LocalPositionSeen | None, now: LocalPositionSeen) -> float:

@@ -276,6 +276,24 @@ def test_a_position_jump_is_noticed_and_the_map_forgotten(rig: Rig) -> None:
     assert_setpoints_only_when_ours(rig.sent)
 
 
+def test_a_position_that_freezes_stops_the_rover(rig: Rig) -> None:
+    """The clock and the velocity go on: only the two together tell."""
+    rig.until(lambda: rig.companion.vehicle.speed_m_s > 1.0)
+    held: list[tuple[float, float]] = []
+
+    def frozen(message: Any) -> Any:
+        if message.get_type() == "LOCAL_POSITION_NED":
+            held.append((message.x, message.y))
+            message.x, message.y = held[0]
+        return message
+
+    rig.change, since_s = frozen, rig.now_s()
+    rig.until(lambda: any("stands still" in text for text in rig.texts()), 3.0)
+    assert rig.now_s() - since_s < 2.0
+    rig.until(lambda: rig.mode == HOLD, 4.0)
+    assert rig.simulator.collisions == ()
+
+
 class Frame:
     """The autopilot moves the origin of its local frame, consistently: origin, position, and what it is told."""
 

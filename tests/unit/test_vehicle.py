@@ -48,7 +48,8 @@ SCAN = RangeScan(1.0, np.full(1, np.pi), np.ones(1), 0.2, 8.0, 0.1, "behind")
 def test_the_newest_is_kept(event: Event, name: str) -> None:
     state = fold(VehicleState(), event)
     assert getattr(state, name) is event
-    others = {field for field in VehicleState.__slots__ if field not in (name, "parameters", "jump_m", "others")}
+    made = ("parameters", "jump_m", "others", "frozen", "reckoned")
+    others = {field for field in VehicleState.__slots__ if field not in (name, *made)}
     assert all(getattr(state, other) is None for other in others)
 
 
@@ -123,3 +124,38 @@ def test_driving_is_no_jump_but_a_reset_is() -> None:
     assert state.jump_m == pytest.approx(5.0)
     state = fold(state, LocalPositionSeen(2.1, 2.1, 9.3, 4.0, 3.0, 0.0))
     assert state.jump_m == pytest.approx(0.0, abs=1e-9)
+
+
+def driven(speed_m_s: float, shown: float, seconds: float) -> VehicleState:
+    """Straight north at 10 Hz; ``shown`` is the share of the way that the position follows."""
+    state = fold(VehicleState(), HeartbeatSeen(0.0, 15, True, 1))
+    for i in range(round(seconds * 10)):
+        t_s = i / 10
+        state = fold(state, LocalPositionSeen(t_s, t_s, shown * speed_m_s * t_s, 0.0, speed_m_s, 0.0))
+    return state
+
+
+@pytest.mark.parametrize("speed_m_s", [0.5, 2.0, 5.0])
+def test_a_position_that_stands_still_while_the_velocity_goes_on_is_noticed(speed_m_s: float) -> None:
+    """After 1.5 m, which is 0.75 s at 2 m/s."""
+    seconds = 1.5 / speed_m_s + 0.3
+    assert driven(speed_m_s, 0.0, seconds).frozen
+    assert not driven(speed_m_s, 0.0, seconds / 2).frozen
+    assert not driven(speed_m_s, 0.6, 10.0).frozen
+
+
+def test_a_frozen_position_is_believed_again_when_a_person_sets_guided() -> None:
+    state = driven(2.0, 0.0, 2.0)
+    held = fold(state, HeartbeatSeen(2.0, 4, True, 1))
+    assert held.frozen
+    assert not fold(held, HeartbeatSeen(3.0, 15, True, 1)).frozen
+
+
+def test_driving_in_circles_is_not_a_frozen_position() -> None:
+    """A circle of 1 m at 1 m/s comes back to where it began again and again."""
+    state = VehicleState()
+    for i in range(300):
+        t_s = i / 10
+        place = (math.sin(t_s), 1.0 - math.cos(t_s), math.cos(t_s), math.sin(t_s))
+        state = fold(state, LocalPositionSeen(t_s, t_s, *place))
+        assert not state.frozen
