@@ -17,8 +17,8 @@ from companion.yielding import first_near, least_room_m
 
 
 def warm_up(settings: Settings) -> None:
-    """Run every compiled kernel once, with the types that a drive uses."""
-    registry.warm_up()
+    """Run every compiled kernel that a drive with these settings uses once, with the types it uses."""
+    registry.warm_up((settings.navigator.planner,), settings.planner)
     evidence = new_map(empty_grid(8, 8), 0.35, settings.mapping)
     bearings = np.array([0.0, 0.5])
     scan = RangeScan(0.0, bearings, np.array([2.0, np.inf]), 0.2, 4.0, 0.1, "warm-up")

@@ -35,21 +35,27 @@ class Hybrid:
         """See ``Planner.plan``. FOUND or NO_PATH. Raises ValueError for a budget without sense."""
         # A look of a few epochs finds the easy paths, and often they cannot be better: then the graph is not searched.
         look = replace(budget, control_points=budget.control_points[:1], max_epochs=budget.min_epochs)
-        tried = self._genetic.plan(problem, look, rng)
-        if self._is_good(problem, tried, _least_cost(problem)):
-            return replace(tried, planner=self.name)
+        first = self._genetic.plan(problem, look, rng)
+        if self._is_good(problem, first, _least_cost(problem)):
+            return replace(first, planner=self.name)
         graph = self._graph.plan(problem, budget, rng)
-        spent = replace(graph, planner=self.name, evaluations=tried.evaluations, epochs=tried.epochs)
         if graph.path is None:
+            return replace(graph, planner=self.name, evaluations=first.evaluations, epochs=first.epochs)
+        if self._is_good(problem, first, graph.path.cost):
+            return replace(first, planner=self.name)
+        # Where the first population failed a second one helps more than further epochs or control points. Only who cannot turn
+        # on the spot has no use for the graph's path, and spends the whole budget.
+        more = budget if problem.motion.turning_radius_fields > 0.0 else look
+        second = self._genetic.plan(problem, more, rng)
+        spent = replace(
+            second,
+            planner=self.name,
+            evaluations=first.evaluations + second.evaluations,
+            epochs=first.epochs + second.epochs,
+        )
+        if self._is_good(problem, second, graph.path.cost):
             return spent
-        if self._is_good(problem, tried, graph.path.cost):
-            return replace(tried, planner=self.name)
-        # Whatever is left of the budget is spent only where there is a path: the proof is cheaper than some ten epochs.
-        full = self._genetic.plan(problem, budget, rng)
-        evaluations, epochs = tried.evaluations + full.evaluations, tried.epochs + full.epochs
-        if self._is_good(problem, full, graph.path.cost):
-            return replace(full, planner=self.name, evaluations=evaluations, epochs=epochs)
-        return replace(spent, path=_smoothed(problem, graph.path), evaluations=evaluations, epochs=epochs)
+        return replace(spent, status=graph.status, path=_smoothed(problem, graph.path), control_points=0)
 
     def _is_good(self, problem: PlanningProblem, result: PlanResult, best: float) -> bool:
         if result.path is None:

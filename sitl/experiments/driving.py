@@ -192,7 +192,8 @@ def run(options: Options, advance: Advance) -> DrivingReport:
     """Make all drives. The result (but for planning times) does not depend on ``jobs``."""
     missions = {**_shipped(options), **_given(options)}
     planners = [planner for planner in DRIVEN if planner in PLANNERS]
-    warm_up(settings_with("hybrid"))
+    for planner in planners:
+        warm_up(settings_with(planner))
     keys = [(name, planner) for name in missions for planner in planners]
     tasks = [(name, planner, options.seed + i) for name, planner in keys for i in range(options.runs)]
     collected: dict[tuple[str, str], list[Report]] = {key: [] for key in keys}

