@@ -257,7 +257,7 @@ class Driver:
         if self._state.returning:
             return not is_clear(self.evidence.grid, self._state.past[:-4:-1])
         current = self._state.current
-        return current is None or not is_clear(self.evidence.grid, current.cells[self._state.index :])
+        return current is None or not is_clear(self.evidence.grid, current.cell_array[self._state.index :])
 
     def _lay_route(self, decision: Decision, pose: Pose) -> None:
         """The route for a decision; a path that goes on keeps its route."""

@@ -8,7 +8,9 @@ y grows north; arrays are indexed ``[y, x]``.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +29,17 @@ class Cell(NamedTuple):
 
     x: int
     y: int
+
+
+def as_array(cells: Iterable[Cell]) -> NDArray[np.int64]:
+    """Fields as an array of shape (n, 2), columns x and y."""
+    return np.array([(cell.x, cell.y) for cell in cells], np.int64).reshape(-1, 2)
+
+
+def as_cells(cells: NDArray[np.int64]) -> tuple[Cell, ...]:
+    """Fields from an array of shape (n, 2), columns x and y."""
+    # ``Cell(x, y)`` for each row takes three times as long; this makes the same objects.
+    return tuple(map(tuple.__new__, repeat(Cell), zip(*cells.T.tolist(), strict=True)))
 
 
 @dataclass(frozen=True, eq=False)

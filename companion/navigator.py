@@ -17,7 +17,8 @@ from enum import StrEnum
 import numpy as np
 
 from companion.grid import Cell, Grid
-from companion.planning.problem import Path, PlanResult, PlanStatus, path_cost
+from companion.planning.problem import Path, PlanResult, PlanStatus
+from companion.planning.raster import CellArray, cells_cost, plain
 
 BACKTRACK_TRIES = 8
 
@@ -97,7 +98,7 @@ def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavSt
         return state, Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
     if state.returning:
         return _return(state, grid, search, entered=entered)
-    if state.current is not None and is_clear(grid, state.current.cells[state.index :]):
+    if state.current is not None and is_clear(grid, state.current.cell_array[state.index :]):
         return _explore(state, grid, search, entered=entered)
     return _search(state, grid, search)
 
@@ -107,11 +108,11 @@ def abandon_path(state: NavState) -> NavState:
     return replace(state, current=None)
 
 
-def is_clear(grid: Grid, cells: tuple[Cell, ...]) -> bool:
+def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...]) -> bool:
     """Whether none of these fields but the first (where the rover is) is an obstacle, and no step cuts a corner."""
     if len(cells) < 2:
         return True
-    x, y = np.array(cells).T
+    x, y = np.asarray(cells).T
     if x.min() < 0 or y.min() < 0 or x.max() >= grid.width or y.max() >= grid.height:
         return False
     ahead = grid.weights[y[1:], x[1:]]
@@ -160,16 +161,16 @@ def _return(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tu
 def _explore(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tuple[NavState, Decision]:
     """Part B (figure 13): follow the current path; every few fields take a better one if there is one."""
     assert state.current is not None
+    ahead = state.current.cell_array[state.index :]
     passed = state.since_better + (1 if entered else 0)
-    ahead = state.current.cells[state.index :]
     if passed < state.better_every:
-        return replace(state, since_better=passed), _follow(ahead, None, "following the current path", ())
+        return replace(state, since_better=passed), _follow(state, "following the current path", ())
     state = replace(state, since_better=0)
     result = search(SearchKind.BETTER, state.past[-1], state.target)
     searches = (SearchKind.BETTER,)
-    if result.path is not None and result.path.cost < path_cost(grid.weights, ahead) - 1e-9:
+    if result.path is not None and result.path.cost < cells_cost(plain(grid.weights), ahead) - 1e-9:
         return _take(state, result.path, Part.EXPLORE, searches, "a better path")
-    return state, _follow(ahead, None, "no better path", searches)
+    return state, _follow(state, "no better path", searches)
 
 
 def _search(state: NavState, grid: Grid, search: Search) -> tuple[NavState, Decision]:
@@ -215,8 +216,9 @@ def _take(
     return state, Decision(Action.FOLLOW, part, path.cells, path, reason, searches)
 
 
-def _follow(ahead: tuple[Cell, ...], new_path: Path | None, reason: str, searches: tuple[SearchKind, ...]) -> Decision:
-    return Decision(Action.FOLLOW, Part.EXPLORE, ahead, new_path, reason, searches)
+def _follow(state: NavState, reason: str, searches: tuple[SearchKind, ...]) -> Decision:
+    assert state.current is not None
+    return Decision(Action.FOLLOW, Part.EXPLORE, state.current.cells[state.index :], None, reason, searches)
 
 
 def _arrive(state: NavState, cell: Cell) -> NavState:
@@ -228,7 +230,7 @@ def _arrive(state: NavState, cell: Cell) -> NavState:
     past = state.past + _fields_between(state.past[-1], cell) + (cell,)
     if state.current is None:
         return replace(state, past=past)
-    index = _place_on(state.current.cells, state.index, cell)
+    index = _place_on(state.current.cell_array, state.index, cell)
     return replace(state, past=past, index=index, current=None if index < 0 else state.current)
 
 
@@ -243,12 +245,13 @@ def _retraced(past: tuple[Cell, ...], cell: Cell) -> tuple[Cell, ...]:
     return (*past[: nearest + 1], *_fields_between(past[nearest], cell), cell)
 
 
-def _place_on(cells: tuple[Cell, ...], index: int, cell: Cell) -> int:
+def _place_on(cells: CellArray, index: int, cell: Cell) -> int:
     """Where on the path the field is: itself, else the first neighbour at or after ``index``; -1 when the path is lost."""
+    gaps = np.abs(cells[index:] - cell).max(axis=1, initial=0)
     for reach in (0, 1):
-        for i in range(index, len(cells)):
-            if max(abs(cells[i].x - cell.x), abs(cells[i].y - cell.y)) <= reach:
-                return i
+        near = np.flatnonzero(gaps <= reach)
+        if len(near) > 0:
+            return index + int(near[0])
     return -1
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from companion.grid import Cell, Weights
 from companion.planning.planner import Planner
 from companion.planning.problem import Budget, PlanningProblem
-from companion.planning.raster import CellArray, as_array
+from companion.planning.raster import CellArray
 from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
 
@@ -41,7 +41,7 @@ def our_planner(name: str, settings: PlannerSettings, budget: Budget) -> Contest
     def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
         planner: Planner = make_planner(name, settings)
         path = planner.plan(PlanningProblem(weights, start, target), budget, np.random.default_rng(seed)).path
-        return None if path is None else lambda: as_array(path.cells)
+        return None if path is None else lambda: path.cell_array
 
     notes = []
     if capabilities.smooth_curve:

@@ -16,7 +16,7 @@ from companion.planning.astar_kernel import search, way_back
 from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import CellArray, as_cells, cells_cost, plain
+from companion.planning.raster import CellArray, cells_cost, plain
 from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
@@ -54,4 +54,4 @@ class Astar:
         cells, cost = _cheapest(weights, reached, *problem.start, *problem.target, problem.corner_cutting)
         if len(cells) == 0:
             return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        return PlanResult(PlanStatus.FOUND, Path(as_cells(cells), cost), self.name)
+        return PlanResult(PlanStatus.FOUND, Path(cells, cost), self.name)

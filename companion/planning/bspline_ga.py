@@ -18,7 +18,7 @@ from companion.planning.ga_tuples import Lives, Places, TuningValues, places_of,
 from companion.planning.ga_turning import control_of, curve_points
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
+from companion.planning.raster import CellArray, cells_cost, plain, polyline, without_loops
 from companion.settings import PlannerSettings
 
 Found = tuple[bool, CellArray, NDArray[np.float64], float, int, int, int]
@@ -124,7 +124,7 @@ class BsplineGa:
         found, cells, curve, cost, count, epochs, evaluations = self._search(problem, budget, seed)
         if not found:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, evaluations, epochs)
-        path = Path(as_cells(cells), cost, curve if len(curve) else None)
+        path = Path(cells, cost, curve if len(curve) else None)
         return PlanResult(PlanStatus.FOUND, path, self.name, evaluations, epochs, count)
 
     def _search(self, problem: PlanningProblem, budget: Budget, seed: int) -> Found:

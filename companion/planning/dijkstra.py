@@ -16,7 +16,7 @@ from companion.grid import OBSTACLE, Cell, Weights
 from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import SQRT2, CellArray, as_cells, cells_cost, plain
+from companion.planning.raster import SQRT2, CellArray, cells_cost, plain
 from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
@@ -192,4 +192,4 @@ class Dijkstra:
         cells, cost = shortest(plain(problem.weights), *problem.start, *problem.target, problem.corner_cutting)
         if len(cells) == 0:
             return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        return PlanResult(PlanStatus.FOUND, Path(as_cells(cells), cost), self.name)
+        return PlanResult(PlanStatus.FOUND, Path(cells, cost), self.name)

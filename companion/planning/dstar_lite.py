@@ -19,7 +19,7 @@ from companion.planning.dstar_kernel import changes, note_changes, queue, settle
 from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import CellArray, as_cells, cells_cost, plain
+from companion.planning.raster import CellArray, cells_cost, plain
 from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
@@ -71,7 +71,7 @@ class DstarLite:
         self._memory, cells = _settled(memory)
         if len(cells) == 0:
             return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        return PlanResult(PlanStatus.FOUND, Path(as_cells(cells), float(cells_cost(weights, cells))), self.name)
+        return PlanResult(PlanStatus.FOUND, Path(cells, float(cells_cost(weights, cells))), self.name)
 
 
 def _begun(weights: Weights, problem: PlanningProblem) -> Memory:

@@ -10,7 +10,7 @@ from companion.planning.astar import Astar
 from companion.planning.bspline_ga import BsplineGa
 from companion.planning.planner import Capabilities
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult
-from companion.planning.raster import SQRT2, as_array, as_cells, cells_cost, plain
+from companion.planning.raster import SQRT2, cells_cost, plain
 from companion.planning.smoothing import fields_under, smooth
 from companion.settings import PlannerSettings
 
@@ -76,6 +76,6 @@ def _smoothed(problem: PlanningProblem, path: Path) -> Path:
     if problem.corner_cutting:
         return path
     weights = plain(problem.weights)
-    curve = smooth(weights, as_array(path.cells))
+    curve = smooth(weights, path.cell_array)
     cells = fields_under(curve)
-    return Path(as_cells(cells), cells_cost(weights, cells), curve)
+    return Path(cells, cells_cost(weights, cells), curve)

@@ -16,7 +16,7 @@ from companion.planning.monotone_evolution import ONE_FLAG, ROW_WISE, SWITCHING,
 from companion.planning.monotone_kernel import square_over, summed
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
+from companion.planning.raster import CellArray, cells_cost, plain, polyline, without_loops
 from companion.settings import PlannerSettings
 
 TuningValues = tuple[int, int, int, int, int, float, float, float, float, float]
@@ -71,7 +71,7 @@ class MonotoneGa:
         evaluations = generations * self._settings[1]
         if not found:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, evaluations, generations)
-        return PlanResult(PlanStatus.FOUND, Path(as_cells(cells), cost), self.name, evaluations, generations)
+        return PlanResult(PlanStatus.FOUND, Path(cells, cost), self.name, evaluations, generations)
 
 
 def sedighi(settings: PlannerSettings) -> MonotoneGa:

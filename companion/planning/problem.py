@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from enum import StrEnum
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.grid import Cell, Weights
+from companion.grid import Cell, Weights, as_array, as_cells
 
 MIN_WEIGHT = 0.01
 """The least that a field costs: on ground of weight 0 a detour must still cost something."""
@@ -80,24 +81,48 @@ class PlanStatus(StrEnum):
     NO_PATH = "no-path"
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, eq=False, slots=True, init=False)
 class Path:
     """The fields from start to target, each 8-adjacent to the one before.
 
-    ``cost``: see ``path_cost``. ``curve``, if the planner has one, is the smooth line the fields came from: shape (n, 2),
+    ``cell_array`` has their places, shape (n, 2), columns x and y; ``cells`` are the same as tuples. ``cost``: see
+    ``path_cost``. ``curve``, if the planner has one, is the smooth line the fields came from: shape (n, 2),
     columns x and y in fields, field centres at whole numbers. ``speeds_fields_s``, if the planner chooses them, has
-    shape (n - 1,): the speed from each point of the curve to the next.
+    shape (n - 1,): the speed from each point of the curve to the next. Nobody writes to these arrays.
     """
 
-    cells: tuple[Cell, ...]
+    cell_array: NDArray[np.int64]
     cost: float
-    curve: NDArray[np.float64] | None = None
-    speeds_fields_s: NDArray[np.float64] | None = None
+    curve: NDArray[np.float64] | None
+    speeds_fields_s: NDArray[np.float64] | None
+    _cells: tuple[Cell, ...] | None = field(init=False, repr=False)
+
+    def __init__(
+        self,
+        cell_array: NDArray[np.int64] | Iterable[Cell],
+        cost: float,
+        curve: NDArray[np.float64] | None = None,
+        speeds_fields_s: NDArray[np.float64] | None = None,
+    ) -> None:
+        put = object.__setattr__
+        put(self, "cell_array", cell_array if isinstance(cell_array, np.ndarray) else as_array(cell_array))
+        put(self, "cost", cost)
+        put(self, "curve", curve)
+        put(self, "speeds_fields_s", speeds_fields_s)
+        put(self, "_cells", None)
+
+    @property
+    def cells(self) -> tuple[Cell, ...]:
+        """The fields one by one. Made when first asked for: on a large map that takes as long as finding the path."""
+        if self._cells is None:
+            object.__setattr__(self, "_cells", as_cells(self.cell_array))
+        assert self._cells is not None
+        return self._cells
 
     @property
     def length_fields(self) -> float:
         """Length in fields; a diagonal step is sqrt 2."""
-        return sum(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(self.cells))
+        return float(np.hypot(*np.diff(self.cell_array, axis=0).T).sum())
 
 
 @dataclass(frozen=True, eq=False, slots=True)

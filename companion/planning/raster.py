@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from itertools import repeat
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.grid import OBSTACLE, Cell, Weights
+from companion.grid import OBSTACLE, Cell, Weights, as_array
 from companion.planning.problem import MIN_WEIGHT
 
 CellArray = NDArray[np.int64]
@@ -134,17 +133,6 @@ def first_fault(weights: Weights, cells: CellArray, corner_cutting: bool) -> tup
 def is_path(weights: Weights, cells: Iterable[Cell], corner_cutting: bool = False) -> bool:
     """Whether the fields are inside the map, free, each adjacent to the one before, and cut no corner."""
     return bool(first_fault(plain(weights), as_array(cells), corner_cutting)[0] == 0)
-
-
-def as_array(cells: Iterable[Cell]) -> CellArray:
-    """Fields as an array of shape (n, 2)."""
-    return np.array([(cell.x, cell.y) for cell in cells], np.int64).reshape(-1, 2)
-
-
-def as_cells(cells: CellArray) -> tuple[Cell, ...]:
-    """Fields from an array of shape (n, 2)."""
-    # ``Cell(x, y)`` for each row takes longer than the whole search on an easy map; this makes the same objects.
-    return tuple(map(tuple.__new__, repeat(Cell), zip(*cells.T.tolist(), strict=True)))
 
 
 def plain(weights: Weights) -> Weights:

@@ -13,7 +13,7 @@ from companion.planning.chance import draw_seed
 from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline, without_loops
+from companion.planning.raster import CellArray, cells_cost, plain, polyline, without_loops
 from companion.planning.segment_kernel import search
 from companion.settings import PlannerSettings
 from companion.settings.planners import AchourSettings
@@ -52,7 +52,7 @@ def drawn(weights: Weights, nodes: CellArray) -> tuple[CellArray, float, bool]:
 def path_through(problem: PlanningProblem, nodes: CellArray) -> Path:
     """The path along nodes of which each sees the next; the nodes are its curve unless they lead round a loop."""
     cells, cost, looped = drawn(plain(problem.weights), nodes)
-    return Path(as_cells(cells), cost, None if looped else nodes.astype(np.float64))
+    return Path(cells, cost, None if looped else nodes.astype(np.float64))
 
 
 class SegmentGa:

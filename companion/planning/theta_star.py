@@ -29,7 +29,6 @@ from companion.planning.raster import (
     SHIFT,
     SQRT2,
     CellArray,
-    as_cells,
     cells_cost,
     fine_steps,
     plain,
@@ -202,4 +201,4 @@ class ThetaStar:
         )
         if len(cells) == 0:
             return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        return PlanResult(PlanStatus.FOUND, Path(as_cells(cells), cost, corners.astype(np.float64)), self.name)
+        return PlanResult(PlanStatus.FOUND, Path(cells, cost, corners.astype(np.float64)), self.name)

@@ -19,7 +19,7 @@ from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.polygons import Polygons, polygons_of
 from companion.planning.problem import Budget, Mover, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import CellArray, as_cells, cells_cost, plain, polyline
+from companion.planning.raster import CellArray, cells_cost, plain, polyline
 from companion.planning.vertex_kernel import GroundValues, search
 from companion.planning.vertex_movers import fleet_of
 from companion.settings import PlannerSettings
@@ -153,7 +153,7 @@ class VertexGa:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, plan.evaluations, plan.generations)
         cells, cost = _drawn(plain(problem.weights), plan.corners)
         speeds = plan.speeds_fields_s if self._timed else None
-        path = Path(as_cells(cells), cost, plan.corners.astype(np.float64), speeds)
+        path = Path(cells, cost, plan.corners.astype(np.float64), speeds)
         return PlanResult(PlanStatus.FOUND, path, self.name, plan.evaluations, plan.generations)
 
 

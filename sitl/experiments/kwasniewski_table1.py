@@ -160,7 +160,7 @@ class TableReport:
                 path = next((trial.path for trial in entry.trials if trial.path is not None), None)
                 notes.append(f"{method} {f'{entry.median_ms:.2g} ms' if entry.found else 'finds nothing'}")
                 if path is not None:
-                    panel.plot(*np.array(path.cells, float).T, color=colour, linewidth=2.0, alpha=0.9)
+                    panel.plot(*path.cell_array.T, color=colour, linewidth=2.0, alpha=0.9)
             drawing.draw_ends(panel, START, TARGET)
             drawing.title(panel, f"{TITLES[name]}: {', '.join(notes)}")
         handles = [Line2D([], [], color=colour, linewidth=2.0, label=method) for method, colour in colours.items()]

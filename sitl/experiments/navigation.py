@@ -200,8 +200,8 @@ def _grounds(case: Case) -> Iterable[Ground]:
     for start, target in case.ends:
         problem = PlanningProblem(case.weights, start, target)
         best = graph.plan(problem, Budget(), np.random.default_rng(0)).path
-        if best is not None and len(best.cells) > 1:
-            yield Ground(case.name, Grid(case.weights, 1.0), start, target, len(best.cells) - 1)
+        if best is not None and len(best.cell_array) > 1:
+            yield Ground(case.name, Grid(case.weights, 1.0), start, target, len(best.cell_array) - 1)
 
 
 def _made(tasks: list[tuple[str, Ground, range]], jobs: int) -> Iterable[list[FieldRun]]:

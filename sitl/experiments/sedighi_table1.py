@@ -149,7 +149,7 @@ class TableReport:
                 if entry.method in colours and entry.paths():
                     # Beside each other where both take the same way.
                     aside = 0.12 if entry.method == "hermanu" else -0.12
-                    line = np.array(entry.paths()[0].cells, float).T + aside
+                    line = entry.paths()[0].cell_array.T + aside
                     panel.plot(*line, color=colours[entry.method], linewidth=2.0)
             drawing.draw_ends(panel, problem.start, problem.target)
             drawing.title(panel, name)
@@ -160,7 +160,7 @@ class TableReport:
 
 def turns(path: Path) -> int:
     """Changes of direction along a path."""
-    steps = np.diff(np.array(path.cells, int).reshape(-1, 2), axis=0)
+    steps = np.diff(path.cell_array, axis=0)
     return int((steps[1:] != steps[:-1]).any(axis=1).sum())
 
 

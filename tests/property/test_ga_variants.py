@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from companion.planning.bspline_ga import BsplineGa
 from companion.planning.problem import Motion, PlanStatus, path_cost
-from companion.planning.raster import as_array, first_fault, plain
+from companion.planning.raster import first_fault, plain
 from companion.settings import PlannerSettings
 from tests.property.test_planner_contract import BUDGET, problems
 
@@ -39,7 +39,7 @@ def test_contract(name, problem, motion, seed):
     cells = result.path.cells
     assert cells == again.path.cells and len(set(cells)) == len(cells)
     assert cells[0] == problem.start and cells[-1] == problem.target
-    assert first_fault(plain(problem.weights), as_array(cells), problem.corner_cutting)[0] == 0
+    assert first_fault(plain(problem.weights), result.path.cell_array, problem.corner_cutting)[0] == 0
     assert result.path.cost == pytest.approx(path_cost(problem.weights, cells), rel=1e-9)
     if motion.turning_radius_fields > 0.0 and problem.start != problem.target:
         assert result.path.curve is not None

@@ -1,14 +1,15 @@
+import pickle
+from dataclasses import FrozenInstanceError, replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.grid import Cell
-from companion.planning.problem import path_cost
+from companion.grid import Cell, as_array, as_cells
+from companion.planning.problem import Path, path_cost
 from companion.planning.raster import (
     FAULTS,
-    as_array,
-    as_cells,
     cells_cost,
     first_fault,
     is_path,
@@ -120,3 +121,16 @@ def test_plain_weights_are_passed_on_and_others_copied():
 
 def test_as_array_of_nothing_has_two_columns():
     assert as_array([]).shape == (0, 2)
+
+
+def test_a_path_has_its_fields_as_an_array_and_as_cells():
+    cells = (Cell(0, 0), Cell(1, 1), Cell(2, 1))
+    path = Path(cells, 1.2)
+    assert path.cells == cells and path.cells is path.cells and isinstance(path.cells[0], Cell)
+    assert path.cell_array.tolist() == [[0, 0], [1, 1], [2, 1]]
+    assert path.length_fields == pytest.approx(1.0 + np.sqrt(2.0))
+    again = pickle.loads(pickle.dumps(path))
+    assert again.cells == cells and replace(again, cost=2.0).cells == cells and replace(again, cost=2.0).cost == 2.0
+    with pytest.raises(FrozenInstanceError):
+        path.cost = 3.0
+    assert Path((cells[0],), 0.0).length_fields == 0.0 and Path((), 0.0).cells == ()

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from companion.grid import Cell
 from companion.planning.problem import Budget, PlanningProblem
-from companion.planning.raster import FAULTS, as_array, cells_cost, first_fault, polyline
+from companion.planning.raster import FAULTS, cells_cost, first_fault, polyline
 from companion.planning.registry import make_planner
 from companion.planning.smoothing import smooth, straightened
 from companion.settings import PlannerSettings
@@ -16,7 +16,7 @@ from tests.planning_maps import drawn, one_obstacle
 
 def shortest(problem: PlanningProblem):
     path = make_planner("dijkstra", PlannerSettings()).plan(problem, Budget(), np.random.default_rng(0)).path
-    return None if path is None else as_array(path.cells)
+    return None if path is None else path.cell_array
 
 
 def fields_under(curve):
