@@ -3,6 +3,8 @@
 Hart, Nilsson & Raphael 1968. What is cheapest in all is taken first, from a circular bucket queue over the quantised sum; the last in is
 the first out, so of equal ones the search goes on with that nearest the target. Costs themselves are not quantised, and a field that
 turns out to be cheaper is taken again, so the width of a bucket decides how fast, never how good.
+
+Where all free ground costs the same, and corners are not cut, most of the work is left out: see ``canonical``.
 """
 
 from __future__ import annotations
@@ -13,6 +15,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.planning.astar_kernel import search, way_back
+from companion.planning.canonical import is_uniform, shortest_uniform
 from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
@@ -20,6 +23,8 @@ from companion.planning.raster import CellArray, cells_cost, plain
 from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
+ROOM = 64
+"""In the queue, beside one place for each field."""
 
 
 @njit(cache=True, nogil=True)
@@ -28,6 +33,10 @@ def _cheapest(
 ) -> tuple[CellArray, float]:
     """The fields of the cheapest path and its cost; no fields if there is none. ``reached``: one 0 for each field."""
     width = weights.shape[1]
+    if not corner_cutting and is_uniform(weights.ravel(), weights[target_y, target_x]):
+        room, lengths = weights.size + ROOM, reached.view(np.int64)
+        cells = shortest_uniform(weights, lengths, room, start_x, start_y, target_x, target_y)
+        return cells, cells_cost(weights, cells) if len(cells) else np.inf
     if not search(weights, reached, start_x, start_y, target_x, target_y, corner_cutting):
         return np.empty((0, 2), np.int64), np.inf
     cells = way_back(weights.ravel(), reached, width, target_x, target_y, corner_cutting)

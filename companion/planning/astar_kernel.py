@@ -119,7 +119,7 @@ def search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every n
         if so_far < 0.0:
             continue
         reached[y * width + x] = -so_far
-        if unused + 8 > len(entries) and free < 0:
+        if waiting + 8 > len(entries):
             free, waiting = swept(entries, heads, reached, width, target_x, target_y, least)
         inside = 0 < x < width - 1 and 0 < y < height - 1
         for i in range(8):

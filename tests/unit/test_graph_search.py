@@ -7,13 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.grid import Cell
+from companion.grid import Cell, as_cells
 from companion.planning.astar import Astar
 from companion.planning.astar_kernel import BUCKETS, per_bucket, swept
+from companion.planning.canonical import is_uniform, shortest_uniform
 from companion.planning.dijkstra import Dijkstra
 from companion.planning.dstar_lite import DstarLite
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
-from companion.planning.raster import is_path
+from companion.planning.raster import cells_cost, is_path
 from companion.planning.theta_star import ThetaStar, line_cost
 from companion.settings import PlannerSettings
 from tests.planning_maps import drawn, one_obstacle
@@ -77,6 +78,32 @@ def test_astars_equally_short_ways_have_few_bends():
     result = plan(Astar(SETTINGS), PlanningProblem(np.full((20, 40), 0.5), Cell(0, 5), Cell(30, 12)))
     turns = (np.diff(np.diff(np.array(result.path.cells), axis=0), axis=0) != 0).any(axis=1).sum()
     assert turns == 1
+
+
+@given(seed=st.integers(0, 2**32 - 1), room=st.integers(8, 40), share=st.sampled_from([0.0, 0.1, 0.3, 0.4]))
+@settings(max_examples=300, deadline=None)
+def test_on_uniform_ground_the_path_is_a_shortest_one_however_little_room_the_queue_begins_with(seed, room, share):
+    rng = np.random.default_rng(seed)
+    weights = ground("even", rng, *rng.integers(1, 40, 2), share)
+    for _ in range(rng.integers(0, 6)):
+        y, x = rng.integers(0, weights.shape[0]), rng.integers(0, weights.shape[1])
+        weights[y : y + rng.integers(1, 8), x : x + rng.integers(1, 8)] = 1.0
+    start, target = some_cell(rng, weights), some_cell(rng, weights)
+    weights[start.y, start.x] = weights[target.y, target.x] = 0.5
+    best = plan(Dijkstra(SETTINGS), PlanningProblem(weights, start, target)).path
+    cells = shortest_uniform(weights, np.zeros(weights.size, np.int64), room, *start, *target)
+    assert (len(cells) == 0) == (best is None)
+    if best is not None:
+        assert cells_cost(weights, cells) == pytest.approx(best.cost, rel=1e-9)
+        assert is_path(weights, as_cells(cells)) and (Cell(*cells[0]), Cell(*cells[-1])) == (start, target)
+
+
+def test_uniform_ground():
+    weights = np.full(40, 0.3)
+    weights[::7] = 1.0
+    assert is_uniform(weights, 0.3) and not is_uniform(weights, 0.5)
+    weights[39] = 0.2
+    assert not is_uniform(weights, 0.3)
 
 
 def test_sweeping_keeps_what_still_waits():
