@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
+from numpy.random import Generator
 
 from companion.grid import Cell, Weights
 from companion.planning.planner import Planner
@@ -20,14 +20,15 @@ Found = Callable[[], CellArray] | None
 
 @dataclass(frozen=True, slots=True)
 class Contestant:
-    """One way to search. ``solve(weights, start, target, seed)`` is what is timed, all preparations for a new map included.
+    """One way to search. ``solve(weights, start, target, rng)`` is what is timed, all preparations for a new map included (but not the
+    generator's: a vehicle has one).
 
     ``random``: the seed matters. ``most_fields``: larger maps are not tried, as they would take hours or all memory. ``note``: what a
     reader must know to compare it fairly.
     """
 
     name: str
-    solve: Callable[[Weights, Cell, Cell, int], Found]
+    solve: Callable[[Weights, Cell, Cell, Generator], Found]
     random: bool = False
     ours: bool = False
     most_fields: int = 100_000_000
@@ -38,9 +39,9 @@ def our_planner(name: str, settings: PlannerSettings, budget: Budget) -> Contest
     """A planner of the registry, made anew for every search (some remember). Raises UnknownPlannerError."""
     capabilities = make_planner(name, settings).capabilities
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         planner: Planner = make_planner(name, settings)
-        path = planner.plan(PlanningProblem(weights, start, target), budget, np.random.default_rng(seed)).path
+        path = planner.plan(PlanningProblem(weights, start, target), budget, rng).path
         return None if path is None else lambda: path.cell_array
 
     notes = []

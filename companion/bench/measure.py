@@ -112,8 +112,9 @@ def _entry(contestant: Contestant, case: Case, optima: list[float], limits: Limi
     try:
         while len(times_ms) < runs and (not times_ms or stopwatch_s() - began_s < limits.cell_s):
             at = len(times_ms) % len(case.ends)
+            rng = np.random.default_rng(limits.first_seed + len(times_ms))
             before_s = stopwatch_s()
-            found = contestant.solve(case.weights, *case.ends[at], limits.first_seed + len(times_ms))
+            found = contestant.solve(case.weights, *case.ends[at], rng)
             times_ms.append(1e3 * (stopwatch_s() - before_s))
             if found is not None:
                 cells = np.ascontiguousarray(found(), np.int64)
@@ -150,7 +151,7 @@ def _faults(case: Case, cells: CellArray, ends: tuple[tuple[int, int], tuple[int
 def _with_memory(contestant: Contestant, case: Case, seed: int) -> tuple[float | None, Found]:
     """One search, and by how much the process grew at its peak, MB; None where the system does not say."""
     before = _peak_kb(reset=True)
-    found = contestant.solve(case.weights, *case.ends[0], seed)
+    found = contestant.solve(case.weights, *case.ends[0], np.random.default_rng(seed))
     after = _peak_kb(reset=False)
     return (None if before is None or after is None else max(after - before, 0) / 1024.0), found
 

@@ -11,6 +11,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.bench.contestants import Contestant, Found
@@ -65,7 +66,7 @@ def _scipy() -> list[Contestant]:
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import dijkstra
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         height, width = weights.shape
         a, b, length = _neighbour_pairs(~_blocked(weights))
         graph = coo_array((length, (a, b)), shape=(height * width, height * width)).tocsr()
@@ -88,7 +89,7 @@ def _scipy() -> list[Contestant]:
 def _skimage() -> list[Contestant]:
     from skimage.graph import route_through_array
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         costs = np.where(_blocked(weights), -1.0, 1.0)
         try:
             path, _ = route_through_array(costs, (start.y, start.x), (target.y, target.x), geometric=True)
@@ -102,7 +103,7 @@ def _skimage() -> list[Contestant]:
 def _tcod() -> list[Contestant]:
     from tcod.path import AStar
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         free = (~_blocked(weights)).astype(np.int8)
         path = AStar(free, diagonal=math.sqrt(2.0)).get_path(start.y, start.x, target.y, target.x)
         return _xy([(start.y, start.x), *path]) if path else None
@@ -113,7 +114,7 @@ def _tcod() -> list[Contestant]:
 def _nano_astar() -> list[Contestant]:
     from nano_astar import astar
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         answer = astar(_blocked(weights).view(np.uint8), (start.y, start.x), (target.y, target.x))
         return None if answer is None else _xy(answer[0])
 
@@ -123,7 +124,7 @@ def _nano_astar() -> list[Contestant]:
 def _pyastar2d() -> list[Contestant]:
     from pyastar2d import astar_path
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         costs = np.where(_blocked(weights), np.float32(np.inf), np.float32(1.0))
         path = astar_path(costs, (start.y, start.x), (target.y, target.x), allow_diagonal=True)
         return None if path is None else _xy(path)
@@ -136,7 +137,7 @@ def _pathfinding() -> list[Contestant]:
     from pathfinding.core.grid import Grid
     from pathfinding.finder.a_star import AStarFinder
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         grid = Grid(matrix=(~_blocked(weights)).astype(int).tolist())
         finder = AStarFinder(diagonal_movement=DiagonalMovement.only_when_no_obstacle)
         nodes, _ = finder.find_path(grid.node(*start), grid.node(*target), grid)
@@ -148,7 +149,7 @@ def _pathfinding() -> list[Contestant]:
 def _networkx() -> list[Contestant]:
     import networkx
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         width = weights.shape[1]
         a, b, length = _neighbour_pairs(~_blocked(weights))
         graph: Any = networkx.Graph()
@@ -173,7 +174,7 @@ def _pathplanning() -> list[Contestant]:
     from pathplanning.core.contracts import DiscreteProblem
     from pathplanning.spaces import Grid2DSearchSpace
 
-    def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+    def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
         height, width = weights.shape
         graph = Grid2DSearchSpace(width, height, occupancy=_blocked(weights)).to_native_graph()
         result = plan_discrete(DiscreteProblem(graph, tuple(start), tuple(target)), planner="astar")
@@ -189,7 +190,7 @@ def _ompl() -> list[Contestant]:
     util.noOutputHandler()
 
     def ompl_planner(name: str) -> Contestant:
-        def solve(weights: Weights, start: Cell, target: Cell, seed: int) -> Found:
+        def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:
             height, width = weights.shape
             free = ~_blocked(weights)
             space = base.RealVectorStateSpace(2)

@@ -14,6 +14,7 @@ from tests.planning_maps import one_obstacle
 
 GRAPH = ("astar", "dijkstra", "theta-star", "dstar-lite")
 PEERS = {"nano_astar": "nano-astar", "tcod": "tcod", "skimage": "scikit-image"}
+RNG = np.random.default_rng(0)
 ROUNDS = {1: 300, 4: 40, 10: 10, 40: 3}
 
 
@@ -25,7 +26,7 @@ def compiled():
 def solve_with(name, problem):
     """One whole search by a planner of ours, made anew: some remember."""
     planner = make_planner(name, PlannerSettings())
-    return planner.plan(problem, Budget(), np.random.default_rng(0))
+    return planner.plan(problem, Budget(), RNG)
 
 
 def peer(module):
@@ -58,7 +59,7 @@ def test_one_obstacle(benchmark, name, factor):
 @pytest.mark.parametrize("module", PEERS)
 def test_peer_one_obstacle(benchmark, module):
     contestant, problem = peer(module), one_obstacle()
-    found = benchmark(lambda: contestant.solve(problem.weights, problem.start, problem.target, 0))
+    found = benchmark(lambda: contestant.solve(problem.weights, problem.start, problem.target, RNG))
     assert found is not None
 
 
@@ -67,7 +68,7 @@ def ratio_to(module, factor):
     seconds = medians_s(
         {
             "astar": lambda: solve_with("astar", problem),
-            module: lambda: contestant.solve(problem.weights, problem.start, problem.target, 0),
+            module: lambda: contestant.solve(problem.weights, problem.start, problem.target, RNG),
         },
         ROUNDS[factor],
     )

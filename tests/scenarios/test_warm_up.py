@@ -37,7 +37,8 @@ print(json.dumps({"outcome": report.outcome, "kernels": sum(before.values()), "n
 
 
 @pytest.mark.parametrize(
-    ("mission", "planner"), [("rooms.toml", "hybrid"), ("one-obstacle.toml", "theta-star"), ("crossing.toml", "vertex++")]
+    ("mission", "planner"),
+    [("rooms.toml", "hybrid"), ("one-obstacle.toml", "theta-star"), ("crossing.toml", "vertex++")],
 )
 def test_a_drive_compiles_nothing(mission: str, planner: str) -> None:
     command = [sys.executable, "-c", LOOK, str(MISSIONS / mission), planner]

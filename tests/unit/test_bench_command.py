@@ -77,7 +77,7 @@ def test_every_installed_peer_finds_the_way_round(peer):
 @pytest.mark.parametrize("peer", [p for p in installed_peers()[0] if "OMPL" not in p.name], ids=lambda peer: peer.name)
 def test_a_peer_says_when_there_is_no_path(peer):
     closed = drawn("...#...", "...#...", "...#...")
-    assert peer.solve(closed, Cell(0, 1), Cell(6, 1), 0) is None
+    assert peer.solve(closed, Cell(0, 1), Cell(6, 1), np.random.default_rng(0)) is None
 
 
 def test_the_four_maps_grow():
