@@ -108,6 +108,7 @@ class BsplineGa:
 
     def __init__(self, settings: PlannerSettings) -> None:
         self._settings = tuning_of(settings)
+        self._by_length = settings.length_fitness
         self._archipelago = Archipelago(settings.islands, settings.migrate_every, settings.threads)
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
@@ -130,7 +131,7 @@ class BsplineGa:
     def _search(self, problem: PlanningProblem, budget: Budget, seed: int) -> Found:
         lives = (budget.population, budget.min_epochs, budget.max_epochs)
         counts = np.array(budget.control_points, np.int64)
-        common = (plain(problem.weights), places_of(problem), self._settings, counts)
+        common = (plain(problem.weights), places_of(problem, self._by_length), self._settings, counts)
         if self._archipelago.islands > 1:
             return search_islands(*common, lives, self._archipelago, seed)
         return search(*common, *lives, seed)

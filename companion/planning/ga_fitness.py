@@ -17,6 +17,7 @@ from companion.planning import bspline
 from companion.planning.raster import HALF, ONE, SHIFT, CellArray, fine_steps
 
 U = np.uint64
+PER_ONE = 1.0 / ONE
 
 GLANCE_FIELDS = 64
 """On lines longer than this, one field in so many is looked at before all are summed."""
@@ -42,7 +43,10 @@ class Tuning(NamedTuple):
 
 
 class Task(NamedTuple):
-    """Start, target, the rule for corners; how tightly the vehicle turns (0: on the spot) and its heading (NaN: any)."""
+    """Start, target, the rule for corners; how tightly the vehicle turns (0: on the spot) and its heading (NaN: any).
+
+    ``by_length``: fields count as much as the line under them is long, not all alike.
+    """
 
     start_x: int
     start_y: int
@@ -51,6 +55,7 @@ class Task(NamedTuple):
     corner_cutting: bool
     turning_radius: float = 0.0
     heading: float = math.nan
+    by_length: bool = False
 
 
 @njit(cache=True, nogil=True)
@@ -113,11 +118,13 @@ def fitness(
     corner_cutting: bool,
     vln: float,
     limit: float,
+    by_length: bool = False,
 ) -> float:
     """Equation 5: the sum of the fields under the lines from way point to way point, start and target counting 0.
 
     Obstacles and fields outside the map count ``vln`` each, a cut corner adds ``vln``; a line that leaves the map is
-    not looked at for corners. See ``is_correct``. Stops early once it has reached ``limit``. The lines are those of
+    not looked at for corners. ``by_length``: the fields of a line count by its length, so that of two ways over as many
+    fields the straighter is the fitter (ours). See ``is_correct``. Stops early once it has reached ``limit``. The lines are those of
     ``raster.line_into``, drawn here once more: a call for each would take longer than the line.
     """
     height, width = weights.shape
@@ -131,6 +138,7 @@ def fitness(
         was_inside, inside = inside, 0 <= to_x < width and 0 <= to_y < height
         safe = was_inside and inside
         strict = safe and not corner_cutting
+        before = total
         for _ in range(steps):
             from_x, from_y = x, y
             fine_x += step_x
@@ -148,6 +156,8 @@ def fitness(
                     if total >= limit:
                         return total
             total += value
+        if by_length and steps > 0:
+            total = before + (total - before) * math.hypot(step_x, step_y) * PER_ONE
         x, y = to_x, to_y
         if total >= limit:
             return total

@@ -125,7 +125,7 @@ def measured(
         enough = math.floor(limit / vln) + 1.0
         if glance(weights, genes, first, basis, enough) >= enough:
             return enough * vln
-    return fitness(weights, genes, first, basis, task.corner_cutting, vln, limit)
+    return fitness(weights, genes, first, basis, task.corner_cutting, vln, limit, task.by_length)
 
 
 @njit(cache=True, nogil=True)

@@ -7,7 +7,7 @@ import math
 from companion.planning.problem import PlanningProblem
 from companion.settings import PlannerSettings
 
-Places = tuple[int, int, int, int, bool, float, float]
+Places = tuple[int, int, int, int, bool, float, float, bool]
 """The fields of ``ga_fitness.Task``."""
 TuningValues = tuple[int, int, float, float, float, float, float, float, float, int, float, bool, int, float]
 """The fields of ``ga_fitness.Tuning``."""
@@ -15,12 +15,12 @@ Lives = tuple[int, int, int]
 """The fields of ``ga_population.Span``."""
 
 
-def places_of(problem: PlanningProblem) -> Places:
+def places_of(problem: PlanningProblem, by_length: bool) -> Places:
     """What ``Task`` is made of."""
     motion = problem.motion
     heading_rad = math.nan if motion.heading_rad is None else float(motion.heading_rad)
     radius = float(motion.turning_radius_fields)
-    return (*problem.start, *problem.target, problem.corner_cutting, radius, heading_rad)
+    return (*problem.start, *problem.target, problem.corner_cutting, radius, heading_rad, by_length)
 
 
 def tuning_of(settings: PlannerSettings) -> TuningValues:

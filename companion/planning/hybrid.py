@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 from numpy.random import Generator
 
 from companion.planning.astar import Astar
 from companion.planning.bspline_ga import BsplineGa
 from companion.planning.planner import Capabilities
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult
-from companion.planning.raster import SQRT2, cells_cost, plain
-from companion.planning.smoothing import fields_under, smooth
+from companion.planning.raster import cells_cost, plain
+from companion.planning.smoothing import curve_cost, fields_under, smooth
 from companion.settings import PlannerSettings
 
 
 class Hybrid:
     """Fast and smooth where the way is easy, complete where it is not: NO_PATH is a proof.
 
-    A genetic path is taken when it costs at most ``hybrid_tolerance`` times the best possible. A dearer one leads a rover another way
-    round than the shortest that its map allows, which in unknown ground costs more than a smooth curve saves; then it is
-    the graph's path, pulled straight and rounded.
+    A genetic path is taken when driving along its curve costs at most ``hybrid_tolerance`` times what the graph's path costs, pulled taut and
+    rounded. A dearer one leads a rover another way round, which in unknown ground costs more than a smooth curve saves.
     """
 
     name = "hybrid"
     capabilities = Capabilities(proves_no_path=True, random=True, smooth_curve=True)
 
     def __init__(self, settings: PlannerSettings) -> None:
-        self._genetic = BsplineGa(settings)
+        self._genetic = BsplineGa(settings.model_copy(update={"length_fitness": True}))
         self._graph = Astar(settings)
         self._tolerance = settings.hybrid_tolerance
 
@@ -35,40 +36,47 @@ class Hybrid:
         """See ``Planner.plan``. FOUND or NO_PATH. Raises ValueError for a budget without sense."""
         # A look of a few epochs finds the easy paths, and often they cannot be better: then the graph is not searched.
         look = replace(budget, control_points=budget.control_points[:1], max_epochs=budget.min_epochs)
-        first = self._genetic.plan(problem, look, rng)
-        if self._is_good(problem, first, _least_cost(problem)):
-            return replace(first, planner=self.name)
+        genetic = self._genetic.plan(problem, look, rng)
+        turns_on_the_spot = problem.motion.turning_radius_fields == 0.0
+        genetic_cost = _driving_cost(problem, genetic.path)
+        if genetic.path is not None and (
+            not turns_on_the_spot or genetic_cost <= self._tolerance * _least_cost(problem)
+        ):
+            return replace(genetic, planner=self.name)
         graph = self._graph.plan(problem, budget, rng)
+        spent = replace(graph, planner=self.name, evaluations=genetic.evaluations, epochs=genetic.epochs)
         if graph.path is None:
-            return replace(graph, planner=self.name, evaluations=first.evaluations, epochs=first.epochs)
-        if self._is_good(problem, first, graph.path.cost):
-            return replace(first, planner=self.name)
-        # Where the first population failed a second one helps more than further epochs or control points. Only who cannot turn
-        # on the spot has no use for the graph's path, and spends the whole budget.
-        more = budget if problem.motion.turning_radius_fields > 0.0 else look
-        second = self._genetic.plan(problem, more, rng)
-        spent = replace(
-            second,
-            planner=self.name,
-            evaluations=first.evaluations + second.evaluations,
-            epochs=first.epochs + second.epochs,
-        )
-        if self._is_good(problem, second, graph.path.cost):
             return spent
-        return replace(spent, status=graph.status, path=_smoothed(problem, graph.path), control_points=0)
+        if not turns_on_the_spot:
+            return self._with_whole_budget(problem, budget, rng, spent)
+        smoothed = _smoothed(problem, graph.path)
+        if genetic_cost <= self._tolerance * _driving_cost(problem, smoothed):
+            return replace(genetic, planner=self.name)
+        return replace(spent, path=smoothed)
 
-    def _is_good(self, problem: PlanningProblem, result: PlanResult, best: float) -> bool:
-        if result.path is None:
-            return False
-        # A vehicle that cannot turn on the spot could not drive the graph's path, however cheap.
-        return problem.motion.turning_radius_fields > 0.0 or result.path.cost <= self._tolerance * best
+    def _with_whole_budget(
+        self, problem: PlanningProblem, budget: Budget, rng: Generator, spent: PlanResult
+    ) -> PlanResult:
+        """A vehicle that cannot turn on the spot has little use for the graph's path: it is the last resort."""
+        genetic = self._genetic.plan(problem, budget, rng)
+        evaluations, epochs = spent.evaluations + genetic.evaluations, spent.epochs + genetic.epochs
+        if genetic.path is None:
+            return replace(spent, evaluations=evaluations, epochs=epochs)
+        return replace(genetic, planner=self.name, evaluations=evaluations, epochs=epochs)
 
 
 def _least_cost(problem: PlanningProblem) -> float:
-    """What no path can cost less than: the octile distance over the cheapest ground there is."""
+    """What driving there cannot cost less than: the straight line over the cheapest ground there is."""
     (x, y), (to_x, to_y) = problem.start, problem.target
-    across, along = sorted((abs(to_x - x), abs(to_y - y)))
-    return (along + (SQRT2 - 1.0) * across) * max(float(problem.weights.min()), MIN_WEIGHT)
+    return math.hypot(to_x - x, to_y - y) * max(float(problem.weights.min()), MIN_WEIGHT)
+
+
+def _driving_cost(problem: PlanningProblem, path: Path | None) -> float:
+    """What driving along a path's curve costs (its fields, if it has none); inf without a path."""
+    if path is None:
+        return math.inf
+    curve = path.cell_array.astype(np.float64) if path.curve is None else path.curve
+    return float(curve_cost(plain(problem.weights), curve))
 
 
 def _smoothed(problem: PlanningProblem, path: Path) -> Path:

@@ -13,14 +13,25 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.grid import Weights
+from companion.grid import OBSTACLE, Cell, Weights
+from companion.planning.problem import MIN_WEIGHT
 from companion.planning.raster import CellArray, cells_cost, first_fault, polyline, without_loops
+from companion.planning.theta_star import any_angle
 
 ROUNDING_FIELDS = (6.0, 4.0, 2.5, 1.5, 0.75)
 """How far from a corner its rounding begins, tried in turn."""
 SLACK = 1.02
 """A straight line may cost so many times what it replaces: a stair is a little dearer than the line beside it."""
 SAMPLES_A_CORNER = 8
+CORRIDOR_FIELDS = 8
+"""So far beside a straightened path a shorter one is looked for."""
+PIECE_FIELDS = 0.5
+GRAZED_WEIGHT = 10.0
+"""What an obstacle counts that a curve touches between the fields under its points: it may be no more than a corner."""
+
+Mask = NDArray[np.bool_]
+Curve = NDArray[np.float64]
+"""Shape (n, 2): columns x and y in fields."""
 
 
 @njit(cache=True, nogil=True)
@@ -143,11 +154,50 @@ def fields_under(curve: NDArray[np.float64]) -> CellArray:
 
 
 @njit(cache=True, nogil=True)
-def smooth(weights: Weights, cells: CellArray) -> NDArray[np.float64]:
+def _fill_corridor(corridor: Mask, width: int, corners: CellArray) -> None:
+    """Mark the fields within ``CORRIDOR_FIELDS`` of the lines from corner to corner."""
+    line = polyline(corners)
+    height = len(corridor) // width
+    for i in range(len(line)):
+        left, right = max(line[i, 0] - CORRIDOR_FIELDS, 0), min(line[i, 0] + CORRIDOR_FIELDS, width - 1)
+        low, high = max(line[i, 1] - CORRIDOR_FIELDS, 0), min(line[i, 1] + CORRIDOR_FIELDS, height - 1)
+        for y in range(low, high + 1):
+            corridor[y * width + left : y * width + right + 1] = True
+
+
+def taut(weights: Weights, corners: CellArray) -> CellArray:
+    """Corners of a shorter path beside one that has been pulled straight: ends included, each in clear sight of the next.
+
+    A graph search counts a way in steps, and of many ways with as many steps takes any; the difference in metres is up to a twelfth.
+    """
+    if len(corners) < 3:
+        return corners
+    corridor = np.zeros(weights.size, np.bool_)
+    _fill_corridor(corridor, weights.shape[1], corners)
+    return any_angle(weights, Cell(*corners[0].tolist()), Cell(*corners[-1].tolist()), False, corridor)
+
+
+def smooth(weights: Weights, cells: CellArray) -> Curve:
     """The curve for a path of fields, shape (n, 2), columns x and y in fields, from its first field to its last."""
     if len(cells) < 3:
         return cells.astype(np.float64)
-    corners = straightened(weights, cells)
+    corners = taut(weights, straightened(weights, cells))
     curve = rounded(weights, corners)
     # Arcs begin and end between fields, so a line from one to the next may clip what the line between the corners does not.
     return curve if _is_free(weights, curve, 0, len(curve)) else corners.astype(np.float64)
+
+
+@njit(cache=True, nogil=True)
+def curve_cost(weights: Weights, curve: Curve) -> float:
+    """The length of a curve, in fields, times the weight of the fields under it: what driving along it costs."""
+    total = 0.0
+    for i in range(1, len(curve)):
+        along_x, along_y = curve[i, 0] - curve[i - 1, 0], curve[i, 1] - curve[i - 1, 1]
+        length = math.hypot(along_x, along_y)
+        pieces = math.ceil(length / PIECE_FIELDS)
+        for k in range(pieces):
+            share = (k + 0.5) / pieces
+            x, y = curve[i - 1, 0] + share * along_x, curve[i - 1, 1] + share * along_y
+            weight = weights[math.floor(y + 0.5), math.floor(x + 0.5)]
+            total += (GRAZED_WEIGHT if weight >= OBSTACLE else max(weight, MIN_WEIGHT)) * length / pieces
+    return total

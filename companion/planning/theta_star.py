@@ -17,7 +17,7 @@ from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from companion.grid import OBSTACLE
+from companion.grid import OBSTACLE, Cell
 from companion.planning.astar_kernel import START_COST, STEP_X, STEP_Y, least_weight, step_cost
 from companion.planning.ends import ends_free
 from companion.planning.heap import put, take_out
@@ -39,7 +39,9 @@ from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
 Fields = NDArray[np.int32]
+Mask = NDArray[np.bool_]
 NO_CELLS = (0, 2)
+ANYWHERE: Mask = np.zeros(0, np.bool_)
 
 
 @njit(cache=True, nogil=True)
@@ -105,8 +107,10 @@ def _search(
     start: int,
     target: int,
     corner_cutting: bool,
+    corridor: Mask,
 ) -> bool:
     """Whether there is a way. Costs in ``reached`` as for A*: 0 not reached, positive on trust, negative looked at."""
+    anywhere = len(corridor) == 0
     width = weights.shape[1]
     least = least_weight(weights.ravel())
     target_x, target_y = target % width, target // width
@@ -123,7 +127,7 @@ def _search(
             step = step_cost(weights, x, y, i, corner_cutting)
             to_x, to_y = x + STEP_X[i], y + STEP_Y[i]
             field = to_y * width + to_x
-            if step == np.inf or reached[field] < 0.0:
+            if step == np.inf or reached[field] < 0.0 or not (anywhere or corridor[field]):
                 continue
             cost = _trusted(reached, come_from, width, here, to_x, to_y, step)
             if reached[field] > 0.0 and cost >= reached[field]:
@@ -160,13 +164,32 @@ def _any_angle(
     start: int,
     target: int,
     corner_cutting: bool,
-) -> tuple[CellArray, CellArray, float]:
-    """Corners, fields and cost of the path; no fields if there is none. The arrays are zeros, one row for each field."""
-    if not _search(weights, reached, come_from, heap, place, keys, start, target, corner_cutting):
-        return np.empty(NO_CELLS, np.int64), np.empty(NO_CELLS, np.int64), np.inf
-    corners = _corners(come_from, weights.shape[1], target)
+    corridor: Mask,
+) -> CellArray:
+    """The corners of the path; none if there is none. The arrays are zeros, one row for each field."""
+    if not _search(weights, reached, come_from, heap, place, keys, start, target, corner_cutting, corridor):
+        return np.empty(NO_CELLS, np.int64)
+    return _corners(come_from, weights.shape[1], target)
+
+
+def any_angle(weights: Floats, start: Cell, target: Cell, corner_cutting: bool, corridor: Mask = ANYWHERE) -> CellArray:
+    """The corners of the path from a free field to another, ends included: shape (n, 2), no rows if there is none.
+
+    ``corridor``: True for fields, row after row, where corners may be; empty: anywhere.
+    """
+    fields, width = weights.size, weights.shape[1]
+    # Zeros of numpy's come from the system as needed: only what is searched is ever touched.
+    waiting, place, come_from = (np.zeros(fields, np.int32) for _ in range(3))
+    reached, keys = np.zeros(fields), np.zeros((fields, 2))
+    ends = (start.y * width + start.x, target.y * width + target.x)
+    return _any_angle(weights, reached, come_from, waiting, place, keys, *ends, corner_cutting, corridor)
+
+
+@njit(cache=True, nogil=True)
+def _drawn(weights: Floats, corners: CellArray) -> tuple[CellArray, float]:
+    """The fields of the path and what they cost."""
     cells = without_loops(polyline(corners))
-    return corners, cells, cells_cost(weights, cells)
+    return cells, cells_cost(weights, cells)
 
 
 class ThetaStar:
@@ -184,21 +207,8 @@ class ThetaStar:
         if not ends_free(problem):
             return PlanResult(PlanStatus.NO_PATH, None, self.name)
         weights = plain(problem.weights)
-        fields, width = weights.size, weights.shape[1]
-        start, target = (cell.y * width + cell.x for cell in (problem.start, problem.target))
-        # Zeros of numpy's come from the system as needed: only what is searched is ever touched.
-        waiting, place, come_from = (np.zeros(fields, np.int32) for _ in range(3))
-        corners, cells, cost = _any_angle(
-            weights,
-            np.zeros(fields),
-            come_from,
-            waiting,
-            place,
-            np.zeros((fields, 2)),
-            start,
-            target,
-            problem.corner_cutting,
-        )
-        if len(cells) == 0:
+        corners = any_angle(weights, problem.start, problem.target, problem.corner_cutting)
+        if len(corners) == 0:
             return PlanResult(PlanStatus.NO_PATH, None, self.name)
+        cells, cost = _drawn(weights, corners)
         return PlanResult(PlanStatus.FOUND, Path(cells, cost, corners.astype(np.float64)), self.name)

@@ -161,6 +161,11 @@ class PlannerSettings(Section):
         0.2, gt=0.0, description="second third: reach round the start, as a share of the smaller map dimension (3.3)"
     )
     margin_fields: int = Field(1, ge=0, description="third third: distance kept from the map's edge (3.3)")
+    length_fitness: bool = Field(
+        False,
+        description="fields count as much as the line over them is long, so that the straighter of two ways over as many fields is fitter "
+        "(ours; 3.4 counts fields). `hybrid` always does so",
+    )
     adaptive: bool = Field(
         False,
         description="the number of control points is part of the chromosome: crossed, and changed by knot insertion and "
@@ -181,7 +186,9 @@ class PlannerSettings(Section):
         2, ge=1, le=64, description="islands at a time. Changes the time that a search takes, never its result"
     )
     hybrid_tolerance: float = Field(
-        1.03, ge=1.0, description="hybrid: a genetic path may cost so many times the best possible"
+        1.01,
+        ge=1.0,
+        description="hybrid: driving along a genetic path may cost so many times what driving along the shortest path costs",
     )
     obstacle_value: float = Field(
         100_000.0, ge=1000.0, description="VLN of 3.4: what an obstacle field adds to a path's fitness"

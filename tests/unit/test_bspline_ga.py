@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -27,6 +29,22 @@ def ga(**changes):
 def value_of(weights, genes, corner_cutting=True, way_points=5, limit=np.inf):
     first, basis = bspline.basis(len(genes), way_points)
     return fitness(weights, genes, first, basis, corner_cutting, VLN, limit)
+
+
+def test_by_length_the_straighter_of_two_ways_over_as_many_fields_is_fitter():
+    """Both lead over 40 fields of open ground; fields alone cannot tell them apart."""
+    weights = np.full((30, 41), 0.5)
+    first, basis = bspline.basis(4, 5)
+    straight = np.array([[0, 10], [13, 10], [27, 10], [40, 10]])
+    bent = np.array([[0, 10], [13, 16], [27, 16], [40, 10]])
+    counted, by_length = (
+        [fitness(weights, genes, first, basis, False, VLN, np.inf, flag) for genes in (straight, bent)]
+        for flag in (False, True)
+    )
+    assert counted[0] == counted[1] == by_length[0] == pytest.approx(19.5)
+    places = [way_point(bent, first, basis, i) for i in range(5)]
+    length = sum(np.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(places))
+    assert by_length[1] == pytest.approx(0.5 * length - 0.5)
 
 
 def walk_of(genes, way_points=5):
