@@ -28,6 +28,7 @@ results: $(KERNELS)
 	$(BIN)/rover-sitl experiment adaptive-control-points --docs docs
 	$(BIN)/rover-sitl experiment kwasniewski-maps --docs docs
 	$(BIN)/rover-sitl experiment sedighi-table1 $(addprefix --maps ,$(wildcard ../shared/data/ga_benchmarks)) --docs docs
+	$(BIN)/rover-sitl experiment achour-table1 --docs docs
 
 # A virtual environment with the versions of constraints.txt, made once and from then on used without a network.
 # PYTHON=... chooses the interpreter; otherwise the first one that works is taken.

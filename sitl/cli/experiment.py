@@ -12,6 +12,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from companion.mapfiles import MapError
 from sitl.experiments import (
+    achour_table1,
     adaptive_control_points,
     driving,
     kwasniewski_maps,
@@ -30,6 +31,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     driving.NAME: driving.run,
     wang_table4.NAME: wang_table4.run,
     sedighi_table1.NAME: sedighi_table1.run,
+    achour_table1.NAME: achour_table1.run,
 }
 EXIT_BAD_INPUT = 2
 
