@@ -90,7 +90,7 @@ class Entry:
 
     def figures(self) -> dict[str, float | None]:
         """Medians: of the time over all searches, else over those that found a path (None: there are none)."""
-        columns = {
+        columns: dict[str, list[float]] = {
             "number": [trial.number for trial in self.found],
             "time_ms": [trial.time_ms for trial in self.trials],
             "path_nodes": [len(trial.nodes) for trial in self.found],
