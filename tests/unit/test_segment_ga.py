@@ -1,6 +1,7 @@
 """Achour & Chaalal 2011: equations 4 to 6, the operators, whole searches, and success over seeds with a bound."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -152,7 +153,7 @@ def test_a_walk_is_a_chain_of_free_lines(seed, share, corner_cutting):
         return
     assert tuple(walk.nodes[0]) == problem.start and tuple(walk.nodes[-1]) == problem.target
     assert len(walk.nodes) == walk.last_iterations + 1 == len({tuple(node) for node in walk.nodes})
-    for one, other in zip(walk.nodes[:-1], walk.nodes[1:], strict=True):
+    for one, other in pairwise(walk.nodes):
         assert sees(weights, *one, *other, corner_cutting)
 
 

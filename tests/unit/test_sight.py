@@ -1,5 +1,7 @@
 """Points in sight of each other, samples of free ground, and paths pulled straight."""
 
+from itertools import pairwise
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -79,7 +81,7 @@ def test_a_path_pulled_straight_stays_one_and_gets_no_longer(seed, corner_cuttin
     assert tuple(after[0]) == points[0] and tuple(after[-1]) == points[-1]
     later = iter(points)
     assert all(tuple(point) in later for point in after)  # in their order, none new
-    for one, other in zip(after[:-1], after[1:], strict=True):
+    for one, other in pairwise(after):
         assert sees(weights, *one, *other, corner_cutting)
     lengths = [np.hypot(*np.diff(nodes, axis=0).T).sum() for nodes in (after, before)]
     assert lengths[0] <= lengths[1] + 1e-9
