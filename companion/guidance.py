@@ -89,8 +89,9 @@ class RoverLimits:
     radius_m: float
     cruise_speed_m_s: float
     sight_m: float
-    narrow_sight: bool = False
     """Valid range of the sensor."""
+    narrow_sight: bool = False
+    """Whether it is single thin beams."""
 
 
 def route_along_cells(grid: Grid, cells: tuple[Cell, ...], start: NedPoint, end: NedPoint | None) -> Route:

@@ -55,7 +55,8 @@ class Pursuit:
         self._tell = tell
         self._scans = 0
         rover = mission.rover
-        self._limits = RoverLimits(rover.radius_m, rover.cruise_speed_m_s, scan.max_range_m, scan.is_narrow)
+        margin_m = settings.guidance.narrow_margin_m if scan.is_narrow else 0.0
+        self._limits = RoverLimits(rover.radius_m + margin_m, rover.cruise_speed_m_s, scan.max_range_m, scan.is_narrow)
         planner = make_planner(settings.navigator.planner, settings.planner)
         searcher = Searcher(planner, settings.navigator, rng)
         self.driver = Driver(laid.evidence, self._limits, settings, searcher, runner)

@@ -129,6 +129,12 @@ class GuidanceSettings(Section):
     narrow_clearance_m: float = Field(
         0.3, ge=0.0, description="clearances smaller than this are not used with single thin beams"
     )
+    narrow_margin_m: float = Field(
+        0.1,
+        ge=0.0,
+        description="with single thin beams the rover is taken for so much wider: of a wall they see points, and the position wanders "
+        "between one look and the next",
+    )
     narrow_speed_m_s: float = Field(
         1.5, gt=0.0, description="never faster than this with single thin beams, between which much stays unseen"
     )
