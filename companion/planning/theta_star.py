@@ -18,7 +18,6 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.grid import OBSTACLE
-from companion.planning.astar_kernel import START_COST, STEP_X, STEP_Y, least_weight, step_cost
 from companion.planning.ends import ends_free
 from companion.planning.heap import put, take_out
 from companion.planning.planner import Capabilities
@@ -35,11 +34,14 @@ from companion.planning.raster import (
     polyline,
     without_loops,
 )
+from companion.planning.steps import STEP_X, STEP_Y, least_cost, step_cost
 from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
 Fields = NDArray[np.int32]
 NO_CELLS = (0, 2)
+START_COST = 1e-300
+"""What the start costs: not 0, which means not reached, but lost in any sum."""
 
 
 @njit(cache=True, nogil=True)
@@ -108,8 +110,8 @@ def _search(
 ) -> bool:
     """Whether there is a way. Costs in ``reached`` as for A*: 0 not reached, positive on trust, negative looked at."""
     width = weights.shape[1]
-    least = least_weight(weights.ravel())
     target_x, target_y = target % width, target // width
+    least = least_cost(weights.ravel(), weights[target_y, target_x])
     reached[start], come_from[start] = START_COST, start
     size = put(heap, place, keys, 0, start, 0.0, 0.0)
     while size > 0:
