@@ -13,9 +13,9 @@ from companion.planning.astar_kernel import shortest
 from companion.planning.dijkstra import Dijkstra
 from companion.planning.dstar_lite import DstarLite
 from companion.planning.problem import MIN_WEIGHT, Budget, PlanningProblem, PlanStatus
-from companion.planning.raster import cells_cost, is_path
+from companion.planning.raster import cells_cost, is_path, polyline
 from companion.planning.steps import least_cost
-from companion.planning.theta_star import ThetaStar, line_cost
+from companion.planning.theta_star import ThetaStar, line_cost, others_before
 from companion.settings import PlannerSettings
 from tests.planning_maps import drawn, one_obstacle
 
@@ -174,6 +174,30 @@ def test_theta_star_turns_only_at_the_obstacles_corners():
     assert len(curve) <= 5
 
 
+def cost_of_line(weights, x0, y0, x1, y1, corner_cutting):
+    even = weights[y1, x1]
+    return line_cost(weights, others_before(weights, even), even, x0, y0, x1, y1, corner_cutting)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 4), st.booleans())
+@settings(max_examples=200, deadline=None)
+def test_the_cost_of_a_line_is_that_of_its_fields(seed, blocks, corner_cutting):
+    rng = np.random.default_rng(seed)
+    weights = ground("even", rng, *rng.integers(2, 90, 2), 0.0)
+    for _ in range(blocks):
+        y, x = rng.integers(0, weights.shape[0]), rng.integers(0, weights.shape[1])
+        weights[y : y + rng.integers(1, 30), x : x + rng.integers(1, 30)] = rng.choice([0.0, 0.2, 0.8, 1.0])
+    start, end = some_cell(rng, weights), some_cell(rng, weights)
+    if start == end or weights[start.y, start.x] == 1.0:
+        return
+    cells = polyline(np.array([start, end]))
+    expected = np.inf
+    if is_path(weights, as_cells(cells), corner_cutting):
+        under = np.maximum(weights[cells[1:, 1], cells[1:, 0]], MIN_WEIGHT)
+        expected = np.hypot(end.x - start.x, end.y - start.y) * under.mean()
+    assert cost_of_line(weights, *start, *end, corner_cutting) == pytest.approx(expected)
+
+
 @given(world=worlds())
 @settings(max_examples=200, deadline=None)
 def test_theta_stars_curve_is_free_and_no_longer_than_its_fields(world):
@@ -185,7 +209,7 @@ def test_theta_stars_curve_is_free_and_no_longer_than_its_fields(world):
         return
     corners = result.path.curve.astype(int)
     for (x0, y0), (x1, y1) in pairwise(corners):
-        assert np.isfinite(line_cost(weights, x0, y0, x1, y1, corner_cutting))
+        assert np.isfinite(cost_of_line(weights, x0, y0, x1, y1, corner_cutting))
 
 
 def test_theta_star_follows_preferred_ground():
@@ -196,5 +220,5 @@ def test_theta_star_follows_preferred_ground():
 
 def test_a_line_past_a_corner_is_free_only_where_corners_may_be_cut():
     weights = drawn(".#", "..")
-    assert np.isinf(line_cost(weights, 0, 0, 1, 1, False))
-    assert line_cost(drawn("#.", ".."), 0, 0, 1, 1, True) == pytest.approx(0.5 * np.sqrt(2.0))
+    assert np.isinf(cost_of_line(weights, 0, 0, 1, 1, False))
+    assert cost_of_line(drawn("#.", ".."), 0, 0, 1, 1, True) == pytest.approx(0.5 * np.sqrt(2.0))
