@@ -74,7 +74,6 @@ def shortest(
     ``reached``: zeros, one for each field. ``room``: of the queue, to begin with, at least 8; if it turns out too small, all begins
     again with more.
     """
-    width = weights.shape[1]
     least = least_cost(weights.ravel(), weights[target_y, target_x])
     found = _search(weights, reached, room, least, start_x, start_y, target_x, target_y, corner_cutting)
     while found == CROWDED:
@@ -83,7 +82,7 @@ def shortest(
         found = _search(weights, reached, room, least, start_x, start_y, target_x, target_y, corner_cutting)
     if found == NONE:
         return np.empty((0, 2), np.int64)
-    return _way_back(reached, width, start_y * width + start_x, target_x, target_y)
+    return _way_back(weights, reached, target_x, target_y, corner_cutting)
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -266,25 +265,30 @@ def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every 
 
 
 @njit(cache=True, nogil=True)
-def _way_back(reached: Reached, width: int, start: int, target_x: int, target_y: int) -> CellArray:
-    """Walk back from the target to the start; fields in the order of the path. Straight on wherever that is as cheap."""
-    count, x, y, way = 1, target_x, target_y, 0
-    while y * width + x != start:
-        way = _entered(reached[y * width + x], way)
-        x, y, count = x - STEP_X[way], y - STEP_Y[way], count + 1
-    cells = np.empty((count, 2), np.int64)
-    x, y, way = target_x, target_y, 0
-    for at in range(count - 1, 0, -1):
+def _way_back(weights: Floats, reached: Reached, target_x: int, target_y: int, corner_cutting: bool) -> CellArray:
+    """Walk back from the target to the start; fields in the order of the path.
+
+    Of equally cheap ways back, canonical or not, the one straight on is taken: fewer bends for the rover.
+    """
+    height, width = weights.shape
+    fields = weights.ravel()
+    cells = np.empty((weights.size, 2), np.int64)
+    x, y, at, back = target_x, target_y, len(cells), 0
+    while True:
+        at -= 1
         cells[at, 0], cells[at, 1] = x, y
-        way = _entered(reached[y * width + x], way)
-        x, y = x - STEP_X[way], y - STEP_Y[way]
-    cells[0, 0], cells[0, 1] = x, y
-    return cells
-
-
-@njit(cache=True, nogil=True, inline="always")
-def _entered(number: int, way: int) -> int:
-    """By which step a field was entered: this one if possible."""
-    while not number >> way & 1:
-        way = (way + 1) & 7
-    return way
+        field = y * width + x
+        cost = reached[U(field)] >> DIRECTIONS
+        if cost == 0:
+            return cells[at:].copy()
+        straight, diagonal = step_costs(fields[U(field)])
+        while True:
+            from_x, from_y = x + STEP_X[back], y + STEP_Y[back]
+            if 0 <= from_x < width and 0 <= from_y < height:
+                before = reached[U(from_y * width + from_x)]
+                is_free = back < 4 or corner_cutting
+                is_free = is_free or max(fields[U(y * width + from_x)], fields[U(from_y * width + x)]) < OBSTACLE
+                if before != 0 and (before >> DIRECTIONS) + (straight if back < 4 else diagonal) == cost and is_free:
+                    break
+            back = (back + 1) & 7
+        x, y = from_x, from_y
