@@ -38,6 +38,8 @@ ANY_WAY = 8
 """From this number on it is no step: the start was not entered by one."""
 BUCKETS = 1024
 """A power of two. They hold what one step can add to the sum: at most sqrt 2, and as much again if it leads away."""
+RUN = 32
+"""So many fields a search goes straight on ahead of its queue."""
 LEAST_SHIFT = 22
 """So many bits of the sum are left out at least when it is put into a bucket."""
 NONE, FOUND, CROWDED = range(3)
@@ -98,17 +100,22 @@ def is_pruned(behind: float, beside: float, between: float, here: float) -> bool
 
 @njit(cache=True, nogil=True, forceinline=True)
 def straight_on(
-    fields: Floats, reached: Reached, width: int, x: int, y: int, way: int, target_x: int, target_y: int, most: int
+    fields: Floats, reached: Reached, width: int, x: int, y: int, way: int, target_x: int, target_y: int, least: float
 ) -> int:
-    """From a field entered by a straight step on as far as nothing but straight on is canonical; how many steps, at most so many.
+    """From a field entered by a straight step on as far as nothing but straight on is canonical; how many steps.
 
-    It goes only while each step leads nearer to the target, and ends before the target, the map's edge, an obstacle, ground that
-    costs something else, and a field that was reached as well.
+    It ends before the target, the map's edge, an obstacle, ground that costs something else, and a field that was reached as well. As
+    long as the sum of cost and what is ahead stays the same it is what the queue would do next; else it runs ahead of the
+    queue, but not far: the queue's work for single fields takes much longer than a few fields too many.
     """
     step_x, step_y, height = STEP_X[way], STEP_Y[way], len(fields) // width
     along = (target_x - x) * step_x + (target_y - y) * step_y
     across = abs((target_x - x) * step_y) + abs((target_y - y) * step_x)
-    most = min(most, along - max(across, 1))
+    edge = (width - 1 - x if step_x > 0 else x) if step_x != 0 else height - 1 - y if step_y > 0 else y
+    most = min(edge, RUN)
+    if along > 0:
+        most = max(most, along - across) if across > 0 and fields[y * width + x] <= least else most
+        most = along - 1 if across == 0 else most
     if most <= 0:
         return 0
     # The rows beside it; where the map ends there, the run itself stands in for them.
@@ -197,17 +204,15 @@ def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every 
     best, free, unused, waiting = NOT_YET, -1, 0, 0
     bucket = ahead(straight, diagonal, target_x - start_x, target_y - start_y) >> shift
     last = NOT_YET
-    x, y, way, total = start_x, start_y, ANY_WAY, 0
+    x, y, way = start_x, start_y, ANY_WAY
     while True:
         way |= loose
         if way < 4:
-            rise = step_costs(fields[y * width + x])[0] - straight
-            most = len(fields) if rise <= 0 else (((bucket + 1) << shift) - 1 - total) // rise
-            steps = straight_on(fields, reached, width, x, y, way, target_x, target_y, most)
-            x, y, total = x + steps * STEP_X[way], y + steps * STEP_Y[way], total + steps * rise
+            steps = straight_on(fields, reached, width, x, y, way, target_x, target_y, least)
+            x, y = x + steps * STEP_X[way], y + steps * STEP_Y[way]
         so_far = reached[y * width + x] >> DIRECTIONS
         inside = 0 < x < width - 1 and 0 < y < height - 1
-        count, held, held_total = ways_on(onward, fields, width, x, y, way), -1, 0
+        count, held = ways_on(onward, fields, width, x, y, way), -1
         for k in range(count):
             i = onward[k]
             to_x, to_y = x + STEP_X[i], y + STEP_Y[i]
@@ -233,7 +238,7 @@ def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every 
                 continue
             into = total >> shift
             if into == bucket and held < 0:
-                held, held_total = i, total
+                held = i
                 continue
             if free >= 0:
                 new, free = free, entries[free, 3]
@@ -246,7 +251,7 @@ def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every 
         if waiting + 8 > room:
             return CROWDED
         if held >= 0:
-            x, y, way, total = x + STEP_X[held], y + STEP_Y[held], held, held_total
+            x, y, way = x + STEP_X[held], y + STEP_Y[held], held
             continue
         while True:
             if waiting == 0 or bucket > last:
@@ -260,8 +265,6 @@ def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every 
             x, y, way = entries[entry, 0], entries[entry, 1], entries[entry, 2]
             if reached[y * width + x] >> way & 1:
                 break
-        so_far = reached[y * width + x] >> DIRECTIONS
-        total = so_far + ahead(straight, diagonal, target_x - x, target_y - y)
 
 
 @njit(cache=True, nogil=True)
