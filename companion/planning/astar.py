@@ -4,7 +4,7 @@ Hart, Nilsson & Raphael 1968. What is cheapest in all is taken first, from a cir
 the first out, so of equal ones the search goes on with that nearest the target. Costs themselves are not quantised, and a field that
 turns out to be cheaper is taken again, so the width of a bucket decides how fast, never how good.
 
-Where all free ground costs the same, and corners are not cut, most of the work is left out: see ``canonical``.
+Where the ground is even, and corners are not cut, most of the work is left out: see ``astar_kernel``.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from companion.planning.astar_kernel import search, way_back
-from companion.planning.canonical import is_uniform, shortest_uniform
+from companion.planning.astar_kernel import Reached, shortest
 from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
@@ -29,18 +28,12 @@ ROOM = 64
 
 @njit(cache=True, nogil=True)
 def _cheapest(
-    weights: Floats, reached: Floats, start_x: int, start_y: int, target_x: int, target_y: int, corner_cutting: bool
+    weights: Floats, reached: Reached, start_x: int, start_y: int, target_x: int, target_y: int, corner_cutting: bool
 ) -> tuple[CellArray, float]:
     """The fields of the cheapest path and its cost; no fields if there is none. ``reached``: one 0 for each field."""
-    width = weights.shape[1]
-    if not corner_cutting and is_uniform(weights.ravel(), weights[target_y, target_x]):
-        room, lengths = weights.size + ROOM, reached.view(np.int64)
-        cells = shortest_uniform(weights, lengths, room, start_x, start_y, target_x, target_y)
-        return cells, cells_cost(weights, cells) if len(cells) else np.inf
-    if not search(weights, reached, start_x, start_y, target_x, target_y, corner_cutting):
-        return np.empty((0, 2), np.int64), np.inf
-    cells = way_back(weights.ravel(), reached, width, target_x, target_y, corner_cutting)
-    return cells, cells_cost(weights, cells)
+    room = weights.size + ROOM
+    cells = shortest(weights, reached, room, start_x, start_y, target_x, target_y, corner_cutting)
+    return cells, cells_cost(weights, cells) if len(cells) else np.inf
 
 
 class Astar:
@@ -59,7 +52,7 @@ class Astar:
             return PlanResult(PlanStatus.NO_PATH, None, self.name)
         weights = plain(problem.weights)
         # Zeros of numpy's come from the system as needed; a compiled function would write each of them.
-        reached = np.zeros(weights.size)
+        reached = np.zeros(weights.size, np.int64)
         cells, cost = _cheapest(weights, reached, *problem.start, *problem.target, problem.corner_cutting)
         if len(cells) == 0:
             return PlanResult(PlanStatus.NO_PATH, None, self.name)

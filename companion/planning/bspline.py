@@ -14,6 +14,18 @@ DEGREE = 2
 Points = NDArray[np.float64]
 
 
+@njit(cache=True, nogil=True, inline="always")
+def basis_at(spans: int, u: float) -> tuple[int, float, float, float]:
+    """One row of ``basis``, ``u`` knot spans from the start: the first control point that counts, and three weights."""
+    span = min(int(u), spans - 1)
+    rise = u - span
+    # With equidistant knots the recursion comes down to squares: halved where the function's support goes on into
+    # the next span, not halved at the clamped ends. The three always sum to 1.
+    falling = (1.0 - rise) * (1.0 - rise) * (1.0 if span == 0 else 0.5)
+    rising = rise * rise * (1.0 if span == spans - 1 else 0.5)
+    return span, falling, 1.0 - falling - rising, rising
+
+
 @njit(cache=True, nogil=True)
 def basis(control_points: int, samples: int) -> tuple[NDArray[np.int64], Points]:
     """Basis functions at ``samples`` places equally far apart in u, ends included.
@@ -24,32 +36,20 @@ def basis(control_points: int, samples: int) -> tuple[NDArray[np.int64], Points]
     first = np.empty(samples, np.int64)
     values = np.empty((samples, DEGREE + 1))
     spans = control_points - DEGREE
+    share = spans / (samples - 1.0)
     for i in range(samples):
-        u = i * (spans / (samples - 1.0))
-        span = min(int(u), spans - 1)
-        rise = u - span
-        # With equidistant knots the recursion comes down to squares: halved where the function's support goes on into
-        # the next span, not halved at the clamped ends. The three always sum to 1.
-        falling = (1.0 - rise) * (1.0 - rise) * (1.0 if span == 0 else 0.5)
-        rising = rise * rise * (1.0 if span == spans - 1 else 0.5)
-        first[i] = span
-        values[i, 0] = falling
-        values[i, 1] = 1.0 - falling - rising
-        values[i, 2] = rising
+        first[i], values[i, 0], values[i, 1], values[i, 2] = basis_at(spans, i * share)
     return first, values
 
 
 @njit(cache=True, nogil=True)
 def curve(control: Points, samples: int) -> Points:
     """The curve at ``samples`` places, shape (samples, 2), from control points of shape (n, 2), n >= 3."""
-    first, values = basis(len(control), samples)
     points = np.empty((samples, 2))
+    spans = len(control) - DEGREE
+    share = spans / max(samples - 1.0, 1.0)
     for i in range(samples):
-        at = first[i]
+        at, a, b, c = basis_at(spans, i * share)
         for axis in range(2):
-            points[i, axis] = (
-                values[i, 0] * control[at, axis]
-                + values[i, 1] * control[at + 1, axis]
-                + values[i, 2] * control[at + 2, axis]
-            )
+            points[i, axis] = a * control[at, axis] + b * control[at + 1, axis] + c * control[at + 2, axis]
     return points

@@ -11,10 +11,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from companion.grid import OBSTACLE
-from companion.planning.astar_kernel import STEP_X, STEP_Y, octile
 from companion.planning.heap import put, take_out
 from companion.planning.problem import MIN_WEIGHT
 from companion.planning.raster import SQRT2, CellArray
+from companion.planning.steps import STEP_X, STEP_Y, octile
 
 Floats = NDArray[np.float64]
 Fields = NDArray[np.int32]

@@ -14,12 +14,12 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.grid import Weights
-from companion.planning.astar_kernel import least_weight, octile
 from companion.planning.dstar_kernel import changes, note_changes, queue, settle, way_on
 from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, cells_cost, plain
+from companion.planning.steps import least_cost, octile
 from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
@@ -82,7 +82,7 @@ def _begun(weights: Weights, problem: PlanningProblem) -> Memory:
     g, rhs, keys = np.full(fields, np.inf), np.full(fields, np.inf), np.zeros((fields, 2))
     heap, place = np.zeros(fields, np.int32), np.zeros(fields, np.int32)
     rhs[target] = 0.0
-    least = float(least_weight(flat))
+    least = float(least_cost(flat, flat[target]))
     size = queue(width, g, rhs, heap, place, keys, 0, target, start, least, 0.0)
     return Memory(
         flat, weights.shape, problem.corner_cutting, start, target, least, 0.0, g, rhs, heap, place, keys, size

@@ -23,6 +23,8 @@ ONE = 1 << 32
 HALF = 1 << 31
 SHIFT = 32
 SQRT2 = math.sqrt(2.0)
+ROUND = (5, 8, 7, 6, 3, 0, 1, 2)
+"""The eight steps anticlockwise from +x, numbered 3 (dy + 1) + dx + 1."""
 
 
 @njit(cache=True, nogil=True)
@@ -72,11 +74,32 @@ def _slot(table: NDArray[np.int64], cells: CellArray, x: int, y: int) -> int:
 
 
 @njit(cache=True, nogil=True)
+def _never_turns_back(cells: CellArray) -> bool:
+    """Whether all steps of a walk lie within less than half a turn: then it comes to no field twice."""
+    taken = 0
+    for i in range(1, len(cells)):
+        step = 3 * (cells[i, 1] - cells[i - 1, 1]) + cells[i, 0] - cells[i - 1, 0] + 4
+        if not 0 <= step < 9:
+            return False
+        taken |= 1 << step
+    for eighth in range(8):
+        four = 0
+        for k in range(4):
+            four |= 1 << ROUND[(eighth + k) & 7]
+        if taken & ~four == 0:
+            return True
+    return False
+
+
+@njit(cache=True, nogil=True)
 def without_loops(cells: CellArray) -> CellArray:
     """The same walk with everything between two visits of one field cut out (paper, section 4.6).
 
-    Neighbours stay neighbours, the ends stay the ends. Time grows with the number of fields, not its square.
+    Neighbours stay neighbours, the ends stay the ends. Time grows with the number of fields, not its square. Without loops it is the
+    same array.
     """
+    if _never_turns_back(cells):
+        return cells
     size = 16
     while size < 2 * len(cells):
         size *= 2

@@ -18,7 +18,6 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.grid import OBSTACLE, Cell
-from companion.planning.astar_kernel import START_COST, STEP_X, STEP_Y, least_weight, step_cost
 from companion.planning.ends import ends_free
 from companion.planning.heap import put, take_out
 from companion.planning.planner import Capabilities
@@ -35,6 +34,7 @@ from companion.planning.raster import (
     polyline,
     without_loops,
 )
+from companion.planning.steps import STEP_X, STEP_Y, least_cost, step_cost
 from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
@@ -42,14 +42,75 @@ Fields = NDArray[np.int32]
 Mask = NDArray[np.bool_]
 NO_CELLS = (0, 2)
 ANYWHERE: Mask = np.zeros(0, np.bool_)
+SHORT_PIECE = 16
+"""So many fields of a line are looked at one by one."""
+START_COST = 1e-300
+"""What the start costs: not 0, which means not reached, but lost in any sum."""
+
+
+@njit(cache=True, nogil=True, inline="always")
+def _length(x: int, y: int) -> float:
+    """``math.hypot`` guards against overflow, which takes several times as long."""
+    return math.sqrt(float(x * x + y * y))
 
 
 @njit(cache=True, nogil=True)
-def line_cost(weights: Floats, x0: int, y0: int, x1: int, y1: int, corner_cutting: bool) -> float:
-    """The cost of the straight line between two different fields, drawn as ``raster.polyline`` does; inf if it is blocked."""
+def others_before(weights: Floats, even: float) -> Fields:
+    """Shape (height + 1, width + 1): how many fields with y and x less than these do not have this weight."""
+    height, width = weights.shape
+    counts = np.empty((height + 1, width + 1), np.int32)
+    counts[0, :] = 0
+    for y in range(height):
+        counts[y + 1, 0] = 0
+        row = 0
+        for x in range(width):
+            row += weights[y, x] != even
+            counts[y + 1, x + 1] = counts[y, x + 1] + row
+    return counts
+
+
+@njit(cache=True, nogil=True)
+def _is_even(counts: Fields, x0: int, y0: int, x1: int, y1: int) -> bool:
+    """Whether all fields of the rectangle between two have the weight that ``counts`` were made for."""
+    left, right, low, high = min(x0, x1), max(x0, x1) + 1, min(y0, y1), max(y0, y1) + 1
+    return bool(counts[high, right] - counts[high, left] - counts[low, right] + counts[low, left] == 0)
+
+
+@njit(cache=True, nogil=True)
+def line_cost(
+    weights: Floats, counts: Fields, even: float, x0: int, y0: int, x1: int, y1: int, corner_cutting: bool
+) -> float:
+    """The cost of the straight line between two different fields, drawn as ``raster.polyline`` does; inf if it is blocked.
+
+    ``counts`` are ``others_before(weights, even)``: pieces of the line in even ground are not looked at field by field.
+    """
     steps, step_x, step_y = fine_steps(x1 - x0, y1 - y0)
     fine_x, fine_y = x0 * ONE + HALF, y0 * ONE + HALF
-    last_x, last_y, total = x0, y0, 0.0
+    last_x, last_y, total, done = x0, y0, 0.0, 0
+    while done < steps:
+        piece = steps - done
+        while True:
+            x, y = (fine_x + piece * step_x) >> SHIFT, (fine_y + piece * step_y) >> SHIFT
+            if _is_even(counts, last_x, last_y, x, y):
+                total += piece * max(even, MIN_WEIGHT)
+                break
+            if piece <= SHORT_PIECE:
+                cost = _piece_cost(weights, fine_x, fine_y, step_x, step_y, piece, corner_cutting)
+                if cost == np.inf:
+                    return np.inf
+                total += cost
+                break
+            piece //= 2
+        fine_x, fine_y, last_x, last_y, done = fine_x + piece * step_x, fine_y + piece * step_y, x, y, done + piece
+    return float(_length(x1 - x0, y1 - y0) * total / steps)
+
+
+@njit(cache=True, nogil=True)
+def _piece_cost(
+    weights: Floats, fine_x: int, fine_y: int, step_x: int, step_y: int, steps: int, corner_cutting: bool
+) -> float:
+    """The sum of the weights under so many fields of a line; inf if one is an obstacle or a corner is cut."""
+    last_x, last_y, total = fine_x >> SHIFT, fine_y >> SHIFT, 0.0
     for _ in range(steps):
         fine_x += step_x
         fine_y += step_y
@@ -62,15 +123,24 @@ def line_cost(weights: Floats, x0: int, y0: int, x1: int, y1: int, corner_cuttin
             return np.inf
         total += max(weight, MIN_WEIGHT)
         last_x, last_y = x, y
-    return float(math.hypot(x1 - x0, y1 - y0) * total / steps)
+    return total
 
 
 @njit(cache=True, nogil=True)
-def _look(weights: Floats, reached: Floats, come_from: Fields, field: int, corner_cutting: bool) -> float:
+def _look(
+    weights: Floats,
+    counts: Fields,
+    even: float,
+    reached: Floats,
+    come_from: Fields,
+    field: int,
+    corner_cutting: bool,
+) -> float:
     """Look at the line that the field was reached by on trust; put right its predecessor if need be. What it costs."""
     width = weights.shape[1]
     x, y, seen_from = field % width, field // width, come_from[field]
-    best = -reached[seen_from] + line_cost(weights, seen_from % width, seen_from // width, x, y, corner_cutting)
+    from_x, from_y = seen_from % width, seen_from // width
+    best = -reached[seen_from] + line_cost(weights, counts, even, from_x, from_y, x, y, corner_cutting)
     for i in range(8):
         # From the field back to a neighbour; the step itself is the opposite one.
         back = step_cost(weights, x, y, i, corner_cutting)
@@ -82,18 +152,6 @@ def _look(weights: Floats, reached: Floats, come_from: Fields, field: int, corne
             best = cost
             come_from[field] = neighbour
     return float(best)
-
-
-@njit(cache=True, nogil=True)
-def _trusted(reached: Floats, come_from: Fields, width: int, here: int, x: int, y: int, cost: float) -> float:
-    """What the field (x, y), a step of this cost from ``here``, would cost in a straight line from where ``here`` is seen from."""
-    seen_from = come_from[here]
-    far_x, far_y = x - seen_from % width, y - seen_from // width
-    near_x, near_y = here % width - seen_from % width, here // width - seen_from // width
-    near = math.hypot(near_x, near_y)
-    step = SQRT2 if far_x != near_x and far_y != near_y else 1.0
-    line = -reached[here] + reached[seen_from] + cost
-    return float(-reached[seen_from] + line * math.hypot(far_x, far_y) / (near + step))
 
 
 @njit(cache=True, nogil=True)
@@ -112,28 +170,36 @@ def _search(
     """Whether there is a way. Costs in ``reached`` as for A*: 0 not reached, positive on trust, negative looked at."""
     anywhere = len(corridor) == 0
     width = weights.shape[1]
-    least = least_weight(weights.ravel())
     target_x, target_y = target % width, target // width
+    even = weights[target_y, target_x]
+    least, counts = least_cost(weights.ravel(), even), others_before(weights, even)
     reached[start], come_from[start] = START_COST, start
     size = put(heap, place, keys, 0, start, 0.0, 0.0)
     while size > 0:
         here = heap[0]
         size = take_out(heap, place, keys, size, here)
-        reached[here] = -_look(weights, reached, come_from, here, corner_cutting) if here != start else -START_COST
+        reached[here] = (
+            -_look(weights, counts, even, reached, come_from, here, corner_cutting) if here != start else -START_COST
+        )
         if here == target:
             return True
         x, y = here % width, here // width
+        # From where this field is seen its neighbours may be too: their cost grows along the line as it does by the step.
+        seen_from = come_from[here]
+        near_x, near_y, near_cost = x - seen_from % width, y - seen_from // width, -reached[seen_from]
+        near = _length(near_x, near_y)
         for i in range(8):
             step = step_cost(weights, x, y, i, corner_cutting)
             to_x, to_y = x + STEP_X[i], y + STEP_Y[i]
             field = to_y * width + to_x
             if step == np.inf or reached[field] < 0.0 or not (anywhere or corridor[field]):
                 continue
-            cost = _trusted(reached, come_from, width, here, to_x, to_y, step)
+            share = _length(near_x + STEP_X[i], near_y + STEP_Y[i]) / (near + (1.0 if i < 4 else SQRT2))
+            cost = near_cost + (-reached[here] - near_cost + step) * share
             if reached[field] > 0.0 and cost >= reached[field]:
                 continue
-            reached[field], come_from[field] = cost, come_from[here]
-            ahead = least * math.hypot(target_x - to_x, target_y - to_y)
+            reached[field], come_from[field] = cost, seen_from
+            ahead = least * _length(target_x - to_x, target_y - to_y)
             size = put(heap, place, keys, size, field, cost + ahead, -cost)
     return False
 

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 from companion.grid import Cell, as_cells
 from companion.planning.astar import Astar
-from companion.planning.astar_kernel import BUCKETS, per_bucket, swept
-from companion.planning.canonical import is_uniform, shortest_uniform
+from companion.planning.astar_kernel import shortest
 from companion.planning.dijkstra import Dijkstra
 from companion.planning.dstar_lite import DstarLite
-from companion.planning.problem import Budget, PlanningProblem, PlanStatus
-from companion.planning.raster import cells_cost, is_path
-from companion.planning.theta_star import ThetaStar, line_cost
+from companion.planning.problem import MIN_WEIGHT, Budget, PlanningProblem, PlanStatus
+from companion.planning.raster import cells_cost, is_path, polyline
+from companion.planning.steps import least_cost
+from companion.planning.theta_star import ThetaStar, line_cost, others_before
 from companion.settings import PlannerSettings
 from tests.planning_maps import drawn, one_obstacle
 
@@ -80,43 +80,32 @@ def test_astars_equally_short_ways_have_few_bends():
     assert turns == 1
 
 
-@given(seed=st.integers(0, 2**32 - 1), room=st.integers(8, 40), share=st.sampled_from([0.0, 0.1, 0.3, 0.4]))
+@given(worlds(), st.integers(8, 40), st.integers(0, 6))
 @settings(max_examples=300, deadline=None)
-def test_on_uniform_ground_the_path_is_a_shortest_one_however_little_room_the_queue_begins_with(seed, room, share):
-    rng = np.random.default_rng(seed)
-    weights = ground("even", rng, *rng.integers(1, 40, 2), share)
-    for _ in range(rng.integers(0, 6)):
+def test_the_path_is_a_cheapest_one_however_little_room_the_queue_begins_with(world, room, blocks):
+    rng, weights, corner_cutting = world
+    for _ in range(blocks):  # even ground with blocks of other ground in it is where most steps are left out
         y, x = rng.integers(0, weights.shape[0]), rng.integers(0, weights.shape[1])
-        weights[y : y + rng.integers(1, 8), x : x + rng.integers(1, 8)] = 1.0
+        weights[y : y + rng.integers(1, 8), x : x + rng.integers(1, 8)] = rng.choice([0.3, 0.8, 1.0])
     start, target = some_cell(rng, weights), some_cell(rng, weights)
     weights[start.y, start.x] = weights[target.y, target.x] = 0.5
-    best = plan(Dijkstra(SETTINGS), PlanningProblem(weights, start, target)).path
-    cells = shortest_uniform(weights, np.zeros(weights.size, np.int64), room, *start, *target)
+    best = plan(Dijkstra(SETTINGS), PlanningProblem(weights, start, target, corner_cutting)).path
+    cells = shortest(weights, np.zeros(weights.size, np.int64), room, *start, *target, corner_cutting)
     assert (len(cells) == 0) == (best is None)
     if best is not None:
         assert cells_cost(weights, cells) == pytest.approx(best.cost, rel=1e-9)
-        assert is_path(weights, as_cells(cells)) and (Cell(*cells[0]), Cell(*cells[-1])) == (start, target)
+        assert is_path(weights, as_cells(cells), corner_cutting)
+        assert (Cell(*cells[0]), Cell(*cells[-1])) == (start, target)
 
 
-def test_uniform_ground():
-    weights = np.full(40, 0.3)
-    weights[::7] = 1.0
-    assert is_uniform(weights, 0.3) and not is_uniform(weights, 0.5)
-    weights[39] = 0.2
-    assert not is_uniform(weights, 0.3)
-
-
-def test_sweeping_keeps_what_still_waits():
-    """Three fields of a row: one waits, one was taken, one waits in a cheaper bucket than this entry's."""
-    least, width, target = 0.5, 3, (2, 0)
-    reached = np.array([5.0, -5.0, 5.0])
-    slots = [int((5.0 + least * (2 - x)) * per_bucket(least)) % BUCKETS for x in range(3)]
-    heads, entries = np.full(BUCKETS, -1, np.int32), np.zeros((3, 3), np.int32)
-    for x, slot in enumerate([slots[0], slots[1], (slots[2] + 40) % BUCKETS]):
-        entries[x], heads[slot] = (x, 0, heads[slot]), x
-    free, waiting = swept(entries, heads, reached, width, *target, least)
-    assert waiting == 1 and heads[slots[0]] == 0 and (heads >= 0).sum() == 1
-    assert {free, entries[free, 2]} == {1, 2} and entries[entries[free, 2], 2] == -1
+def test_the_least_cost_whether_the_guess_is_right_or_not():
+    fields = np.full(41, 0.5)
+    fields[::7] = 1.0
+    assert least_cost(fields, 0.5) == 0.5 and least_cost(fields, 0.7) == 0.5
+    fields[40] = 0.2
+    assert least_cost(fields, 0.5) == 0.2
+    fields[3] = 0.0
+    assert least_cost(fields, 0.0) == least_cost(fields, 0.5) == MIN_WEIGHT
 
 
 def drive(planner, seed, steps=12):
@@ -185,6 +174,30 @@ def test_theta_star_turns_only_at_the_obstacles_corners():
     assert len(curve) <= 5
 
 
+def cost_of_line(weights, x0, y0, x1, y1, corner_cutting):
+    even = weights[y1, x1]
+    return line_cost(weights, others_before(weights, even), even, x0, y0, x1, y1, corner_cutting)
+
+
+@given(st.integers(0, 2**32 - 1), st.integers(0, 4), st.booleans())
+@settings(max_examples=200, deadline=None)
+def test_the_cost_of_a_line_is_that_of_its_fields(seed, blocks, corner_cutting):
+    rng = np.random.default_rng(seed)
+    weights = ground("even", rng, *rng.integers(2, 90, 2), 0.0)
+    for _ in range(blocks):
+        y, x = rng.integers(0, weights.shape[0]), rng.integers(0, weights.shape[1])
+        weights[y : y + rng.integers(1, 30), x : x + rng.integers(1, 30)] = rng.choice([0.0, 0.2, 0.8, 1.0])
+    start, end = some_cell(rng, weights), some_cell(rng, weights)
+    if start == end or weights[start.y, start.x] == 1.0:
+        return
+    cells = polyline(np.array([start, end]))
+    expected = np.inf
+    if is_path(weights, as_cells(cells), corner_cutting):
+        under = np.maximum(weights[cells[1:, 1], cells[1:, 0]], MIN_WEIGHT)
+        expected = np.hypot(end.x - start.x, end.y - start.y) * under.mean()
+    assert cost_of_line(weights, *start, *end, corner_cutting) == pytest.approx(expected)
+
+
 @given(world=worlds())
 @settings(max_examples=200, deadline=None)
 def test_theta_stars_curve_is_free_and_no_longer_than_its_fields(world):
@@ -196,7 +209,7 @@ def test_theta_stars_curve_is_free_and_no_longer_than_its_fields(world):
         return
     corners = result.path.curve.astype(int)
     for (x0, y0), (x1, y1) in pairwise(corners):
-        assert np.isfinite(line_cost(weights, x0, y0, x1, y1, corner_cutting))
+        assert np.isfinite(cost_of_line(weights, x0, y0, x1, y1, corner_cutting))
 
 
 def test_theta_star_follows_preferred_ground():
@@ -207,5 +220,5 @@ def test_theta_star_follows_preferred_ground():
 
 def test_a_line_past_a_corner_is_free_only_where_corners_may_be_cut():
     weights = drawn(".#", "..")
-    assert np.isinf(line_cost(weights, 0, 0, 1, 1, False))
-    assert line_cost(drawn("#.", ".."), 0, 0, 1, 1, True) == pytest.approx(0.5 * np.sqrt(2.0))
+    assert np.isinf(cost_of_line(weights, 0, 0, 1, 1, False))
+    assert cost_of_line(drawn("#.", ".."), 0, 0, 1, 1, True) == pytest.approx(0.5 * np.sqrt(2.0))
