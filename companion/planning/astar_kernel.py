@@ -38,8 +38,8 @@ ANY_WAY = 8
 """From this number on it is no step: the start was not entered by one."""
 BUCKETS = 1024
 """A power of two. They hold what one step can add to the sum: at most sqrt 2, and as much again if it leads away."""
-RUN = 32
-"""So many fields a search goes straight on ahead of its queue."""
+RUN = 8
+"""So many fields a search goes straight on ahead of its queue. With many more it now and then has much to correct."""
 LEAST_SHIFT = 22
 """So many bits of the sum are left out at least when it is put into a bucket."""
 NONE, FOUND, CROWDED = range(3)
