@@ -1,0 +1,169 @@
+"""Manoeuvres: short ways of arcs for a rover that cannot turn on the spot, back to its route when it cannot simply drive on along it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from companion.frames import NedPoint, Pose
+from companion.guidance import STEP_M, Points, Route, RoverLimits
+from companion.manoeuvre_search import Means, Poses, Wish, find
+from companion.mapping import EvidenceMap
+from companion.settings import SteeringSettings
+from companion.swept import Ground, kept_room
+
+ALIGNED_RAD = math.radians(25.0)
+"""Headings that differ by less are the same to a rover that follows a line."""
+BIN_M, STEP_OF_SEARCH_M = 0.25, 0.5
+WINDOW_M = 10.0
+AHEAD_M = (5.0, 3.0, 8.0)
+"""The place on the route to come back to lies so far ahead, tried in turn."""
+ANY_RAD = math.pi
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Leg:
+    """A piece driven in one direction. ``points``: shape (n, 2), north and east in metres, ``STEP_M`` apart or less."""
+
+    points: Points
+    backwards: bool
+
+    @property
+    def end(self) -> NedPoint:
+        """Where it ends."""
+        return NedPoint(float(self.points[-1, 0]), float(self.points[-1, 1]))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Manoeuvre:
+    """Legs to drive one after the other, and how far along the first one the rover has come."""
+
+    legs: tuple[Leg, ...]
+    progress: int = 0
+
+    @property
+    def end(self) -> NedPoint:
+        """Where it leads."""
+        return self.legs[-1].end
+
+    @property
+    def leg(self) -> Leg:
+        """The one being driven."""
+        return self.legs[0]
+
+    def after_leg(self) -> Manoeuvre | None:
+        """What is left when this leg is done."""
+        return Manoeuvre(self.legs[1:]) if len(self.legs) > 1 else None
+
+    def at(self, progress: int) -> Manoeuvre:
+        """The same, farther along its leg."""
+        return replace(self, progress=progress)
+
+    def as_route(self) -> Route:
+        """All that is left as one line."""
+        points = np.vstack([leg.points for leg in self.legs])
+        return Route(points, min(self.progress, len(points) - 1))
+
+
+def ground_of(evidence: EvidenceMap, pose: Pose) -> Ground:
+    """The map for the compiled loops."""
+    cell = evidence.base.cell_at(pose.point)
+    weights, settings = evidence.base.weights, evidence.settings
+    return Ground(
+        evidence.log_odds, weights, evidence.penalty, evidence.subdivisions, settings.occupied_at, cell.x, cell.y
+    )
+
+
+def in_cells(points: Points, evidence: EvidenceMap) -> Points:
+    """North and east in metres as x and y in evidence cells."""
+    corner, scale = evidence.base.south_west, 1.0 / evidence.evidence_m
+    return np.column_stack(((points[:, 1] - corner.east_m) * scale, (points[:, 0] - corner.north_m) * scale))
+
+
+def find_manoeuvre(
+    route: Route, pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: SteeringSettings, *, rolling: bool
+) -> Manoeuvre | None:
+    """A way of arcs to a place ahead on the route, with as much room as there is; None when there is none.
+
+    ``rolling``: the rover rolls forwards, so the way must begin forwards.
+    """
+    ground = ground_of(evidence, pose)
+    here = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0]
+    for ahead_m in AHEAD_M:
+        for clearance_m in settings.clearances_m:
+            wish = _wish(route, ahead_m, evidence, settings)
+            means = _means(here, ground, evidence, rover, settings, clearance_m, rolling=rolling)
+            way = find(ground, here[0], here[1], pose.heading_rad, wish, means)
+            if len(way) > 1:
+                return _manoeuvre(way, evidence)
+        if route.left_m <= ahead_m:
+            break
+    return None
+
+
+def _wish(route: Route, ahead_m: float, evidence: EvidenceMap, settings: SteeringSettings) -> Wish:
+    there = route.point_ahead(ahead_m)
+    x, y = in_cells(np.array([[there.north_m, there.east_m]]), evidence)[0]
+    scale = 1.0 / evidence.evidence_m
+    if route.left_m <= ahead_m:
+        return Wish(x, y, 0.0, settings.end_within_m * scale, ANY_RAD, 0.0)
+    heading_rad = route.point_ahead(ahead_m - 1.0).bearing_rad(route.point_ahead(ahead_m + 0.5))
+    return Wish(x, y, heading_rad, settings.join_within_m * scale, ALIGNED_RAD, settings.turned_cost_m * scale)
+
+
+def _means(
+    here: Points,
+    ground: Ground,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: SteeringSettings,
+    clearance_m: float,
+    *,
+    rolling: bool,
+) -> Means:
+    scale = 1.0 / evidence.evidence_m
+    room = kept_room(ground, here[0], here[1], (rover.radius_m + clearance_m) * scale, (rover.radius_m - 0.05) * scale)
+    return Means(
+        sharpest=1.0 / (rover.turning_radius_m * settings.planned_radius * scale),
+        step=STEP_OF_SEARCH_M * scale,
+        window=math.ceil(WINDOW_M * scale),
+        bin=max(1, round(BIN_M * scale)),
+        room=room,
+        switch_cost=settings.switch_cost_m * scale,
+        forwards_first=rolling,
+        expansions=settings.most_poses,
+    )
+
+
+def _manoeuvre(way: Poses, evidence: EvidenceMap) -> Manoeuvre:
+    """The legs of a way: a new one wherever its direction changes."""
+    legs: list[Leg] = []
+    begin = 0
+    for i in range(1, len(way)):
+        if i == len(way) - 1 or way[i + 1, 3] != way[i, 3]:
+            legs.append(Leg(_drawn(way[begin : i + 1], evidence), bool(way[i, 3] < 0.0)))
+            begin = i
+    return Manoeuvre(tuple(legs))
+
+
+def _drawn(way: Poses, evidence: EvidenceMap) -> Points:
+    """The arcs between poses as points not more than ``STEP_M`` apart."""
+    corner = evidence.base.south_west
+    lines = [way[:1, :2]]
+    for start, end in zip(way[:-1], way[1:], strict=True):
+        chord = math.hypot(end[0] - start[0], end[1] - start[1])
+        pieces = max(1, math.ceil(chord * evidence.evidence_m / STEP_M))
+        turned, length = (end[2] - start[2]) / pieces, end[3] * chord / pieces
+        if abs(end[2] - start[2]) > 1e-9:
+            length *= abs(math.sin(turned / 2.0) * pieces / math.sin((end[2] - start[2]) / 2.0))
+        place = np.array(start[:3])
+        points = np.empty((pieces, 2))
+        for i in range(pieces):
+            middle = place[2] + 0.5 * turned
+            place += (length * math.sin(middle), length * math.cos(middle), turned)
+            points[i] = place[:2]
+        lines.append(points)
+    cells = np.vstack(lines) * evidence.evidence_m
+    return np.column_stack((cells[:, 1] + corner.north_m, cells[:, 0] + corner.east_m))
