@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -83,18 +84,18 @@ def in_cells(points: Points, evidence: EvidenceMap) -> Points:
 
 
 def find_manoeuvre(
-    route: Route, pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: SteeringSettings, *, rolling: bool
+    route: Route, pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: SteeringSettings, first_way: int = 0
 ) -> Manoeuvre | None:
     """A way of arcs to a place ahead on the route, with as much room as there is; None when there is none.
 
-    ``rolling``: the rover rolls forwards, so the way must begin forwards.
+    ``first_way``: 1 if it must begin forwards, since the rover rolls so, -1 for backwards, 0 for either.
     """
     ground = ground_of(evidence, pose)
     here = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0]
     for ahead_m in AHEAD_M:
         for clearance_m in settings.clearances_m:
             wish = _wish(route, ahead_m, evidence, settings)
-            means = _means(here, ground, evidence, rover, settings, clearance_m, rolling=rolling)
+            means = _means(here, ground, evidence, rover, settings, clearance_m, first_way)
             way = find(ground, here[0], here[1], pose.heading_rad, wish, means)
             if len(way) > 1:
                 return _manoeuvre(way, evidence)
@@ -120,8 +121,7 @@ def _means(
     rover: RoverLimits,
     settings: SteeringSettings,
     clearance_m: float,
-    *,
-    rolling: bool,
+    first_way: int,
 ) -> Means:
     scale = 1.0 / evidence.evidence_m
     room = kept_room(ground, here[0], here[1], (rover.radius_m + clearance_m) * scale, (rover.radius_m - 0.05) * scale)
@@ -132,7 +132,7 @@ def _means(
         bin=max(1, round(BIN_M * scale)),
         room=room,
         switch_cost=settings.switch_cost_m * scale,
-        forwards_first=rolling,
+        first_way=first_way,
         expansions=settings.most_poses,
     )
 
@@ -152,7 +152,7 @@ def _drawn(way: Poses, evidence: EvidenceMap) -> Points:
     """The arcs between poses as points not more than ``STEP_M`` apart."""
     corner = evidence.base.south_west
     lines = [way[:1, :2]]
-    for start, end in zip(way[:-1], way[1:], strict=True):
+    for start, end in pairwise(way):
         chord = math.hypot(end[0] - start[0], end[1] - start[1])
         pieces = max(1, math.ceil(chord * evidence.evidence_m / STEP_M))
         turned, length = (end[2] - start[2]) / pieces, end[3] * chord / pieces

@@ -54,7 +54,7 @@ class Means(NamedTuple):
     bin: int
     room: float
     switch_cost: float
-    forwards_first: bool
+    first_way: int
     expansions: int
 
 
@@ -112,6 +112,15 @@ def _arrival(wish: Any, x: float, y: float, heading: float) -> float:
 
 
 @njit(cache=True, nogil=True)
+def _turn_cost(wish: Any, heading: float, sharpest: float) -> float:
+    """The least that turning to the wished heading costs, whatever lies in the way."""
+    aside = abs((heading - wish.heading + math.pi) % (2.0 * math.pi) - math.pi)
+    straight = max(aside - wish.heading_tolerance, 0.0) / sharpest
+    turned = max(math.pi - aside - wish.heading_tolerance, 0.0) / sharpest + wish.turned_cost
+    return float(min(straight, turned))
+
+
+@njit(cache=True, nogil=True)
 def _arc_cost(
     ground: Any, known: Any, left: int, low: int, pose: Any, curvature: float, way: float, means: Any
 ) -> tuple[float, float, float, float]:
@@ -161,7 +170,7 @@ def find(ground: Any, x: float, y: float, heading: float, wish: Any, means: Any)
         if expanded > means.expansions:
             break
         for way in (1.0, -1.0):
-            if here == 0 and way < 0.0 and means.forwards_first:
+            if here == 0 and way * means.first_way < 0.0:
                 continue
             for share in SHARES:
                 nx, ny, turned, cost = _arc_cost(
@@ -182,7 +191,8 @@ def find(ground: Any, x: float, y: float, heading: float, wish: Any, means: Any)
                 best[bin_there] = cost
                 costs[used] = best[bin_there]
                 before[used] = here
-                heapq.heappush(queue, (cost + GREED * to_go[bin_y, bin_x], used))
+                estimate = max(to_go[bin_y, bin_x], _turn_cost(wish, turned, means.sharpest))
+                heapq.heappush(queue, (cost + GREED * estimate, used))
                 used += 1
     return np.empty((0, 4))
 

@@ -29,7 +29,7 @@ from companion.guidance import (
 from companion.manoeuvre import Leg, Manoeuvre, find_manoeuvre, ground_of, in_cells
 from companion.mapping import EvidenceMap, clearance_m
 from companion.settings import Settings
-from companion.swept import LOST, REACHED, Drive, Ground, Points, arc_clear, follow, kept_room, steered
+from companion.swept import Drive, Ground, Points, arc_clear, follow, kept_room, steered
 
 MEMORY_S = 0.3
 """Speed and curvature are those of the last moments."""
@@ -38,6 +38,8 @@ LEAST_M = 0.3
 TOUCH_M = 0.05
 """Room beside the rover's radius that is kept in any case."""
 LEG_ENDS_M = 0.15
+GOES_ON_M = 1.5
+"""With less than this left of a manoeuvre that ends tail first the next one is looked for."""
 OFF_ROUTE_M = 1.5
 """A manoeuvre that ends farther from the route than this leads nowhere any more."""
 RATE_STEP_RAD_S = 0.02
@@ -54,7 +56,10 @@ class Rolling:
 
 @dataclass(frozen=True, slots=True)
 class Ahead:
-    """How following a way will go: how it ends, how far the rover gets, how far that has been seen, what to steer now (1/m)."""
+    """How following a way will go: how it ends, how far it can be driven, how far it has been seen, what to steer now (1/m).
+
+    Both lengths are inf where nothing is in the way to the way's end, or as far as guidance looks.
+    """
 
     end: int
     clear_m: float
@@ -86,16 +91,16 @@ class Helm:
             return view.brake()
         self._forget_what_leads_nowhere(route)
         if self.manoeuvre is not None:
-            answer = self._go_on(view)
+            answer = self._go_on(view, route)
             if answer is not None:
                 return answer
         if rolling.speed_m_s < -self._settings.steering.stopped_m_s:
             return view.brake()
         ahead = view.follow(route.points, route.progress, self._settings.steering.clearance_m, backwards=False)
-        if ahead.end != REACHED and ahead.clear_m < self._settings.steering.drives_on_m + view.needed_m:
+        if ahead.clear_m < self._settings.steering.drives_on_m + view.needed_m:
             self._look_for_manoeuvre(route, view)
             if self.manoeuvre is not None:
-                answer = self._go_on(view)
+                answer = self._go_on(view, route)
                 if answer is not None:
                     return answer
         return view.drive(ahead, backwards=False, left_m=route.left_m)
@@ -124,7 +129,7 @@ class Helm:
         if np.hypot(ahead[:, 0] - end.north_m, ahead[:, 1] - end.east_m).min() > OFF_ROUTE_M:
             self.manoeuvre = None
 
-    def _go_on(self, view: _View) -> Guide | None:
+    def _go_on(self, view: _View, route: Route) -> Guide | None:
         """The next moment of the manoeuvre; None when it is over, or cannot be driven any more."""
         manoeuvre = self.manoeuvre
         assert manoeuvre is not None
@@ -132,6 +137,10 @@ class Helm:
         if not stopped and leg.backwards != (view.rolling.speed_m_s < 0.0):
             return view.brake()
         progress, left_m = view.along(leg, manoeuvre.progress)
+        if leg.backwards and len(manoeuvre.legs) == 1 and left_m < GOES_ON_M and self._look_for_manoeuvre(route, view):
+            assert self.manoeuvre is not None
+            manoeuvre, leg = self.manoeuvre, self.manoeuvre.leg
+            progress, left_m = view.along(leg, 0)
         if left_m <= LEG_ENDS_M:
             self.manoeuvre = manoeuvre.after_leg()
             if self.manoeuvre is None and not leg.backwards:
@@ -139,18 +148,21 @@ class Helm:
             return view.brake()
         self.manoeuvre = manoeuvre.at(progress)
         ahead = view.follow(leg.points, progress, TOUCH_M, backwards=leg.backwards)
-        if ahead.clear_m < min(left_m - 0.3, view.needed_m + LEAST_M) or (ahead.end == LOST and stopped):
+        if ahead.clear_m < view.needed_m + LEAST_M:
             self.manoeuvre = None
             return None if stopped else view.brake()
         return view.drive(ahead, backwards=leg.backwards, left_m=left_m)
 
-    def _look_for_manoeuvre(self, route: Route, view: _View) -> None:
-        settings = self._settings.steering
+    def _look_for_manoeuvre(self, route: Route, view: _View) -> bool:
+        """Whether there is a new one. Who rolls must begin the way he rolls."""
+        settings, speed_m_s = self._settings.steering, view.rolling.speed_m_s
         if view.pose.time_s - self._looked_s < settings.manoeuvre_every_s:
-            return
+            return False
         self._looked_s = view.pose.time_s
-        rolling = view.rolling.speed_m_s > settings.stopped_m_s
-        self.manoeuvre = find_manoeuvre(route, view.pose, self._evidence, view.rover, settings, rolling=rolling)
+        way = 0 if abs(speed_m_s) <= settings.stopped_m_s else 1 if speed_m_s > 0.0 else -1
+        found = find_manoeuvre(route, view.pose, self._evidence, view.rover, settings, way)
+        self.manoeuvre = found or self.manoeuvre
+        return found is not None
 
 
 class _View:
@@ -242,8 +254,8 @@ class _View:
         slowest_m_s = guidance.min_speed_m_s if not backwards else guidance.back_out_speed_m_s
         creep_m = braking_distance_m(slowest_m_s, guidance)
         reach_m = min(ahead.clear_m, ahead.seen_m + creep_m)
-        stopped = abs(self.rolling.speed_m_s) <= steering.stopped_m_s
-        if reach_m < min(max(self.needed_m, creep_m) + 0.1, left_m - 0.1) or (ahead.clear_m < LEAST_M < left_m):
+        if reach_m < max(self.needed_m, creep_m) + 0.1:
+            stopped = abs(self.rolling.speed_m_s) <= steering.stopped_m_s
             return Guide(Motion.BLOCKED, STOP, 0.0) if stopped else self.brake()
         limit_m_s = fastest_within_m(min(reach_m, left_m), guidance)
         bend_m_s = math.sqrt(steering.lateral_m_s2 / max(abs(ahead.curvature_m), 1e-3))

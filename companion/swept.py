@@ -143,13 +143,14 @@ def follow(
 ) -> tuple[int, float, float, float]:
     """Play through how the rover follows a line, from its pose and the curvature it drives now, for at most ``length``.
 
-    Returns how that ends, how far it gets, how far of that has been seen (middle and flanks), and the curvature to steer now.
+    Returns how that ends, how far it gets before something is in the way or it is lost, how far its middle and flanks have been seen
+    (both inf if that is never so), and the curvature to steer now.
     """
     course = heading + math.pi if drive.backwards else heading
     gone, seen = 0.0, math.inf
     wanted_now = math.nan
     last = len(line) - 1
-    end = REACHED
+    end, clear = REACHED, math.inf
     while gone < length:
         at, wanted, aside = steered(line, at, x, y, course, drive.ahead)
         wanted = min(max(wanted, -drive.sharpest), drive.sharpest)
@@ -159,7 +160,7 @@ def follow(
         if at == last and (off < STEP_CELLS or abs(aside) > 0.5 * math.pi):
             break
         if abs(aside) > LATE_RAD or off > drive.astray:
-            end = LOST
+            end, clear = LOST, gone
             break
         curvature += min(max(wanted - curvature, -drive.steering * STEP_CELLS), drive.steering * STEP_CELLS)
         middle = course + 0.5 * curvature * STEP_CELLS
@@ -167,7 +168,7 @@ def follow(
         course += curvature * STEP_CELLS
         state = place(ground, x, y, drive.room)
         if state == BLOCKED:
-            end = STOPPED
+            end, clear = STOPPED, gone
             break
         if gone < seen and (
             state == UNSEEN or (gone > drive.near and _flank_unseen(ground, x, y, course, drive.flank))
@@ -176,7 +177,7 @@ def follow(
         gone += STEP_CELLS
     if math.isnan(wanted_now):
         wanted_now = 0.0
-    return end, gone, min(seen, gone), wanted_now
+    return end, clear, seen, wanted_now
 
 
 @njit(cache=True, nogil=True)
