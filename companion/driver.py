@@ -186,7 +186,7 @@ class Driver:
         self._notice_changes(pose)
         if not self._runner.busy and self.evidence.base.contains(cell) and self._step_is_due(cell):
             state = self._state
-            grid = with_turning_cost(self.evidence.grid, pose, self._settings.guidance)
+            grid = with_turning_cost(self.evidence.grid, pose, self._settings.guidance, self._rover.turning_radius_m)
             weights = grid.weights
             movers, motion = self._movers(pose), self._motion(pose)
 

@@ -18,9 +18,9 @@ from companion.swept import Ground, kept_room
 ALIGNED_RAD = math.radians(25.0)
 """Headings that differ by less are the same to a rover that follows a line."""
 BIN_M, STEP_OF_SEARCH_M = 0.25, 0.5
-WINDOW_M = 10.0
-AHEAD_M = (5.0, 3.0, 8.0)
-"""The place on the route to come back to lies so far ahead, tried in turn."""
+WINDOW_RADII, LEAST_WINDOW_M = 4.0, 8.0
+AHEAD_RADII, LEAST_AHEAD_M = (2.0, 1.2, 3.2), 2.0
+"""The place on the route to come back to lies so many turning radii ahead, tried in turn."""
 ANY_RAD = math.pi
 
 
@@ -92,9 +92,10 @@ def find_manoeuvre(
     """
     ground = ground_of(evidence, pose)
     here = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0]
-    for ahead_m in AHEAD_M:
+    for radii in AHEAD_RADII:
+        ahead_m = max(radii * rover.turning_radius_m, LEAST_AHEAD_M)
         for clearance_m in settings.clearances_m:
-            wish = _wish(route, ahead_m, evidence, settings)
+            wish = _wish(route, ahead_m, evidence, rover, settings)
             means = _means(here, ground, evidence, rover, settings, clearance_m, first_way)
             way = find(ground, here[0], here[1], pose.heading_rad, wish, means)
             if len(way) > 1:
@@ -104,14 +105,21 @@ def find_manoeuvre(
     return None
 
 
-def _wish(route: Route, ahead_m: float, evidence: EvidenceMap, settings: SteeringSettings) -> Wish:
+def _wish(route: Route, ahead_m: float, evidence: EvidenceMap, rover: RoverLimits, settings: SteeringSettings) -> Wish:
     there = route.point_ahead(ahead_m)
     x, y = in_cells(np.array([[there.north_m, there.east_m]]), evidence)[0]
     scale = 1.0 / evidence.evidence_m
     if route.left_m <= ahead_m:
         return Wish(x, y, 0.0, settings.end_within_m * scale, ANY_RAD, 0.0)
     heading_rad = route.point_ahead(ahead_m - 1.0).bearing_rad(route.point_ahead(ahead_m + 0.5))
-    return Wish(x, y, heading_rad, settings.join_within_m * scale, ALIGNED_RAD, settings.turned_cost_m * scale)
+    return Wish(
+        x,
+        y,
+        heading_rad,
+        settings.join_within_m * scale,
+        ALIGNED_RAD,
+        settings.turned_cost_radii * rover.turning_radius_m * scale,
+    )
 
 
 def _means(
@@ -128,7 +136,7 @@ def _means(
     return Means(
         sharpest=1.0 / (rover.turning_radius_m * settings.planned_radius * scale),
         step=STEP_OF_SEARCH_M * scale,
-        window=math.ceil(WINDOW_M * scale),
+        window=math.ceil(max(WINDOW_RADII * rover.turning_radius_m, LEAST_WINDOW_M) * scale),
         bin=max(1, round(BIN_M * scale)),
         room=room,
         switch_cost=settings.switch_cost_m * scale,

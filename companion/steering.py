@@ -40,8 +40,8 @@ TOUCH_M = 0.05
 LEG_ENDS_M = 0.15
 GOES_ON_M = 1.5
 """With less than this left of a manoeuvre that ends tail first the next one is looked for."""
-OFF_ROUTE_M = 1.5
-"""A manoeuvre that ends farther from the route than this leads nowhere any more."""
+OFF_ROUTE_RADII = 1.0
+"""A manoeuvre that ends farther from the route than so many turning radii leads nowhere any more."""
 RATE_STEP_RAD_S = 0.02
 """Turn rates are told in steps of this, so that not every tick is a new setpoint."""
 
@@ -89,7 +89,7 @@ class Helm:
         if view.would_touch():
             self.manoeuvre = None
             return view.brake()
-        self._forget_what_leads_nowhere(route)
+        self._forget_what_leads_nowhere(route, rover)
         if self.manoeuvre is not None:
             answer = self._go_on(view, route)
             if answer is not None:
@@ -120,13 +120,14 @@ class Helm:
         turned_rad = wrap_pi_rad(pose.heading_rad - first.heading_rad)
         return Rolling(speed_m_s if forwards else -speed_m_s, turned_rad / max(moved_m, 0.1))
 
-    def _forget_what_leads_nowhere(self, route: Route) -> None:
+    def _forget_what_leads_nowhere(self, route: Route, rover: RoverLimits) -> None:
         """The route may have been laid anew: a manoeuvre that ends beside it is given up."""
         if self.manoeuvre is None:
             return
         end = self.manoeuvre.end
         ahead = route.points[route.progress :]
-        if np.hypot(ahead[:, 0] - end.north_m, ahead[:, 1] - end.east_m).min() > OFF_ROUTE_M:
+        off_m = float(np.hypot(ahead[:, 0] - end.north_m, ahead[:, 1] - end.east_m).min())
+        if off_m > OFF_ROUTE_RADII * rover.turning_radius_m:
             self.manoeuvre = None
 
     def _go_on(self, view: _View, route: Route) -> Guide | None:

@@ -175,7 +175,9 @@ class SteeringSettings(Section):
     join_within_m: float = Field(0.5, gt=0.0, description="a manoeuvre ends so near to the route")
     end_within_m: float = Field(0.3, gt=0.0, description="... and so near to the route's end")
     switch_cost_m: float = Field(1.5, ge=0.0, description="what changing direction costs in metres")
-    turned_cost_m: float = Field(6.0, ge=0.0, description="what ending a manoeuvre tail first costs in metres")
+    turned_cost_radii: float = Field(
+        2.5, ge=0.0, description="what ending a manoeuvre tail first costs, in turning radii"
+    )
     most_poses: int = Field(
         6000, ge=100, le=1_000_000, description="poses from which one search for a manoeuvre goes on"
     )
