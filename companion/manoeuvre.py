@@ -10,14 +10,15 @@ import numpy as np
 
 from companion.frames import NedPoint, Pose
 from companion.guidance import STEP_M, Points, Route, RoverLimits
-from companion.manoeuvre_search import Means, Poses, Wish, find
+from companion.manoeuvre_search import HEADINGS, Means, Poses, Wish, find
 from companion.mapping import EvidenceMap
 from companion.settings import SteeringSettings
 from companion.swept import Ground, kept_room
 
 ALIGNED_RAD = math.radians(25.0)
 """Headings that differ by less are the same to a rover that follows a line."""
-BIN_M, STEP_OF_SEARCH_M = 0.25, 0.5
+HEADING_RAD = 2.0 * math.pi / HEADINGS
+BIN_M, LEAST_ARC_M = 0.25, 0.5
 WINDOW_RADII, LEAST_WINDOW_M = 4.0, 8.0
 AHEAD_RADII, LEAST_AHEAD_M = (2.0, 1.2, 3.2), 2.0
 """The place on the route to come back to lies so many turning radii ahead, tried in turn."""
@@ -132,10 +133,12 @@ def _means(
     first_way: int,
 ) -> Means:
     scale = 1.0 / evidence.evidence_m
+    radius_m = rover.turning_radius_m * settings.planned_radius
     room = kept_room(ground, here[0], here[1], (rover.radius_m + clearance_m) * scale, (rover.radius_m - 0.05) * scale)
     return Means(
-        sharpest=1.0 / (rover.turning_radius_m * settings.planned_radius * scale),
-        step=STEP_OF_SEARCH_M * scale,
+        sharpest=1.0 / (radius_m * scale),
+        # A step at full lock must lead to another heading, or it is told from a straight one by its cost alone.
+        step=max(LEAST_ARC_M, 1.05 * HEADING_RAD * radius_m) * scale,
         window=math.ceil(max(WINDOW_RADII * rover.turning_radius_m, LEAST_WINDOW_M) * scale),
         bin=max(1, round(BIN_M * scale)),
         room=room,
