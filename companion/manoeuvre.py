@@ -84,26 +84,42 @@ def in_cells(points: Points, evidence: EvidenceMap) -> Points:
     return np.column_stack(((points[:, 1] - corner.east_m) * scale, (points[:, 0] - corner.north_m) * scale))
 
 
+@dataclass(frozen=True, slots=True)
+class Try:
+    """One way to look for a manoeuvre: to the place so far ahead on the route, with so much room beside the rover's radius."""
+
+    ahead_m: float
+    clearance_m: float
+
+
+def tries(route: Route, rover: RoverLimits, settings: SteeringSettings) -> tuple[Try, ...]:
+    """What to try one after the other: near and roomy first."""
+    clearances_m = (settings.narrow_clearance_m,) if rover.narrow_sight else settings.clearances_m
+    aheads_m = [max(radii * rover.turning_radius_m, LEAST_AHEAD_M) for radii in AHEAD_RADII]
+    while len(aheads_m) > 1 and route.left_m <= aheads_m[-2]:
+        aheads_m.pop()
+    return tuple(Try(ahead_m, clearance_m) for ahead_m in aheads_m for clearance_m in clearances_m)
+
+
 def find_manoeuvre(
-    route: Route, pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: SteeringSettings, first_way: int = 0
+    route: Route,
+    pose: Pose,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: SteeringSettings,
+    wanted: Try,
+    first_way: int = 0,
 ) -> Manoeuvre | None:
-    """A way of arcs to a place ahead on the route, with as much room as there is; None when there is none.
+    """A way of arcs to a place ahead on the route; None when none was found.
 
     ``first_way``: 1 if it must begin forwards, since the rover rolls so, -1 for backwards, 0 for either.
     """
     ground = ground_of(evidence, pose)
-    here = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0]
-    for radii in AHEAD_RADII:
-        ahead_m = max(radii * rover.turning_radius_m, LEAST_AHEAD_M)
-        for clearance_m in settings.clearances_m:
-            wish = _wish(route, ahead_m, evidence, rover, settings)
-            means = _means(here, ground, evidence, rover, settings, clearance_m, first_way)
-            way = find(ground, here[0], here[1], pose.heading_rad, wish, means)
-            if len(way) > 1:
-                return _manoeuvre(way, evidence)
-        if route.left_m <= ahead_m:
-            break
-    return None
+    x, y = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0].tolist()
+    wish = _wish(route, wanted.ahead_m, evidence, rover, settings)
+    means = _means((x, y), ground, evidence, rover, settings, wanted.clearance_m, first_way)
+    way = find(ground, x, y, pose.heading_rad, wish, means)
+    return _manoeuvre(way, evidence) if len(way) > 1 else None
 
 
 def _wish(route: Route, ahead_m: float, evidence: EvidenceMap, rover: RoverLimits, settings: SteeringSettings) -> Wish:
@@ -124,7 +140,7 @@ def _wish(route: Route, ahead_m: float, evidence: EvidenceMap, rover: RoverLimit
 
 
 def _means(
-    here: Points,
+    here: tuple[float, float],
     ground: Ground,
     evidence: EvidenceMap,
     rover: RoverLimits,

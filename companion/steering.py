@@ -26,7 +26,7 @@ from companion.guidance import (
     fastest_within_m,
     speed_limit_m_s,
 )
-from companion.manoeuvre import Leg, Manoeuvre, find_manoeuvre, ground_of, in_cells
+from companion.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, ground_of, in_cells, tries
 from companion.mapping import EvidenceMap, clearance_m
 from companion.settings import Settings
 from companion.swept import Drive, Ground, Points, arc_clear, follow, kept_room, steered
@@ -76,6 +76,7 @@ class Helm:
         self._settings = settings
         self._poses: deque[Pose] = deque()
         self._looked_s = -math.inf
+        self._tries: deque[Try] = deque()
 
     def reset(self) -> None:
         """The leg is over: no manoeuvre is under way."""
@@ -96,7 +97,9 @@ class Helm:
                 return answer
         if rolling.speed_m_s < -self._settings.steering.stopped_m_s:
             return view.brake()
-        ahead = view.follow(route.points, route.progress, self._settings.steering.clearance_m, backwards=False)
+        steering = self._settings.steering
+        room_m = steering.narrow_clearance_m if rover.narrow_sight else steering.clearance_m
+        ahead = view.follow(route.points, route.progress, room_m, backwards=False)
         if ahead.clear_m < self._settings.steering.drives_on_m + view.needed_m:
             self._look_for_manoeuvre(route, view)
             if self.manoeuvre is not None:
@@ -155,15 +158,24 @@ class Helm:
         return view.drive(ahead, backwards=leg.backwards, left_m=left_m)
 
     def _look_for_manoeuvre(self, route: Route, view: _View) -> bool:
-        """Whether there is a new one. Who rolls must begin the way he rolls."""
-        settings, speed_m_s = self._settings.steering, view.rolling.speed_m_s
-        if view.pose.time_s - self._looked_s < settings.manoeuvre_every_s:
+        """Whether there is a new one. Only one thing is tried each time, so that no tick takes long.
+
+        Who rolls must begin the way he rolls.
+        """
+        settings, speed_m_s, now_s = self._settings.steering, view.rolling.speed_m_s, view.pose.time_s
+        if now_s - self._looked_s >= settings.manoeuvre_every_s:
+            self._tries = deque(tries(route, view.rover, settings))
+        if not self._tries:
             return False
-        self._looked_s = view.pose.time_s
+        self._looked_s = now_s
         way = 0 if abs(speed_m_s) <= settings.stopped_m_s else 1 if speed_m_s > 0.0 else -1
-        found = find_manoeuvre(route, view.pose, self._evidence, view.rover, settings, way)
-        self.manoeuvre = found or self.manoeuvre
-        return found is not None
+        wanted = self._tries.popleft()
+        found = find_manoeuvre(route, view.pose, self._evidence, view.rover, settings, wanted, way)
+        if found is None:
+            return False
+        self.manoeuvre = found
+        self._tries.clear()
+        return True
 
 
 class _View:

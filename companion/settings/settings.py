@@ -168,6 +168,9 @@ class SteeringSettings(Section):
     clearances_m: tuple[float, ...] = Field(
         (0.4, 0.25, 0.12), min_length=1, description="the same when a manoeuvre is looked for, tried in turn"
     )
+    narrow_clearance_m: float = Field(
+        0.3, ge=0.0, description="both with single thin beams, between which much stays unseen"
+    )
     drives_on_m: float = Field(
         2.5, gt=0.0, description="with less than this of its route to be driven in arcs the rover looks for a manoeuvre"
     )
