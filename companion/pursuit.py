@@ -63,6 +63,8 @@ class Pursuit:
             scan.is_narrow,
             rover.turning_radius_m,
         )
+        if rover.turning_radius_m > 0.0 and scan.is_narrow:
+            tell("Single beams see too little for a rover that turns in arcs: give it a lidar", WARNING)
         planner = make_planner(settings.navigator.planner, settings.planner)
         searcher = Searcher(planner, settings.navigator, rng)
         self.driver = Driver(laid.evidence, self._limits, settings, searcher, runner)
