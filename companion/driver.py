@@ -27,6 +27,7 @@ from companion.planning import problem
 from companion.planning.problem import PlanResult
 from companion.searching import Searcher
 from companion.settings import Settings
+from companion.steering import Helm
 from companion.stepping import StepRunner
 from companion.traffic import Moving, motion_changed, planners_movers
 from companion.turning import with_turning_cost
@@ -82,6 +83,7 @@ class Driver:
         self._seed = int(searcher.rng.integers(2**63))
         self._epoch = 0
         self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
+        self._helm = Helm(evidence, settings) if rover.turning_radius_m > 0.0 else None
         self._looking_rad: float | None = None
         self._braking = False
         self._stuck_places: dict[Cell, int] = {}
@@ -110,6 +112,7 @@ class Driver:
 
     def leave(self) -> None:
         """The leg is over (or must begin again from where the rover is now)."""
+        self._drop_manoeuvre()
         self._goal = None
         self._state = None
         self.route = None
@@ -133,8 +136,10 @@ class Driver:
 
     def _make_way(self, guide: Guide, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> Guide:
         rover, settings = self._rover, self._settings
+        manoeuvre = self._helm.manoeuvre if self._helm else None
+        route = self.route if manoeuvre is None else manoeuvre.as_route()
         way, self._aside_rad = yielded(
-            guide, self.route, pose, speed_m_s, moving, self.evidence, rover, settings, self._aside_rad
+            guide, route, pose, speed_m_s, moving, self.evidence, rover, settings, self._aside_rad
         )
         return way
 
@@ -159,22 +164,20 @@ class Driver:
             rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
         planned_m_s = max(self.route.planned_m_s, self._settings.guidance.min_speed_m_s)
         rover = replace(rover, cruise_speed_m_s=min(rover.cruise_speed_m_s, planned_m_s))
-        settings = self._settings.guidance
-        now = guide(
-            self.route,
-            pose,
-            speed_m_s,
-            self.evidence,
-            rover,
-            settings,
-            looking_rad=self._looking_rad,
-            braking=self._braking,
-        )
-        self._braking = now.motion is Motion.BRAKE
-        self._looking_rad = now.setpoint.heading_rad if isinstance(now.setpoint, GuidedHeading) else None
+        now = self._guided(self.route, pose, speed_m_s, rover)
         if self._is_stuck(pose, now):
             self._get_unstuck(pose)
         return now, decision
+
+    def _guided(self, route: Route, pose: Pose, speed_m_s: float, rover: RoverLimits) -> Guide:
+        """The setpoint that leads along the route, for a rover that turns on the spot or for one that cannot."""
+        if self._helm is not None:
+            return self._helm.guide(route, pose, speed_m_s, rover)
+        settings, looking, braking = self._settings.guidance, self._looking_rad, self._braking
+        now = guide(route, pose, speed_m_s, self.evidence, rover, settings, looking_rad=looking, braking=braking)
+        self._braking = now.motion is Motion.BRAKE
+        self._looking_rad = now.setpoint.heading_rad if isinstance(now.setpoint, GuidedHeading) else None
+        return now
 
     def _field_step(self, pose: Pose) -> Decision | None:
         """Start the navigator's step when a new field is entered or the path ahead is blocked; take its result."""
@@ -183,9 +186,9 @@ class Driver:
         self._notice_changes(pose)
         if not self._runner.busy and self.evidence.base.contains(cell) and self._step_is_due(cell):
             state = self._state
-            grid = with_turning_cost(self.evidence.grid, pose, self._settings.guidance)
+            grid = with_turning_cost(self.evidence.grid, pose, self._settings.guidance, self._rover.turning_radius_m)
             weights = grid.weights
-            movers, motion = self._movers(pose), self._motion()
+            movers, motion = self._movers(pose), self._motion(pose)
 
             def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
                 return self.searcher.search(weights, kind, start, target, movers, motion)
@@ -218,14 +221,19 @@ class Driver:
         radius_m, traffic = self._rover.radius_m, self._settings.traffic
         return planners_movers(self._moving, self.evidence.grid, radius_m, pose.time_s, traffic)
 
-    def _motion(self) -> problem.Motion:
-        """How fast the rover may be planned to go."""
+    def _motion(self, pose: Pose) -> problem.Motion:
+        """Where the rover points, how tightly it can turn and how fast it may be planned to go."""
         fastest_m_s = self._rover.cruise_speed_m_s
         if self._goal is not None and self._goal.speed_m_s is not None:
             fastest_m_s = self._goal.speed_m_s
         slowest_m_s = min(self._settings.guidance.min_speed_m_s, fastest_m_s)
         resolution_m = self.evidence.base.resolution_m
-        return problem.Motion(speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m))
+        turning_radius_m = self._rover.turning_radius_m * self._settings.steering.planned_radius
+        return problem.Motion(
+            heading_rad=wrap_pi_rad(0.5 * math.pi - pose.heading_rad),
+            turning_radius_fields=turning_radius_m / resolution_m,
+            speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m),
+        )
 
     def _notice_changes(self, pose: Pose) -> None:
         """A plan made among moving things is dropped when one of them moves otherwise than it did."""
@@ -311,10 +319,15 @@ class Driver:
             pose.time_s + self._settings.guidance.back_out_m / self._settings.guidance.back_out_speed_m_s
         )
         self._epoch += 1
+        self._drop_manoeuvre()
         self._state = abandon_path(self._state)
         self._progress = None
         self.route = None
         self.decision = None
+
+    def _drop_manoeuvre(self) -> None:
+        if self._helm is not None:
+            self._helm.reset()
 
     def _place_ahead(self, pose: Pose) -> NedPoint:
         if self.route is None:

@@ -92,6 +92,8 @@ class RoverLimits:
     """Valid range of the sensor."""
     narrow_sight: bool = False
     """Whether it is single thin beams."""
+    turning_radius_m: float = 0.0
+    """The tightest arc it can drive; 0: it turns on the spot."""
 
 
 def route_along_cells(grid: Grid, cells: tuple[Cell, ...], start: NedPoint, end: NedPoint | None) -> Route:
@@ -182,7 +184,7 @@ def guide(
     if error > _turn_first_rad(close, looking_rad is not None, settings) and pose.point.distance_m(target) > 0.5:
         close = close or _would_touch_turning(pose, speed_m_s, bearing, evidence, rover, settings)
         return turn_to(bearing, speed_m_s if close else 0.0, settings)
-    limit_m_s = _speed_limit(min(beside_m, room_m), error, rover, settings)
+    limit_m_s = speed_limit_m_s(min(beside_m, room_m), error, rover, settings)
     limit_m_s = min(limit_m_s, _limit_by_heading(pose, evidence, rover, settings))
     return Guide(Motion.DRIVE, GuidedPosition(target), limit_m_s)
 
@@ -329,7 +331,7 @@ def _look_or_blocked(
     return Guide(Motion.BLOCKED, STOP, 0.0)
 
 
-def _speed_limit(beside_m: float, bearing_error_rad: float, rover: RoverLimits, settings: GuidanceSettings) -> float:
+def speed_limit_m_s(beside_m: float, bearing_error_rad: float, rover: RoverLimits, settings: GuidanceSettings) -> float:
     """Cruise speed; less where the sensor sees too short, something is close beside, or the rover is still turning."""
     sight = fastest_within_m(rover.sight_m - rover.radius_m - settings.clearance_m, settings)
     share = min(max(beside_m / settings.slow_within_m, 0.0), 1.0)

@@ -56,7 +56,15 @@ class Pursuit:
         self._scans = 0
         rover = mission.rover
         margin_m = settings.guidance.narrow_margin_m if scan.is_narrow else 0.0
-        self._limits = RoverLimits(rover.radius_m + margin_m, rover.cruise_speed_m_s, scan.max_range_m, scan.is_narrow)
+        self._limits = RoverLimits(
+            rover.radius_m + margin_m,
+            rover.cruise_speed_m_s,
+            scan.max_range_m,
+            scan.is_narrow,
+            rover.turning_radius_m,
+        )
+        if rover.turning_radius_m > 0.0 and scan.is_narrow:
+            tell("Single beams see too little for a rover that turns in arcs: give it a lidar", WARNING)
         planner = make_planner(settings.navigator.planner, settings.planner)
         searcher = Searcher(planner, settings.navigator, rng)
         self.driver = Driver(laid.evidence, self._limits, settings, searcher, runner)

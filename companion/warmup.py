@@ -8,16 +8,18 @@ import numpy as np
 
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
+from companion.guidance import Route, RoverLimits
 from companion.mapping import clearance_m, integrate, look_along, new_map, penalise, unseen_beside
 from companion.planning import registry
 from companion.scan import RangeScan
 from companion.settings import Settings
+from companion.steering import Helm
 from companion.tracking import Tracker
 from companion.yielding import first_near, least_room_m
 
 
-def warm_up(settings: Settings) -> None:
-    """Run every compiled kernel that a drive with these settings uses once, with the types it uses."""
+def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
+    """Run every compiled kernel that a drive of such a rover with these settings uses once, with the types it uses."""
     registry.warm_up((settings.navigator.planner,), settings.planner)
     evidence = new_map(empty_grid(8, 8), 0.35, settings.mapping)
     bearings = np.array([0.0, 0.5])
@@ -32,6 +34,18 @@ def warm_up(settings: Settings) -> None:
     places = np.zeros((2, 2))
     least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]), 5.0)
     first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
+    if turning_radius_m > 0.0:
+        _steer(settings)
     # What lives now lives to the end: a collection that walks through it would stall a tick for a tenth of a second.
     gc.collect()
     gc.freeze()
+
+
+def _steer(settings: Settings) -> None:
+    """To a place behind, standing and rolling, as rovers do that cannot turn on the spot."""
+    evidence = new_map(empty_grid(16, 16), 0.35, settings.mapping)
+    route = Route(np.column_stack((np.linspace(8.0, 2.0, 25), np.full(25, 8.0))))
+    helm = Helm(evidence, settings)
+    for tick in range(8):
+        rover = RoverLimits(0.35, 2.0, 8.0, turning_radius_m=1.0)
+        helm.guide(route, Pose(8.0 + 0.05 * tick, 8.0, 0.0, 0.05 * tick), 1.0 if tick > 4 else 0.0, rover)

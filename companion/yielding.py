@@ -231,6 +231,8 @@ def _aside(
         along_m = np.minimum(along_m, min(rover.cruise_speed_m_s, ASIDE_M_S) * after_s)
         places = _moved(_ahead(pose, _braked_m(speed_m_s, times_s, settings)), bearing_rad, along_m)
         if error_rad > math.radians(settings.turn_until_close_deg):
+            if rover.turning_radius_m > 0.0:
+                return []
             return [Choice(turn_to(bearing_rad, speed_m_s, settings), places, aside_rad=bearing_rad)]
         going_m_s = min(rover.cruise_speed_m_s, ASIDE_M_S)
         going = Guide(Motion.LOOK, GuidedVelocity(going_m_s, 0.0), going_m_s)

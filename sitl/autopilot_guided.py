@@ -1,7 +1,8 @@
 """Compiled guided motion: to a place, along a heading, with a turn rate (behaviour of ModeGuided, AR_WPNav, AR_PosControl).
 
 A position target is shaped: an inner target runs ahead of the rover with limited speed, acceleration and jerk, and
-the rover is steered after it. A target farther to the side than WP_PIVOT_ANGLE is first faced on the spot.
+the rover is steered after it. A target farther to the side than WP_PIVOT_ANGLE is first faced on the spot; a rover with steered
+wheels cannot, and drives an arc.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from sitl.autopilot_speed import (
     accel_limited,
     filter_share,
     forward_speed,
+    has_steered_wheels,
     rate_of_lateral,
     rate_to_heading,
     run_motors,
@@ -68,7 +70,7 @@ def bearing_to_target(control: Any, estimate: Any) -> float:
 def check_pivot(control: Any, tuning: Any, estimate: Any) -> None:
     """Begin or end turning on the spot."""
     limit = math.radians(tuning.pivot_angle_deg)
-    if limit <= PIVOT_ACCURACY_RAD:
+    if limit <= PIVOT_ACCURACY_RAD or has_steered_wheels(tuning):
         control.pivoting = 0
         return
     error = bearing_to_target(control, estimate) - estimate.heading_rad
@@ -139,6 +141,12 @@ def error_limit(speed_max: float, gain: float, accel: float) -> float:
 
 
 @njit(cache=True, nogil=True)
+def turn_speed(tuning: Any) -> float:
+    """The speed at which a turn of TURN_RADIUS takes half the lateral acceleration that is allowed."""
+    return math.sqrt(max(0.5 * tuning.turn_max_g * GRAVITY_M_S2 * tuning.turn_radius_m, 0.0))
+
+
+@njit(cache=True, nogil=True)
 def follow_shaped(control: Any, tuning: Any, estimate: Any) -> None:
     """Speed and turn rate that keep the rover with the inner target."""
     if control.tick - control.place_tick >= ACTIVE_TICKS:
@@ -165,7 +173,9 @@ def follow_shaped(control: Any, tuning: Any, estimate: Any) -> None:
     accel_e = control.vel_error_e * tuning.vel_p + feed_e
     ahead_n, ahead_e = math.cos(estimate.heading_rad), math.sin(estimate.heading_rad)
     speed = goal_n * ahead_n + goal_e * ahead_e
-    speed = min(0.0, speed) if control.reversed else max(0.0, speed)
+    # Who cannot turn on the spot must keep rolling to come round to a target that is not ahead.
+    rolling = min(math.hypot(goal_n, goal_e), turn_speed(tuning)) if has_steered_wheels(tuning) else 0.0
+    speed = min(-rolling, speed) if control.reversed else max(rolling, speed)
     control.nav_speed = accel_limited(control, tuning, speed)
     control.nav_turn_rate = rate_of_lateral(accel_e * ahead_n - accel_n * ahead_e, control.nav_speed)
 
@@ -244,7 +254,7 @@ def run_control(control: Any, tuning: Any, estimate: Any) -> None:
             control.arrived = 1
         run_stop(control, tuning, estimate)
         control.steering = 0.0
-    run_motors(control, tuning)
+    run_motors(control, tuning, estimate)
 
 
 __all__ = ["approach_rate", "begin_guided", "begin_target", "run_control"]

@@ -7,7 +7,7 @@ from typing import Any
 
 from numba import njit
 
-from sitl.control import LOOP_S
+from sitl.control import GROUND_STEERING, LOOP_S
 from sitl.shaping import limited
 
 GRAVITY_M_S2 = 9.80665
@@ -146,7 +146,30 @@ def run_steering(control: Any, tuning: Any, estimate: Any, rate: float) -> None:
 
 
 @njit(cache=True, nogil=True)
-def run_motors(control: Any, tuning: Any) -> None:
+def has_steered_wheels(tuning: Any) -> bool:
+    """Whether the servo outputs are those of a rover with Ackermann steering, which cannot turn on the spot."""
+    return bool(tuning.steering_function == GROUND_STEERING)
+
+
+@njit(cache=True, nogil=True)
+def run_wheels(control: Any, tuning: Any, speed: float, throttle: float, steering: float) -> None:
+    """Outputs for steered wheels: the faster, the less steering; the other way round when rolling backwards.
+
+    Up to MOT_SPD_SCA_BASE steering is not scaled, and counts as limited, so that its integral does not wind up.
+    """
+    fast = tuning.steering_base_m_s > 0.0 and abs(speed) > tuning.steering_base_m_s
+    control.left_limited = 1 if not fast or steering <= -1.0 else 0
+    control.right_limited = 1 if not fast or steering >= 1.0 else 0
+    control.throttle_limited = 1 if abs(throttle) >= 1.0 else 0
+    control.throttle_before = throttle
+    if fast:
+        steering *= tuning.steering_base_m_s / abs(speed)
+    control.servo_1 = -steering if speed < 0.0 else steering
+    control.servo_3 = throttle
+
+
+@njit(cache=True, nogil=True)
+def run_motors(control: Any, tuning: Any, estimate: Any) -> None:
     """Mix throttle and steering to the two sides; what does not fit is scaled down evenly."""
     throttle = control.throttle
     if tuning.slew_rate > 0.0:
@@ -155,8 +178,11 @@ def run_motors(control: Any, tuning: Any) -> None:
     throttle = limited(throttle, 1.0)
     steering = limited(control.steering, 1.0)
     if not control.armed:
-        control.left = control.right = control.throttle_before = 0.0
+        control.servo_1 = control.servo_3 = control.throttle_before = 0.0
         control.left_limited = control.right_limited = control.throttle_limited = 1
+        return
+    if has_steered_wheels(tuning):
+        run_wheels(control, tuning, forward_speed(estimate), throttle, steering)
         return
     # The firmware lets a rover turn on the spot, but not faster than its throttle leaves room for.
     total = abs(throttle) + abs(steering)
@@ -165,5 +191,5 @@ def run_motors(control: Any, tuning: Any) -> None:
     control.right_limited = 1 if steering > 0.0 and (scale < 1.0 or steering >= 1.0) else 0
     control.throttle_limited = 1 if scale < 1.0 or abs(throttle) >= 1.0 else 0
     control.throttle_before = throttle
-    control.left = scale * (throttle + steering)
-    control.right = scale * (throttle - steering)
+    control.servo_1 = scale * (throttle + steering)
+    control.servo_3 = scale * (throttle - steering)

@@ -121,8 +121,8 @@ def _position_target(vehicle: Vehicle) -> list[Any]:
 
 def _servos(vehicle: Vehicle) -> list[Any]:
     control = vehicle.control[0]
-    left, right = (1500 + round(500 * float(control[side])) for side in ("left", "right"))
-    return [mavlink.MAVLink_servo_output_raw_message(vehicle.time_us, 0, left, 0, right, 0, 0, 0, 0, 0)]
+    first, third = (1500 + round(500 * float(control[servo])) for servo in ("servo_1", "servo_3"))
+    return [mavlink.MAVLink_servo_output_raw_message(vehicle.time_us, 0, first, 0, third, 0, 0, 0, 0, 0)]
 
 
 def _simstate(vehicle: Vehicle) -> list[Any]:

@@ -16,6 +16,9 @@ LOOP_S = 1.0 / LOOP_HZ
 STOP, WAYPOINT, HEADING, TURN_RATE, COAST = 0, 1, 2, 3, 4
 """What the motion controller is doing: braking, driving to a place, holding a heading or a turn rate, nothing."""
 
+GROUND_STEERING, THROTTLE = 26, 70
+"""SERVO1_FUNCTION and SERVO3_FUNCTION of a rover with steered wheels."""
+
 NEVER = -1_000_000
 """Tick of something that has not happened."""
 
@@ -51,11 +54,14 @@ CONTROL = np.dtype(
             "nav_speed", "nav_turn_rate",
             "desired_speed", "speed_error", "speed_integral",
             "desired_turn_rate", "steer_error", "steer_integral",
-            "throttle", "throttle_before", "steering", "left", "right", "room_m",
+            "throttle", "throttle_before", "steering", "servo_1", "servo_3", "room_m",
         )
     ]
 )  # fmt: skip
-"""Everything the motion controllers remember; metres, m/s, radians, outputs -1 to 1."""
+"""Everything the motion controllers remember; metres, m/s, radians, outputs -1 to 1.
+
+``servo_1`` and ``servo_3`` are the left and right motor of a skid rover, steering and throttle of one with steered wheels.
+"""
 
 TUNING_NAMES = {
     "wp_speed": "WP_SPEED",
@@ -91,6 +97,9 @@ TUNING_NAMES = {
     "guided_options": "GUID_OPTIONS",
     "avoid": "AVOID_ENABLE",
     "avoid_margin_m": "AVOID_MARGIN",
+    "steering_function": "SERVO1_FUNCTION",
+    "turn_radius_m": "TURN_RADIUS",
+    "steering_base_m_s": "MOT_SPD_SCA_BASE",
 }
 """Fields of a tuning record and the parameters they come from."""
 

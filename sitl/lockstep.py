@@ -109,7 +109,7 @@ class Drive:
     def __post_init__(self) -> None:
         self.report = Report(self.seed)
         began_s = stopwatch_s()
-        warm_up(self.settings)
+        warm_up(self.settings, self.mission.rover.turning_radius_m)
         self.simulator = self.scenario.simulator(self.seed)
         self.report.compile_time_s = stopwatch_s() - began_s
         near, far = MemoryLink.pair()

@@ -92,7 +92,7 @@ def run_loops(
         update_estimate(estimate, rover, origin, noise, draws[loop])
         run_control(control, tuning, estimate)
         for _ in range(SUBSTEPS):
-            drive(rover, obstacles, south_m, west_m, resolution_m, control.left, control.right, LOOP_S / SUBSTEPS)
+            drive(rover, obstacles, south_m, west_m, resolution_m, control.servo_1, control.servo_3, LOOP_S / SUBSTEPS)
         if mover_radii_m.size > 0:
             now_s = time_s + (loop + 1) * LOOP_S
             meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)

@@ -1,7 +1,8 @@
-"""The plant: a skid-steered rover's motion in the world frame, and what happens where it touches something.
+"""The plant: a rover's motion in the world frame, and what happens where it touches something.
 
-The model is that of the firmware's own simulated skid rover: speed follows the mean of both motors with a
-first-order lag, the turn rate follows their difference at once.
+Skid steering is that of the firmware's own simulated skid rover: speed follows the mean of both motors with a first-order lag,
+the turn rate follows their difference at once. Ackermann steering is the bicycle model: the same drive, and front wheels that turn
+no faster and no farther than they can, so the rover turns only while it moves.
 """
 
 from __future__ import annotations
@@ -21,6 +22,11 @@ SPEED_LAG_S = 4.0 / 14.0
 TURN_RATE_RAD_S = math.radians(140.0)
 """Turn rate for one motor's full output of difference between left and right."""
 
+WHEEL_MOST_RAD = math.radians(35.0)
+"""Steering angle at full lock, where the rover drives its turning radius; that of the firmware's simulated rover."""
+WHEEL_RATE_RAD_S = math.radians(60.0)
+"""How fast the steered wheels turn: 0.6 s from straight ahead to full lock."""
+
 RELEASE_M = 0.05
 """A contact has ended when the rover has come this far away from the obstacle."""
 
@@ -38,35 +44,65 @@ ROVER = np.dtype(
         ("contacts", "i8"),
         ("struck", "i8"),
         ("struck_m_s", "f8"),
+        ("turning_radius_m", "f8"),
+        ("wheel_rad", "f8"),
     ]
 )
 """The truth about the rover, world frame, heading clockwise from north; ``contacts`` counts collisions so far.
 
 ``struck``: number of the mover it touches, from 1; ``struck_m_s``: the rover's own speed when that began.
+``turning_radius_m``: 0 for skid steering; ``wheel_rad``: where the steered wheels point, clockwise.
 """
 
 RoverState = NDArray[Any]
 
 
-def new_rover(north_m: float, east_m: float, heading_rad: float, radius_m: float) -> RoverState:
-    """A rover at rest: an array of one ``ROVER`` record."""
+def new_rover(
+    north_m: float, east_m: float, heading_rad: float, radius_m: float, turning_radius_m: float = 0.0
+) -> RoverState:
+    """A rover at rest: an array of one ``ROVER`` record. A turning radius makes it one with Ackermann steering."""
     state = np.zeros(1, dtype=ROVER)
+    state["turning_radius_m"] = turning_radius_m
     state["north_m"], state["east_m"] = north_m, east_m
     state["heading_rad"], state["radius_m"] = heading_rad, radius_m
     return state
 
 
 @njit(cache=True, nogil=True)
+def wheel_curvature(wheel_rad: float, turning_radius_m: float) -> float:
+    """Curvature of the way driven, 1/m, clockwise, with the steered wheels at this angle (bicycle model)."""
+    return math.tan(wheel_rad) / (turning_radius_m * math.tan(WHEEL_MOST_RAD))
+
+
+@njit(cache=True, nogil=True)
+def turn_wheels(rover: Any, steering: float, step_s: float) -> None:
+    """Turn the steered wheels towards a share of full lock, -1 to 1, as fast as they can."""
+    change_rad = min(max(steering, -1.0), 1.0) * WHEEL_MOST_RAD - rover.wheel_rad
+    most_rad = WHEEL_RATE_RAD_S * step_s
+    rover.wheel_rad += min(max(change_rad, -most_rad), most_rad)
+
+
+@njit(cache=True, nogil=True)
 def drive(
     rover: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
-    left: float, right: float, step_s: float,
+    servo_1: float, servo_3: float, step_s: float,
 ) -> None:  # fmt: skip
-    """Move the rover for ``step_s`` (a few milliseconds) with motor outputs -1 to 1."""
-    goal_m_s = 0.5 * (left + right) * TOP_SPEED_M_S
+    """Move the rover for ``step_s`` (a few milliseconds) with servo outputs -1 to 1.
+
+    As in the firmware they are the left and the right motor of a skid rover, steering and throttle of one with Ackermann steering.
+    """
+    ackermann = rover.turning_radius_m > 0.0
+    goal_m_s = servo_3 * TOP_SPEED_M_S if ackermann else 0.5 * (servo_1 + servo_3) * TOP_SPEED_M_S
     before_m_s = rover.speed_m_s
     speed_m_s = goal_m_s + (before_m_s - goal_m_s) * math.exp(-step_s / SPEED_LAG_S)
     rover.accel_m_s2 = (speed_m_s - before_m_s) / step_s
-    rover.yaw_rate_rad_s = (left - right) * TURN_RATE_RAD_S
+    from_rad = rover.heading_rad
+    if ackermann:
+        turn_wheels(rover, servo_1, step_s)
+        curvature = wheel_curvature(rover.wheel_rad, rover.turning_radius_m)
+        rover.yaw_rate_rad_s = 0.5 * (before_m_s + speed_m_s) * curvature
+    else:
+        rover.yaw_rate_rad_s = (servo_1 - servo_3) * TURN_RATE_RAD_S
     heading_rad = rover.heading_rad + rover.yaw_rate_rad_s * step_s
     rover.heading_rad = (heading_rad + math.pi) % (2.0 * math.pi) - math.pi
     way_m = 0.5 * (before_m_s + speed_m_s) * step_s
@@ -82,6 +118,9 @@ def drive(
             rover.touching = 1
             rover.speed_m_s = 0.0
             rover.accel_m_s2 = 0.0
+            if ackermann:
+                rover.heading_rad = from_rad
+                rover.yaw_rate_rad_s = 0.0
             return
     elif room_m >= reach_m:
         rover.touching = 0

@@ -12,7 +12,7 @@ from companion.mission.mission import Mission, SitlSpec
 from sitl.motion import NoiseSettings
 from sitl.movers import Mover, timed_track
 from sitl.sensors import suite_named
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import SimStart, Simulator, steered_wheels
 from sitl.world import World
 
 SOMEWHERE = GeoPoint(53.1325, 23.1688)
@@ -35,10 +35,21 @@ class Scenario:
     sensors: str = "lidar-90"
     rover_radius_m: float = 0.35
     parameters: dict[str, float] = field(default_factory=dict)
+    turning_radius_m: float = 0.0
+    """0: skid steering; else Ackermann."""
 
     def simulator(self, seed: int, noise: bool | NoiseSettings = True) -> Simulator:
         """A rover that has just been switched on."""
-        return Simulator(self.world, self.start, self.sensors, seed, self.rover_radius_m, self.parameters, noise)
+        return Simulator(
+            self.world,
+            self.start,
+            self.sensors,
+            seed,
+            self.rover_radius_m,
+            self.parameters,
+            noise,
+            turning_radius_m=self.turning_radius_m,
+        )
 
 
 def scenario_from_mission(mission: Mission) -> Scenario:
@@ -68,7 +79,20 @@ def scenario_from_mission(mission: Mission) -> Scenario:
         )
     start = SimStart(*start_m, math.radians(spec.heading_deg), _home(mission, spec))
     parameters = {"WP_SPEED": mission.rover.cruise_speed_m_s, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
-    return Scenario(world, start, spec.sensors, radius_m, parameters)
+    turning_radius_m = _turning_radius_m(mission, spec, name)
+    if turning_radius_m > 0.0:
+        parameters |= steered_wheels(turning_radius_m)
+    return Scenario(world, start, spec.sensors, radius_m, parameters, turning_radius_m)
+
+
+def _turning_radius_m(mission: Mission, spec: SitlSpec, name: str) -> float:
+    """The plant's, by default the rover's own; 0 for skid steering."""
+    radius_m = mission.rover.turning_radius_m
+    if spec.steering == "ackermann" and radius_m <= 0.0:
+        raise ScenarioError(
+            f"{name}: sitl.steering: ackermann needs [rover] turning_radius_m, the tightest turn it can drive"
+        )
+    return 0.0 if spec.steering == "skid" else radius_m
 
 
 def _ground(mission: Mission, spec: SitlSpec, name: str) -> tuple[World, tuple[float, float]]:

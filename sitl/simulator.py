@@ -18,7 +18,7 @@ from sitl.autopilot_lidar import LidarComponent
 from sitl.autopilot_link import Channel
 from sitl.autopilot_traffic import Traffic
 from sitl.autopilot_vehicle import Vehicle
-from sitl.control import LOOP_HZ
+from sitl.control import GROUND_STEERING, LOOP_HZ, THROTTLE
 from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.rover import new_rover
 from sitl.sensors import RangeSensing, SensorSuite, suite_named
@@ -80,6 +80,19 @@ class Collision:
     speed_m_s: float = math.nan
 
 
+def steered_wheels(turning_radius_m: float) -> dict[str, float]:
+    """ArduRover's parameters for a rover with steered wheels: outputs, TURN_RADIUS, and steering tuned to it.
+
+    At MOT_SPD_SCA_BASE, 1 m/s, a turn rate of 1 rad/s is a turn of 1 m radius, so the feed-forward is the radius at full lock.
+    """
+    return {
+        "SERVO1_FUNCTION": float(GROUND_STEERING),
+        "SERVO3_FUNCTION": float(THROTTLE),
+        "TURN_RADIUS": turning_radius_m,
+        "ATC_STR_RAT_FF": turning_radius_m,
+    }
+
+
 class SimLink:
     """One connection to the vehicle and to the components on its network."""
 
@@ -111,8 +124,12 @@ class Simulator:
         parameters: Mapping[str, float] | None = None,
         noise: bool | NoiseSettings = True,
         lidar_rate_hz: float | None = None,
+        turning_radius_m: float = 0.0,
     ) -> None:
         """``sensors`` is a suite or its name; ``parameters`` are ArduRover's, other than the defaults.
+
+        ``turning_radius_m``: 0 for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
+        (``steered_wheels``), as on a real rover.
 
         Raises ValueError for an unknown suite, KeyError for an unknown parameter.
         """
@@ -127,7 +144,7 @@ class Simulator:
         self._noise = settings.as_array()
         self._rng = np.random.default_rng(motion_seed)
         self._sensing = RangeSensing(suite, world, settings.range_m, np.random.default_rng(range_seed))
-        self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, rover_radius_m)
+        self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m)
         self._geo_start = (geodesy.to_units(start.home.lat_deg), geodesy.to_units(start.home.lon_deg))
         # Noise is drawn in fixed blocks, so that it does not depend on how the loops are batched.
         self._draws = np.empty((NOISE_ROWS, NOISE_COLUMNS))

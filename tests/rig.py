@@ -113,7 +113,7 @@ class Rig:
     ) -> None:
         """``late_s``: how long the vehicle has been switched on when the companion comes."""
         settings = settings or Settings()
-        warm_up(settings)
+        warm_up(settings, mission.rover.turning_radius_m)
         self.settings = settings
         self.simulator = scenario_from_mission(mission).simulator(seed)
         self.simulator.advance_to_s(late_s)

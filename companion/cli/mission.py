@@ -109,14 +109,21 @@ def _map_text(grid: Grid) -> str:
 
 
 def _vehicle(mission: Mission) -> list[str]:
-    lines = [f"rover: radius {mission.rover.radius_m:g} m, cruises at {mission.rover.cruise_speed_m_s:g} m/s"]
+    rover = mission.rover
+    turns = (
+        f"in arcs of {rover.turning_radius_m:g} m radius or wider" if rover.turning_radius_m > 0.0 else "on the spot"
+    )
+    lines = [f"rover: radius {rover.radius_m:g} m, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
     if mission.planned_home is not None:
         lines.append(f"planned home: {place_text(mission.planned_home)}; the rover's own home is what counts")
     if mission.sitl is not None:
         sitl = mission.sitl
         start = f", start {place_text(sitl.start)}" if sitl.start is not None else ""
         world = "" if sitl.world else "open ground, "
-        lines.append(f"simulator only: {world}heading {sitl.heading_deg:g} deg, sensors {sitl.sensors}{start}")
+        steering = f", {sitl.steering} steering" if sitl.steering is not None else ""
+        lines.append(
+            f"simulator only: {world}heading {sitl.heading_deg:g} deg, sensors {sitl.sensors}{steering}{start}"
+        )
         lines += [f"simulator only: {mover_text(mover)}" for mover in sitl.movers]
     return lines
 

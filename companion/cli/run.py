@@ -51,7 +51,7 @@ def run(
             recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
             link = open_link(connect)
             with console.status("compiling the planner (once a machine) ..."):
-                warm_up(settings)
+                warm_up(settings, mission.rover.turning_radius_m)
             link.read()  # what piled up meanwhile is old
             place = recorder.directory if isinstance(recorder, Recorder) else None
             if place != record:

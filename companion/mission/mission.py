@@ -62,10 +62,14 @@ class GridSpec:
 
 @dataclass(frozen=True, slots=True)
 class RoverSpec:
-    """The vehicle: everything within ``radius_m`` of its centre must stay clear."""
+    """The vehicle: everything within ``radius_m`` of its centre must stay clear.
+
+    ``turning_radius_m`` is the tightest arc that its centre can drive; 0: it turns on the spot.
+    """
 
     radius_m: float = 0.35
     cruise_speed_m_s: float = 2.0
+    turning_radius_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +117,8 @@ class SitlSpec:
 
     ``world``: map file; ``resolution_m``: its field size where it has none of its own (None: the mission's);
     ``start``: the field of the world where the rover stands; heading clockwise from north;
-    ``home``: where on earth that is (None: the planned home, else the first target in degrees, else somewhere).
+    ``home``: where on earth that is (None: the planned home, else the first target in degrees, else somewhere);
+    ``steering``: skid or ackermann (None: ackermann if the rover has a turning radius).
     """
 
     world: Path | None = None
@@ -123,6 +128,7 @@ class SitlSpec:
     sensors: str = "lidar-90"
     home: GeoPoint | None = None
     movers: tuple[MoverSpec, ...] = ()
+    steering: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

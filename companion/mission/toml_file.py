@@ -159,6 +159,7 @@ class RoverTable(Table):
 
     radius_m: Annotated[float, Field(gt=0.0, le=20.0)] = RoverSpec().radius_m
     cruise_speed_m_s: Annotated[float, Field(gt=0.0, le=50.0)] = RoverSpec().cruise_speed_m_s
+    turning_radius_m: Annotated[float, Field(ge=0.0, le=100.0)] = RoverSpec().turning_radius_m
 
 
 class GeoTable(Table):
@@ -198,6 +199,7 @@ class SitlTable(Table):
     sensors: Name = SitlSpec().sensors
     home: GeoTable | None = None
     movers: Annotated[list[MoverTable], Field(max_length=100)] = []
+    steering: Literal["skid", "ackermann"] | None = None
 
 
 class MissionTable(Table):
@@ -252,7 +254,7 @@ def _mission(table: MissionTable, path: Path) -> Mission:
             None if table.grid.home is None else Cell(*table.grid.home),
             table.grid.margin_m,
         ),
-        rover=RoverSpec(table.rover.radius_m, table.rover.cruise_speed_m_s),
+        rover=RoverSpec(table.rover.radius_m, table.rover.cruise_speed_m_s, table.rover.turning_radius_m),
         keep_out=keep_out + (fences.keep_out if fences else ()),
         keep_in=keep_in + (fences.keep_in if fences else ()),
         weighted=tuple(
@@ -275,6 +277,7 @@ def _sitl(table: SitlTable, path: Path) -> SitlSpec:
         sensors=table.sensors,
         home=None if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
         movers=tuple(_named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)),
+        steering=table.steering,
     )
 
 

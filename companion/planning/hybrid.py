@@ -22,6 +22,9 @@ class Hybrid:
 
     A genetic path is taken when driving along its curve costs at most ``hybrid_tolerance`` times what the graph's path costs, pulled taut and
     rounded. A dearer one leads a rover another way round, which in unknown ground costs more than a smooth curve saves.
+
+    For who cannot turn on the spot the genetic path is the one that can be driven, and it may cost as much more as coming round to
+    the target does. Otherwise it is the graph's path, and guidance finds the manoeuvres that it takes.
     """
 
     name = "hybrid"
@@ -37,32 +40,41 @@ class Hybrid:
         # A look of a few epochs finds the easy paths, and often they cannot be better: then the graph is not searched.
         look = replace(budget, control_points=budget.control_points[:1], max_epochs=budget.min_epochs)
         genetic = self._genetic.plan(problem, look, rng)
-        turns_on_the_spot = problem.motion.turning_radius_fields == 0.0
+        turning = _turning_cost(problem)
         genetic_cost = _driving_cost(problem, genetic.path)
-        if genetic.path is not None and (
-            not turns_on_the_spot or genetic_cost <= self._tolerance * _least_cost(problem)
-        ):
+        if genetic_cost <= self._tolerance * _least_cost(problem) + turning:
             return replace(genetic, planner=self.name)
         graph = self._graph.plan(problem, budget, rng)
         spent = replace(graph, planner=self.name, evaluations=genetic.evaluations, epochs=genetic.epochs)
         if graph.path is None:
             return spent
-        if not turns_on_the_spot:
-            return self._with_whole_budget(problem, budget, rng, spent)
-        smoothed = _smoothed(problem, graph.path)
-        if genetic_cost <= self._tolerance * _driving_cost(problem, smoothed):
+        spent = replace(spent, path=_smoothed(problem, graph.path))
+        good_cost = self._tolerance * _driving_cost(problem, spent.path) + turning
+        if genetic_cost <= good_cost:
             return replace(genetic, planner=self.name)
-        return replace(spent, path=smoothed)
+        if problem.motion.turning_radius_fields == 0.0:
+            return spent
+        return self._with_whole_budget(problem, budget, rng, spent, good_cost)
 
     def _with_whole_budget(
-        self, problem: PlanningProblem, budget: Budget, rng: Generator, spent: PlanResult
+        self, problem: PlanningProblem, budget: Budget, rng: Generator, spent: PlanResult, good_cost: float
     ) -> PlanResult:
-        """A vehicle that cannot turn on the spot has little use for the graph's path: it is the last resort."""
+        """To a vehicle that cannot turn on the spot a path that it can drive is worth more trouble."""
         genetic = self._genetic.plan(problem, budget, rng)
         evaluations, epochs = spent.evaluations + genetic.evaluations, spent.epochs + genetic.epochs
-        if genetic.path is None:
+        if _driving_cost(problem, genetic.path) > good_cost:
             return replace(spent, evaluations=evaluations, epochs=epochs)
         return replace(genetic, planner=self.name, evaluations=evaluations, epochs=epochs)
+
+
+def _turning_cost(problem: PlanningProblem) -> float:
+    """What coming round to the target costs who cannot turn on the spot: the arc, and as much again to be back on the way."""
+    motion, ordinary = problem.motion, 0.5
+    if motion.turning_radius_fields <= 0.0 or motion.heading_rad is None:
+        return 0.0
+    bearing_rad = math.atan2(problem.target[1] - problem.start[1], problem.target[0] - problem.start[0])
+    turn_rad = abs(math.remainder(bearing_rad - motion.heading_rad, 2.0 * math.pi))
+    return 2.0 * turn_rad * motion.turning_radius_fields * ordinary
 
 
 def _least_cost(problem: PlanningProblem) -> float:

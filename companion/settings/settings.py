@@ -145,6 +145,48 @@ class GuidanceSettings(Section):
     arrival_m: float = Field(0.5, gt=0.0, description="a target is reached within this distance")
 
 
+class SteeringSettings(Section):
+    """Guidance of rovers that cannot turn on the spot (`rover.turning_radius_m` of the mission)."""
+
+    planned_radius: float = Field(
+        1.15,
+        ge=1.0,
+        le=3.0,
+        description="ways are planned with so many times the turning radius, to have some left for corrections",
+    )
+    steer_time_s: float = Field(0.6, ge=0.0, description="from straight ahead to full lock")
+    scale_base_m_s: float = Field(
+        1.0,
+        gt=0.0,
+        description="ArduRover's MOT_SPD_SCA_BASE: slower than this it drives only a part of the turn rate it is told",
+    )
+    lateral_m_s2: float = Field(1.0, gt=0.0, description="bends are driven so slowly that they take no more than this")
+    ahead_m: float = Field(0.9, gt=0.0, description="the place on the way that is steered for lies so far ahead ...")
+    ahead_s: float = Field(0.5, ge=0.0, description="... and so much farther for each m/s")
+    astray_m: float = Field(0.8, gt=0.0, description="farther beside its way than this the rover has lost it")
+    clearance_m: float = Field(0.15, ge=0.0, description="room kept beside the rover's radius")
+    clearances_m: tuple[float, ...] = Field(
+        (0.4, 0.25, 0.12), min_length=1, description="the same when a manoeuvre is looked for, tried in turn"
+    )
+    narrow_clearance_m: float = Field(
+        0.3, ge=0.0, description="both with single thin beams, between which much stays unseen"
+    )
+    drives_on_m: float = Field(
+        2.5, gt=0.0, description="with less than this of its route to be driven in arcs the rover looks for a manoeuvre"
+    )
+    manoeuvre_every_s: float = Field(0.5, ge=0.0, description="... and not sooner again than this")
+    join_within_m: float = Field(0.5, gt=0.0, description="a manoeuvre ends so near to the route")
+    end_within_m: float = Field(0.3, gt=0.0, description="... and so near to the route's end")
+    switch_cost_m: float = Field(1.5, ge=0.0, description="what changing direction costs in metres")
+    turned_cost_radii: float = Field(
+        2.5, ge=0.0, description="what ending a manoeuvre tail first costs, in turning radii"
+    )
+    most_poses: int = Field(
+        6000, ge=100, le=1_000_000, description="poses from which one search for a manoeuvre goes on"
+    )
+    stopped_m_s: float = Field(0.15, gt=0.0, description="slower than this the rover may change its direction")
+
+
 class SafetySettings(Section):
     """Watchdogs."""
 
@@ -204,6 +246,7 @@ class Settings(Section):
     navigator: NavigatorSettings = NavigatorSettings()
     mapping: MappingSettings = MappingSettings()
     guidance: GuidanceSettings = GuidanceSettings()
+    steering: SteeringSettings = SteeringSettings()
     safety: SafetySettings = SafetySettings()
     traffic: TrafficSettings = TrafficSettings()
     link: LinkSettings = LinkSettings()

@@ -262,6 +262,18 @@ def crossing() -> Mask:
     return world
 
 
+def ackermann() -> Mask:
+    """Two walls with gaps out of line, and between them a bay of five fields, too narrow to drive a circle in."""
+    world = open_ground()
+    fill(world, 20, 0, 21, HEIGHT - 1)
+    fill(world, 20, 31, 21, 35, value=False)
+    fill(world, 40, 21, 60, 27)
+    fill(world, 40, 22, 58, 26, value=False)
+    fill(world, 78, 0, 79, HEIGHT - 1)
+    fill(world, 78, 12, 79, 16, value=False)
+    return world
+
+
 def known_1() -> Mask:
     """One obstacle."""
     world = open_ground()
@@ -319,6 +331,7 @@ WORLDS: dict[str, Callable[[], Mask]] = {
     "dead-end": dead_end,
     "sealed": sealed,
     "crossing": crossing,
+    "ackermann": ackermann,
     "known-1": known_1,
     "known-2": known_2,
     "known-3": known_3,

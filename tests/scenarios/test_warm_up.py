@@ -38,7 +38,12 @@ print(json.dumps({"outcome": report.outcome, "kernels": sum(before.values()), "n
 
 @pytest.mark.parametrize(
     ("mission", "planner"),
-    [("rooms.toml", "hybrid"), ("one-obstacle.toml", "theta-star"), ("crossing.toml", "vertex++")],
+    [
+        ("rooms.toml", "hybrid"),
+        ("one-obstacle.toml", "theta-star"),
+        ("crossing.toml", "vertex++"),
+        ("ackermann.toml", "hybrid"),
+    ],
 )
 def test_a_drive_compiles_nothing(mission: str, planner: str) -> None:
     command = [sys.executable, "-c", LOOK, str(MISSIONS / mission), planner]

@@ -40,7 +40,7 @@ def opened(mask: np.ndarray, size: int) -> np.ndarray:
 
 
 def test_the_worlds_that_are_promised_are_there() -> None:
-    expected = {"one-obstacle", "clutter", "rooms", "complex", "dead-end", "sealed", "crossing"}
+    expected = {"one-obstacle", "clutter", "rooms", "complex", "dead-end", "sealed", "crossing", "ackermann"}
     assert set(WORLDS) == expected | {f"known-{i}" for i in range(1, 5)}
     assert all(world(name).shape == (50, 100) for name in WORLDS)
 

@@ -1,0 +1,50 @@
+"""A rover with steered wheels, driven by the whole system over MAVLink bytes: through a world with a bay too narrow for a circle."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from companion.commands import GuidedHeading
+from companion.mission.load import load_mission
+from companion.recorder import NullRecorder
+from companion.settings import Settings
+from sitl.lockstep import Drive
+from sitl.scenario import scenario_from_mission
+
+MISSION = Path(__file__).resolve().parents[2] / "missions" / "ackermann.toml"
+
+
+def run_of(suite: str, seed: int) -> Drive:
+    mission = load_mission(MISSION)
+    assert mission.sitl is not None and mission.rover.turning_radius_m == 2.5
+    mission = replace(mission, sitl=replace(mission.sitl, sensors=suite))
+    scenario = scenario_from_mission(mission)
+    assert scenario.turning_radius_m == 2.5
+    return Drive(mission, scenario, Settings(), seed, NullRecorder(), time_limit_s=900.0)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("suite", ["lidar-360", "lidar-90"])
+def test_both_targets_are_reached_and_nothing_is_touched(suite: str, seed: int) -> None:
+    run = run_of(suite, seed)
+    report = run.run()
+    assert run.simulator.collisions == ()
+    assert [status for _, status in report.targets] == ["reached", "reached"]
+    assert report.exit_code == 0
+
+
+def test_it_is_never_told_to_turn_on_the_spot_and_it_backs_up() -> None:
+    run = run_of("lidar-360", 2)
+    told, send = [], run.companion._autopilot.send
+    speeds = []
+
+    def heard(command, now_s):  # type: ignore[no-untyped-def]
+        told.append(command)
+        return send(command, now_s)
+
+    run.companion._autopilot.send = heard  # type: ignore[method-assign]
+    report = run.run(lambda status: speeds.append(run.simulator.truth.speed_m_s))
+    assert report.exit_code == 0
+    assert len(told) > 500 and not any(isinstance(command, GuidedHeading) for command in told)
+    assert min(speeds) < -0.2 and max(speeds) > 1.8
