@@ -12,9 +12,11 @@ from companion.settings import LinkSettings
 
 WINDOW_S = 3.0
 """Rates are measured over so long."""
-ENOUGH = 0.5
+ENOUGH = 0.6
 """Less than this share of what was asked for is asked for again."""
 LONGEST_WAIT_S = 30.0
+EKF_HZ = 5.0
+"""Silence for a second stops the rover: on a bad line several in a row may be lost before that."""
 SLOW_HZ = 2.0
 HEARTBEAT_HZ = 5.0
 """Mode and arming are known only from it: at the 1 Hz that comes unasked, a pilot could be overlooked for a second."""
@@ -59,7 +61,7 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
         WantedRate(mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED, settings.position_rate_hz),
         WantedRate(mavlink.MAVLINK_MSG_ID_ATTITUDE, settings.attitude_rate_hz),
         WantedRate(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, SLOW_HZ),
-        WantedRate(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, SLOW_HZ),
+        WantedRate(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, EKF_HZ),
         WantedRate(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_RANGEFINDER, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, SLOW_HZ, always=False, told=False),
