@@ -17,6 +17,7 @@ from companion.planning.monotone_ga import geisler, hermanu, sedighi
 from companion.planning.planner import Planner, PlannerFactory
 from companion.planning.prm import Prm
 from companion.planning.problem import Budget, PlanningProblem
+from companion.planning.raster import cells_cost
 from companion.planning.segment_ga import SegmentGa
 from companion.planning.theta_star import ThetaStar
 from companion.planning.vertex_ga import vertex, vertex_plus
@@ -61,7 +62,9 @@ def warm_up(names: Iterable[str] = tuple(PLANNERS), settings: PlannerSettings | 
     for name in names:
         planner = make_planner(name, settings or PlannerSettings())
         for problem in (_easy(), _winding()):
-            planner.plan(problem, Budget(), rng)
+            path = planner.plan(problem, Budget(), rng).path
+            if path is not None:
+                cells_cost(problem.weights, path.cell_array)  # what is left of a path is weighed by the navigator
 
 
 def _easy() -> PlanningProblem:

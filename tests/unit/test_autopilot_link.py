@@ -62,7 +62,7 @@ def test_rates_and_places_are_asked_for_when_the_vehicle_is_heard() -> None:
     assert isinstance(event, HeartbeatSeen)
     asked = bench.tick(1.0, "COMMAND_LONG")
     intervals = {int(m.param1): m.param2 for m in asked if m.command == 511}
-    assert intervals[32] == 100_000.0 and intervals[30] == 50_000.0 and intervals[193] == 500_000.0
+    assert intervals[32] == 100_000.0 and intervals[30] == 50_000.0 and intervals[193] == 200_000.0
     assert 330 not in intervals and {33, 87, 132} <= set(intervals)
     assert [m.param1 for m in asked if m.command == 512] == [49.0, 242.0]
 
@@ -99,13 +99,13 @@ def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, f
 
 def test_rates_that_arrive_are_not_asked_for_again() -> None:
     bench = Bench()
-    assert feed_rates(bench, 0.05, 20.0, {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 2.0}) == []
+    assert feed_rates(bench, 0.05, 20.0, {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0}) == []
     assert bench.link.rate_faults == ()
 
 
 def test_a_rate_that_falls_is_asked_for_again_with_growing_pauses() -> None:
     bench = Bench()
-    asked = feed_rates(bench, 0.05, 90.0, {0: 5.0, 30: 20.0, 32: 1.0, 33: 2.0, 193: 2.0})
+    asked = feed_rates(bench, 0.05, 90.0, {0: 5.0, 30: 20.0, 32: 1.0, 33: 2.0, 193: 5.0})
     times = [time_s for time_s, message_id in asked if message_id == 32]
     assert {message_id for _, message_id in asked} == {32}
     pauses = [later - earlier for earlier, later in pairwise(times)]
@@ -117,7 +117,7 @@ def test_a_rate_that_falls_is_asked_for_again_with_growing_pauses() -> None:
 
 def test_missing_range_data_is_no_fault_but_slow_range_data_is() -> None:
     bench = Bench()
-    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 2.0}
+    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0}
     assert feed_rates(bench, 0.05, 10.0, steady) == []
     asked = feed_rates(bench, 10.0, 20.0, {**steady, 132: 1.0})
     assert {message_id for _, message_id in asked} == {132}
@@ -125,7 +125,7 @@ def test_missing_range_data_is_no_fault_but_slow_range_data_is() -> None:
 
 def test_seldom_heartbeats_are_asked_for_again_but_nobody_is_told() -> None:
     bench = Bench()
-    asked = feed_rates(bench, 0.05, 20.0, {0: 1.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 2.0})
+    asked = feed_rates(bench, 0.05, 20.0, {0: 1.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0})
     assert {message_id for _, message_id in asked} == {0} and bench.link.rate_faults == ()
 
 
