@@ -25,6 +25,8 @@ SLACK = 1.02
 SAMPLES_A_CORNER = 8
 CORRIDOR_FIELDS = 8
 """So far beside a straightened path a shorter one is looked for."""
+TAUT_FIELDS = 400
+"""So long a beginning of a path is made taut."""
 PIECE_FIELDS = 0.5
 GRAZED_WEIGHT = 10.0
 """What an obstacle counts that a curve touches between the fields under its points: it may be no more than a corner."""
@@ -169,12 +171,20 @@ def taut(weights: Weights, corners: CellArray) -> CellArray:
     """Corners of a shorter path beside one that has been pulled straight: ends included, each in clear sight of the next.
 
     A graph search counts a way in steps, and of many ways with as many steps takes any; the difference in metres is up to a twelfth.
+    Of a very long path only the beginning is made taut: a rover plans anew long before it comes to the rest.
     """
-    if len(corners) < 3:
+    reached = np.abs(np.diff(corners, axis=0)).max(axis=1, initial=0).cumsum()
+    count = 1 + int(np.searchsorted(reached, TAUT_FIELDS, "right"))
+    if count < 3:
         return corners
-    corridor = np.zeros(weights.size, np.bool_)
-    _fill_corridor(corridor, weights.shape[1], corners)
-    return any_angle(weights, Cell(*corners[0].tolist()), Cell(*corners[-1].tolist()), False, corridor)
+    head = corners[:count]
+    low = np.maximum(head.min(axis=0) - CORRIDOR_FIELDS, 0)
+    high = head.max(axis=0) + CORRIDOR_FIELDS + 1
+    around = np.ascontiguousarray(weights[low[1] : high[1], low[0] : high[0]])
+    corridor = np.zeros(around.size, np.bool_)
+    _fill_corridor(corridor, around.shape[1], head - low)
+    start, end = (Cell(*place.tolist()) for place in (head[0] - low, head[-1] - low))
+    return np.concatenate((any_angle(around, start, end, False, corridor) + low, corners[count:]))
 
 
 def smooth(weights: Weights, cells: CellArray) -> Curve:
