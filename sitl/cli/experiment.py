@@ -52,6 +52,9 @@ def experiment(
             help="navigation, driving: another map, with its MovingAI scenario file beside it; several times for several."
         ),
     ] = None,
+    planners: Annotated[
+        str, typer.Option(help="navigation, driving: names, commas between them; default: all that make sense there.")
+    ] = "",
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
         Path | None, typer.Option(help="Folder whose results.md and images/ are brought up to date.")
@@ -67,7 +70,9 @@ def experiment(
             # A place that cannot be written should show before the work, not after it.
             json_file.parent.mkdir(parents=True, exist_ok=True)
             json_file.open("a", encoding="utf-8").close()
-        report = _with_progress(name, made, Options(runs, seed, jobs, maps, tuple(world or ())), console)
+        names = tuple(planner.strip() for planner in planners.split(",") if planner.strip())
+        options = Options(runs, seed, jobs, maps, tuple(world or ()), names)
+        report = _with_progress(name, made, options, console)
         _put_out(report, console, json_file, docs)
     except (ExperimentError, MapError) as error:
         typer.echo(str(error), err=True)

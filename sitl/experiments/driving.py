@@ -15,11 +15,10 @@ from companion.bench.movingai import ScenarioFileError, read_scenarios, scenario
 from companion.mapfiles import load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
-from companion.planning.registry import PLANNERS
 from companion.recorder import NullRecorder
 from companion.warmup import warm_up
 from sitl.experiments import drawing
-from sitl.experiments.experiment import Advance, ExperimentError, Options, where_measured
+from sitl.experiments.experiment import Advance, ExperimentError, Options, planners_of, where_measured
 from sitl.experiments.navigation import settings_with
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
 from sitl.ground import mission_on_map
@@ -191,7 +190,7 @@ SUM_HEAD = ("planner", "time s", "/ref", "missed", "coll.")
 def run(options: Options, advance: Advance) -> DrivingReport:
     """Make all drives. The result (but for planning times) does not depend on ``jobs``."""
     missions = {**_shipped(options), **_given(options)}
-    planners = [planner for planner in DRIVEN if planner in PLANNERS]
+    planners = planners_of(options, DRIVEN)
     for planner in planners:
         warm_up(settings_with(planner))
     keys = [(name, planner) for name in missions for planner in planners]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import version
 from os import cpu_count
@@ -14,6 +14,8 @@ from rich.table import Table
 
 from companion.grid import Cell, Grid
 from companion.mapfiles import load_map
+from companion.planning.registry import UnknownPlannerError, make_planner
+from companion.settings import PlannerSettings
 
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""
@@ -27,7 +29,8 @@ class ExperimentError(Exception):
 class Options:
     """How much of an experiment to do. Run i has the seed ``seed + i``; ``maps`` None: those of the source checkout.
 
-    ``worlds``: maps of the user's, with scenario files beside them, for experiments that take any.
+    ``worlds``: maps of the user's, with scenario files beside them, and ``planners``, names (none: the experiment's own choice), for
+    experiments that take any.
     """
 
     runs: int = 100
@@ -35,6 +38,7 @@ class Options:
     jobs: int = 1
     maps: Path | None = None
     worlds: tuple[Path, ...] = ()
+    planners: tuple[str, ...] = ()
 
 
 class Report(Protocol):
@@ -57,6 +61,16 @@ Advance = Callable[[int, int], None]
 """Called with the runs done and the runs there are."""
 
 Experiment = Callable[[Options, Advance], Report]
+
+
+def planners_of(options: Options, usual: Iterable[str]) -> tuple[str, ...]:
+    """The planners to compare. Raises ExperimentError for an unknown name."""
+    for name in options.planners:
+        try:
+            make_planner(name, PlannerSettings())
+        except UnknownPlannerError as error:
+            raise ExperimentError(f"--planners: {error}") from error
+    return options.planners or tuple(usual)
 
 
 def load_maps(folder: Path | None, names: tuple[str, ...]) -> dict[str, Grid]:

@@ -22,7 +22,16 @@ from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import PLANNERS, make_planner
 from companion.settings import PlannerSettings, Settings, parse_settings
 from sitl.experiments import drawing
-from sitl.experiments.experiment import START, TARGET, Advance, ExperimentError, Options, load_maps, where_measured
+from sitl.experiments.experiment import (
+    START,
+    TARGET,
+    Advance,
+    ExperimentError,
+    Options,
+    load_maps,
+    planners_of,
+    where_measured,
+)
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
 from sitl.field_level import STEP_LIMIT, FieldRun, Outcome, drive_fields
 
@@ -162,8 +171,9 @@ Measured on {where_measured()}.
 def run(options: Options, advance: Advance) -> NavigationReport:
     """Make all runs. The result (but for times) does not depend on ``jobs``."""
     grounds = (*_paper_grounds(options), *_given_grounds(options))
-    registry.warm_up()
-    keys = [(planner, ground) for ground in grounds for planner in PLANNERS]
+    planners = planners_of(options, PLANNERS)
+    registry.warm_up(planners)
+    keys = [(planner, ground) for ground in grounds for planner in planners]
     tasks = []
     for planner, ground in keys:
         random = make_planner(planner, PlannerSettings()).capabilities.random
