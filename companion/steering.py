@@ -29,7 +29,7 @@ from companion.guidance import (
 from companion.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, ground_of, in_cells, tries
 from companion.mapping import EvidenceMap, clearance_m
 from companion.settings import Settings
-from companion.swept import Drive, Ground, Points, arc_clear, follow, kept_room, steered
+from companion.swept import BLOCKED, Drive, Ground, Points, arc_clear, follow, kept_room, steered
 
 MEMORY_S = 0.3
 """Speed and curvature are those of the last moments."""
@@ -68,7 +68,7 @@ class Ahead:
 
 
 class Helm:
-    """Steers one rover. It remembers the manoeuvre under way and the last few poses."""
+    """Steers one rover. It remembers the manoeuvre under way and the last few poses. ``backwards``: the rover rolls tail first."""
 
     def __init__(self, evidence: EvidenceMap, settings: Settings) -> None:
         self.manoeuvre: Manoeuvre | None = None
@@ -77,6 +77,7 @@ class Helm:
         self._poses: deque[Pose] = deque()
         self._looked_s = -math.inf
         self._tries: deque[Try] = deque()
+        self.backwards = False
 
     def reset(self) -> None:
         """The leg is over: no manoeuvre is under way."""
@@ -86,6 +87,7 @@ class Helm:
     def guide(self, route: Route, pose: Pose, speed_m_s: float, rover: RoverLimits) -> Guide:
         """What to tell the autopilot now. ``speed_m_s``: over ground, without a sign."""
         rolling = self._rolling(pose, speed_m_s)
+        self.backwards = rolling.speed_m_s < 0.0
         view = _View(self._evidence, rover, self._settings, pose, rolling)
         if view.would_touch():
             self.manoeuvre = None
@@ -201,7 +203,7 @@ class _View:
         course_rad = self.pose.heading_rad + (math.pi if speed_m_s < 0.0 else 0.0)
         needed, room = self.needed_m * self._scale, self._room(TOUCH_M)
         curvature = self.rolling.curvature_m / self._scale
-        return arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, needed) < needed - 1e-6
+        return arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, needed, BLOCKED) < needed - 1e-6
 
     def _room(self, clearance_m: float) -> float:
         """Room to keep, in cells."""
