@@ -139,7 +139,16 @@ class Driver:
         manoeuvre = self._helm.manoeuvre if self._helm else None
         route = self.route if manoeuvre is None else manoeuvre.as_route()
         way, self._aside_rad = yielded(
-            guide, route, pose, speed_m_s, moving, self.evidence, rover, settings, self._aside_rad
+            guide,
+            route,
+            pose,
+            speed_m_s,
+            moving,
+            self.evidence,
+            rover,
+            settings,
+            self._aside_rad,
+            backwards=self._helm is not None and self._helm.backwards,
         )
         return way
 

@@ -212,6 +212,8 @@ def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
     base = evidence.base
     settings = evidence.settings
     x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, base.width), min(y1, base.height)
+    if x0 >= x1 or y0 >= y1:
+        return  # the rover is off the map, and sees nothing of it
     weights, reach = evidence.grid.weights, settings.soft_reach_m / base.resolution_m
     radius = evidence.rover_radius_m / evidence.evidence_m
     penalty, s = evidence.penalty, evidence.subdivisions

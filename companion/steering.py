@@ -29,7 +29,7 @@ from companion.guidance import (
 from companion.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, ground_of, in_cells, tries
 from companion.mapping import EvidenceMap, clearance_m
 from companion.settings import Settings
-from companion.swept import Drive, Ground, Points, arc_clear, follow, kept_room, steered
+from companion.swept import BLOCKED, Drive, Ground, Points, arc_clear, follow, kept_room, steered
 
 MEMORY_S = 0.3
 """Speed and curvature are those of the last moments."""
@@ -68,7 +68,7 @@ class Ahead:
 
 
 class Helm:
-    """Steers one rover. It remembers the manoeuvre under way and the last few poses."""
+    """Steers one rover. It remembers the manoeuvre under way and the last few poses. ``backwards``: the rover rolls tail first."""
 
     def __init__(self, evidence: EvidenceMap, settings: Settings) -> None:
         self.manoeuvre: Manoeuvre | None = None
@@ -77,6 +77,8 @@ class Helm:
         self._poses: deque[Pose] = deque()
         self._looked_s = -math.inf
         self._tries: deque[Try] = deque()
+        self.backwards = False
+        self._told_m = 0.0
 
     def reset(self) -> None:
         """The leg is over: no manoeuvre is under way."""
@@ -86,7 +88,14 @@ class Helm:
     def guide(self, route: Route, pose: Pose, speed_m_s: float, rover: RoverLimits) -> Guide:
         """What to tell the autopilot now. ``speed_m_s``: over ground, without a sign."""
         rolling = self._rolling(pose, speed_m_s)
-        view = _View(self._evidence, rover, self._settings, pose, rolling)
+        self.backwards = rolling.speed_m_s < 0.0
+        view = _View(self._evidence, rover, self._settings, pose, rolling, self._told_m)
+        answer = self._answer(view, route, rover)
+        self._told_m = view.told_m
+        return answer
+
+    def _answer(self, view: _View, route: Route, rover: RoverLimits) -> Guide:
+        """On with the manoeuvre, on along the route, or stop."""
         if view.would_touch():
             self.manoeuvre = None
             return view.brake()
@@ -95,7 +104,7 @@ class Helm:
             answer = self._go_on(view, route)
             if answer is not None:
                 return answer
-        if rolling.speed_m_s < -self._settings.steering.stopped_m_s:
+        if view.rolling.speed_m_s < -self._settings.steering.stopped_m_s:
             return view.brake()
         steering = self._settings.steering
         room_m = steering.narrow_clearance_m if rover.narrow_sight else steering.clearance_m
@@ -179,11 +188,18 @@ class Helm:
 
 
 class _View:
-    """What the rover sees of its ways at one moment."""
+    """What the rover sees of its ways at one moment. ``told_m``: the curvature that it has last been told, 1/m."""
 
     def __init__(
-        self, evidence: EvidenceMap, rover: RoverLimits, settings: Settings, pose: Pose, rolling: Rolling
+        self,
+        evidence: EvidenceMap,
+        rover: RoverLimits,
+        settings: Settings,
+        pose: Pose,
+        rolling: Rolling,
+        told_m: float,
     ) -> None:
+        self.told_m = told_m
         self.pose, self.rolling, self.rover = pose, rolling, rover
         self.needed_m = braking_distance_m(abs(rolling.speed_m_s), settings.guidance)
         self._evidence = evidence
@@ -201,7 +217,7 @@ class _View:
         course_rad = self.pose.heading_rad + (math.pi if speed_m_s < 0.0 else 0.0)
         needed, room = self.needed_m * self._scale, self._room(TOUCH_M)
         curvature = self.rolling.curvature_m / self._scale
-        return arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, needed) < needed - 1e-6
+        return arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, needed, BLOCKED) < needed - 1e-6
 
     def _room(self, clearance_m: float) -> float:
         """Room to keep, in cells."""
@@ -256,10 +272,13 @@ class _View:
         return at, float(np.hypot(*rest.T).sum()) / self._scale
 
     def brake(self) -> Guide:
-        """Stop on the arc that the rover is on: it is the one that has been looked along."""
+        """Stop with the wheels as they are: the arc that the rover is on has been looked along.
+
+        To tell it the arc it really drives would open that arc more and more if it drives wider ones than it is told.
+        """
         if abs(self.rolling.speed_m_s) <= self._settings.guidance.roll_out_m_s:
             return Guide(Motion.BRAKE, STOP, 0.0)
-        return Guide(Motion.BRAKE, GuidedVelocity(0.0, self._turn_rate(self.rolling.curvature_m)), 0.0)
+        return Guide(Motion.BRAKE, GuidedVelocity(0.0, self._turn_rate(self.told_m)), 0.0)
 
     def drive(self, ahead: Ahead, *, backwards: bool, left_m: float) -> Guide:
         """Go on along a way, as fast as may be; BRAKE or BLOCKED where that is not at all."""
@@ -277,6 +296,7 @@ class _View:
         speed_m_s = max(min(limit_m_s, bend_m_s, beside_m_s), slowest_m_s)
         if backwards:
             speed_m_s = min(speed_m_s, 2.0 * slowest_m_s)
+        self.told_m = ahead.curvature_m
         setpoint = GuidedVelocity(round(-speed_m_s if backwards else speed_m_s, 1), self._turn_rate(ahead.curvature_m))
         return Guide(Motion.DRIVE, setpoint, speed_m_s)
 

@@ -98,14 +98,18 @@ def kept_room(ground: Any, x: float, y: float, room: float, least: float) -> flo
 
 
 @njit(cache=True, nogil=True)
-def arc_clear(ground: Any, x: float, y: float, course: float, curvature: float, room: float, length: float) -> float:
-    """How far the rover can go on an arc (``course``: direction of travel) before something is in its way; at most ``length``."""
+def arc_clear(
+    ground: Any, x: float, y: float, course: float, curvature: float, room: float, length: float, stop_at: int
+) -> float:
+    """How far the rover can go on an arc (``course``: direction of travel) until it would stand where it is BLOCKED, or where it is
+    UNSEEN if ``stop_at`` says so; at most ``length``.
+    """
     gone = 0.0
     while gone < length:
         step = min(STEP_CELLS, length - gone)
         middle = course + 0.5 * curvature * step
         x, y, course = x + step * math.sin(middle), y + step * math.cos(middle), course + curvature * step
-        if place(ground, x, y, room) == BLOCKED:
+        if place(ground, x, y, room) >= stop_at:
             return gone
         gone += step
     return gone

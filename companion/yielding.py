@@ -19,8 +19,10 @@ from numpy.typing import NDArray
 from companion.commands import GuidedVelocity
 from companion.frames import Pose, wrap_pi_rad
 from companion.guidance import STEP_M, STOP, Guide, Motion, Route, RoverLimits, turn_to
+from companion.manoeuvre import ground_of, in_cells
 from companion.mapping import EvidenceMap, look_along
 from companion.settings import GuidanceSettings, Settings
+from companion.swept import UNSEEN, arc_clear, kept_room
 from companion.traffic import Moving
 
 Points = NDArray[np.float64]
@@ -44,6 +46,8 @@ ASIDE_RAD = (0.5 * math.pi, -0.5 * math.pi, 0.25 * math.pi, -0.25 * math.pi)
 ASIDE_M_S = 1.2
 OFF_M = 1.5
 """How far it backs off at most."""
+ARC_M, ARC_SHARES = 2.5, (0.0, -1.0, 1.0)
+"""How far, and with which shares of the sharpest curvature, who cannot turn on the spot makes off."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -69,10 +73,13 @@ def yielded(
     rover: RoverLimits,
     settings: Settings,
     aside_rad: float | None = None,
+    *,
+    backwards: bool = False,
 ) -> tuple[Guide, float | None]:
     """What to do instead of ``now`` because of what moves; ``now`` itself if nothing comes across.
 
     Also which way the rover moves aside, if it does; handed in again as ``aside_rad`` it keeps to that.
+    ``backwards``: it rolls tail first.
     """
     moving = tuple(one for one in moving if _matters(one, pose, rover, settings))
     if not moving:
@@ -84,13 +91,17 @@ def yielded(
     def room_m(choice: Choice, share: float) -> float:
         return least_room_m(choice.places, discs, times_s, share * margins_m, choice.until_s)
 
-    on_the_way = list(_on_the_way(now, route, pose, speed_m_s, settings.guidance, times_s))
+    on_the_way = list(_on_the_way(now, route, pose, speed_m_s, settings.guidance, times_s, backwards))
     for share in MARGIN_SHARES:
         for choice in on_the_way:
             if room_m(choice, share) >= 0.0:
                 return choice.guide, None
     choices = on_the_way
-    for choice in _out_of_the_way(pose, speed_m_s, moving, evidence, rover, settings.guidance, times_s, aside_rad):
+    if rover.turning_radius_m > 0.0:
+        away = _on_arcs(pose, speed_m_s, evidence, rover, settings, times_s, backwards)
+    else:
+        away = _out_of_the_way(pose, speed_m_s, moving, evidence, rover, settings.guidance, times_s, aside_rad)
+    for choice in away:
         if room_m(choice, MARGIN_SHARES[-1]) >= 0.0:
             return choice.guide, choice.aside_rad
         choices.append(choice)
@@ -156,10 +167,17 @@ def first_near(places: Points, discs: Points, times_s: Points, near_m: float) ->
 
 
 def _on_the_way(
-    now: Guide, route: Route | None, pose: Pose, speed_m_s: float, settings: GuidanceSettings, times_s: Points
+    now: Guide,
+    route: Route | None,
+    pose: Pose,
+    speed_m_s: float,
+    settings: GuidanceSettings,
+    times_s: Points,
+    backwards: bool,
 ) -> Iterator[Choice]:
     """Going on, going on a little, stopping."""
-    halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), _ahead(pose, _braked_m(speed_m_s, times_s, settings)))
+    rolls_m = _braked_m(speed_m_s, times_s, settings)
+    halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), _ahead(pose, -rolls_m if backwards else rolls_m))
     if now.motion is Motion.DRIVE and route is not None:
         for goes_s in GO_ON_S:
             along_m = _driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
@@ -231,8 +249,6 @@ def _aside(
         along_m = np.minimum(along_m, min(rover.cruise_speed_m_s, ASIDE_M_S) * after_s)
         places = _moved(_ahead(pose, _braked_m(speed_m_s, times_s, settings)), bearing_rad, along_m)
         if error_rad > math.radians(settings.turn_until_close_deg):
-            if rover.turning_radius_m > 0.0:
-                return []
             return [Choice(turn_to(bearing_rad, speed_m_s, settings), places, aside_rad=bearing_rad)]
         going_m_s = min(rover.cruise_speed_m_s, ASIDE_M_S)
         going = Guide(Motion.LOOK, GuidedVelocity(going_m_s, 0.0), going_m_s)
@@ -257,6 +273,44 @@ def _off(
     back_m = np.minimum(np.maximum(times_s - settings.brake_delay_s, 0.0) * settings.back_out_speed_m_s, free_m)
     guide = Guide(Motion.LOOK, GuidedVelocity(-settings.back_out_speed_m_s, 0.0), settings.back_out_speed_m_s)
     return [Choice(guide, _ahead(pose, -back_m))]
+
+
+def _on_arcs(
+    pose: Pose,
+    speed_m_s: float,
+    evidence: EvidenceMap,
+    rover: RoverLimits,
+    settings: Settings,
+    times_s: Points,
+    backwards: bool,
+) -> Iterator[Choice]:
+    """Where a rover might make off to that cannot turn on the spot: straight or at full lock, the way it rolls; standing, either way."""
+    guidance, ground = settings.guidance, ground_of(evidence, pose)
+    rolls, scale = speed_m_s > settings.steering.stopped_m_s, 1.0 / evidence.evidence_m
+    x, y = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0].tolist()
+    room = kept_room(ground, x, y, (rover.radius_m + guidance.clearance_m) * scale, (rover.radius_m - 0.05) * scale)
+    sharpest_m = 1.0 / (rover.turning_radius_m * settings.steering.planned_radius)
+    for tail_first in (backwards,) if rolls else (False, True):
+        going_m_s = 2.0 * guidance.back_out_speed_m_s if tail_first else min(rover.cruise_speed_m_s, ASIDE_M_S)
+        course_rad = pose.heading_rad + (math.pi if tail_first else 0.0)
+        for share in ARC_SHARES:
+            curvature_m = share * sharpest_m
+            reach = ARC_M * scale
+            if arc_clear(ground, x, y, course_rad, curvature_m / scale, room, reach, UNSEEN) < reach - 1e-6:
+                continue
+            along_m = np.minimum(_driven_m(speed_m_s, going_m_s, math.inf, times_s, guidance), ARC_M)
+            turn_rate = curvature_m * max(speed_m_s, settings.steering.scale_base_m_s)
+            setpoint = GuidedVelocity(-going_m_s if tail_first else going_m_s, round(turn_rate, 2))
+            places = _moved_on_arc(pose, course_rad, curvature_m, along_m)
+            yield Choice(Guide(Motion.LOOK, setpoint, going_m_s), places)
+
+
+def _moved_on_arc(pose: Pose, course_rad: float, curvature_m: float, along_m: Points) -> Points:
+    """Places on an arc from where the rover is."""
+    half_rad = 0.5 * curvature_m * along_m
+    chord_m = along_m * np.sinc(half_rad / math.pi)
+    bearing_rad = course_rad + half_rad
+    return np.column_stack((pose.north_m + chord_m * np.cos(bearing_rad), pose.east_m + chord_m * np.sin(bearing_rad)))
 
 
 def _braked_m(speed_m_s: float, times_s: Points, settings: GuidanceSettings) -> Points:

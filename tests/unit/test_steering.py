@@ -315,11 +315,22 @@ def test_the_planner_is_told_heading_and_radius() -> None:
     assert isinstance(guide.setpoint, GuidedVelocity)
 
 
-def test_it_makes_way_without_turning_on_the_spot() -> None:
+def test_it_makes_way_on_arcs_and_never_turns_on_the_spot() -> None:
     route_on = route((0, 0), (16, 0))
     now = Guide(Motion.DRIVE, GuidedVelocity(2.0, 0.0), 2.0)
-    for east_m_s in (1.2, 0.0):
-        moving = Moving("m", 0.0, NedPoint(MIDDLE + 4.0, MIDDLE - 3.0 * (east_m_s > 0.0)), -1.0, east_m_s, 0.5)
-        way, aside_rad = yielded(now, route_on, pose(), 1.5, (moving,), ground(), ROVER, SETTINGS)
-        assert isinstance(way.setpoint, GuidedVelocity)
-        assert aside_rad is None or abs(aside_rad) < math.radians(16.0)
+    crossing = Moving("m", 0.0, NedPoint(MIDDLE + 4.0, MIDDLE - 3.0), 0.0, 1.2, 0.5)
+    way, aside_rad = yielded(now, route_on, pose(), 1.5, (crossing,), ground(), ROVER, SETTINGS)
+    assert isinstance(way.setpoint, GuidedVelocity) and way is not now and aside_rad is None
+    # Something comes straight on while it stands: out of its way on an arc, for straight back would not be enough.
+    coming = Moving("m", 0.0, NedPoint(MIDDLE + 4.0, MIDDLE), -0.9, 0.0, 0.5)
+    way, _ = yielded(now, None, pose(), 0.0, (coming,), ground(), ROVER, SETTINGS)
+    assert isinstance(way.setpoint, GuidedVelocity)
+    assert way.setpoint.forward_m_s != 0.0 and way.setpoint.yaw_rate_rad_s != 0.0
+    # With walls on both sides there is only straight back.
+    lane = ground([(0.0, 18.0, 40.0, 19.0), (0.0, 21.0, 40.0, 22.0)])
+    way, _ = yielded(now, None, pose(), 0.0, (coming,), lane, ROVER, SETTINGS)
+    assert isinstance(way.setpoint, GuidedVelocity)
+    assert way.setpoint.forward_m_s < 0.0 and way.setpoint.yaw_rate_rad_s == 0.0
+    # Rolling backwards it is not asked to go forwards at once.
+    way, _ = yielded(now, None, pose(), 0.7, (coming,), ground(), ROVER, SETTINGS, backwards=True)
+    assert isinstance(way.setpoint, GuidedVelocity) and way.setpoint.forward_m_s <= 0.0
