@@ -130,7 +130,7 @@ class GuidanceSettings(Section):
         0.3, ge=0.0, description="clearances smaller than this are not used with single thin beams"
     )
     narrow_margin_m: float = Field(
-        0.1,
+        0.05,
         ge=0.0,
         description="with single thin beams the rover is taken for so much wider: of a wall they see points, and the position wanders "
         "between one look and the next",
