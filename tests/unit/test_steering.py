@@ -13,11 +13,12 @@ from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
 from companion.guidance import Guide, Motion, Route, RoverLimits, braking_distance_m
 from companion.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, tries
-from companion.mapping import EvidenceMap, new_map
+from companion.mapping import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.planning.problem import PlanningProblem
 from companion.planning.registry import make_planner
+from companion.scan import RangeScan
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.steering import Helm
@@ -334,3 +335,12 @@ def test_it_makes_way_on_arcs_and_never_turns_on_the_spot() -> None:
     # Rolling backwards it is not asked to go forwards at once.
     way, _ = yielded(now, None, pose(), 0.7, (coming,), ground(), ROVER, SETTINGS, backwards=True)
     assert isinstance(way.setpoint, GuidedVelocity) and way.setpoint.forward_m_s <= 0.0
+
+
+def test_a_scan_from_far_off_the_map_changes_nothing_of_it() -> None:
+    evidence = ground()
+    weights = evidence.grid.weights.copy()
+    bearings = np.radians(np.arange(0.0, 360.0, 5.0))
+    scan = RangeScan(0.0, bearings, np.full(72, 3.0), 0.1, 8.0, np.radians(5.0), "test")
+    integrate(evidence, Pose(-60.0, 20.0, 0.0, 0.0), scan, 1)
+    assert np.array_equal(evidence.grid.weights, weights)
