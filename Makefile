@@ -29,6 +29,10 @@ results: $(KERNELS)
 	$(BIN)/rover-sitl experiment kwasniewski-maps --docs docs
 	$(BIN)/rover-sitl experiment sedighi-table1 $(addprefix --maps ,$(wildcard ../shared/data/ga_benchmarks)) --docs docs
 	$(BIN)/rover-sitl experiment achour-table1 --docs docs
+	$(BIN)/rover-sitl experiment wang-table4 --docs docs
+	$(BIN)/rover-sitl experiment navigation --runs 10 --docs docs
+	$(BIN)/rover-sitl experiment driving --runs 6 --docs docs
+	$(BIN)/rover-companion bench --docs docs
 
 # A virtual environment with the versions of constraints.txt, made once and from then on used without a network.
 # PYTHON=... chooses the interpreter; otherwise the first one that works is taken.
