@@ -11,8 +11,8 @@ import numpy as np
 
 from companion.clock import Clock, stopwatch_s
 from companion.commands import Arm, Command, Say, SetMode
-from companion.driver import STANDSTILL, Driver
-from companion.guidance import Guide
+from companion.driver import Driver
+from companion.guidance import STANDSTILL, Guide
 from companion.itinerary import Itinerary, TargetStatus
 from companion.laying import from_home
 from companion.mapfiles import save_ros_map

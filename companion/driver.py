@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.commands import GuidedHeading, GuidedVelocity
+from companion.commands import GuidedHeading
 from companion.frames import NedPoint, Pose, wrap_pi_rad
 from companion.grid import Cell
 from companion.guidance import (
+    STANDSTILL,
     Guide,
     Motion,
     Route,
@@ -20,11 +21,12 @@ from companion.guidance import (
     route_is_clear,
     with_planned_speeds,
 )
-from companion.mapping import EvidenceMap, doubt, look_along, penalise
+from companion.mapping import EvidenceMap, doubt
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Action, Decision, NavState, Part, SearchKind, abandon_path, begin, is_clear, step
 from companion.planning import problem
 from companion.planning.problem import PlanResult
+from companion.recovery import Recovery
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.steering import Helm
@@ -33,23 +35,7 @@ from companion.traffic import Moving, motion_changed, planners_movers
 from companion.turning import with_turning_cost
 from companion.yielding import yielded
 
-STANDSTILL = Guide(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
-MOVED_M = 0.3
-TURNED_RAD = math.radians(15.0)
-FRESH_PENALTY = 0.15
-FINAL_PENALTY = 1.0
-TRIES_AT_ONE_PLACE = 3
 DOUBT_REACH_M = 2.5
-BACK_ROOM_M = 0.4
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """Where the rover last got on, for noticing that it is stuck."""
-
-    pose: Pose
-    moved_s: float
-    changed_s: float
 
 
 @dataclass
@@ -77,8 +63,7 @@ class Driver:
         self._runner = runner
         self._goal: ResolvedTarget | None = None
         self._state: NavState | None = None
-        self._progress: Progress | None = None
-        self._back_until_s = -math.inf
+        self._recovery = Recovery(evidence, rover.radius_m, settings.guidance)
         self._doubts_left = 0
         self._seed = int(searcher.rng.integers(2**63))
         self._epoch = 0
@@ -86,7 +71,6 @@ class Driver:
         self._helm = Helm(evidence, settings) if rover.turning_radius_m > 0.0 else None
         self._looking_rad: float | None = None
         self._braking = False
-        self._stuck_places: dict[Cell, int] = {}
         self._moving: tuple[Moving, ...] = ()
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf
@@ -103,7 +87,7 @@ class Driver:
         self.route = None
         self.decision = None
         self._doubts_left = self._settings.navigator.doubts
-        self._progress = Progress(pose, pose.time_s, pose.time_s)
+        self._recovery.begin(pose)
 
     @property
     def goal(self) -> ResolvedTarget | None:
@@ -123,7 +107,7 @@ class Driver:
 
     def pause(self) -> None:
         """The rover stands still for a good reason: do not count it as stuck."""
-        self._progress = None
+        self._recovery.pause()
 
     def update(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...] = ()) -> tuple[Guide, Decision | None]:
         """One tick: the setpoint for now, and the navigator's decision if it has just made one. ``moving``: what moves about."""
@@ -157,8 +141,9 @@ class Driver:
         self._moving = moving
         if self._goal is None or self._state is None:
             return STANDSTILL, None
-        if pose.time_s < self._back_until_s:
-            return self._backing_out(pose), None
+        backing = self._recovery.backing(pose)
+        if backing is not None:
+            return backing, None
         decision = self._field_step(pose)
         if self._arrived(pose, speed_m_s):
             self.decision = Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
@@ -174,7 +159,7 @@ class Driver:
         planned_m_s = max(self.route.planned_m_s, self._settings.guidance.min_speed_m_s)
         rover = replace(rover, cruise_speed_m_s=min(rover.cruise_speed_m_s, planned_m_s))
         now = self._guided(self.route, pose, speed_m_s, rover)
-        if self._is_stuck(pose, now):
+        if self._recovery.is_stuck(pose, now):
             self._get_unstuck(pose)
         return now, decision
 
@@ -301,36 +286,14 @@ class Driver:
         near_m = self._settings.guidance.arrival_m
         return distance_m <= near_m or (distance_m <= 2.0 * near_m and speed_m_s < 0.1)
 
-    def _is_stuck(self, pose: Pose, now: Guide) -> bool:
-        """No movement (turning counts for a while) for ``stuck_after_s``."""
-        last = self._progress
-        if last is None or pose.point.distance_m(last.pose.point) >= MOVED_M:
-            self._progress = Progress(pose, pose.time_s, pose.time_s)
-            return False
-        if abs(wrap_pi_rad(pose.heading_rad - last.pose.heading_rad)) >= TURNED_RAD:
-            self._progress = Progress(
-                replace(pose, north_m=last.pose.north_m, east_m=last.pose.east_m), last.moved_s, pose.time_s
-            )
-            return pose.time_s - last.moved_s >= 3.0 * self._settings.guidance.stuck_after_s
-        limit_s = self._settings.guidance.stuck_after_s
-        return pose.time_s - last.changed_s >= (limit_s / 3.0 if now.motion is Motion.BLOCKED else limit_s)
-
     def _get_unstuck(self, pose: Pose) -> None:
-        """Remember the place ahead as costly (in the end as an obstacle), back out if there is room, plan anew."""
+        """Back out if there is room, away from a place that is remembered as costly, and plan anew."""
         assert self._state is not None
         self.tally.stuck += 1
-        ahead = self._place_ahead(pose)
-        cell = self.evidence.base.cell_at(ahead)
-        self._stuck_places[cell] = self._stuck_places.get(cell, 0) + 1
-        final = self._stuck_places[cell] >= TRIES_AT_ONE_PLACE
-        penalise(self.evidence, cell, FINAL_PENALTY if final else FRESH_PENALTY)
-        self._back_until_s = (
-            pose.time_s + self._settings.guidance.back_out_m / self._settings.guidance.back_out_speed_m_s
-        )
+        self._recovery.back_out(pose, self._place_ahead(pose))
         self._epoch += 1
         self._drop_manoeuvre()
         self._state = abandon_path(self._state)
-        self._progress = None
         self.route = None
         self.decision = None
 
@@ -343,14 +306,3 @@ class Driver:
             return pose.point.moved(pose.heading_rad, self.evidence.base.resolution_m)
         point = self.route.point_ahead(self.evidence.base.resolution_m)
         return pose.point.moved(pose.point.bearing_rad(point), self.evidence.base.resolution_m)
-
-    def _backing_out(self, pose: Pose) -> Guide:
-        """Straight back over ground that is known to be free, and not a step farther."""
-        self._progress = None
-        speed_m_s = self._settings.guidance.back_out_speed_m_s
-        behind = pose.point.moved(pose.heading_rad + math.pi, BACK_ROOM_M)
-        line = look_along(self.evidence, pose.point, behind, self._rover.radius_m + self._settings.guidance.clearance_m)
-        if min(line.clear_m, line.seen_m) < BACK_ROOM_M - 1e-6:
-            self._back_until_s = pose.time_s
-            return STANDSTILL
-        return Guide(Motion.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)

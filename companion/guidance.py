@@ -82,6 +82,9 @@ class Guide:
     speed_m_s: float
 
 
+STANDSTILL = Guide(Motion.BLOCKED, STOP, 0.0)
+
+
 @dataclass(frozen=True, slots=True)
 class RoverLimits:
     """The rover as guidance sees it."""
