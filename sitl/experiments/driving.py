@@ -166,7 +166,7 @@ class DrivingReport:
         tables = "\n\n".join(f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}" for name in self._names())
         return f"""## What the rover feels: driving times
 
-`rover-sitl experiment {NAME} --runs {self.options.runs} --seed {self.options.seed} --docs docs`
+`{self.options.command(NAME)}`
 
 The shipped missions in lock-step, with the rover's dynamics and sensor noise, {self.options.runs} seeds each, with several planners in the
 navigator. *time* is the mean driving time, */ref* the same divided by the faster of `{REFERENCES[0]}` and `{REFERENCES[1]}`; *missed* counts

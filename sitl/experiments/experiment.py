@@ -40,6 +40,11 @@ class Options:
     worlds: tuple[Path, ...] = ()
     planners: tuple[str, ...] = ()
 
+    def command(self, name: str) -> str:
+        """What writes this experiment's part of the results page again."""
+        chosen = f" --planners {','.join(self.planners)}" if self.planners else ""
+        return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"
+
 
 class Report(Protocol):
     """What came out."""

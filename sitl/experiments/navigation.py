@@ -145,7 +145,9 @@ class NavigationReport:
                         panel.plot(*np.array(typical.track, float).T, color=colour, linewidth=1.6, alpha=0.85)
             drawing.draw_ends(panel, ground.start, ground.target)
             drawing.title(panel, name)
-        handles = [Line2D([], [], color=colour, linewidth=2.0, label=planner) for planner, colour in SHOWN.items()]
+        driven = {series.planner for series in self.series}
+        shown = {planner: colour for planner, colour in SHOWN.items() if planner in driven}
+        handles = [Line2D([], [], color=colour, linewidth=2.0, label=planner) for planner, colour in shown.items()]
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
         return figure
 
@@ -153,7 +155,7 @@ class NavigationReport:
         tables = "\n\n".join(f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}" for name in self._names())
         return f"""## Every planner inside the navigator
 
-`rover-sitl experiment {NAME} --runs {self.options.runs} --seed {self.options.seed} --docs docs`
+`{self.options.command(NAME)}`
 
 The four maps of the section on unknown maps, driven field by field as there (at most {STEP_LIMIT} steps), each time with another planner in the
 navigator. *steps/best* is the median (then the mean) of the steps over those of a shortest path for somebody who knows the map;
