@@ -78,7 +78,8 @@ def plan(
 def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, seed: int, top_left: bool) -> Answer:
     """Plan with the budget of a thorough search. The time is without compiling. Raises UnknownPlannerError."""
     chosen = make_planner(name, settings.planner)
-    warm_up((name,), settings.planner)
+    with Console(stderr=True).status("compiling (once a machine) ..."):
+        warm_up((name,), settings.planner)
     began_s = stopwatch_s()
     result = chosen.plan(problem, budget_of(settings.navigator.thorough), np.random.default_rng(seed))
     return Answer(result, stopwatch_s() - began_s, seed, top_left, grid)
