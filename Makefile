@@ -34,7 +34,7 @@ results: $(KERNELS)
 	$(BIN)/rover-sitl experiment wang-table4 --docs docs
 	$(BIN)/rover-sitl experiment navigation --runs 10 --planners $(NAVIGATORS) --docs docs
 	$(BIN)/rover-sitl experiment driving --runs 6 --docs docs
-	$(BIN)/rover-companion bench --docs docs
+	$(BIN)/rover-companion bench --cell-s 2 --docs docs
 
 # A virtual environment with the versions of constraints.txt, made once and from then on used without a network.
 # PYTHON=... chooses the interpreter; otherwise the first one that works is taken.

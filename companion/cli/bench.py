@@ -69,7 +69,7 @@ def bench(
     if json_file is not None:
         json_file.write_text(json.dumps(as_json(entries, cases, limits), indent=2) + "\n", encoding="utf-8")
     if docs is not None:
-        command = f"rover-companion bench --sizes {sizes} --seeds {seeds} --seed {seed} --docs docs"
+        command = f"rover-companion bench --sizes {sizes} --seeds {seeds} --seed {seed} --cell-s {cell_s:g} --docs docs"
         for file in write_page(docs, command, entries, contestants, cases, limits):
             console.print(f"written: {file}")
 
