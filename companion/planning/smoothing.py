@@ -25,6 +25,12 @@ SLACK = 1.02
 SAMPLES_A_CORNER = 8
 CORRIDOR_FIELDS = 8
 """So far beside a straightened path a shorter one is looked for."""
+EVEN_SHARE = 0.5
+SIDE_WEIGHT = 0.9
+"""Fields beside an obstacle are this dear when a path is made taut, and others a quarter of what they are: a rover goes round corners
+faster, and with less doubt, where there is room beside it."""
+ROOM_SHARE = 1.15
+"""A path with room beside it may cost so many times the one that it takes the place of."""
 TAUT_FIELDS = 400
 """So long a beginning of a path is made taut."""
 PIECE_FIELDS = 0.5
@@ -167,6 +173,20 @@ def _fill_corridor(corridor: Mask, width: int, corners: CellArray) -> None:
             corridor[y * width + left : y * width + right + 1] = True
 
 
+@njit(cache=True, nogil=True)
+def _mark_sides(around: Weights, before: Weights) -> None:
+    """Obstacles as they were, and free fields beside one as dear as can be; all others have been made cheap."""
+    height, width = around.shape
+    for y in range(height):
+        for x in range(width):
+            if before[y, x] >= EVEN_SHARE * OBSTACLE:
+                around[y, x] = OBSTACLE
+                for to_y in range(max(y - 1, 0), min(y + 2, height)):
+                    for to_x in range(max(x - 1, 0), min(x + 2, width)):
+                        if around[to_y, to_x] < OBSTACLE:
+                            around[to_y, to_x] = SIDE_WEIGHT
+
+
 def taut(weights: Weights, corners: CellArray) -> CellArray:
     """Corners of a shorter path beside one that has been pulled straight: ends included, each in clear sight of the next.
 
@@ -180,11 +200,16 @@ def taut(weights: Weights, corners: CellArray) -> CellArray:
     head = corners[:count]
     low = np.maximum(head.min(axis=0) - CORRIDOR_FIELDS, 0)
     high = head.max(axis=0) + CORRIDOR_FIELDS + 1
-    around = np.ascontiguousarray(weights[low[1] : high[1], low[0] : high[0]])
+    around = EVEN_SHARE * weights[low[1] : high[1], low[0] : high[0]]
     corridor = np.zeros(around.size, np.bool_)
     _fill_corridor(corridor, around.shape[1], head - low)
+    _mark_sides(around, around.copy())
     start, end = (Cell(*place.tolist()) for place in (head[0] - low, head[-1] - low))
-    return np.concatenate((any_angle(around, start, end, False, corridor) + low, corners[count:]))
+    shorter = any_angle(around, start, end, False, corridor) + low
+    # Beside obstacles all fields have been made alike: where they are not, room could be bought too dearly.
+    if curve_cost(weights, shorter.astype(np.float64)) > ROOM_SHARE * curve_cost(weights, head.astype(np.float64)):
+        return corners
+    return np.concatenate((shorter, corners[count:]))
 
 
 def smooth(weights: Weights, cells: CellArray) -> Curve:

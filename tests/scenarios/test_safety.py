@@ -267,7 +267,7 @@ def test_a_position_jump_is_noticed_and_the_map_forgotten(rig: Rig) -> None:
     rig.change, jump_s = shifted(0.0, -3.0), rig.now_s()
     rig.until(lambda: any("jumped 3" in text for text in rig.texts()), 1.0)
     said_s = rig.now_s()
-    assert int((evidence.log_odds != 0.0).sum()) <= before
+    assert int((evidence.log_odds != 0.0).sum()) <= 1.05 * before  # one scan may have come before the jump
     rig.until(lambda: int((evidence.log_odds != 0.0).sum()) < before / 2, 2.0)
     between = [one for one in rig.sent if said_s <= one.time_s < rig.now_s() and one.is_setpoint]
     assert between and all(one.is_standstill for one in between)

@@ -101,12 +101,11 @@ def test_taut_corners_see_each_other(problem):
     assert (shorter[0] == corners[0]).all() and (shorter[-1] == corners[-1]).all()
     assert first_fault(problem.weights, polyline(shorter), False)[0] == 0
     before, after = (curve_cost(problem.weights, line.astype(float)) for line in (corners, shorter))
-    # Lazy Theta* looks at lines late, so it is not always the best; and costs are summed a little differently here.
-    assert after <= 1.35 * before + 0.5
+    assert after <= 1.15 * before + 1e-9
 
 
 def test_taut_is_nearly_as_short_as_any_angle_search_on_the_whole_map():
-    """A corridor is enough: over random clutter the mean is within 1 % of a search of the whole map."""
+    """A corridor is enough: over random clutter the mean is within 3 % of a search of the whole map, room at corners included."""
     ratios = []
     for seed in range(20):
         rng = np.random.default_rng(seed)
@@ -122,7 +121,7 @@ def test_taut_is_nearly_as_short_as_any_angle_search_on_the_whole_map():
             beside = taut(weights, straightened(weights, cells))
             ratios.append(length_of(beside) / length_of(whole))
     assert len(ratios) >= 15
-    assert np.mean(ratios) < 1.01
+    assert np.mean(ratios) < 1.03
 
 
 def length_of(corners):
@@ -135,3 +134,14 @@ def test_what_driving_along_a_curve_costs():
     assert curve_cost(weights, np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]])) == pytest.approx(np.sqrt(2.0))
     assert curve_cost(weights, np.array([[0.0, 2.0], [4.0, 2.0]])) == pytest.approx(3 * 0.5 + 10.0)
     assert curve_cost(weights, np.array([[1.0, 1.0]])) == 0.0
+
+
+def test_taut_keeps_a_field_of_room_at_corners_where_there_is_room():
+    """Round the end of a wall: the field at its corner is left alone, but not where the gap is one field wide."""
+    weights = np.full((30, 40), 0.5)
+    weights[8:, 20] = 1.0
+    corners = np.array([[10, 20], [19, 7], [21, 7], [30, 20]])
+    places = polyline(taut(weights, corners)).tolist()
+    assert [19, 7] not in places and [21, 7] not in places
+    weights[:7, 20] = 1.0
+    assert [20, 7] in polyline(taut(weights, corners)).tolist()
