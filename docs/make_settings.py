@@ -31,8 +31,8 @@ INTRODUCTION = """# Settings
 
 <!-- Written by docs/make_settings.py from companion/settings/. -->
 
-Every setting has a default, so no file is needed. To change some, write them into a TOML file and give it to any command with
-`--settings FILE`:
+Every setting has a default, so no file is needed. To change some, write them into a TOML file and give it to `run`, `plan`,
+`bench` or `drive` with `--settings FILE`:
 
 ```toml
 # settings

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from sitl.lockstep import Drive
 
+LEGEND_COLUMNS = 5
 PART_COLOURS = {"B": "#1f6fd6", "C": "#e07b00", "A": "#c2185b", "-": "#1f6fd6"}
 MOVER_COLOUR, MOVER_STEP_S = "#7b1fa2", 0.5
 PART_NAMES = {"B": "exploring (B)", "C": "new path (C)", "A": "returning (A)"}
@@ -41,11 +42,12 @@ def save_picture(run: Drive, path: Path) -> None:
     axes.set_xlabel("east, m")
     axes.set_ylabel("north, m")
     report = run.report
-    axes.set_title(
+    figure.suptitle(
         f"{run.mission.name}: {report.outcome} - {report.distance_m:.0f} m in {report.driving_time_s:.0f} s, "
-        f"{report.steps} steps ({report.return_steps} returning), {report.collisions} collisions, seed {report.seed}"
+        f"{report.steps} steps ({report.return_steps} returning), {report.collisions} collisions, seed {report.seed}",
+        fontsize=12,
     )
-    figure.legend(loc="outside lower center", ncols=7, frameon=False)
+    figure.legend(loc="outside lower center", ncols=LEGEND_COLUMNS, frameon=False)
     figure.savefig(path)
 
 
@@ -120,4 +122,7 @@ def _draw_places(axes: Axes, run: Drive) -> None:
         place = (target.point.east_m + start.east_m, target.point.north_m + start.north_m)
         axes.plot(*place, "*", color="#d32f2f", markersize=14, label="target" if i == 0 else None)
         if itinerary is not None and len(itinerary.targets) > 1:
-            axes.annotate(target.name, place, textcoords="offset points", xytext=(8, 6), fontsize=9)
+            # Towards the middle, where there is room for it.
+            left = place[0] > sum(axes.get_xlim()) / 2.0
+            aside, towards = ((-8, 8), "right") if left else ((8, 8), "left")
+            axes.annotate(target.name, place, textcoords="offset points", xytext=aside, ha=towards, fontsize=9)

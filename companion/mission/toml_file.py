@@ -196,7 +196,7 @@ class SitlTable(Table):
     resolution_m: Positive | None = None
     start: Field2 | None = None
     heading_deg: float = SitlSpec().heading_deg
-    sensors: Name = SitlSpec().sensors
+    sensors: Literal["lidar-90", "lidar-360", "beams", "none"] = "lidar-90"
     home: GeoTable | None = None
     movers: Annotated[list[MoverTable], Field(max_length=100)] = []
     steering: Literal["skid", "ackermann"] | None = None

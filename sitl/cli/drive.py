@@ -23,6 +23,7 @@ from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
 from sitl.picture import save_picture
 from sitl.scenario import ScenarioError, scenario_from_mission
+from sitl.sensors import suite_named
 
 EXIT_BAD_INPUT = 2
 LINE_EVERY_S = 60.0
@@ -58,12 +59,13 @@ def drive(
         settings = usable_settings(settings_file)
         mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
         if sensors is not None:
-            mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=sensors))
+            mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=_known(sensors)))
         _refuse_blind(mission)
         scenario = scenario_from_mission(mission)
         recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
         picture(image)
         writable(json_file)
+        map_stem = map_stem.with_suffix("") if map_stem and map_stem.suffix in (".yaml", ".pgm") else map_stem
         writable(map_stem, ".yaml")
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
@@ -84,6 +86,14 @@ def drive(
     if json_file is not None:
         json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
     raise typer.Exit(report.exit_code)
+
+
+def _known(sensors: str) -> str:
+    try:
+        suite_named(sensors)
+    except ValueError as error:
+        raise ScenarioError(f"--sensors: {error}") from error
+    return sensors
 
 
 def _refuse_blind(mission: Mission) -> None:

@@ -70,6 +70,8 @@ def experiment(
             # A place that cannot be written should show before the work, not after it.
             json_file.parent.mkdir(parents=True, exist_ok=True)
             json_file.open("a", encoding="utf-8").close()
+        if planners and name not in (navigation.NAME, driving.NAME):
+            raise ExperimentError(f"--planners: {name} compares its own; the option is for navigation and driving")
         names = tuple(planner.strip() for planner in planners.split(",") if planner.strip())
         options = Options(runs, seed, jobs, maps, tuple(world or ()), names)
         report = _with_progress(name, made, options, console)

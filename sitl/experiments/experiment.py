@@ -75,7 +75,7 @@ def planners_of(options: Options, usual: Iterable[str]) -> tuple[str, ...]:
             make_planner(name, PlannerSettings())
         except UnknownPlannerError as error:
             raise ExperimentError(f"--planners: {error}") from error
-    return options.planners or tuple(usual)
+    return tuple(dict.fromkeys(options.planners or usual))
 
 
 def load_maps(folder: Path | None, names: tuple[str, ...]) -> dict[str, Grid]:
