@@ -48,8 +48,18 @@ def curve(control: Points, samples: int) -> Points:
     points = np.empty((samples, 2))
     spans = len(control) - DEGREE
     share = spans / max(samples - 1.0, 1.0)
-    for i in range(samples):
-        at, a, b, c = basis_at(spans, i * share)
-        for axis in range(2):
-            points[i, axis] = a * control[at, axis] + b * control[at + 1, axis] + c * control[at + 2, axis]
+    i = 0
+    for span in range(spans):
+        # In one span the curve is a parabola in ``rise``: its value at 0, its slope there, its bend.
+        _, a, b, _ = basis_at(spans, float(span))
+        opening = 2.0 if span == 0 else 1.0
+        closing = 1.0 if span == spans - 1 else 0.5
+        while i < samples and (span == spans - 1 or i * share < span + 1):
+            rise = i * share - span
+            for axis in range(2):
+                p, q, r = control[span, axis], control[span + 1, axis], control[span + 2, axis]
+                points[i, axis] = (
+                    a * p + b * q + rise * (opening * (q - p) + rise * (closing * (r - q) - 0.5 * opening * (q - p)))
+                )
+            i += 1
     return points

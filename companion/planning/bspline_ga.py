@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numba import njit
 from numpy.random import Generator
@@ -107,39 +109,42 @@ class BsplineGa:
     capabilities = Capabilities(random=True, smooth_curve=True, turning_radius=True)
 
     def __init__(self, settings: PlannerSettings) -> None:
-        self._settings = tuning_of(settings)
+        self._tuning = tuning_of(settings)
         self._by_length = settings.length_fitness
-        self._archipelago = Archipelago(settings.islands, settings.migrate_every, settings.threads)
+        self._settings = settings
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
         """See ``Planner.plan``. FOUND or BUDGET_SPENT.
 
         Raises ValueError for a budget without sense: fewer than 3 control points or 4 chromosomes.
         """
-        check_budget(budget)
+        counts = counts_of(budget.control_points, budget.population)
         seed = draw_seed(rng)
         if not ends_free(problem):
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
         if problem.start == problem.target:
             return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
-        found, cells, curve, cost, count, epochs, evaluations = self._search(problem, budget, seed)
+        found, cells, curve, cost, count, epochs, evaluations = self._search(problem, budget, counts, seed)
         if not found:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, evaluations, epochs)
         path = Path(cells, cost, curve if len(curve) else None)
         return PlanResult(PlanStatus.FOUND, path, self.name, evaluations, epochs, count)
 
-    def _search(self, problem: PlanningProblem, budget: Budget, seed: int) -> Found:
+    def _search(self, problem: PlanningProblem, budget: Budget, counts: NDArray[np.int64], seed: int) -> Found:
         lives = (budget.population, budget.min_epochs, budget.max_epochs)
-        counts = np.array(budget.control_points, np.int64)
-        common = (plain(problem.weights), places_of(problem, self._by_length), self._settings, counts)
-        if self._archipelago.islands > 1:
-            return search_islands(*common, lives, self._archipelago, seed)
+        common = (plain(problem.weights), places_of(problem, self._by_length), self._tuning, counts)
+        settings = self._settings
+        if settings.islands > 1:
+            archipelago = Archipelago(settings.islands, settings.migrate_every, settings.threads)
+            return search_islands(*common, lives, archipelago, seed)
         return search(*common, *lives, seed)
 
 
-def check_budget(budget: Budget) -> None:
-    """Raise ValueError for a budget that no search can be made of."""
-    if not budget.control_points or min(budget.control_points) < bspline.DEGREE + 1:
-        raise ValueError(f"a B-spline of degree 2 needs 3 control points or more, not {budget.control_points}")
-    if budget.population < 4:
-        raise ValueError(f"a population needs 4 chromosomes or more, not {budget.population}")
+@lru_cache
+def counts_of(control_points: tuple[int, ...], population: int) -> NDArray[np.int64]:
+    """The numbers of control points for the kernel. Raises ValueError for a budget that no search can be made of."""
+    if not control_points or min(control_points) < bspline.DEGREE + 1:
+        raise ValueError(f"a B-spline of degree 2 needs 3 control points or more, not {control_points}")
+    if population < 4:
+        raise ValueError(f"a population needs 4 chromosomes or more, not {population}")
+    return np.array(control_points, np.int64)

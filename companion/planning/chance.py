@@ -35,7 +35,8 @@ def uniform(state: State) -> float:
     z = state[0]
     z = (z ^ (z >> _30)) * _MIX_1
     z = (z ^ (z >> _27)) * _MIX_2
-    return float((z ^ (z >> _31)) >> _11) * (1.0 / 9007199254740992.0)
+    # A signed number becomes a float in one instruction, and 53 bits have no sign.
+    return float(np.int64((z ^ (z >> _31)) >> _11)) * (1.0 / 9007199254740992.0)
 
 
 @njit(cache=True, nogil=True)

@@ -19,8 +19,9 @@ from companion.planning.raster import HALF, ONE, SHIFT, CellArray, fine_steps
 U = np.uint64
 PER_ONE = 1.0 / ONE
 
+GLANCES = 16
 GLANCE_FIELDS = 64
-"""On lines longer than this, one field in so many is looked at before all are summed."""
+"""Before all fields are summed a few are looked at, so many on a line as long as the map, but one in so many fields at least."""
 
 
 class Tuning(NamedTuple):
@@ -91,20 +92,23 @@ def glance(
 ) -> float:
     """Obstacles among a few fields of every long line, up to ``enough``: there are at least so many under the whole path.
 
-    On a large map every field is a wait for memory, and most chromosomes are hopeless.
+    Most chromosomes are hopeless, and on a large map every field is a wait for memory.
     """
     height, width = weights.shape
+    stride = min(max(width, height) // GLANCES + 1, GLANCE_FIELDS)
     seen = 0.0
     x, y = genes[0, 0], genes[0, 1]
     for i in range(1, len(first)):
         to_x, to_y = way_point(genes, first, basis, i)
         steps, step_x, step_y = fine_steps(to_x - x, to_y - y)
-        for k in range(GLANCE_FIELDS, steps, GLANCE_FIELDS):
-            at_x, at_y = (x * ONE + HALF + k * step_x) >> SHIFT, (y * ONE + HALF + k * step_y) >> SHIFT
+        at_x, at_y, done = to_x, to_y, 0
+        while done < steps:
             if not (0 <= at_x < width and 0 <= at_y < height) or weights[U(at_y), U(at_x)] >= OBSTACLE:
                 seen += 1.0
                 if seen >= enough:
                     return seen
+            done += stride
+            at_x, at_y = (x * ONE + HALF + done * step_x) >> SHIFT, (y * ONE + HALF + done * step_y) >> SHIFT
         x, y = to_x, to_y
     return seen
 
@@ -153,8 +157,8 @@ def fitness(
                     worst = max(value, beside if (x != from_x) & (y != from_y) else 0.0)
                 if worst >= OBSTACLE:
                     value = vln if value >= OBSTACLE else vln + value
-                    if total >= limit:
-                        return total
+                    if total + value >= limit:
+                        return total + value
             total += value
         if by_length and steps > 0:
             total = before + (total - before) * math.hypot(step_x, step_y) * PER_ONE

@@ -120,7 +120,7 @@ def measured(
     """A chromosome's fitness, as far as the limit."""
     if task.turning_radius > 0.0:
         return turning_fitness(weights, genes, task, vln, limit)
-    if limit < math.inf and max(weights.shape[0], weights.shape[1]) > 4 * GLANCE_FIELDS:
+    if limit < vln or (limit < math.inf and max(weights.shape[0], weights.shape[1]) > 4 * GLANCE_FIELDS):
         # One obstacle more than the limit has outweighs what the target does not count.
         enough = math.floor(limit / vln) + 1.0
         if glance(weights, genes, first, basis, enough) >= enough:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from operator import attrgetter
 
 from companion.planning.problem import PlanningProblem
 from companion.settings import PlannerSettings
@@ -23,21 +24,25 @@ def places_of(problem: PlanningProblem, by_length: bool) -> Places:
     return (*problem.start, *problem.target, problem.corner_cutting, radius, heading_rad, by_length)
 
 
+_TUNING = attrgetter(
+    "way_points",
+    "span_way_points",
+    "mixing",
+    "selected_share",
+    "mutation_probability",
+    "mutation_range",
+    "line_probability",
+    "line_range",
+    "neighbourhood",
+    "margin_fields",
+    "obstacle_value",
+    "adaptive",
+    "most_control_points",
+    "number_probability",
+)
+
+
 def tuning_of(settings: PlannerSettings) -> TuningValues:
     """What ``Tuning`` is made of."""
-    return (
-        settings.way_points,
-        settings.span_way_points,
-        settings.mixing,
-        settings.selected_share,
-        settings.mutation_probability,
-        settings.mutation_range,
-        settings.line_probability,
-        settings.line_range,
-        settings.neighbourhood,
-        settings.margin_fields,
-        settings.obstacle_value,
-        settings.adaptive,
-        settings.most_control_points,
-        settings.number_probability,
-    )
+    values: TuningValues = _TUNING(settings)
+    return values
