@@ -11,6 +11,7 @@ from companion.grid import empty_grid
 from companion.guidance import Route, RoverLimits
 from companion.mapping import clearance_m, integrate, look_along, new_map, penalise, unseen_beside
 from companion.planning import registry
+from companion.prediction import steered
 from companion.scan import RangeScan
 from companion.settings import Settings
 from companion.steering import Helm
@@ -33,6 +34,7 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     Tracker(evidence, settings.traffic).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
     places = np.zeros((2, 2))
     least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]), 5.0)
+    steered(0.0, 0.0, 0.0, places, np.zeros(2), np.zeros(1))
     first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
     if turning_radius_m > 0.0:
         _steer(settings)

@@ -14,21 +14,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from companion.commands import GuidedVelocity
 from companion.frames import Pose, wrap_pi_rad
-from companion.guidance import STEP_M, STOP, Guide, Motion, Route, RoverLimits, turn_to
+from companion.guidance import STOP, Guide, Motion, Route, RoverLimits, turn_to
 from companion.manoeuvre import ground_of, in_cells
 from companion.mapping import EvidenceMap, look_along
+from companion.prediction import PERIOD_S, TURN_RAD_S, Points, ahead, braked_m, driven_m, moved, moved_on_arc, on_route
 from companion.settings import GuidanceSettings, Settings
 from companion.swept import UNSEEN, arc_clear, kept_room
 from companion.traffic import Moving
 
-Points = NDArray[np.float64]
-"""Shape (n, 2): columns north_m and east_m, one row for each of the moments looked at."""
-
-PERIOD_S = 0.2
 GO_ON_S = (math.inf, 0.4, 1.5, 3.0)
 """How long the rover might go on before it stops: 0.4 s is a little more than until it is asked again, the others get it past something."""
 MARGIN_SHARES = (1.0, 0.5)
@@ -36,8 +32,6 @@ MARGIN_SHARES = (1.0, 0.5)
 STRAIGHT_S = 1.0
 NEAR_M = 0.15
 """Where everything would touch something in the end, what keeps from coming so near for longest is done."""
-TURN_RAD_S = 1.2
-"""How fast it is taken to turn on the spot."""
 TURNING_S = 5.0
 """A rover that stands to look about goes on with that as long as nothing comes within this."""
 ASIDE_M = (2.5, 1.5)
@@ -91,7 +85,7 @@ def yielded(
     def room_m(choice: Choice, share: float) -> float:
         return least_room_m(choice.places, discs, times_s, share * margins_m, choice.until_s)
 
-    on_the_way = list(_on_the_way(now, route, pose, speed_m_s, settings.guidance, times_s, backwards))
+    on_the_way = list(_on_the_way(now, route, pose, speed_m_s, rover, settings.guidance, times_s, backwards))
     for share in MARGIN_SHARES:
         for choice in on_the_way:
             if room_m(choice, share) >= 0.0:
@@ -171,17 +165,19 @@ def _on_the_way(
     route: Route | None,
     pose: Pose,
     speed_m_s: float,
+    rover: RoverLimits,
     settings: GuidanceSettings,
     times_s: Points,
     backwards: bool,
 ) -> Iterator[Choice]:
     """Going on, going on a little, stopping."""
-    rolls_m = _braked_m(speed_m_s, times_s, settings)
-    halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), _ahead(pose, -rolls_m if backwards else rolls_m))
+    rolls_m = braked_m(speed_m_s, times_s, settings)
+    halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), ahead(pose, -rolls_m if backwards else rolls_m))
     if now.motion is Motion.DRIVE and route is not None:
+        course_rad = pose.heading_rad + (math.pi if backwards else 0.0)
         for goes_s in GO_ON_S:
-            along_m = _driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
-            yield Choice(now, _along(route, pose, along_m))
+            along_m = driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
+            yield Choice(now, on_route(route, pose, course_rad, along_m, rover.turning_radius_m))
     else:
         yield Choice(now, halt.places, TURNING_S)
     yield halt
@@ -218,13 +214,13 @@ def _straight_on(
     times_s: Points,
 ) -> list[Choice]:
     """Straight past, and stop then: a way that has just been laid anew may turn off before what comes across."""
-    along_m = _driven_m(speed_m_s, speed_m_s, STRAIGHT_S, times_s, settings)
+    along_m = driven_m(speed_m_s, speed_m_s, STRAIGHT_S, times_s, settings)
     length_m = float(along_m[-1])
     there = pose.point.moved(pose.heading_rad, length_m)
     line = look_along(evidence, pose.point, there, rover.radius_m + settings.clearance_m)
     if speed_m_s <= settings.roll_out_m_s or min(line.clear_m, line.seen_m) < length_m - 0.05:
         return []
-    return [Choice(Guide(Motion.LOOK, GuidedVelocity(speed_m_s, 0.0), speed_m_s), _ahead(pose, along_m))]
+    return [Choice(Guide(Motion.LOOK, GuidedVelocity(speed_m_s, 0.0), speed_m_s), ahead(pose, along_m))]
 
 
 def _aside(
@@ -247,7 +243,7 @@ def _aside(
         after_s = np.maximum(times_s - turns_s, 0.0)
         along_m = np.minimum(0.5 * settings.deceleration_m_s2 * after_s**2, aside_m)
         along_m = np.minimum(along_m, min(rover.cruise_speed_m_s, ASIDE_M_S) * after_s)
-        places = _moved(_ahead(pose, _braked_m(speed_m_s, times_s, settings)), bearing_rad, along_m)
+        places = moved(ahead(pose, braked_m(speed_m_s, times_s, settings)), bearing_rad, along_m)
         if error_rad > math.radians(settings.turn_until_close_deg):
             return [Choice(turn_to(bearing_rad, speed_m_s, settings), places, aside_rad=bearing_rad)]
         going_m_s = min(rover.cruise_speed_m_s, ASIDE_M_S)
@@ -272,7 +268,7 @@ def _off(
         return []
     back_m = np.minimum(np.maximum(times_s - settings.brake_delay_s, 0.0) * settings.back_out_speed_m_s, free_m)
     guide = Guide(Motion.LOOK, GuidedVelocity(-settings.back_out_speed_m_s, 0.0), settings.back_out_speed_m_s)
-    return [Choice(guide, _ahead(pose, -back_m))]
+    return [Choice(guide, ahead(pose, -back_m))]
 
 
 def _on_arcs(
@@ -298,53 +294,8 @@ def _on_arcs(
             reach = ARC_M * scale
             if arc_clear(ground, x, y, course_rad, curvature_m / scale, room, reach, UNSEEN) < reach - 1e-6:
                 continue
-            along_m = np.minimum(_driven_m(speed_m_s, going_m_s, math.inf, times_s, guidance), ARC_M)
+            along_m = np.minimum(driven_m(speed_m_s, going_m_s, math.inf, times_s, guidance), ARC_M)
             turn_rate = curvature_m * max(speed_m_s, settings.steering.scale_base_m_s)
             setpoint = GuidedVelocity(-going_m_s if tail_first else going_m_s, round(turn_rate, 2))
-            places = _moved_on_arc(pose, course_rad, curvature_m, along_m)
+            places = moved_on_arc(pose, course_rad, curvature_m, along_m)
             yield Choice(Guide(Motion.LOOK, setpoint, going_m_s), places)
-
-
-def _moved_on_arc(pose: Pose, course_rad: float, curvature_m: float, along_m: Points) -> Points:
-    """Places on an arc from where the rover is."""
-    half_rad = 0.5 * curvature_m * along_m
-    chord_m = along_m * np.sinc(half_rad / math.pi)
-    bearing_rad = course_rad + half_rad
-    return np.column_stack((pose.north_m + chord_m * np.cos(bearing_rad), pose.east_m + chord_m * np.sin(bearing_rad)))
-
-
-def _braked_m(speed_m_s: float, times_s: Points, settings: GuidanceSettings) -> Points:
-    """How far the rover has rolled at each moment when it is stopped now."""
-    brakes_s = np.clip(times_s - settings.brake_delay_s, 0.0, speed_m_s / settings.deceleration_m_s2)
-    rolls_m = np.minimum(times_s, settings.brake_delay_s) * speed_m_s
-    return np.asarray(rolls_m + speed_m_s * brakes_s - 0.5 * settings.deceleration_m_s2 * brakes_s**2)
-
-
-def _driven_m(speed_m_s: float, goal_m_s: float, goes_s: float, times_s: Points, settings: GuidanceSettings) -> Points:
-    """How far it has driven at each moment when it goes on at the speed it is told, and stops after ``goes_s``."""
-    rate = settings.deceleration_m_s2
-    fastest = (
-        np.minimum(goal_m_s, speed_m_s + rate * times_s) if goal_m_s > speed_m_s else np.full(times_s.shape, goal_m_s)
-    )
-    going = times_s <= goes_s
-    after_s = np.maximum(times_s - goes_s - settings.brake_delay_s, 0.0)
-    slowed = np.maximum(float(fastest[going][-1]) - rate * after_s, 0.0)
-    speeds = np.where(going, fastest, slowed)
-    return np.concatenate(([0.0], np.cumsum((speeds[1:] + speeds[:-1]) / 2.0 * PERIOD_S)))
-
-
-def _ahead(pose: Pose, along_m: Points) -> Points:
-    """Places straight ahead of the rover."""
-    return _moved(np.tile((pose.north_m, pose.east_m), (len(along_m), 1)), pose.heading_rad, along_m)
-
-
-def _moved(places: Points, bearing_rad: float, along_m: Points) -> Points:
-    return np.asarray(places + along_m[:, None] * (math.cos(bearing_rad), math.sin(bearing_rad)))
-
-
-def _along(route: Route, pose: Pose, along_m: Points) -> Points:
-    """Places on the route, from where the rover is now."""
-    last = min(len(route.points), route.progress + 2 + math.ceil(float(along_m[-1]) / STEP_M))
-    points = np.vstack(((pose.north_m, pose.east_m), route.points[route.progress + 1 : last]))
-    reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
-    return np.column_stack((np.interp(along_m, reached_m, points[:, 0]), np.interp(along_m, reached_m, points[:, 1])))
