@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 from companion.cli import mission
 from companion.cli.bench import bench
 from companion.cli.plan import plan
 from companion.cli.run import run
+from companion.cli.version import version_option
 
 app = typer.Typer(
     name="rover-companion",
@@ -23,5 +26,5 @@ app.add_typer(mission.app)
 
 
 @app.callback()
-def options() -> None:
+def options(version: Annotated[bool, version_option("rover-companion")] = False) -> None:
     """Finds a rover's way to a mission's targets through unknown ground."""

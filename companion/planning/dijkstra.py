@@ -12,7 +12,7 @@ from numba import njit
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from companion.grid import OBSTACLE, Cell, Weights
+from companion.grid import OBSTACLE, Weights
 from companion.planning.ends import ends_free
 from companion.planning.planner import Capabilities
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult, PlanStatus
@@ -63,7 +63,7 @@ def buckets_needed(least: float, largest: float) -> int:
 def spread(
     costs: Floats, stride: int, start: int, target: int, least: float, largest: float, corner_cutting: bool
 ) -> Floats:
-    """Distances from the start, of all fields (``target`` -1) or at least of those nearer than the target; inf: none."""
+    """Distances from the start, at least of those fields that are nearer than the target; inf: none."""
     table = moves(stride)
     mask = buckets_needed(least, largest) - 1
     # A little narrower than the cheapest step, so that rounding never puts a step's end into its own bucket: then a
@@ -152,27 +152,6 @@ def shortest(
         return np.empty((0, 2), np.int64), np.inf
     cells = trace(costs, distances, stride, target, corner_cutting)
     return cells, cells_cost(weights, cells)
-
-
-@njit(cache=True, nogil=True)
-def _costs_from(weights: Weights, start_x: int, start_y: int, corner_cutting: bool) -> Floats:
-    height, width = weights.shape
-    costs, least, largest = step_costs(weights)
-    stride = width + 2
-    distances = spread(costs, stride, (start_y + 1) * stride + start_x + 1, -1, least, largest, corner_cutting)
-    return distances.reshape((height + 2, stride))[1:-1, 1:-1].copy()
-
-
-def reachable_costs(weights: Weights, start: Cell, corner_cutting: bool = False) -> Floats:
-    """The cost of the cheapest path from ``start`` to every field, shape of ``weights``; inf where none leads.
-
-    All inf if the start itself is an obstacle or outside the map. Costs as in ``path_cost``.
-    """
-    height, width = weights.shape
-    if not (0 <= start.x < width and 0 <= start.y < height) or weights[start.y, start.x] >= OBSTACLE:
-        return np.full(weights.shape, np.inf)
-    distances: Floats = _costs_from(plain(weights), start.x, start.y, corner_cutting)
-    return distances
 
 
 class Dijkstra:

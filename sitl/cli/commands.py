@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
+from companion.cli.version import version_option
 from sitl.cli.drive import drive
 from sitl.cli.experiment import experiment
 from sitl.cli.serve import serve
@@ -17,8 +20,8 @@ app = typer.Typer(
 
 
 @app.callback()
-def _commands() -> None:
-    """Keeps ``serve`` a named command, however many there are."""
+def options(version: Annotated[bool, version_option("rover-sitl")] = False) -> None:
+    """A light rover simulator that speaks ArduRover's MAVLink."""
 
 
 app.command()(drive)

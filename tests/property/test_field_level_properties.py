@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from companion.grid import BASE_WEIGHT, OBSTACLE, Cell, Grid
 from companion.navigator import simplified
-from companion.planning.dijkstra import reachable_costs
+from companion.planning.dijkstra import Dijkstra
+from companion.planning.problem import Budget, PlanningProblem, PlanStatus
 from companion.planning.raster import is_path
 from companion.settings import Settings
 from sitl.field_level import Outcome, drive_fields
@@ -33,7 +34,9 @@ def worlds(draw):
 def test_the_target_is_reached_if_and_only_if_there_is_a_way(world, seed):
     truth, start, target = world
     run = drive_fields(truth, start, target, Settings(), seed)
-    reachable = np.isfinite(reachable_costs(truth.weights, start)[target.y, target.x])
+    problem = PlanningProblem(truth.weights, start, target)
+    known = Dijkstra(Settings().planner).plan(problem, Budget(), np.random.default_rng(0))
+    reachable = known.status is PlanStatus.FOUND
     assert run.outcome is (Outcome.REACHED if reachable else Outcome.UNREACHABLE)
     assert run.track[-1] == (target if reachable else start), "in vain it is back where it started"
     assert is_path(truth.weights, run.track), "from field to field, through no obstacle and past no corner"

@@ -5,7 +5,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import dijkstra as scipy_dijkstra
 
 from companion.grid import Cell
-from companion.planning.dijkstra import Dijkstra, reachable_costs
+from companion.planning.dijkstra import Dijkstra
 from companion.planning.problem import MIN_WEIGHT, Budget, PlanningProblem, PlanStatus, path_cost
 from companion.planning.raster import is_path
 from companion.settings import PlannerSettings
@@ -17,6 +17,11 @@ RNG = np.random.default_rng(0)
 
 def plan(problem):
     return Dijkstra(PlannerSettings()).plan(problem, Budget(), RNG)
+
+
+def cost_to(weights, target, corner_cutting):
+    path = plan(PlanningProblem(weights, Cell(0, 0), target, corner_cutting)).path
+    return np.inf if path is None else path.cost
 
 
 def steps_of(weights, corner_cutting):
@@ -53,7 +58,7 @@ def test_every_distance_is_scipys(seed, corner_cutting):
     )
     graph = csr_matrix((costs, (rows, columns)), shape=(weights.size, weights.size))
     expected = scipy_dijkstra(graph, indices=0).reshape(weights.shape)
-    found = reachable_costs(weights, Cell(0, 0), corner_cutting)
+    found = np.array([[cost_to(weights, Cell(x, y), corner_cutting) for x in range(width)] for y in range(len(weights))])
     assert np.array_equal(np.isinf(found), np.isinf(expected))
     reached = np.isfinite(expected)
     assert reached.sum() > 20
@@ -134,15 +139,8 @@ def test_start_and_target_in_one_field():
     assert result.path is not None and result.path.cells == (Cell(1, 1),) and result.path.cost == 0.0
 
 
-def test_costs_from_an_obstacle_are_infinite():
-    weights = drawn("..", "#.")
-    assert np.isinf(reachable_costs(weights, Cell(0, 0))).all()
-    assert np.isinf(reachable_costs(weights, Cell(-1, 0))).all()
-
-
-def test_costs_leave_the_map_alone():
+def test_the_map_is_left_alone():
     problem = one_obstacle()
     before = problem.weights.copy()
-    reachable_costs(problem.weights, problem.start)
     plan(problem)
     assert np.array_equal(before, problem.weights)
