@@ -18,6 +18,7 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
     try:
         return _run(name, load())
     except KeyboardInterrupt:
+        print(f"{name}: stopped by Ctrl-C", file=sys.stderr)
         return EXIT_STOPPED
 
 
@@ -28,8 +29,8 @@ def _run(name: str, commands: Callable[..., object]) -> int:
     usage_error = cast(type[typer.BadParameter], typer.BadParameter.__base__)
     try:
         code = commands(prog_name=name, standalone_mode=False)
-    except typer.Abort:
-        return EXIT_STOPPED
+    except typer.Abort:  # what typer makes of an interrupt
+        raise KeyboardInterrupt from None
     except usage_error as error:
         where = error.ctx.command_path if error.ctx is not None else name
         print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)

@@ -19,12 +19,12 @@ from companion.mission.resolve import resolve
 
 EXIT_BAD_INPUT = 2
 
-app = typer.Typer(name="mission", help="Mission files.")
+app = typer.Typer(name="mission", help="Mission files: `mission check FILE` says what is understood of one.")
 
 
 @app.callback()
 def group() -> None:
-    """Mission files."""
+    """Mission files: `mission check FILE` says what is understood of one."""
 
 
 @app.command()

@@ -132,5 +132,6 @@ class _StopSignals:
     def _stop(self, number: int, frame: FrameType | None) -> None:
         self.asked = True
         if self.listener is None:
+            typer.echo("stopped before anything was sent to the rover", err=True)
             raise SystemExit(EXIT_STOPPED)
         self.listener.stop()

@@ -14,6 +14,7 @@ from rich.table import Table
 
 from companion.app import Status
 from companion.cli.inputs import OutputError, picture, usable_settings, writable
+from companion.itinerary import TargetStatus
 from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError, SitlSpec
@@ -25,7 +26,7 @@ from sitl.picture import save_picture
 from sitl.scenario import ScenarioError, scenario_from_mission
 from sitl.sensors import suite_named
 
-EXIT_BAD_INPUT = 2
+EXIT_BAD_INPUT, EXIT_STOPPED = 2, 130
 LINE_EVERY_S = 60.0
 
 
@@ -52,9 +53,12 @@ def drive(
 ) -> None:
     """Drive MISSION (or --world with --start and --target) in lock-step.
 
-    Exit code 0: all targets reached and no collision; 3: a target unreachable or given up; 4: collision; 2: bad input.
+    Exit code 0: all targets reached and no collision; 3: a target unreachable or given up; 4: collision; 2: bad input;
+    130: stopped by Ctrl-C.
     """
     console = Console()
+    recorder: Recorder | NullRecorder = NullRecorder()
+    run: Drive | None = None
     try:
         settings = usable_settings(settings_file)
         mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
@@ -62,7 +66,8 @@ def drive(
             mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=_known(sensors)))
         _refuse_blind(mission)
         scenario = scenario_from_mission(mission)
-        recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
+        if record is not None:
+            recorder = Recorder(record, mission_file, settings, seed)
         picture(image)
         writable(json_file)
         map_stem = map_stem.with_suffix("") if map_stem and map_stem.suffix in (".yaml", ".pgm") else map_stem
@@ -73,19 +78,48 @@ def drive(
     except (SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
+    except KeyboardInterrupt:
+        recorder.close()
+        typer.echo(_stopped(run, recorder), err=True)
+        raise typer.Exit(EXIT_STOPPED) from None
     recorder.close()
     _print_summary(report, console)
+    _put_out(run, recorder, console, image, map_stem, json_file)
+    raise typer.Exit(report.exit_code)
+
+
+def _put_out(
+    run: Drive,
+    recorder: Recorder | NullRecorder,
+    console: Console,
+    image: Path | None,
+    map_stem: Path | None,
+    json_file: Path | None,
+) -> None:
+    """Write what was asked for, and say where it is."""
     if image is not None:
         save_picture(run, image)
-        console.print(f"picture: {image}")
+        console.print(f"picture: {image}", soft_wrap=True)
     if map_stem is not None:
         run.companion.save_map(map_stem)
-        console.print(f"map:     {map_stem}.yaml")
+        console.print(f"map:     {map_stem}.yaml", soft_wrap=True)
     if isinstance(recorder, Recorder):
-        console.print(f"record:  {recorder.directory}")
+        console.print(f"record:  {recorder.directory}", soft_wrap=True)
     if json_file is not None:
-        json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
-    raise typer.Exit(report.exit_code)
+        json_file.write_text(json.dumps(run.report.as_json(), indent=2) + "\n", encoding="utf-8")
+        console.print(f"figures: {json_file}", soft_wrap=True)
+
+
+def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
+    """What Ctrl-C has ended, and where the record of it lies."""
+    if run is None:
+        what = "before the first metre"
+    else:
+        reached = sum(status is TargetStatus.REACHED for _, status in run.companion.statuses())
+        targets = f"{reached} of {len(run.mission.targets)} targets reached"
+        what = f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}"
+    kept = f"record so far: {recorder.directory}" if isinstance(recorder, Recorder) else "nothing was written"
+    return f"stopped by Ctrl-C: {what}; {kept}"
 
 
 def _known(sensors: str) -> str:

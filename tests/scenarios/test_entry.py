@@ -4,8 +4,12 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.metadata import version
+from pathlib import Path
 
 import pytest
+
+from tests.served import finished, process
 
 SCRIPTS = {"rover-companion": "companion", "rover-sitl": "sitl"}
 
@@ -43,3 +47,20 @@ def test_an_interrupt_while_it_loads_is_no_traceback(name: str) -> None:
         # Before our first line runs, the interpreter itself may still be starting: that is not ours.
         quiet += "cli/" not in errors and process.returncode in (0, 130)
     assert quiet >= 1
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_the_version_is_told(name: str) -> None:
+    done = subprocess.run(command(name, "--version"), capture_output=True, text=True, timeout=60, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (0, f"{name} {version('rover-companion')}\n", "")
+
+
+def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(tmp_path: Path) -> None:
+    record = tmp_path / "record"
+    with process("sitl", "drive", "missions/rooms.toml", "--sensors", "beams", "--record", record) as child:
+        assert child.stdout is not None and child.stdout.readline().startswith("Rooms")
+        child.send_signal(signal.SIGINT)
+        code, _, errors = finished(child, 20.0)
+    assert code == 130 and errors.count("\n") == 1
+    assert errors.startswith("stopped by Ctrl-C: Rooms after ") and "0 of 1 targets reached" in errors
+    assert errors.endswith(f"record so far: {record}\n") and (record / "link.tlog").stat().st_size > 0

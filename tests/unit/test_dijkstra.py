@@ -58,7 +58,9 @@ def test_every_distance_is_scipys(seed, corner_cutting):
     )
     graph = csr_matrix((costs, (rows, columns)), shape=(weights.size, weights.size))
     expected = scipy_dijkstra(graph, indices=0).reshape(weights.shape)
-    found = np.array([[cost_to(weights, Cell(x, y), corner_cutting) for x in range(width)] for y in range(len(weights))])
+    found = np.array(
+        [[cost_to(weights, Cell(x, y), corner_cutting) for x in range(width)] for y in range(len(weights))]
+    )
     assert np.array_equal(np.isinf(found), np.isinf(expected))
     reached = np.isfinite(expected)
     assert reached.sum() > 20
