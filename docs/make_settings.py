@@ -45,7 +45,7 @@ horizon_m = 6.0
 max_epochs = 80
 ```
 
-An unknown key is refused and the nearest known one is named; so is a value of the wrong type or out of range.
+An unknown key is refused with one that is spelt nearly so, or else with all that are known there; so is a value of the wrong type or out of range.
 `profile = "paper"` searches with the genetic algorithm alone (it sets `navigator.planner` to `bspline-ga`, unless the file says
 otherwise); the default has graph search behind it, see [planners.md](planners.md).
 """

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 
 import numpy as np
@@ -21,7 +20,7 @@ from companion.planning.raster import cells_cost
 from companion.planning.segment_ga import SegmentGa
 from companion.planning.theta_star import ThetaStar
 from companion.planning.vertex_ga import vertex, vertex_plus
-from companion.settings import PlannerSettings
+from companion.settings import PlannerSettings, alike
 
 PLANNERS: dict[str, PlannerFactory] = {
     "bspline-ga": BsplineGa,
@@ -41,15 +40,16 @@ PLANNERS: dict[str, PlannerFactory] = {
 
 
 class UnknownPlannerError(ValueError):
-    """A planner's name that is not in PLANNERS; the text names the known ones and the nearest."""
+    """A planner's name that is not in PLANNERS; the text names the known ones, and one that is spelt nearly so."""
 
 
 def make_planner(name: str, settings: PlannerSettings) -> Planner:
     """The planner of this name. Raises UnknownPlannerError."""
     factory = PLANNERS.get(name)
     if factory is None:
-        nearest = difflib.get_close_matches(name, PLANNERS, n=1, cutoff=0.0)[0]
-        raise UnknownPlannerError(f"unknown planner {name!r}, did you mean {nearest!r}? known: {', '.join(PLANNERS)}")
+        near = alike(name, PLANNERS)
+        hint = f", did you mean {near!r}?" if near else ";"
+        raise UnknownPlannerError(f"unknown planner {name!r}{hint} known: {', '.join(PLANNERS)}")
     return factory(settings)
 
 

@@ -1,7 +1,7 @@
 """Every setting of the companion, with its default, unit and meaning, and the file they are read from."""
 
 from companion.settings.planners import PlannerSettings
-from companion.settings.section import Section, SettingsError
+from companion.settings.section import Section, SettingsError, alike
 from companion.settings.settings import (
     GuidanceSettings,
     LinkSettings,
@@ -30,6 +30,7 @@ __all__ = [
     "SettingsError",
     "SteeringSettings",
     "TrafficSettings",
+    "alike",
     "describe_first",
     "load_settings",
     "parse_settings",

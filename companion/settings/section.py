@@ -1,8 +1,17 @@
-"""What every group of settings is."""
+"""What every group of settings is, and what is said of wrong ones."""
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
+
 from pydantic import BaseModel, ConfigDict
+
+
+def alike(name: str, known: Iterable[str]) -> str:
+    """The known name that an unknown one is spelt nearly like; empty if there is none."""
+    near = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
+    return near[0] if near else ""
 
 
 class SettingsError(Exception):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from pathlib import Path
 from typing import Annotated, Literal, get_args
@@ -10,7 +9,7 @@ from typing import Annotated, Literal, get_args
 from pydantic import BaseModel, Field, ValidationError
 
 from companion.settings.planners import PlannerSettings
-from companion.settings.section import Section, SettingsError
+from companion.settings.section import Section, SettingsError, alike
 
 ControlPoints = tuple[Annotated[int, Field(ge=3, le=64)], ...]
 
@@ -255,7 +254,7 @@ class Settings(Section):
 def load_settings(path: Path | None) -> Settings:
     """Read a TOML settings file; None gives the defaults.
 
-    Raises SettingsError (one line: file, place, reason, for an unknown key the nearest known one).
+    Raises SettingsError (one line: file, place, reason, for an unknown key the known ones).
     """
     if path is None:
         return Settings()
@@ -283,14 +282,15 @@ def parse_settings(data: dict[str, object], source: str) -> Settings:
 
 
 def describe_first(error: ValidationError, model: type[BaseModel]) -> str:
-    """The first fault of a validation as one line: place, reason, and for an unknown key the nearest known one."""
+    """The first fault of a validation as one line: place, reason, and for an unknown key one that is spelt nearly so, else all."""
     fault = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in fault["loc"]) or "file"
     if fault["type"] != "extra_forbidden":
         return f"{place}: {fault['msg'].lower()} (got {fault.get('input')!r:.60})"
     known = _known_keys(model, fault["loc"][:-1])
-    near = difflib.get_close_matches(str(fault["loc"][-1]), known, n=1, cutoff=0.0)
-    return f"{place}: unknown key" + (f", did you mean '{near[0]}'?" if near else "")
+    near = alike(str(fault["loc"][-1]), known)
+    hint = f", did you mean '{near}'?" if near else f"; known here: {', '.join(known)}"
+    return f"{place}: unknown key{hint}"
 
 
 def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:

@@ -82,6 +82,9 @@ def test_an_unknown_planner_is_named_with_the_nearest():
     with pytest.raises(UnknownPlannerError, match="'dijkstar', did you mean 'dijkstra'") as error:
         make_planner("dijkstar", PlannerSettings())
     assert all(name in str(error.value) for name in PLANNERS)
+    with pytest.raises(UnknownPlannerError, match="unknown planner 'rrt'; known: bspline-ga") as error:
+        make_planner("rrt", PlannerSettings())
+    assert "did you mean" not in str(error.value)
 
 
 def test_warm_up_compiles_what_plans_use():

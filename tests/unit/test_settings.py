@@ -34,6 +34,12 @@ def test_an_unknown_key_is_named_with_the_nearest_known_one(text, place, near, t
     assert f"{place}: unknown key, did you mean '{near}'?" in refused(text, tmp_path)
 
 
+def test_a_key_like_no_other_is_not_taken_for_one_that_is_unrelated(tmp_path):
+    message = refused("[navigator]\nreplan_evry = 1", tmp_path)
+    assert "did you mean" not in message
+    assert "navigator.replan_evry: unknown key; known here: planner, better_every_fields" in message
+
+
 @pytest.mark.parametrize(
     ("text", "place"),
     [
