@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+import math
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
 from rich.console import Console
-from rich.table import Table
 
 from companion.cli.inputs import OutputError, picture
+from companion.cli.plan_answer import Answer, as_table, as_text, flipped
 from companion.cli.plan_image import save_image
 from companion.clock import stopwatch_s
 from companion.grid import Cell, Grid
 from companion.mapfiles import MapError, load_map
-from companion.planning.problem import PlanningProblem, PlanResult, PlanStatus
+from companion.planning.problem import Motion, PlanningProblem, PlanStatus
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
 from companion.searching import budget_of
 from companion.settings import Settings, SettingsError, load_settings
@@ -29,19 +28,8 @@ class PlaceError(ValueError):
     """A start or target that cannot be one; the text is one line."""
 
 
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """What a search came to, and what was asked."""
-
-    result: PlanResult
-    seconds: float
-    seed: int
-    top_left: bool
-    grid: Grid
-
-    def place(self, cell: Cell) -> tuple[int, int]:
-        """A field in the coordinates that the user chose."""
-        return flipped(cell, self.grid.height, self.top_left)
+class TurningError(ValueError):
+    """A turning radius or a heading that would not count; the text is one line."""
 
 
 def plan(
@@ -49,7 +37,13 @@ def plan(
     start: Annotated[str, typer.Option(metavar="X,Y", help="Field: X right, Y up from the bottom row.")],
     target: Annotated[str, typer.Option(metavar="X,Y", help="Field.")],
     planner: Annotated[str | None, typer.Option(help=f"One of: {', '.join(PLANNERS)}.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the genetic algorithm.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
+    turning_radius_m: Annotated[
+        float, typer.Option(min=0.0, help="The rover's tightest turn; 0: it turns on the spot.")
+    ] = 0.0,
+    heading_deg: Annotated[
+        float | None, typer.Option(help="Where it points at the start, clockwise from up; default: anywhere.")
+    ] = None,
     image: Annotated[Path | None, typer.Option(help="Write a picture of map and path, north up.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     top_left: Annotated[bool, typer.Option("--top-left", help="Y counts down from the top row (MovingAI).")] = False,
@@ -58,17 +52,19 @@ def plan(
     """Find a path over MAP. Exit code 0: found; 3: no path, or none within the budget; 2: bad input."""
     try:
         settings = load_settings(settings_file)
+        name = planner or settings.navigator.planner
         grid = load_map(map_file)
         problem = PlanningProblem(
             grid.weights,
             place_of("--start", start, grid, top_left),
             place_of("--target", target, grid, top_left),
+            motion=motion_of(name, settings, turning_radius_m, heading_deg, grid),
         )
         picture(image)
-        answer = search(grid, problem, planner or settings.navigator.planner, settings, seed, top_left)
+        answer = search(grid, problem, name, settings, seed, top_left)
         if image is not None:
             save_image(image, grid, problem.start, problem.target, answer.result.path)
-    except (SettingsError, MapError, PlaceError, UnknownPlannerError, OutputError) as error:
+    except (SettingsError, MapError, PlaceError, TurningError, UnknownPlannerError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     typer.echo(as_text(answer)) if as_json else Console().print(as_table(answer))
@@ -82,7 +78,22 @@ def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, 
         warm_up((name,), settings.planner)
     began_s = stopwatch_s()
     result = chosen.plan(problem, budget_of(settings.navigator.thorough), np.random.default_rng(seed))
-    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid)
+    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, problem.motion)
+
+
+def motion_of(name: str, settings: Settings, radius_m: float, heading_deg: float | None, grid: Grid) -> Motion:
+    """How the rover turns, for a planner that heeds it. Raises TurningError for one that does not, and UnknownPlannerError."""
+    if radius_m == 0.0:
+        if heading_deg is not None:
+            raise TurningError(f"--heading-deg {heading_deg:g}: counts only with --turning-radius-m")
+        return Motion()
+    if not (math.isfinite(radius_m) and math.isfinite(heading_deg or 0.0)):
+        raise TurningError("--turning-radius-m, --heading-deg: finite numbers are needed")
+    if not make_planner(name, settings.planner).capabilities.turning_radius:
+        able = (each for each in PLANNERS if make_planner(each, settings.planner).capabilities.turning_radius)
+        raise TurningError(f"--turning-radius-m: {name} does not heed it; {' and '.join(able)} do")
+    heading_rad = None if heading_deg is None else math.remainder(math.radians(90.0 - heading_deg), 2.0 * math.pi)
+    return Motion(heading_rad, radius_m / grid.resolution_m)
 
 
 def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:
@@ -99,44 +110,3 @@ def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:
     if grid.is_obstacle(cell):
         raise PlaceError(f"{option} {text}: on an obstacle, choose a free field")
     return cell
-
-
-def flipped(cell: Cell, height: int, top_left: bool) -> tuple[int, int]:
-    """From a field's place in the grid to the user's coordinates, and the same way back."""
-    return (cell.x, height - 1 - cell.y) if top_left else (cell.x, cell.y)
-
-
-def as_text(answer: Answer) -> str:
-    """The answer as one JSON object; the path is a list of [x, y] in the user's coordinates."""
-    result, path = answer.result, answer.result.path
-    return json.dumps(
-        {
-            "status": result.status.value,
-            "planner": result.planner,
-            "cost": path.cost if path else None,
-            "length_fields": path.length_fields if path else None,
-            "length_m": path.length_fields * answer.grid.resolution_m if path else None,
-            "time_s": answer.seconds,
-            "epochs": result.epochs,
-            "evaluations": result.evaluations,
-            "control_points": result.control_points,
-            "seed": answer.seed,
-            "path": [answer.place(cell) for cell in path.cells] if path else None,
-        }
-    )
-
-
-def as_table(answer: Answer) -> Table:
-    """The answer for people."""
-    result, path = answer.result, answer.result.path
-    table = Table(show_header=False)
-    table.add_row("status", result.status.value)
-    table.add_row("planner", result.planner)
-    if path is not None:
-        length_m = path.length_fields * answer.grid.resolution_m
-        table.add_row("cost", f"{path.cost:.3f}")
-        table.add_row("length", f"{path.length_fields:.2f} fields, {length_m:.2f} m")
-    table.add_row("time", f"{answer.seconds * 1000.0:.3f} ms")
-    if result.epochs:
-        table.add_row("search", f"{result.epochs} epochs, {result.evaluations} chromosomes")
-    return table

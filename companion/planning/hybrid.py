@@ -28,7 +28,7 @@ class Hybrid:
     """
 
     name = "hybrid"
-    capabilities = Capabilities(proves_no_path=True, random=True, smooth_curve=True)
+    capabilities = Capabilities(proves_no_path=True, random=True, smooth_curve=True, turning_radius=True)
 
     def __init__(self, settings: PlannerSettings) -> None:
         self._genetic = BsplineGa(settings.model_copy(update={"length_fitness": True}))

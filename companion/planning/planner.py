@@ -14,7 +14,7 @@ from companion.settings import PlannerSettings
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a planner can promise."""
+    """What a planner can promise. ``turning_radius``: it heeds the problem's, if it can."""
 
     proves_no_path: bool = False
     optimal: bool = False

@@ -6,6 +6,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
+from companion.cli.plan_answer import tightest_radius
 from companion.cli.plan_image import CURVE_COLOUR, OBSTACLE_COLOUR, PATH_COLOUR, START_COLOUR, TARGET_COLOUR
 
 MAP = """type octile
@@ -51,6 +52,56 @@ def test_json_holds_the_path_in_the_users_coordinates(map_file, planner):
     assert answer["time_s"] > 0.0
 
 
+def shown(output):
+    """The rows of a table as a dict."""
+    rows = (line.strip("│ ").split("│") for line in output.splitlines() if line.startswith("│"))
+    return {name.strip(): text.strip() for name, text in rows}
+
+
+def test_the_length_of_the_fields_and_of_the_line_to_drive_are_told_apart():
+    ends = ("missions/maps/rooms.png", "--start", "0,24", "--target", "98,24")
+    table = shown(run(*ends, "--planner", "theta-star").output)
+    assert table["from field to field"] == "126.12 fields, 126.12 m"
+    assert table["line to drive"] == "118.85 fields, 118.85 m", "docs/planners.md has it too"
+    assert "the same" in shown(run(*ends, "--planner", "astar").output)["line to drive"]
+    answer = json.loads(run(*ends, "--planner", "theta-star", "--json").stdout)
+    assert answer["length_m"] == pytest.approx(126.12, abs=0.01)
+    assert answer["curve_length_m"] == pytest.approx(118.85, abs=0.01)
+
+
+def test_what_a_search_tried_is_called_what_it_is():
+    ends = ("missions/maps/one-obstacle.png", "--start", "0,24", "--target", "98,24")
+    for planner, words in (("prm", "lines looked at"), ("achour", "segments weighed"), ("bspline-ga", "chromosomes")):
+        assert shown(run(*ends, "--planner", planner).output)["search"].endswith(words)
+    assert "search" not in shown(run(*ends, "--planner", "astar").output)
+
+
+@pytest.mark.parametrize("heading_deg", [0, 90, 180])
+def test_a_rover_that_cannot_turn_on_the_spot_sets_out_ahead_and_in_wide_bends(heading_deg):
+    ends = ("missions/maps/one-obstacle.png", "--start", "20,24", "--target", "90,24")
+    turning = ("--turning-radius-m", "3", "--heading-deg", heading_deg)
+    for planner in ("bspline-ga", "hybrid"):
+        table = shown(run(*ends, *turning, "--planner", planner).output)
+        assert table["sets out"] == "ahead"
+        answer = json.loads(run(*ends, *turning, "--planner", planner, "--json").stdout)
+        assert answer["sharpest_bend_m"] > 2.9
+        assert table["sharpest bend"] == f"{answer['sharpest_bend_m']:.2f} m radius"
+
+
+def test_a_line_that_such_a_rover_cannot_drive_is_said_to_be_none():
+    turning = ("--turning-radius-m", "3", "--heading-deg", "180")
+    result = run("missions/maps/rooms.png", "--start", "0,24", "--target", "98,24", *turning)
+    assert result.exit_code == 0
+    assert "too tight" in result.output and "off its heading" in result.output
+
+
+def test_the_sharpest_bend_of_a_circle_is_its_radius():
+    angles = np.linspace(0.0, 3.0, 40)
+    circle = 5.0 * np.column_stack((np.cos(angles), np.sin(angles)))
+    assert tightest_radius(circle) == pytest.approx(5.0, rel=1e-3)
+    assert tightest_radius(np.column_stack((angles, 2.0 * angles))) == np.inf
+
+
 def test_top_left_counts_y_down(map_file):
     result = run(map_file, "--start", "0,5", "--target", "7,5", "--top-left", "--json")
     path = json.loads(result.stdout)["path"]
@@ -84,6 +135,12 @@ def test_no_path_is_exit_code_3(map_file, tmp_path):
         (["--start", "0;0", "--target", "7,0"], ["--start 0;0", "two whole numbers"]),
         (["--start", "0,0,0", "--target", "7,0"], ["two whole numbers"]),
         (["--start", "0,0", "--target", "7,0", "--planner", "hibrid"], ["'hibrid'", "'hybrid'"]),
+        (["--start", "0,0", "--target", "7,0", "--heading-deg", "90"], ["--heading-deg 90", "--turning-radius-m"]),
+        (["--start", "0,0", "--target", "7,0", "--turning-radius-m", "inf"], ["--turning-radius-m", "finite"]),
+        (
+            ["--start", "0,0", "--target", "7,0", "--turning-radius-m", "2", "--planner", "astar"],
+            ["astar does not heed", "bspline-ga and hybrid"],
+        ),
         (["--start", "0,0", "--target", "7,0", "--settings", "no-such.toml"], ["no-such.toml"]),
         (["--start", "0,0", "--target", "7,0", "--image", "/dev/null/a.png"], ["/dev/null/a.png"]),
         (["--start", "0,0", "--target", "7,0", "--image", "picture.none"], ["picture.none", ".png"]),
