@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from sitl.news import News
 from sitl.simulator import SimLink, Simulator
 
 STEP_S = 0.02
@@ -49,15 +50,21 @@ def _address(url: str) -> tuple[str, str, int]:
     return kind, host, int(port)
 
 
-def open_endpoint(url: str, simulator: Simulator) -> Endpoint:
+def open_endpoint(url: str, simulator: Simulator, news: News | None = None) -> Endpoint:
     """Open ``tcp:HOST:PORT`` (listens), ``udpout:HOST:PORT`` (sends) or ``udpin:HOST:PORT`` (waits). Raises ListenError."""
     kind, host, port = _address(url)
+    news = news or News()
     try:
         if kind == "tcp":
-            return TcpServer(host, port)
-        return UdpEndpoint(host, port, listens=kind == "udpin", link=simulator.connect())
+            return TcpServer(host, port, news)
+        return UdpEndpoint(host, port, listens=kind == "udpin", link=simulator.connect(), news=news)
     except OSError as error:
         raise ListenError(f"{url}: cannot be opened: {error.strerror or error}; choose another port") from error
+
+
+def place_text(place: tuple[str, int]) -> str:
+    """An address of the other side as people write it."""
+    return f"{place[0]}:{place[1]}"
 
 
 def datagrams(data: bytes) -> list[bytes]:
@@ -79,8 +86,10 @@ def datagrams(data: bytes) -> list[bytes]:
 class UdpEndpoint:
     """One UDP partner: a fixed one (udpout) or whoever spoke last (udpin)."""
 
-    def __init__(self, host: str, port: int, listens: bool, link: SimLink) -> None:
+    def __init__(self, host: str, port: int, listens: bool, link: SimLink, news: News) -> None:
         """Raises OSError when the address cannot be used."""
+        self._url = f"{'udpin' if listens else 'udpout'}:{host}:{port}"
+        self._news = news
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._link = link
@@ -108,6 +117,7 @@ class UdpEndpoint:
                 break
             except OSError:  # the partner's port is closed; it may open again
                 continue
+            self._news.heard(place_text(self._partner), self._url)
             self._link.receive(data)
         if self._link.dropped:
             self._link = simulator.connect()
@@ -127,6 +137,7 @@ class TcpClient:
 
     socket: socket.socket
     link: SimLink
+    name: str
     waiting: bytearray = field(default_factory=bytearray)
     gone: bool = False
 
@@ -154,8 +165,10 @@ class TcpClient:
 class TcpServer:
     """Listens on one port; every client has a link of its own."""
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(self, host: str, port: int, news: News) -> None:
         """Raises OSError when the port is in use."""
+        self._url = f"tcp:{host}:{port}"
+        self._news = news
         self._clients: list[TcpClient] = []
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
@@ -175,13 +188,15 @@ class TcpServer:
         """Let new clients in, serve the others, forget those that left."""
         with contextlib.suppress(BlockingIOError):
             while True:
-                caller, _ = self._socket.accept()
+                caller, place = self._socket.accept()
                 caller.setblocking(False)
                 caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                self._clients.append(TcpClient(caller, simulator.connect()))
+                self._clients.append(TcpClient(caller, simulator.connect(), place_text(place)))
+                self._news.came(self._clients[-1].name, self._url)
         for client in self._clients:
             client.exchange()
             if client.gone or client.link.dropped:
+                self._news.left(client.name, self._url, dropped=not client.gone)
                 simulator.disconnect(client.link)
                 client.socket.close()
         self._clients = [client for client in self._clients if not (client.gone or client.link.dropped)]
@@ -199,8 +214,10 @@ def serve(
     now_s: Callable[[], float],
     speedup: float,
     running: Callable[[], bool],
+    news: News | None = None,
 ) -> None:
-    """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no."""
+    """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no; ``news`` tells of it."""
+    news = news or News()
     began_s = now_s() - simulator.time_s / speedup
     while running():
         for endpoint in endpoints:
@@ -212,6 +229,7 @@ def serve(
         simulator.advance_to_s(goal_s)
         for endpoint in endpoints:
             endpoint.exchange(simulator)
+        news.look(simulator)
         wait_s = (simulator.time_s + STEP_S) / speedup + began_s - now_s()
         if wait_s > 0.0:
             sockets = [one for endpoint in endpoints for one in endpoint.sockets()]

@@ -185,6 +185,11 @@ class Simulator:
         )
 
     @property
+    def start(self) -> SimStart:
+        """Where the rover was switched on."""
+        return self._start
+
+    @property
     def collisions(self) -> tuple[Collision, ...]:
         """Every contact with an obstacle so far; one that lasts counts once."""
         return tuple(self._collisions)

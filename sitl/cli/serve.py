@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import signal
 from pathlib import Path
 from types import FrameType
@@ -13,6 +14,7 @@ from companion.clock import WallClock
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from sitl.news import News
 from sitl.scenario import ScenarioError, scenario_from_mission
 from sitl.server import Endpoint, ListenError, open_endpoint
 from sitl.server import serve as run_server
@@ -29,22 +31,31 @@ def serve(
     ] = None,
     speedup: Annotated[float, typer.Option(min=0.01, max=200.0, help="Times real time.")] = 1.0,
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
 ) -> None:
-    """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C."""
+    """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C.
+
+    One line tells of each client that comes or goes, and of each collision.
+    """
+    clock = WallClock()
+    news = News() if quiet else News(_say, clock.now_s)
     endpoints: list[Endpoint] = []
     try:
         simulator = scenario_from_mission(load_mission(mission_file)).simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
         simulator.advance_to_s(0.02)
         for url in listen or DEFAULT_LISTEN:
-            endpoints.append(open_endpoint(url, simulator))
+            endpoints.append(open_endpoint(url, simulator, news))
     except (MissionError, MapError, ScenarioError, ListenError) as error:
         for endpoint in endpoints:
             endpoint.close()
         typer.echo(str(error), err=True)
         raise typer.Exit(BAD_INPUT) from error
-    for url in listen or DEFAULT_LISTEN:
-        typer.echo(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
+    if not quiet:
+        for url in listen or DEFAULT_LISTEN:
+            _say(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
+        if not listen:
+            _say("a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760")
     stop: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:
@@ -53,7 +64,15 @@ def serve(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
     try:
-        run_server(simulator, endpoints, WallClock().now_s, speedup, lambda: not stop)
+        run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, news)
     finally:
         for endpoint in endpoints:
             endpoint.close()
+    if not quiet:
+        _say(f"stopped after {simulator.time_s:.0f} s of the rover's time")
+
+
+def _say(line: str) -> None:
+    """A line on standard output; the simulator goes on when nobody reads it any more."""
+    with contextlib.suppress(OSError):
+        typer.echo(line)

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from tests.served import finished, process, wait_until
 from tests.unit.test_sitl_server import free_port
 
 
@@ -20,10 +21,10 @@ def test_it_serves_twenty_times_as_fast_and_ends_cleanly(tmp_path: Path, number:
     port = free_port()
     arguments = ["serve", str(mission), "--listen", f"tcp:127.0.0.1:{port}", "--speedup", "20"]
     code = "from sitl.cli.main import main; main()"
-    with subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, text=True) as process:
+    with subprocess.Popen([sys.executable, "-c", code, *arguments], stdout=subprocess.PIPE, text=True) as child:
         try:
-            assert process.stdout is not None
-            assert process.stdout.readline() == f"listening on tcp:127.0.0.1:{port}\n"
+            assert child.stdout is not None
+            assert child.stdout.readline() == f"listening on tcp:127.0.0.1:{port}\n"
             with socket.create_connection(("127.0.0.1", port), timeout=5.0) as client:
                 parser, times_s = mavlink.MAVLink(None), []
                 began_s = time.monotonic()
@@ -33,7 +34,27 @@ def test_it_serves_twenty_times_as_fast_and_ends_cleanly(tmp_path: Path, number:
                             times_s.append(message.time_boot_ms / 1000)
             # Loosely, as the machine may be busy: 30 s of the rover's time have passed.
             assert 10.0 < times_s[-1] - times_s[0] < 40.0
-            process.send_signal(number)
-            assert process.wait(timeout=5.0) == 0
+            assert "has come" in child.stdout.readline() and "has left" in child.stdout.readline()
+            child.send_signal(number)
+            assert child.wait(timeout=5.0) == 0
+            assert child.stdout.read().startswith("stopped after ")
         finally:
-            process.kill()
+            child.kill()
+
+
+def test_quiet_it_says_nothing(tmp_path: Path) -> None:
+    mission = tmp_path / "open.toml"
+    mission.write_text("[grid]\nsize = [20, 20]\nhome = [1, 1]\n[[target]]\nfield = [9, 9]\n")
+    port = free_port()
+    with process("sitl", "serve", mission, "--quiet", "--listen", f"tcp:127.0.0.1:{port}") as child:
+        wait_until(lambda: can_connect(port), 20.0)
+        child.send_signal(signal.SIGTERM)
+        assert finished(child, 10.0) == (0, "", "")
+
+
+def can_connect(port: int) -> bool:
+    try:
+        socket.create_connection(("127.0.0.1", port), timeout=1.0).close()
+    except OSError:
+        return False
+    return True

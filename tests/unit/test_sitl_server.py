@@ -3,15 +3,17 @@
 import socket
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from sitl.cli.commands import app
+from sitl.news import News
 from sitl.server import Endpoint, ListenError, datagrams, open_endpoint, serve
-from sitl.simulator import Simulator
+from sitl.simulator import Collision, Simulator
 from tests.sitl_client import open_ground
 
 
@@ -21,6 +23,9 @@ class Bench:
     def __init__(self) -> None:
         self.simulator: Simulator = open_ground()
         self.endpoints: list[Endpoint] = []
+        self.said: list[str] = []
+        self.real_s = 0.0
+        self.news = News(self.said.append, lambda: self.real_s)
 
     def run(self, seconds: float) -> None:
         goal_s = self.simulator.time_s + seconds
@@ -32,10 +37,10 @@ class Bench:
             now_s += 0.005
             return now_s
 
-        serve(self.simulator, self.endpoints, clock, 10.0, lambda: self.simulator.time_s < goal_s)
+        serve(self.simulator, self.endpoints, clock, 10.0, lambda: self.simulator.time_s < goal_s, self.news)
 
     def open(self, url: str) -> None:
-        self.endpoints.append(open_endpoint(url, self.simulator))
+        self.endpoints.append(open_endpoint(url, self.simulator, self.news))
 
 
 @pytest.fixture
@@ -89,6 +94,56 @@ def test_tcp_clients_come_and_go(bench: Bench) -> None:
         assert "HEARTBEAT" in kinds(read_all(one)) & kinds(read_all(other))
 
 
+def test_tcp_clients_that_come_and_go_are_told_of(bench: Bench) -> None:
+    port = free_port()
+    bench.open(f"tcp:127.0.0.1:{port}")
+    with socket.create_connection(("127.0.0.1", port)) as client:
+        who = f"127.0.0.1:{client.getsockname()[1]}"
+        bench.run(1.0)
+        assert bench.said == [f"{who} has come (tcp:127.0.0.1:{port})"]
+    bench.run(1.0)
+    assert bench.said[1:] == [f"{who} has left (tcp:127.0.0.1:{port})"]
+
+
+def test_a_udp_partner_that_falls_silent_is_told_of_once(bench: Bench) -> None:
+    port = free_port(socket.SOCK_DGRAM)
+    bench.open(f"udpin:127.0.0.1:{port}")
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as partner:
+        for _ in range(2):
+            partner.sendto(request_version(), ("127.0.0.1", port))
+            bench.run(1.0)
+        who = f"127.0.0.1:{partner.getsockname()[1]}"
+        assert bench.said == [f"{who} has come (udpin:127.0.0.1:{port})"]
+        for real_s in (4.0, 6.0, 12.0):
+            bench.real_s = real_s
+            bench.run(1.0)
+        assert bench.said[1:] == [f"{who} has been silent for 5 s (udpin:127.0.0.1:{port})"]
+        partner.sendto(request_version(), ("127.0.0.1", port))
+        bench.run(1.0)
+        assert len(bench.said) == 3 and "has come" in bench.said[2]
+
+
+def test_collisions_are_told_of_with_their_place_not_more_than_one_a_second() -> None:
+    said: list[str] = []
+    real_s = 0.0
+    news = News(said.append, lambda: real_s)
+    simulator = open_ground()
+    news.look(simulator)
+    touched: list[Collision] = []
+    stand_in = SimpleNamespace(start=simulator.start, collisions=touched)
+    start = simulator.start
+    touched.append(Collision(61.3, start.north_m + 3.0, start.east_m - 1.5))
+    news.look(cast(Simulator, stand_in))
+    assert said == ["collision 1: the rover touched an obstacle at 61.3 s, north 3.0 m, east -1.5 m of its start"]
+    for _ in range(3):
+        touched.append(Collision(61.5, start.north_m, start.east_m, "cart"))
+        news.look(cast(Simulator, stand_in))
+    assert len(said) == 1
+    real_s = 1.5
+    news.look(cast(Simulator, stand_in))
+    assert said[1].startswith("collision 4: the rover touched cart at 61.5 s")
+
+
 def test_a_rebooting_vehicle_drops_its_tcp_clients(bench: Bench) -> None:
     port = free_port()
     bench.open(f"tcp:127.0.0.1:{port}")
@@ -99,6 +154,7 @@ def test_a_rebooting_vehicle_drops_its_tcp_clients(bench: Bench) -> None:
         client.settimeout(1.0)
         while client.recv(65536):
             pass
+        assert "dropped: the autopilot restarts" in bench.said[-1]
     with socket.create_connection(("127.0.0.1", port)) as client:
         bench.run(5.0)
         assert "HEARTBEAT" in kinds(read_all(client))
