@@ -24,7 +24,7 @@ from companion.outbox import Outbox
 from companion.pursuit import Pursuit
 from companion.recorder import DecisionLog
 from companion.reporting import Reporter, Status
-from companion.safety import Control, Reaction, Watch, check, latched
+from companion.safety import Control, Reaction, Watch, awaited, check, latched
 from companion.settings import Settings
 from companion.startup import StartUp
 from companion.stepping import StepRunner
@@ -229,6 +229,8 @@ class Companion:
             case _:
                 if before is Control.COMPANION:
                     self._tell(f"Companion silent: {verdict.reason}", WARNING)
+                if missing := awaited(self.vehicle, now_s, self._settings.safety):
+                    self._reporter.doing = f"stopped: {verdict.reason}, waiting for {missing}"
 
     def _begin(self, now_s: float) -> Pursuit | None:
         """Everything before the first metre; once the rover may be driven, the mission on the map."""

@@ -74,7 +74,7 @@ def check(
         # The heartbeat may still show GUIDED just after our own HOLD: wait until it has been seen to leave GUIDED.
         if heartbeat.armed and heartbeat.time_s >= watch.hold_s + HOLD_AGAIN_S:
             return replace(watch, hold_s=now_s), Verdict(Reaction.HOLD, "the first HOLD was not taken")
-        return watch, Verdict(Reaction.SILENT, "waiting for HOLD")
+        return watch, Verdict(Reaction.SILENT, "HOLD was asked for")
     watch = replace(watch, control=control)
     if not heartbeat.armed:
         return replace(watch, unsafe_since_s=None), Verdict(Reaction.SILENT, "disarmed")
@@ -85,6 +85,23 @@ def check(
     if now_s - since_s >= settings.hold_after_s:
         return Watch(Control.PERSON, since_s, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, reason)
     return replace(watch, unsafe_since_s=since_s), Verdict(Reaction.STOP, reason)
+
+
+def awaited(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> str:
+    """What a companion that has fallen silent waits for, in words, so that a person knows what to do; empty for nothing.
+
+    A rover that has been disarmed, as one is whose autopilot has restarted, is never armed by this run again.
+    """
+    heartbeat = vehicle.heartbeat
+    if heartbeat is None or now_s - heartbeat.time_s > settings.heartbeat_s:
+        return "the autopilot to be heard again"
+    wanted = [] if heartbeat.mode == RoverMode.GUIDED else ["set GUIDED"]
+    if not heartbeat.armed:
+        wanted.append("arm (or end this run, and start it again with --arm)")
+    if not wanted:
+        return ""
+    data = unsafe_reason(vehicle, now_s, settings)
+    return f"{f'good data ({data}) and ' if data else ''}a person to {' and '.join(wanted)}"
 
 
 def unsafe_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> str:

@@ -48,7 +48,7 @@ def start_step(
         return StartStep(f"good data ({reason})")
     if vehicle.heartbeat.mode != RoverMode.GUIDED:
         if control is Control.PERSON:
-            return StartStep("a person to set GUIDED (somebody has taken the rover)")
+            return StartStep("a person to set GUIDED (the rover was taken out of it)")
         if vehicle.heartbeat.armed and vehicle.heartbeat.mode != RoverMode.HOLD:
             return StartStep("a person to set GUIDED (somebody is driving)")
         return StartStep("GUIDED", SetMode(RoverMode.GUIDED))

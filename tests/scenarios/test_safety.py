@@ -117,6 +117,7 @@ def test_disarming_silences_it_and_it_never_arms_again(rig: Rig) -> None:
     rig.run_for(10.0)
     assert_silent(rig, since_s)
     assert any("disarmed" in text for text in rig.texts())
+    assert "stopped: disarmed, waiting for a person to arm (or end this run," in rig.companion.status().doing
     rig.pilot(ARM, 1)
     assert_reached(rig)
 
@@ -347,7 +348,10 @@ def test_an_autopilot_that_restarts_on_the_way(tmp_path: Path, form: str) -> Non
     rig.pilot(REBOOT, 1)
     rig.until(lambda: rig.mode == MANUAL, 5.0)
     since_s = rig.now_s()
-    rig.run_for(50.0)
+    rig.run_for(5.0)
+    assert "mode is not GUIDED, waiting for good data (" in rig.companion.status().doing
+    rig.run_for(45.0)
+    assert "waiting for a person to set GUIDED and arm (or end this run," in rig.companion.status().doing
     assert_silent(rig, since_s)
     assert any("origin moved" in text for text in rig.texts())
     rig.pilot_mode(GUIDED)
