@@ -106,9 +106,9 @@ def _entry(contestant: Contestant, case: Case, optima: list[float], limits: Limi
     memory_mb, found = _with_memory(
         contestant, case, limits.first_seed
     )  # and what it loads the first time is loaded now
-    began_s = stopwatch_s()
     gc.collect()
     gc.disable()
+    began_s = stopwatch_s()
     try:
         while len(times_ms) < runs and (not times_ms or stopwatch_s() - began_s < limits.cell_s):
             at = len(times_ms) % len(case.ends)

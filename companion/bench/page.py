@@ -10,7 +10,7 @@ import numpy as np
 from companion.bench.cases import PAPER_MAPS, Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import Entry, Limits
-from companion.bench.report import head, rows, where
+from companion.bench.report import head, rows, runs_explained, where
 
 PICTURE = "benchmarks.png"
 
@@ -33,13 +33,14 @@ def _page(command: str, entries: list[Entry], contestants: list[Contestant], cas
 Written by `{command}`. All rows were measured in one process, one after the other, so they can be compared with each other;
 on another machine all are faster or slower.
 
-{where()}. Seeds {limits.first_seed} to {limits.first_seed + limits.seeds - 1} for planners that draw random numbers; at most
-{limits.cell_s:g} s for one planner on one map, and a planner whose next larger map would take longer than that for a single search is not sent
-there (`-`). Times are medians of whole searches as a user calls them, in milliseconds, with the 99th percentile in brackets: a new map
-each time, so building a graph or a queue counts. *cost / best* is the median cost of the paths over the least possible (Dijkstra's); *found* counts
-searches that gave a path; *MB* is by how much the process grew during one search. Where several figures stand in one cell they
+{where()}. At most {limits.cell_s:g} s for one planner on one map, and a planner whose next larger map would take longer than that for a
+single search is not sent there (`-`). Times are medians of whole searches as a user calls them, in milliseconds, with the 99th percentile in
+brackets: a new map each time, so building a graph or a queue counts. *cost / best* is the median cost of the paths over the least possible
+(Dijkstra's); *MB* is by how much the process grew during one search. Where several figures stand in one cell they
 belong to the sizes in order. Remarks on faults are by our own rules: no path may touch an obstacle or cut its corner; paths of
 any-angle planners are rounded to fields for this, and may touch a corner by the rounding.
+
+{chr(10).join(runs_explained(limits))}
 
 ![Time against size](images/{PICTURE})
 """

@@ -9,7 +9,7 @@ from os import cpu_count
 
 from companion.bench.cases import Case
 from companion.bench.contestants import Contestant
-from companion.bench.measure import Entry, Limits
+from companion.bench.measure import DETERMINISTIC_RUNS, Entry, Limits
 
 PACKAGES = (
     "rover-companion",
@@ -38,6 +38,20 @@ def _version(package: str) -> str:
         return importlib.metadata.version(package)
     except importlib.metadata.PackageNotFoundError:
         return ""
+
+
+def runs_explained(limits: Limits) -> list[str]:
+    """How many searches a row is made of, and what those that found nothing came to; lines, column names between asterisks."""
+    last = limits.first_seed + limits.seeds - 1
+    return [
+        "*found* counts the searches that gave a path, of all that were made:",
+        f"{limits.seeds} with seeds {limits.first_seed} to {last} of planners that draw random numbers, {DETERMINISTIC_RUNS} (or one a problem, "
+        "if there are more) of others, whose path is always the same;",
+        f"fewer where {limits.cell_s:g} s were over. Times are of all searches, costs of those that gave a path.",
+        "A random planner but `hybrid` that finds none has spent its budget (`plan` says so), which proves nothing: `bspline-ga` after its epochs,",
+        "`prm` when the samples of all its rounds do not join start and target. Our graph searches and `hybrid` end with a path or with the proof",
+        "that there is none.",
+    ]
 
 
 def short(value: float) -> str:

@@ -18,7 +18,7 @@ from companion.bench.measure import Entry, Limits, measure
 from companion.bench.movingai import ScenarioFileError
 from companion.bench.page import write_page
 from companion.bench.peers import installed_peers
-from companion.bench.report import as_json, head, rows
+from companion.bench.report import as_json, head, rows, runs_explained
 from companion.cli.inputs import OutputError, usable_settings, writable
 from companion.mapfiles import MapError
 from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
@@ -37,20 +37,24 @@ def bench(
         list[Path] | None, typer.Argument(metavar="[MAP]...", help="MovingAI maps with scenario files beside them.")
     ] = None,
     sizes: Annotated[
-        str, typer.Option(help="Sizes of the four shipped maps, times 100 x 50; empty: none.")
+        str, typer.Option(help="Sizes of the four shipped maps, times 100 x 50, commas between; '': none.")
     ] = "1,4,16,40",
     planners: Annotated[str, typer.Option(help="Names, commas between them; default: all of ours.")] = "",
     peers: Annotated[bool, typer.Option(help="Other libraries too, those that are installed.")] = True,
-    seeds: Annotated[int, typer.Option(min=1, help="Searches of a random planner on each map.")] = 100,
+    seeds: Annotated[int, typer.Option(min=1, help="Searches on each map of planners that draw random numbers.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
-    problems: Annotated[int, typer.Option(min=1, help="Problems of a scenario file.")] = 20,
-    cell_s: Annotated[float, typer.Option(min=0.1, help="Seconds for one planner on one map.")] = 10.0,
+    problems: Annotated[int, typer.Option(min=1, help="So many problems of each MAP's scenario file.")] = 20,
+    cell_s: Annotated[float, typer.Option(min=0.1, help="At most so many seconds for one planner on one map.")] = 10.0,
     maps: Annotated[Path | None, typer.Option(help="Folder with the four maps; default: missions/maps.")] = None,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[Path | None, typer.Option(help="Folder whose benchmarks.md and images/ are written.")] = None,
 ) -> None:
-    """Compare planners on the four shipped maps, grown to several sizes, and on MAPs. Exit code 2: bad input."""
+    """Compare planners on the four shipped maps, grown to several sizes, and on MAPs. Exit code 2: bad input.
+
+    A row is made of --seeds searches of a planner that draws random numbers, of 20 of any other (its path is always the same), or of
+    fewer where --cell-s is over; its column 'found' says how many searches gave a path, of how many.
+    """
     console = Console()
     try:
         settings = usable_settings(settings_file)
@@ -66,6 +70,7 @@ def bench(
         raise typer.Exit(EXIT_BAD_INPUT) from error
     for table in _tables(entries, contestants, cases):
         console.print(table)
+    console.print("\n" + " ".join(runs_explained(limits)).replace("*", "").replace("`", ""), highlight=False)
     if json_file is not None:
         json_file.write_text(json.dumps(as_json(entries, cases, limits), indent=2) + "\n", encoding="utf-8")
     if docs is not None:

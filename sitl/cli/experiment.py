@@ -38,7 +38,7 @@ EXIT_BAD_INPUT = 2
 
 def experiment(
     name: Annotated[str, typer.Argument(metavar="NAME", help=f"One of: {', '.join(EXPERIMENTS)}.")],
-    runs: Annotated[int, typer.Option(min=1, help="Runs on each map.")] = 100,
+    runs: Annotated[int, typer.Option(min=1, help="Runs, with seeds that count up, on each map or mission.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones count up.")] = 0,
     jobs: Annotated[
         int, typer.Option(min=1, help="Runs at a time. Results stay the same, but they disturb each other's times.")

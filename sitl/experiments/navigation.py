@@ -95,8 +95,10 @@ class NavigationReport:
     series: tuple[Series, ...]
 
     def tables(self) -> list[Table]:
-        """One for each map, a row a planner."""
-        return [terminal_table(f"{NAME}: {name}", HEAD, self._rows(name)) for name in self._names()]
+        """One for each map, a row a planner; the last says what they are made of."""
+        tables = [terminal_table(f"{NAME}: {name}", HEAD, self._rows(name)) for name in self._names()]
+        tables[-1].caption, tables[-1].caption_justify = self._runs_explained().replace("*", ""), "left"
+        return tables
 
     def as_json(self) -> dict[str, object]:
         """Every run's figures, in the order of their seeds."""
@@ -126,6 +128,14 @@ class NavigationReport:
             drawing.save(self._draw(), folder / "images" / f"{NAME}.png"),
             write_section(folder, NAME, self._section()),
         ]
+
+    def _runs_explained(self) -> str:
+        """How many runs a row is made of; column names between asterisks."""
+        runs, first = self.options.runs, self.options.seed
+        made = "1 run, with seed" if runs == 1 else f"{runs} runs, with seeds {first} to"
+        return f"""*reached* counts the runs that arrived, of all that were made: on each problem {made} {first + runs - 1}, of planners that draw random
+numbers, and 1 of others, whose run is always the same. A planner whose searches may end without a path or a proof (prm, achour and
+the genetic algorithms) sends the rover back when its budget is spent, which shows in *back*, and may give up a target that can be reached."""
 
     def _names(self) -> list[str]:
         return list(dict.fromkeys(ground.name for ground in self.grounds))
@@ -160,7 +170,8 @@ class NavigationReport:
 The four maps of the section on unknown maps, driven field by field as there (at most {STEP_LIMIT} steps), each time with another planner in the
 navigator. *steps/best* is the median (then the mean) of the steps over those of a shortest path for somebody who knows the map;
 *back* the mean number of steps in return mode; *plan* the median of all planning of one run together, *p99* of single calls of the
-navigator's step, searches included, in milliseconds. Planners that draw no random numbers are run once on each problem.
+navigator's step, searches included, in milliseconds.
+{self._runs_explained()}
 
 {tables}
 

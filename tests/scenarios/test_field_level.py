@@ -87,6 +87,15 @@ def test_table_1(tmp_path):
     assert "N.F." in page and "43.06" in page and (docs / "images" / "kwasniewski-table1.png").exists()
 
 
+def test_navigation_says_how_many_runs_a_row_is_made_of(tmp_path):
+    arguments = ["experiment", "navigation", "--runs", "2", "--seed", "3", "--planners", "astar,hybrid"]
+    result = CliRunner().invoke(app, [*arguments, "--docs", str(tmp_path / "docs")])
+    assert result.exit_code == 0, result.output
+    assert "2 runs, with seeds 3 to 4" in (tmp_path / "docs" / "results.md").read_text()
+    assert "of all that were made" in result.output
+    assert result.output.count("2/2") == result.output.count("1/1") == 4
+
+
 def test_each_experiment_replaces_only_its_own_section(tmp_path):
     from sitl.experiments.results_page import write_section
 

@@ -138,6 +138,8 @@ def test_the_command_writes_table_json_and_page(tmp_path):
     assert {entry["contestant"] for entry in figures["entries"]} == {"dijkstra", "bspline-ga"}
     assert len(figures["maps"]) == 4 and "numpy" in figures["where"]
     page = (tmp_path / "docs" / "benchmarks.md").read_text()
+    assert "\n3 with seeds 0 to 2 of planners that draw random numbers, 20 (" in page
+    assert "3 with seeds 0 to 2" in " ".join(result.output.split())
     assert "## rooms (100 x 50 fields)" in page and "| dijkstra |" in page
     assert (tmp_path / "docs" / "images" / "benchmarks.png").stat().st_size > 10_000
 
