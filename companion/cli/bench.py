@@ -46,7 +46,7 @@ def bench(
     problems: Annotated[int, typer.Option(min=1, help="So many problems of each MAP's scenario file.")] = 20,
     cell_s: Annotated[float, typer.Option(min=0.1, help="At most so many seconds for one planner on one map.")] = 10.0,
     maps: Annotated[Path | None, typer.Option(help="Folder with the four maps; default: missions/maps.")] = None,
-    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
+    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[Path | None, typer.Option(help="Folder whose benchmarks.md and images/ are written.")] = None,
 ) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from companion.cli.inputs import OutputError, picture
+from companion.cli.inputs import OutputError, picture, usable_settings
 from companion.cli.plan_answer import Answer, as_table, as_text, flipped
 from companion.cli.plan_image import save_image
 from companion.clock import stopwatch_s
@@ -19,7 +19,7 @@ from companion.mapfiles import MapError, load_map
 from companion.planning.problem import Motion, PlanningProblem, PlanStatus
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
 from companion.searching import budget_of
-from companion.settings import Settings, SettingsError, load_settings
+from companion.settings import Settings, SettingsError
 
 EXIT_FOUND, EXIT_BAD_INPUT, EXIT_NO_PATH = 0, 2, 3
 
@@ -34,25 +34,29 @@ class TurningError(ValueError):
 
 def plan(
     map_file: Annotated[Path, typer.Argument(metavar="MAP", help="ROS yaml, MovingAI .map, or an image.")],
-    start: Annotated[str, typer.Option(metavar="X,Y", help="Field: X right, Y up from the bottom row.")],
-    target: Annotated[str, typer.Option(metavar="X,Y", help="Field.")],
-    planner: Annotated[str | None, typer.Option(help=f"One of: {', '.join(PLANNERS)}.")] = None,
+    start: Annotated[
+        str, typer.Option(metavar="X,Y", help="The field to start from: X right, Y up from the bottom row.")
+    ],
+    target: Annotated[str, typer.Option(metavar="X,Y", help="The field to reach, counted in the same way.")],
+    planner: Annotated[
+        str | None, typer.Option(help=f"One of: {', '.join(PLANNERS)}; default: the settings', hybrid.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
     turning_radius_m: Annotated[
-        float, typer.Option(min=0.0, help="The rover's tightest turn; 0: it turns on the spot.")
+        float, typer.Option(min=0.0, help="The tightest turn; 0: it turns on the spot. For bspline-ga, hybrid.")
     ] = 0.0,
     heading_deg: Annotated[
-        float | None, typer.Option(help="Where it points at the start, clockwise from up; default: anywhere.")
+        float | None, typer.Option(help="Where it points at the start, clockwise from north (up); default: anywhere.")
     ] = None,
-    image: Annotated[Path | None, typer.Option(help="Write a picture of map and path, north up.")] = None,
+    image: Annotated[Path | None, typer.Option(help="Write a picture (.png, .jpg) of map and path, north up.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     top_left: Annotated[bool, typer.Option("--top-left", help="Y counts down from the top row (MovingAI).")] = False,
-    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
+    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
 ) -> None:
     """Find a path over MAP. Exit code 0: found; 3: no path, or none within the budget; 2: bad input."""
     try:
-        settings = load_settings(settings_file)
-        name = planner or settings.navigator.planner
+        settings = usable_settings(settings_file)
+        name = settings.navigator.planner if planner is None else planner
         grid = load_map(map_file)
         problem = PlanningProblem(
             grid.weights,

@@ -35,11 +35,13 @@ def run(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.")],
     connect: Annotated[
         str,
-        typer.Option(help="udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or serial:DEVICE:BAUD"),
+        typer.Option(
+            help="The autopilot: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or serial:DEVICE:BAUD."
+        ),
     ],
     arm: Annotated[bool, typer.Option("--arm", help="Arm the motors; otherwise wait for a person to do it.")] = False,
-    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the genetic algorithm.")] = 0,
+    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
     record: Annotated[Path | None, typer.Option(help="Directory for the record and the map of this run.")] = None,
 ) -> None:
     """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 130: stopped by a signal."""

@@ -9,9 +9,14 @@ from pydantic import BaseModel, ConfigDict
 
 
 def alike(name: str, known: Iterable[str]) -> str:
-    """The known name that an unknown one is spelt nearly like; empty if there is none."""
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.75)
-    return near[0] if near else ""
+    """The known name that an unknown one is spelt nearly like; empty if there is none.
+
+    Slips are seldom in the first letter: another one there must be made up for by the rest.
+    """
+    for near in difflib.get_close_matches(name, known):
+        if near[0] == name[0] or difflib.SequenceMatcher(None, near, name).ratio() >= 0.75:
+            return near
+    return ""
 
 
 class SettingsError(Exception):

@@ -35,26 +35,28 @@ def drive(
         Path | None, typer.Argument(metavar="[MISSION]", help="TOML, .plan or .waypoints file.", show_default=False)
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of planner and simulator: the same seed gives the same run.")] = 0,
-    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file.")] = None,
+    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
     record: Annotated[Path | None, typer.Option(help="Directory for the record of this run.")] = None,
-    image: Annotated[Path | None, typer.Option(help="Write a PNG of map and track.")] = None,
+    image: Annotated[Path | None, typer.Option(help="Write a picture (.png, .jpg) of map and track.")] = None,
     map_stem: Annotated[
-        Path | None, typer.Option("--map", help="Write what was mapped as STEM.yaml and STEM.pgm.")
+        Path | None, typer.Option("--map", metavar="STEM", help="Write what was mapped as STEM.yaml and STEM.pgm.")
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")] = None,
     sensors: Annotated[str | None, typer.Option(help="lidar-90, lidar-360 or beams; default: the mission's.")] = None,
     world: Annotated[Path | None, typer.Option(help="Map of the ground (image, ROS yaml, MovingAI .map).")] = None,
     start: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to start from.")] = None,
     target: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to reach.")] = None,
-    top_left: Annotated[bool, typer.Option("--top-left", help="Y counts down from the top row.")] = False,
+    top_left: Annotated[bool, typer.Option("--top-left", help="With --world: Y counts down from the top row.")] = False,
     resolution_m: Annotated[float | None, typer.Option(help="Field size of --world, where the map has none.")] = None,
-    prior: Annotated[bool, typer.Option("--prior", help="The companion knows the map from the start.")] = False,
+    prior: Annotated[
+        bool, typer.Option("--prior", help="With --world: the companion knows the map from the start.")
+    ] = False,
     time_limit_s: Annotated[float, typer.Option(min=1.0, help="Simulated seconds before giving up.")] = 3600.0,
 ) -> None:
-    """Drive MISSION (or --world with --start and --target) in lock-step.
+    """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
-    Exit code 0: all targets reached and no collision; 3: a target unreachable or given up; 4: collision; 2: bad input;
-    130: stopped by Ctrl-C.
+    Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time; 4: collision; 2: bad
+    input; 130: stopped by Ctrl-C.
     """
     console = Console()
     recorder: Recorder | NullRecorder = NullRecorder()

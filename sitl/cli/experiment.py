@@ -10,6 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from companion.cli.inputs import OutputError, writable
 from companion.mapfiles import MapError
 from sitl.experiments import (
     achour_table1,
@@ -38,7 +39,12 @@ EXIT_BAD_INPUT = 2
 
 def experiment(
     name: Annotated[str, typer.Argument(metavar="NAME", help=f"One of: {', '.join(EXPERIMENTS)}.")],
-    runs: Annotated[int, typer.Option(min=1, help="Runs, with seeds that count up, on each map or mission.")] = 100,
+    runs: Annotated[
+        int,
+        typer.Option(
+            min=1, help="Runs, with seeds that count up, on each map or mission. kwasniewski-table1: 3 at least."
+        ),
+    ] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones count up.")] = 0,
     jobs: Annotated[
         int, typer.Option(min=1, help="Runs at a time. Results stay the same, but they disturb each other's times.")
@@ -66,17 +72,15 @@ def experiment(
         made = EXPERIMENTS.get(name)
         if made is None:
             raise ExperimentError(f"experiment {name}: unknown; known are {', '.join(EXPERIMENTS)}")
-        if json_file is not None:
-            # A place that cannot be written should show before the work, not after it.
-            json_file.parent.mkdir(parents=True, exist_ok=True)
-            json_file.open("a", encoding="utf-8").close()
-        if planners and name not in (navigation.NAME, driving.NAME):
-            raise ExperimentError(f"--planners: {name} compares its own; the option is for navigation and driving")
+        # A place that cannot be written should show before the work, not after it.
+        writable(json_file)
+        writable(docs and docs / "results.md")
+        _refuse_unused(name, planners=planners, world=world, maps=maps)
         names = tuple(planner.strip() for planner in planners.split(",") if planner.strip())
         options = Options(runs, seed, jobs, maps, tuple(world or ()), names)
         report = _with_progress(name, made, options, console)
         _put_out(report, console, json_file, docs)
-    except (ExperimentError, MapError) as error:
+    except (ExperimentError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     except OSError as error:
@@ -84,9 +88,20 @@ def experiment(
         raise typer.Exit(EXIT_BAD_INPUT) from error
 
 
+def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: Path | None) -> None:
+    """An option that would not count is said to be none. Raises ExperimentError."""
+    if name not in (navigation.NAME, driving.NAME):
+        if planners:
+            raise ExperimentError(f"--planners: {name} compares its own; the option is for navigation and driving")
+        if world:
+            raise ExperimentError(f"--world: {name} has its own maps; the option is for navigation and driving")
+    if maps is not None and name in (wang_table4.NAME, achour_table1.NAME):
+        raise ExperimentError(f"--maps: {name} draws the paper's own environments, it reads no maps")
+
+
 def _with_progress(name: str, made: Experiment, options: Options, console: Console) -> Report:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress:
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
         # Nothing is shown before there is anything to show: a bad folder of maps gets its one line only.
         task = progress.add_task(name, total=None, visible=False)
 

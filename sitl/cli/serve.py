@@ -27,7 +27,10 @@ def serve(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.")],
     listen: Annotated[
         list[str] | None,
-        typer.Option(help="tcp:HOST:PORT (listens), udpout:HOST:PORT, udpin:HOST:PORT; several times for several."),
+        typer.Option(
+            help="tcp:HOST:PORT (listens), udpout:HOST:PORT, udpin:HOST:PORT; several times for several. "
+            f"Default: {', '.join(DEFAULT_LISTEN)}."
+        ),
     ] = None,
     speedup: Annotated[float, typer.Option(min=0.01, max=200.0, help="Times real time.")] = 1.0,
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,

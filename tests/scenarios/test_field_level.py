@@ -113,13 +113,17 @@ def test_each_experiment_replaces_only_its_own_section(tmp_path):
         (["kwasniewski-maps", "--maps", "{tmp}/none"], "--maps"),
         (["kwasniewski-table1", "--maps", "{tmp}"], "known-1.png"),
         (["kwasniewski-maps", "--json", "{tmp}"], "cannot be written"),
+        (["kwasniewski-maps", "--docs", "/dev/null/docs"], "/dev/null/docs/results.md: cannot be written"),
+        (["kwasniewski-maps", "--world", "missions/maps/rooms.png"], "--world: kwasniewski-maps has its own maps"),
+        (["wang-table4", "--maps", "{tmp}"], "--maps: wang-table4"),
+        (["navigation", "--planners", "nope"], "unknown planner 'nope'"),
     ],
-    ids=["name", "folder", "map", "json"],
+    ids=["name", "folder", "map", "json", "docs", "world", "no maps", "planner"],
 )
 def test_a_user_error_is_one_line_and_exit_code_2(arguments, said, tmp_path):
     result = CliRunner().invoke(app, ["experiment", *(a.format(tmp=tmp_path) for a in arguments)])
     assert result.exit_code == 2
-    assert said in result.stderr and len(result.stderr.strip().splitlines()) == 1
+    assert said in result.stderr and len(result.stderr.strip().splitlines()) == 1 and result.stdout == ""
 
 
 def test_a_map_with_an_obstacle_on_the_start_is_refused(tmp_path):

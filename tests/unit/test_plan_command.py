@@ -135,6 +135,7 @@ def test_no_path_is_exit_code_3(map_file, tmp_path):
         (["--start", "0;0", "--target", "7,0"], ["--start 0;0", "two whole numbers"]),
         (["--start", "0,0,0", "--target", "7,0"], ["two whole numbers"]),
         (["--start", "0,0", "--target", "7,0", "--planner", "hibrid"], ["'hibrid'", "'hybrid'"]),
+        (["--start", "0,0", "--target", "7,0", "--planner", ""], ["unknown planner ''"]),
         (["--start", "0,0", "--target", "7,0", "--heading-deg", "90"], ["--heading-deg 90", "--turning-radius-m"]),
         (["--start", "0,0", "--target", "7,0", "--turning-radius-m", "inf"], ["--turning-radius-m", "finite"]),
         (

@@ -2,7 +2,8 @@ from pathlib import Path
 
 import pytest
 
-from companion.settings import Settings, SettingsError, load_settings, parse_settings
+from companion.planning.registry import PLANNERS
+from companion.settings import Settings, SettingsError, alike, load_settings, parse_settings
 
 
 def refused(text: str, tmp_path: Path) -> str:
@@ -32,6 +33,21 @@ def test_no_file_means_the_defaults():
 )
 def test_an_unknown_key_is_named_with_the_nearest_known_one(text, place, near, tmp_path):
     assert f"{place}: unknown key, did you mean '{near}'?" in refused(text, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [
+        ("hibryd", "hybrid"),
+        ("dstar", "dstar-lite"),
+        ("teta-star", "theta-star"),
+        ("atsar", "astar"),
+        ("", ""),
+        ("rrt", ""),
+    ],
+)
+def test_only_what_is_spelt_alike_is_offered(name, near):
+    assert alike(name, PLANNERS) == near
 
 
 def test_a_key_like_no_other_is_not_taken_for_one_that_is_unrelated(tmp_path):
