@@ -52,8 +52,8 @@ def bench(
 ) -> None:
     """Compare planners on the four shipped maps, grown to several sizes, and on MAPs. Exit code 2: bad input.
 
-    A row is made of --seeds searches of a planner that draws random numbers, of 20 of any other (its path is always the same), or of
-    fewer where --cell-s is over; its column 'found' says how many searches gave a path, of how many.
+    A row is made of --seeds searches if the planner draws random numbers, of 20 if not (its path is always the same),
+    and of fewer where --cell-s is over; its column 'found' says how many searches gave a path, of how many.
     """
     console = Console()
     try:

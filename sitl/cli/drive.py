@@ -55,8 +55,8 @@ def drive(
 ) -> None:
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
-    Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time; 4: collision; 2: bad
-    input; 130: stopped by Ctrl-C.
+    Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
+    4: collision; 2: bad input; 130: stopped by Ctrl-C.
     """
     console = Console()
     recorder: Recorder | NullRecorder = NullRecorder()

@@ -39,7 +39,6 @@ def test_an_unknown_key_is_named_with_the_nearest_known_one(text, place, near, t
     ("name", "near"),
     [
         ("hibryd", "hybrid"),
-        ("dstar", "dstar-lite"),
         ("teta-star", "theta-star"),
         ("atsar", "astar"),
         ("", ""),
