@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import select
 import socket
 from collections.abc import Callable
@@ -59,7 +60,8 @@ def open_endpoint(url: str, simulator: Simulator, news: News | None = None) -> E
             return TcpServer(host, port, news)
         return UdpEndpoint(host, port, listens=kind == "udpin", link=simulator.connect(), news=news)
     except OSError as error:
-        raise ListenError(f"{url}: cannot be opened: {error.strerror or error}; choose another port") from error
+        remedy = "choose another port" if error.errno == errno.EADDRINUSE else "is that an address of this computer?"
+        raise ListenError(f"{url}: cannot be opened: {error.strerror or error}; {remedy}") from error
 
 
 def place_text(place: tuple[str, int]) -> str:

@@ -214,6 +214,11 @@ def test_a_port_in_use_is_one_line(bench: Bench) -> None:
             bench.open(f"tcp:127.0.0.1:{other.getsockname()[1]}")
 
 
+def test_an_address_of_another_computer_is_not_taken_for_a_busy_port(bench: Bench) -> None:
+    with pytest.raises(ListenError, match=r"cannot be opened.*is that an address of this computer\?"):
+        bench.open("tcp:192.0.2.1:5760")
+
+
 @pytest.mark.parametrize("url", ["tcp", "serial:/dev/x:57600", "tcp:127.0.0.1", "tcp:127.0.0.1:0", "udpin:x:99999"])
 def test_bad_addresses_are_told(bench: Bench, url: str) -> None:
     with pytest.raises(ListenError, match="not an address"):
