@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.commands import GuidedVelocity
+from companion.commands import GuidedPosition, GuidedVelocity
 from companion.frames import Pose, wrap_pi_rad
 from companion.guidance import STEP_M, STOP, Guide, Motion, Route, RoverLimits, turn_to
 from companion.manoeuvre import ground_of, in_cells
@@ -179,9 +179,10 @@ def _on_the_way(
     rolls_m = _braked_m(speed_m_s, times_s, settings)
     halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), _ahead(pose, -rolls_m if backwards else rolls_m))
     if now.motion is Motion.DRIVE and route is not None:
+        way = _told_way(now, route, pose)
         for goes_s in GO_ON_S:
             along_m = _driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
-            yield Choice(now, _along(route, pose, along_m))
+            yield Choice(now, _along(way, along_m))
     else:
         yield Choice(now, halt.places, TURNING_S)
     yield halt
@@ -342,9 +343,24 @@ def _moved(places: Points, bearing_rad: float, along_m: Points) -> Points:
     return np.asarray(places + along_m[:, None] * (math.cos(bearing_rad), math.sin(bearing_rad)))
 
 
-def _along(route: Route, pose: Pose, along_m: Points) -> Points:
-    """Places on the route, from where the rover is now."""
-    last = min(len(route.points), route.progress + 2 + math.ceil(float(along_m[-1]) / STEP_M))
-    points = np.vstack(((pose.north_m, pose.east_m), route.points[route.progress + 1 : last]))
+def _told_way(now: Guide, route: Route, pose: Pose) -> Points:
+    """Where it drives: straight to the place that it is told, and on from there along the route.
+
+    That place lies some metres ahead. On a route that turns off before it, a new one that begins sideways above all, the rover goes
+    across, and is never where the route is.
+    """
+    ahead = route.points[route.progress + 1 :]
+    here = (pose.north_m, pose.east_m)
+    if isinstance(now.setpoint, GuidedPosition) and len(ahead) > 0:
+        told = np.array((now.setpoint.point.north_m, now.setpoint.point.east_m))
+        nearest = int(np.argmin(((ahead - told) ** 2).sum(axis=1)))
+        if nearest > 0:  # else it is not ahead any more
+            return np.vstack((here, told, ahead[nearest + 1 :]))
+    return np.vstack((here, ahead))
+
+
+def _along(points: Points, along_m: Points) -> Points:
+    """Places so far along a line through points."""
+    points = points[: 3 + math.ceil(float(along_m[-1]) / STEP_M)]
     reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     return np.column_stack((np.interp(along_m, reached_m, points[:, 0]), np.interp(along_m, reached_m, points[:, 1])))
