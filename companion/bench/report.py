@@ -10,6 +10,8 @@ from os import cpu_count
 from companion.bench.cases import Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import Entry, Limits
+from companion.provenance import made_with
+from companion.settings import Settings
 
 PACKAGES = (
     "rover-companion",
@@ -74,9 +76,15 @@ def _fault_text(fault: str) -> str:
     return {"corner cut": "cuts corners", "obstacle": "touches obstacles"}.get(fault, fault)
 
 
-def as_json(entries: list[Entry], cases: list[Case], limits: Limits) -> dict[str, object]:
+def as_json(entries: list[Entry], cases: list[Case], limits: Limits, settings: Settings) -> dict[str, object]:
     """Everything measured, and what it was measured with."""
     maps = [
         {"name": case.name, "scale": case.scale, "fields": case.fields, "problems": len(case.ends)} for case in cases
     ]
-    return {"where": where(), "limits": asdict(limits), "maps": maps, "entries": [asdict(entry) for entry in entries]}
+    return {
+        "where": where(),
+        "limits": asdict(limits),
+        **made_with(settings),
+        "maps": maps,
+        "entries": [asdict(entry) for entry in entries],
+    }

@@ -19,6 +19,7 @@ from companion.grid import Cell, Grid
 from companion.mapfiles import MapError, load_map
 from companion.planning.problem import PlanningProblem, PlanResult, PlanStatus
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
+from companion.provenance import made_with
 from companion.searching import budget_of
 from companion.settings import Settings, SettingsError, load_settings
 
@@ -38,6 +39,7 @@ class Answer:
     seed: int
     top_left: bool
     grid: Grid
+    settings: Settings
 
     def place(self, cell: Cell) -> tuple[int, int]:
         """A field in the coordinates that the user chose."""
@@ -49,7 +51,7 @@ def plan(
     start: Annotated[str, typer.Option(metavar="X,Y", help="Field: X right, Y up from the bottom row.")],
     target: Annotated[str, typer.Option(metavar="X,Y", help="Field.")],
     planner: Annotated[str | None, typer.Option(help=f"One of: {', '.join(PLANNERS)}.")] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of the genetic algorithm.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
     image: Annotated[Path | None, typer.Option(help="Write a picture of map and path, north up.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
     top_left: Annotated[bool, typer.Option("--top-left", help="Y counts down from the top row (MovingAI).")] = False,
@@ -82,7 +84,7 @@ def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, 
         warm_up((name,), settings.planner)
     began_s = stopwatch_s()
     result = chosen.plan(problem, budget_of(settings.navigator.thorough), np.random.default_rng(seed))
-    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid)
+    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, settings)
 
 
 def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:
@@ -122,6 +124,7 @@ def as_text(answer: Answer) -> str:
             "control_points": result.control_points,
             "seed": answer.seed,
             "path": [answer.place(cell) for cell in path.cells] if path else None,
+            **made_with(answer.settings),
         }
     )
 

@@ -17,6 +17,7 @@ from companion.cli.inputs import OutputError, picture, usable_settings, writable
 from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError, SitlSpec
+from companion.provenance import made_with
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
 from sitl.ground import field_at, mission_in_world, mission_on_map
@@ -84,7 +85,7 @@ def drive(
     if isinstance(recorder, Recorder):
         console.print(f"record:  {recorder.directory}")
     if json_file is not None:
-        json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+        json_file.write_text(json.dumps({**report.as_json(), **made_with(settings)}, indent=2) + "\n", encoding="utf-8")
     raise typer.Exit(report.exit_code)
 
 

@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.mapfiles import MapError
+from companion.provenance import made_with
+from companion.settings import Settings
 from sitl.experiments import (
     achour_table1,
     adaptive_control_points,
@@ -70,8 +72,11 @@ def experiment(
             # A place that cannot be written should show before the work, not after it.
             json_file.parent.mkdir(parents=True, exist_ok=True)
             json_file.open("a", encoding="utf-8").close()
-        if planners and name not in (navigation.NAME, driving.NAME):
-            raise ExperimentError(f"--planners: {name} compares its own; the option is for navigation and driving")
+        for option, given in (("--planners", planners), ("--world", world)):
+            if given and name not in (navigation.NAME, driving.NAME):
+                raise ExperimentError(f"{option}: {name} has its own; the option is for navigation and driving")
+        if maps is not None and name in (achour_table1.NAME, wang_table4.NAME):
+            raise ExperimentError(f"--maps: {name} draws its own environments; leave the option out")
         names = tuple(planner.strip() for planner in planners.split(",") if planner.strip())
         options = Options(runs, seed, jobs, maps, tuple(world or ()), names)
         report = _with_progress(name, made, options, console)
@@ -100,7 +105,9 @@ def _put_out(report: Report, console: Console, json_file: Path | None, docs: Pat
     for table in report.tables():
         console.print(table)
     if json_file is not None:
-        json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+        json_file.write_text(
+            json.dumps({**made_with(Settings()), **report.as_json()}, indent=2) + "\n", encoding="utf-8"
+        )
         typer.echo(f"figures: {json_file}")
     if docs is not None:
         for file in report.write_docs(docs):

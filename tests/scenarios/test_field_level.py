@@ -28,6 +28,7 @@ def test_every_run_reaches_the_target_on_every_map_in_both_profiles(made):
     """The figure to hold is 100 of 100. Were it 90 of 100, these 48 runs would show it with a chance of 0.994."""
     _, figures, _ = made
     assert figures["runs"] == RUNS and figures["step_limit"] == 2000
+    assert figures["versions"]["numba"] and figures["settings"]["planner"]["mixing"] == 0.8
     cases = {(result["profile"], result["map"]): result for result in figures["results"]}
     maps = ("one-obstacle", "clutter", "rooms", "complex")
     assert set(cases) == {(profile, name) for profile in ("default", "paper") for name in maps}
@@ -104,8 +105,11 @@ def test_each_experiment_replaces_only_its_own_section(tmp_path):
         (["kwasniewski-maps", "--maps", "{tmp}/none"], "--maps"),
         (["kwasniewski-table1", "--maps", "{tmp}"], "known-1.png"),
         (["kwasniewski-maps", "--json", "{tmp}"], "cannot be written"),
+        (["wang-table4", "--world", "{tmp}/none.map"], "--world"),
+        (["achour-table1", "--maps", "{tmp}"], "--maps"),
+        (["wang-table4", "--planners", "hybrid"], "--planners"),
     ],
-    ids=["name", "folder", "map", "json"],
+    ids=["name", "folder", "map", "json", "world", "drawn", "planners"],
 )
 def test_a_user_error_is_one_line_and_exit_code_2(arguments, said, tmp_path):
     result = CliRunner().invoke(app, ["experiment", *(a.format(tmp=tmp_path) for a in arguments)])

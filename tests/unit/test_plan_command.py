@@ -51,6 +51,15 @@ def test_json_holds_the_path_in_the_users_coordinates(map_file, planner):
     assert answer["time_s"] > 0.0
 
 
+def test_json_says_what_it_was_made_with(map_file, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text("[planner]\nmixing = 0.7\n", encoding="utf-8")
+    result = run(map_file, "--start", "0,0", "--target", "7,0", "--seed", 5, "--settings", own, "--json")
+    answer = json.loads(result.stdout)
+    assert answer["seed"] == 5 and answer["settings"]["planner"]["mixing"] == 0.7
+    assert answer["versions"]["numba"] and answer["versions"]["rover-companion"] != "not installed"
+
+
 def test_top_left_counts_y_down(map_file):
     result = run(map_file, "--start", "0,5", "--target", "7,5", "--top-left", "--json")
     path = json.loads(result.stdout)["path"]
