@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from companion.frames import Pose
-from companion.guidance import STEP_M, Route
+from companion.guidance import STEP_M
 from companion.settings import GuidanceSettings
 
 Points = NDArray[np.float64]
@@ -61,13 +61,12 @@ def moved_on_arc(pose: Pose, course_rad: float, curvature_m: float, along_m: Poi
     return np.column_stack((pose.north_m + chord_m * np.cos(bearing_rad), pose.east_m + chord_m * np.sin(bearing_rad)))
 
 
-def on_route(route: Route, pose: Pose, course_rad: float, along_m: Points, turning_radius_m: float) -> Points:
-    """Places on the way along the route, from where the rover is and rolls to now: it has to turn first.
+def steered_along(points: Points, course_rad: float, along_m: Points, turning_radius_m: float) -> Points:
+    """Places on the way along a line from where the rover is, which rolls to ``course_rad`` now: it has to turn first.
 
     ``turning_radius_m``: 0 for a rover that can turn on the spot.
     """
-    last = min(len(route.points), route.progress + 2 + math.ceil((float(along_m[-1]) + AIM_M) / STEP_M))
-    points = np.vstack(((pose.north_m, pose.east_m), route.points[route.progress + 1 : last]))
+    points = points[: 3 + math.ceil((float(along_m[-1]) + AIM_M) / STEP_M)]
     reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     along_m = np.minimum(along_m, reached_m[-1])
     aims_m = along_m + AIM_M
@@ -75,7 +74,7 @@ def on_route(route: Route, pose: Pose, course_rad: float, along_m: Points, turni
     most_rad = np.full(len(along_m) - 1, TURN_RAD_S * PERIOD_S)
     if turning_radius_m > 0.0:
         most_rad = np.minimum(most_rad, np.diff(along_m) / turning_radius_m)
-    return steered(pose.north_m, pose.east_m, course_rad, aims, along_m, most_rad)
+    return steered(points[0, 0], points[0, 1], course_rad, aims, along_m, most_rad)
 
 
 @njit(cache=True, nogil=True)

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-import importlib.metadata
 import json
-import platform
 import shutil
 import struct
 from pathlib import Path
@@ -13,10 +11,10 @@ from typing import IO, Protocol
 
 from companion.clock import unix_time_us
 from companion.navigator import Decision
+from companion.provenance import versions
 from companion.settings import Settings
 
 FLUSH_S = 1.0
-PACKAGES = ("rover-companion", "numpy", "numba", "pymavlink")
 
 
 class RecordError(Exception):
@@ -158,12 +156,5 @@ def _meta(mission_file: Path | None, settings: Settings, seed: int, start_us: in
         "settings": values,
         "settings_sha256": hashlib.sha256(canonical).hexdigest(),
         "start_unix_us": start_us,
-        "versions": {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}},
+        "versions": versions(),
     }
-
-
-def _version(package: str) -> str:
-    try:
-        return importlib.metadata.version(package)
-    except importlib.metadata.PackageNotFoundError:
-        return "not installed"

@@ -15,12 +15,22 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from companion.commands import GuidedVelocity
+from companion.commands import GuidedPosition, GuidedVelocity
 from companion.frames import Pose, wrap_pi_rad
 from companion.guidance import STOP, Guide, Motion, Route, RoverLimits, turn_to
 from companion.manoeuvre import ground_of, in_cells
 from companion.mapping import EvidenceMap, look_along
-from companion.prediction import PERIOD_S, TURN_RAD_S, Points, ahead, braked_m, driven_m, moved, moved_on_arc, on_route
+from companion.prediction import (
+    PERIOD_S,
+    TURN_RAD_S,
+    Points,
+    ahead,
+    braked_m,
+    driven_m,
+    moved,
+    moved_on_arc,
+    steered_along,
+)
 from companion.settings import GuidanceSettings, Settings
 from companion.swept import UNSEEN, arc_clear, kept_room
 from companion.traffic import Moving
@@ -174,10 +184,11 @@ def _on_the_way(
     rolls_m = braked_m(speed_m_s, times_s, settings)
     halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), ahead(pose, -rolls_m if backwards else rolls_m))
     if now.motion is Motion.DRIVE and route is not None:
+        way = _told_way(now, route, pose)
         course_rad = pose.heading_rad + (math.pi if backwards else 0.0)
         for goes_s in GO_ON_S:
             along_m = driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
-            yield Choice(now, on_route(route, pose, course_rad, along_m, rover.turning_radius_m))
+            yield Choice(now, steered_along(way, course_rad, along_m, rover.turning_radius_m))
     else:
         yield Choice(now, halt.places, TURNING_S)
     yield halt
@@ -299,3 +310,19 @@ def _on_arcs(
             setpoint = GuidedVelocity(-going_m_s if tail_first else going_m_s, round(turn_rate, 2))
             places = moved_on_arc(pose, course_rad, curvature_m, along_m)
             yield Choice(Guide(Motion.LOOK, setpoint, going_m_s), places)
+
+
+def _told_way(now: Guide, route: Route, pose: Pose) -> Points:
+    """Where it drives: straight to the place that it is told, and on from there along the route.
+
+    That place lies some metres ahead. On a route that turns off before it, a new one that begins sideways above all, the rover goes
+    across, and is never where the route is.
+    """
+    ahead = route.points[route.progress + 1 :]
+    here = (pose.north_m, pose.east_m)
+    if isinstance(now.setpoint, GuidedPosition) and len(ahead) > 0:
+        told = np.array((now.setpoint.point.north_m, now.setpoint.point.east_m))
+        nearest = int(np.argmin(((ahead - told) ** 2).sum(axis=1)))
+        if nearest > 0:  # else it is not ahead any more
+            return np.vstack((here, told, ahead[nearest + 1 :]))
+    return np.vstack((here, ahead))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from companion.bench.aims import genetic_ratios, genetic_verdict, peer_ratios, peers_verdict
 from companion.bench.cases import PAPER_MAPS, Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import Entry, Limits
@@ -55,7 +56,7 @@ any-angle planners are rounded to fields for this, and may touch a corner by the
         problems = len(own[0].ends)
         title = f"{name} ({size}{f', {problems} problems' if problems > 1 else ''})"
         parts.append(f"## {title}\n\n{_markdown(head(scales), rows(entries, contestants, name, scales))}\n")
-    parts.append(_ratios(entries))
+    parts += [part for part in (_ratios(entries), _peers(entries, contestants)) if part]
     return "\n".join(parts).rstrip() + "\n"
 
 
@@ -66,18 +67,22 @@ def _markdown(names: list[str], table: list[list[str]]) -> str:
 
 def _ratios(entries: list[Entry]) -> str:
     """The genetic algorithm against graph search, where both were measured."""
-    lines = []
-    for name in dict.fromkeys(entry.case for entry in entries if entry.case in PAPER_MAPS):
-        times = {(e.contestant, e.scale): e for e in entries if e.case == name}
-        for scale in sorted({scale for _, scale in times}):
-            genetic, graph = times.get(("bspline-ga", scale)), times.get(("astar", scale))
-            if genetic and graph:
-                share = f"{100.0 * genetic.found / genetic.runs:.0f} %"
-                lines.append([name, f"x{scale}", f"{graph.median_ms / genetic.median_ms:.2f}", share])
-    if not lines:
+    ratios = genetic_ratios(entries)
+    if not ratios:
         return ""
+    lines = [[name, f"x{scale}", f"{ratio:.2f}", f"{100.0 * share:.0f} %"] for name, scale, ratio, share in ratios]
     table = _markdown(["map", "size", "astar's time over bspline-ga's", "bspline-ga finds a path in"], lines)
-    return f"## Where the genetic algorithm wins, and where it stops\n\n{table}\n"
+    return f"## Where the genetic algorithm wins, and where it stops\n\n{genetic_verdict(ratios)}\n\n{table}\n"
+
+
+def _peers(entries: list[Entry], contestants: list[Contestant]) -> str:
+    """Our fastest complete planner against the fastest of others, where both were measured."""
+    ratios = peer_ratios(entries, contestants)
+    if not ratios:
+        return ""
+    lines = [[name, f"x{scale}", f"{ratio:.2f}", peer] for name, scale, peer, ratio in ratios]
+    table = _markdown(["map", "size", "the peer's time over astar's", "fastest complete peer"], lines)
+    return f"## astar against the fastest peer\n\n{peers_verdict(ratios)}\n\n{table}\n"
 
 
 def plot(file: Path, entries: list[Entry], contestants: list[Contestant]) -> None:

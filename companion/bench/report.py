@@ -10,6 +10,8 @@ from os import cpu_count
 from companion.bench.cases import Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import DETERMINISTIC_RUNS, Entry, Limits
+from companion.provenance import made_with
+from companion.settings import Settings
 
 PACKAGES = (
     "rover-companion",
@@ -45,8 +47,8 @@ def runs_explained(limits: Limits) -> list[str]:
     last = limits.first_seed + limits.seeds - 1
     return [
         "*found* counts the searches that gave a path, of all that were made:",
-        f"{limits.seeds} with seeds {limits.first_seed} to {last} of planners that draw random numbers, {DETERMINISTIC_RUNS} (or one a problem, "
-        "if there are more) of others, whose path is always the same;",
+        f"{limits.seeds} with seeds {limits.first_seed} to {last} of planners that draw random numbers, {DETERMINISTIC_RUNS} of others, whose path "
+        "is always the same, and one a problem where a map has more problems than that;",
         f"fewer where {limits.cell_s:g} s were over. Times are of all searches, costs of those that gave a path.",
         "A random planner but `hybrid` that finds none has spent its budget (`plan` says so), which proves nothing: `bspline-ga` after its epochs,",
         "`prm` when the samples of all its rounds do not join start and target. Our graph searches and `hybrid` end with a path or with the proof",
@@ -88,9 +90,15 @@ def _fault_text(fault: str) -> str:
     return {"corner cut": "cuts corners", "obstacle": "touches obstacles"}.get(fault, fault)
 
 
-def as_json(entries: list[Entry], cases: list[Case], limits: Limits) -> dict[str, object]:
+def as_json(entries: list[Entry], cases: list[Case], limits: Limits, settings: Settings) -> dict[str, object]:
     """Everything measured, and what it was measured with."""
     maps = [
         {"name": case.name, "scale": case.scale, "fields": case.fields, "problems": len(case.ends)} for case in cases
     ]
-    return {"where": where(), "limits": asdict(limits), "maps": maps, "entries": [asdict(entry) for entry in entries]}
+    return {
+        "where": where(),
+        "limits": asdict(limits),
+        **made_with(settings),
+        "maps": maps,
+        "entries": [asdict(entry) for entry in entries],
+    }

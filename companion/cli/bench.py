@@ -72,7 +72,7 @@ def bench(
         console.print(table)
     console.print("\n" + " ".join(runs_explained(limits)).replace("*", "").replace("`", ""), highlight=False)
     if json_file is not None:
-        json_file.write_text(json.dumps(as_json(entries, cases, limits), indent=2) + "\n", encoding="utf-8")
+        json_file.write_text(json.dumps(as_json(entries, cases, limits, settings), indent=2) + "\n", encoding="utf-8")
     if docs is not None:
         command = f"rover-companion bench --sizes {sizes} --seeds {seeds} --seed {seed} --cell-s {cell_s:g} --docs docs"
         for file in write_page(docs, command, entries, contestants, cases, limits):

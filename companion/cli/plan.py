@@ -82,7 +82,7 @@ def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, 
         warm_up((name,), settings.planner)
     began_s = stopwatch_s()
     result = chosen.plan(problem, budget_of(settings.navigator.thorough), np.random.default_rng(seed))
-    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, problem.motion)
+    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, problem.motion, settings)
 
 
 def motion_of(name: str, settings: Settings, radius_m: float, heading_deg: float | None, grid: Grid) -> Motion:

@@ -12,6 +12,8 @@ from rich.table import Table
 
 from companion.grid import Cell, Grid
 from companion.planning.problem import Motion, Path, PlanResult, PlanStatus
+from companion.provenance import made_with
+from companion.settings import Settings
 
 EFFORT = {
     "sedighi": ("generations", "chromosomes"),
@@ -44,6 +46,7 @@ class Answer:
     top_left: bool
     grid: Grid
     motion: Motion
+    settings: Settings
 
     def place(self, cell: Cell) -> tuple[int, int]:
         """A field in the coordinates that the user chose."""
@@ -101,6 +104,7 @@ def as_text(answer: Answer) -> str:
             "control_points": result.control_points,
             "seed": answer.seed,
             "path": [answer.place(cell) for cell in path.cells] if path else None,
+            **made_with(answer.settings),
         }
     )
 

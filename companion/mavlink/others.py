@@ -44,7 +44,7 @@ def adsb_vehicle(message: Any, time_s: float) -> OtherSeen | None:
 
 
 def ais_vessel(message: Any, time_s: float) -> OtherSeen | None:
-    """AIS_VESSEL; half its length or width counts as its radius, whichever is more."""
+    """AIS_VESSEL; its place is that of its antenna, often far aft: its radius is from there to the farthest of bow, stern and sides."""
     point = point_of(message.lat, message.lon)
     if point is None:
         return None
@@ -52,9 +52,8 @@ def ais_vessel(message: Any, time_s: float) -> OtherSeen | None:
     speed_m_s = message.velocity / 100.0 if message.flags & moves == moves and message.COG < NO_COURSE else 0.0
     radius_m = None
     if message.flags & mavlink.AIS_FLAGS_VALID_DIMENSIONS:
-        length_m = message.dimension_bow + message.dimension_stern
-        width_m = message.dimension_port + message.dimension_starboard
-        radius_m = min(max(length_m, width_m) / 2.0, LARGEST_M) or None
+        sides_m = (message.dimension_bow, message.dimension_stern, message.dimension_port, message.dimension_starboard)
+        radius_m = min(float(max(sides_m)), LARGEST_M) or None
     velocity = _velocity(speed_m_s, message.COG)
     return OtherSeen(time_s, f"AIS {message.MMSI}", time_s - message.tslc, point, *velocity, radius_m=radius_m)
 

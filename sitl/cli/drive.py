@@ -18,6 +18,7 @@ from companion.itinerary import TargetStatus
 from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError, SitlSpec
+from companion.provenance import made_with
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
 from sitl.ground import field_at, mission_in_world, mission_on_map
@@ -108,7 +109,9 @@ def _put_out(
     if isinstance(recorder, Recorder):
         console.print(f"record:  {recorder.directory}", soft_wrap=True)
     if json_file is not None:
-        json_file.write_text(json.dumps(run.report.as_json(), indent=2) + "\n", encoding="utf-8")
+        json_file.write_text(
+            json.dumps({**run.report.as_json(), **made_with(run.settings)}, indent=2) + "\n", encoding="utf-8"
+        )
         console.print(f"figures: {json_file}", soft_wrap=True)
 
 

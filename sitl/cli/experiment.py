@@ -12,6 +12,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from companion.cli.inputs import OutputError, writable
 from companion.mapfiles import MapError
+from companion.provenance import made_with
+from companion.settings import Settings
 from sitl.experiments import (
     achour_table1,
     adaptive_control_points,
@@ -115,7 +117,9 @@ def _put_out(report: Report, console: Console, json_file: Path | None, docs: Pat
     for table in report.tables():
         console.print(table)
     if json_file is not None:
-        json_file.write_text(json.dumps(report.as_json(), indent=2) + "\n", encoding="utf-8")
+        json_file.write_text(
+            json.dumps({**made_with(Settings()), **report.as_json()}, indent=2) + "\n", encoding="utf-8"
+        )
         typer.echo(f"figures: {json_file}")
     if docs is not None:
         for file in report.write_docs(docs):

@@ -19,7 +19,7 @@ from companion.recorder import NullRecorder
 from companion.warmup import warm_up
 from sitl.experiments import drawing
 from sitl.experiments.experiment import Advance, ExperimentError, Options, planners_of, where_measured
-from sitl.experiments.navigation import settings_with
+from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
 from sitl.ground import mission_on_map
 from sitl.lockstep import Drive, Report
@@ -58,9 +58,17 @@ class Series:
         return float(np.mean([report.driving_time_s for report in self.reports]))
 
     @property
+    def steps(self) -> float:
+        """Mean fields driven."""
+        return float(np.mean([report.steps for report in self.reports]))
+
+    @property
     def missed(self) -> int:
         """Drives in which a target was missed."""
-        return sum(report.outcome not in ("reached", "collision") for report in self.reports)
+        return sum(
+            report.outcome not in ("reached", "collision") or any(status != "reached" for _, status in report.targets)
+            for report in self.reports
+        )
 
     def row(self, best_s: float) -> list[str]:
         """Figures for people; ``best_s``: the reference's time on this mission."""
@@ -70,7 +78,7 @@ class Series:
             f"{self.time_s:.1f}",
             f"{self.time_s / best_s:.3f}",
             f"{np.mean([report.distance_m for report in reports]):.1f}",
-            f"{np.mean([report.steps for report in reports]):.1f}",
+            f"{self.steps:.1f}",
             f"{np.mean([report.return_steps for report in reports]):.1f}",
             f"{self.missed}",
             f"{sum(report.collisions for report in reports)}",
@@ -178,10 +186,37 @@ All missions together:
 
 {markdown_table(SUM_HEAD, self._sums())}
 
+{shortfalls(self.series)}
+
 Driving times do not depend on the computer; plan (all planning of a drive, ms) was measured on {where_measured()}.
 
 ![Driving times](images/{NAME}.png)
 """
+
+
+def shortfalls(series: tuple[Series, ...]) -> str:
+    """What was aimed at, and every mission where it is not reached, in words; empty if ``hybrid`` was not driven."""
+    own = {(s.planner, s.mission): s for s in series}
+    slower, longer = [], []
+    for one in (s for s in series if s.planner == OURS):
+        references = [own[p, one.mission].time_s for p in REFERENCES if (p, one.mission) in own]
+        if references and one.time_s > min(references):
+            slower.append(f"{one.mission} ({one.time_s / min(references):.3f})")
+        steps = own.get((STEPS_REFERENCE, one.mission))
+        if steps is not None and one.steps > STEPS_FACTOR * steps.steps:
+            longer.append(f"{one.mission} ({one.steps / steps.steps:.3f})")
+    missed = sum(s.missed for s in series if s.planner == OURS)
+    if not any(s.planner == OURS for s in series):
+        return ""
+    return (
+        f"Aimed at with `{OURS}` on every mission: no more time than the faster of the references"
+        f" ({_misses(slower)}); at most {STEPS_FACTOR:g} times the steps of `{STEPS_REFERENCE}` ({_misses(longer)}); no target"
+        f" missed ({f'{missed} missed' if missed else 'reached'})."
+    )
+
+
+def _misses(missed: list[str]) -> str:
+    return f"not reached: {', '.join(missed)}" if missed else "reached"
 
 
 SUM_HEAD = ("planner", "time s", "/ref", "missed", "coll.")

@@ -100,5 +100,5 @@ def where_measured() -> str:
     """The computer and the versions that times depend on, in words."""
     return (
         f"{platform.machine()}, {cpu_count()} processors, Python {platform.python_version()}, "
-        f"numpy {version('numpy')}, numba {version('numba')}"
+        f"rover-companion {version('rover-companion')}, numpy {version('numpy')}, numba {version('numba')}"
     )

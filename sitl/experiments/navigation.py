@@ -40,6 +40,8 @@ MAPS = ("one-obstacle", "clutter", "rooms", "complex")
 PROBLEMS = 10
 """Of each map that the user names; the first are trivial, the last the longest."""
 RUNS_A_TASK = 5
+OURS, STEPS_REFERENCE, STEPS_FACTOR = "hybrid", "dstar-lite", 1.05
+"""Aimed at: what drives by default takes no more steps than so many times this one's."""
 SHOWN = {"hybrid": drawing.BLUE, "bspline-ga": drawing.ORANGE, "dstar-lite": drawing.GREEN, "theta-star": drawing.RED}
 
 
@@ -175,10 +177,26 @@ navigator's step, searches included, in milliseconds.
 
 {tables}
 
+{shortfalls(self.series)}
+
 Measured on {where_measured()}.
 
 ![Typical paths](images/{NAME}.png)
 """
+
+
+def shortfalls(series: tuple[Series, ...]) -> str:
+    """What was aimed at, and every map where it is not reached, in words; empty if one of the two was not compared."""
+    own = {(s.planner, s.map_name): s for s in series}
+    pairs = [(one, own.get((STEPS_REFERENCE, one.map_name))) for one in series if one.planner == OURS]
+    ratios = {a.map_name: float(np.median(a.over) / np.median(b.over)) for a, b in pairs if b and a.over and b.over}
+    if not ratios:
+        return ""
+    missed = [f"{name} ({ratio:.3f})" for name, ratio in ratios.items() if ratio > STEPS_FACTOR]
+    verdict = f"not reached: {', '.join(missed)}" if missed else "reached"
+    return (
+        f"Aimed at: median steps of `{OURS}` at most {STEPS_FACTOR:g} times those of `{STEPS_REFERENCE}` ({verdict})."
+    )
 
 
 def run(options: Options, advance: Advance) -> NavigationReport:

@@ -28,6 +28,7 @@ def test_every_run_reaches_the_target_on_every_map_in_both_profiles(made):
     """The figure to hold is 100 of 100. Were it 90 of 100, these 48 runs would show it with a chance of 0.994."""
     _, figures, _ = made
     assert figures["runs"] == RUNS and figures["step_limit"] == 2000
+    assert figures["versions"]["numba"] and figures["settings"]["planner"]["mixing"] == 0.8
     cases = {(result["profile"], result["map"]): result for result in figures["results"]}
     maps = ("one-obstacle", "clutter", "rooms", "complex")
     assert set(cases) == {(profile, name) for profile in ("default", "paper") for name in maps}
@@ -114,11 +115,12 @@ def test_each_experiment_replaces_only_its_own_section(tmp_path):
         (["kwasniewski-table1", "--maps", "{tmp}"], "known-1.png"),
         (["kwasniewski-maps", "--json", "{tmp}"], "cannot be written"),
         (["kwasniewski-maps", "--docs", "/dev/null/docs"], "/dev/null/docs/results.md: cannot be written"),
-        (["kwasniewski-maps", "--world", "missions/maps/rooms.png"], "--world: kwasniewski-maps has its own maps"),
-        (["wang-table4", "--maps", "{tmp}"], "--maps: wang-table4"),
+        (["wang-table4", "--world", "{tmp}/none.map"], "--world: wang-table4 has its own maps"),
+        (["achour-table1", "--maps", "{tmp}"], "--maps: achour-table1"),
+        (["wang-table4", "--planners", "hybrid"], "--planners"),
         (["navigation", "--planners", "nope"], "unknown planner 'nope'"),
     ],
-    ids=["name", "folder", "map", "json", "docs", "world", "no maps", "planner"],
+    ids=["name", "folder", "map", "json", "docs", "world", "drawn", "planners", "planner"],
 )
 def test_a_user_error_is_one_line_and_exit_code_2(arguments, said, tmp_path):
     result = CliRunner().invoke(app, ["experiment", *(a.format(tmp=tmp_path) for a in arguments)])

@@ -81,7 +81,7 @@ def test_drive_command_writes_what_it_promises(tmp_path: Path) -> None:
     report = json.loads((tmp_path / "r.json").read_text())
     wanted = {
         "outcome", "targets", "steps", "return_steps", "searches", "distance_m", "collisions", "sim_time_s",
-        "wall_time_s", "planning_time_s", "seed",
+        "wall_time_s", "planning_time_s", "seed", "versions", "settings",
     }  # fmt: skip
     assert wanted <= report.keys()
     assert report["outcome"] == "reached"

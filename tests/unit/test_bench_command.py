@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from companion.bench.aims import genetic_ratios, genetic_verdict, peer_ratios, peers_verdict
 from companion.bench.cases import Case, map_case, paper_cases
 from companion.bench.contestants import Contestant, our_planner
-from companion.bench.measure import Limits, measure
+from companion.bench.measure import Entry, Limits, measure, spread_order
 from companion.bench.movingai import ScenarioFileError, read_scenarios, spread
 from companion.bench.peers import installed_peers
 from companion.cli.commands import app
@@ -54,6 +55,50 @@ def test_a_random_planner_is_measured_over_seeds():
 def test_faults_of_others_are_found(cells, fault):
     entry = run(Contestant("cheat", lambda *_: lambda: np.array(cells, np.int64)))
     assert fault in entry.faults
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 9, 20, 21])
+def test_every_problem_comes_once_and_a_hard_one_soon(count):
+    order = spread_order(count)
+    assert sorted(order) == list(range(count))
+    assert max(order[: (count + 2) // 3 + 1]) >= count // 2
+
+
+def test_a_random_planner_meets_every_problem_however_few_the_seeds():
+    asked = []
+
+    def solve(weights, start, target, rng):
+        asked.append((start, target))
+
+    ends = tuple((Cell(0, y), Cell(7, y)) for y in range(5))
+    measure([Contestant("any", solve, random=True)], [Case("wall", 1, WALL, ends)], Limits(seeds=2), lambda *_: None)
+    assert set(asked) == set(ends)
+
+
+def entry(name: str, case: str, scale: int, ms: float, found: int = 10) -> Entry:
+    return Entry(name, case, scale, 10, found, (ms,), (1.0,) * found, (), None)
+
+
+def test_what_was_aimed_at_is_said_and_every_miss_named():
+    entries = [
+        entry("astar", "rooms", 1, 1.0),
+        entry("astar", "one-obstacle", 40, 8.0),
+        entry("bspline-ga", "one-obstacle", 40, 0.1, found=9),
+        entry("sampler", "rooms", 1, 0.1),
+        entry("library", "rooms", 1, 2.0),
+        entry("slow", "rooms", 1, 9.0),
+        entry("library", "one-obstacle", 40, 80.0),
+    ]
+    peers = [Contestant(name, lambda *_: None) for name in ("library", "slow")]
+    peers.append(Contestant("sampler", lambda *_: None, random=True))
+    ratios = peer_ratios(entries, peers)
+    assert ratios == [("rooms", 1, "library", 2.0), ("one-obstacle", 40, "library", 10.0)]
+    assert peers_verdict(ratios).endswith("Not reached: rooms x1 (2.00).")
+    assert peers_verdict(ratios[1:]).endswith("Reached.")
+    assert genetic_ratios(entries) == [("one-obstacle", 40, pytest.approx(80.0), 0.9)]
+    assert genetic_verdict(genetic_ratios(entries)).endswith("Reached.")
+    slower = [entry("astar", "one-obstacle", 1, 0.5), entry("bspline-ga", "one-obstacle", 1, 1.0)]
+    assert genetic_verdict(genetic_ratios(slower)).endswith("Not reached: x1 (0.50).")
 
 
 def test_what_finds_nothing_has_no_cost():
@@ -137,9 +182,11 @@ def test_the_command_writes_table_json_and_page(tmp_path):
     figures = json.loads((tmp_path / "b.json").read_text())
     assert {entry["contestant"] for entry in figures["entries"]} == {"dijkstra", "bspline-ga"}
     assert len(figures["maps"]) == 4 and "numpy" in figures["where"]
+    assert figures["settings"]["planner"]["mixing"] == 0.8 and figures["versions"]["numba"]
     page = (tmp_path / "docs" / "benchmarks.md").read_text()
-    assert "\n3 with seeds 0 to 2 of planners that draw random numbers, 20 (" in page
+    assert "\n3 with seeds 0 to 2 of planners that draw random numbers, 20 of others" in page
     assert "3 with seeds 0 to 2" in " ".join(result.output.split())
+    assert "astar against" not in page, "nothing to compare"
     assert "## rooms (100 x 50 fields)" in page and "| dijkstra |" in page
     assert (tmp_path / "docs" / "images" / "benchmarks.png").stat().st_size > 10_000
 

@@ -102,6 +102,15 @@ def test_the_sharpest_bend_of_a_circle_is_its_radius():
     assert tightest_radius(np.column_stack((angles, 2.0 * angles))) == np.inf
 
 
+def test_json_says_what_it_was_made_with(map_file, tmp_path):
+    own = tmp_path / "own.toml"
+    own.write_text("[planner]\nmixing = 0.7\n", encoding="utf-8")
+    result = run(map_file, "--start", "0,0", "--target", "7,0", "--seed", 5, "--settings", own, "--json")
+    answer = json.loads(result.stdout)
+    assert answer["seed"] == 5 and answer["settings"]["planner"]["mixing"] == 0.7
+    assert answer["versions"]["numba"] and answer["versions"]["rover-companion"] != "not installed"
+
+
 def test_top_left_counts_y_down(map_file):
     result = run(map_file, "--start", "0,5", "--target", "7,5", "--top-left", "--json")
     path = json.loads(result.stdout)["path"]

@@ -66,7 +66,7 @@ def test_receivers_speak_of_others_whoever_passes_it_on(system: int) -> None:
     assert (plane.north_m_s, plane.east_m_s) == pytest.approx((0.0, 1.5), abs=1e-9)
     assert (plane.seen_s, plane.altitude_m, plane.radius_m) == (1.0, 120.0, None)
     assert (ship.north_m_s, ship.east_m_s) == pytest.approx((-2.0, 0.0), abs=1e-9)
-    assert (ship.radius_m, ship.altitude_m) == (4.0, None)
+    assert (ship.radius_m, ship.altitude_m) == (6.0, None), "from the antenna to the bow"
 
 
 def test_what_flags_do_not_vouch_for_is_not_believed() -> None:

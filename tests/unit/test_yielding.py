@@ -116,3 +116,22 @@ def test_a_plan_of_meeting_by_chance_is_never_driven_into() -> None:
             north_m = min(north_m + speed_m_s * 0.05, 36.0)
             gaps.append(moving.at(pose.time_s).distance_m(NedPoint(north_m, 20.0)) - 0.85)
         assert min(gaps) > 0.0
+
+
+def test_it_looks_where_it_really_drives_and_not_where_the_route_is() -> None:
+    """The route goes round the other one, the place that the rover is told lies behind it: straight there they would meet."""
+    round_it = np.vstack(
+        (
+            np.column_stack((np.full(16, 20.0), np.arange(20.0, 24.0, 0.25))),
+            np.column_stack((np.arange(20.0, 36.0, 0.25), np.full(64, 24.0))),
+        )
+    )
+    other = Moving("m", 100.0, NedPoint(23.5, 22.2), -0.4, 0.0, 0.5)
+
+    def then(told: NedPoint) -> Guide:
+        now = Guide(Motion.DRIVE, GuidedPosition(told), 1.5)
+        made = yielded(now, Route(round_it), HERE, 1.0, (other,), open_ground(), ROVER, SETTINGS)[0]
+        return DRIVE if made is now else made
+
+    assert then(NedPoint(20.0, 22.0)) is DRIVE
+    assert then(NedPoint(25.0, 24.0)) is not DRIVE

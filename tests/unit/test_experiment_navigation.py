@@ -1,0 +1,96 @@
+"""The experiments that compare planners on the way: field by field, and driven."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sitl.cli.commands import app
+from sitl.experiments import navigation
+from sitl.experiments.driving import Series, shortfalls
+from sitl.lockstep import Report
+
+MAP = """type octile
+height 6
+width 9
+map
+.........
+....@....
+....@....
+....@....
+....@....
+....@....
+"""
+SCENARIOS = """version 1
+0\tslit.map\t9\t6\t0\t5\t8\t5\t13.656854
+0\tslit.map\t9\t6\t8\t5\t0\t2\t12.071068
+"""
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> Path:
+    (tmp_path / "slit.map.scen").write_text(SCENARIOS, encoding="ascii")
+    file = tmp_path / "slit.map"
+    file.write_text(MAP, encoding="ascii")
+    return file
+
+
+def figures_of(world: Path, name: str) -> dict[tuple[str, str], dict[str, object]]:
+    file = world.with_name(name)
+    arguments = ["experiment", "navigation", "--runs", "2", "--planners", "hybrid,dstar-lite", "--world", str(world)]
+    result = CliRunner().invoke(app, [*arguments, "--json", str(file)])
+    assert result.exit_code == 0, result.output
+    return {(one["planner"], one["map"]): one for one in json.loads(file.read_text())["results"]}
+
+
+def test_navigation_drives_each_planner_through_given_maps(world: Path) -> None:
+    once, again = figures_of(world, "one.json"), figures_of(world, "two.json")
+    assert set(once) == {
+        (p, m) for p in ("hybrid", "dstar-lite") for m in ("one-obstacle", "clutter", "rooms", "complex", "slit")
+    }
+    for (planner, name), series in once.items():
+        runs = (2 if planner == "hybrid" else 1) * (2 if name == "slit" else 1)
+        assert series["outcomes"] == ["reached"] * runs
+        assert all(over >= 1.0 for over in series["steps_over_best"])  # type: ignore[attr-defined]
+        for key in ("steps", "return_steps", "searches"):
+            assert series[key] == again[planner, name][key]
+
+
+def test_a_map_without_scenarios_is_one_line(tmp_path: Path) -> None:
+    file = tmp_path / "bare.map"
+    file.write_text(MAP, encoding="ascii")
+    result = CliRunner().invoke(app, ["experiment", "navigation", "--world", str(file)])
+    assert result.exit_code == 2 and "bare.map.scen" in result.stderr and len(result.stderr.splitlines()) == 1
+
+
+def driven(planner: str, mission: str, time_s: float, steps: int, outcome: str = "reached") -> Series:
+    return Series(planner, mission, (Report(0, outcome, steps=steps, driving_time_s=time_s),))
+
+
+def test_every_shortfall_of_driving_is_said() -> None:
+    good = (driven("hybrid", "a", 9.0, 105), driven("astar", "a", 10.0, 90), driven("theta-star", "a", 9.5, 90))
+    text = shortfalls((*good, driven("dstar-lite", "a", 8.0, 100)))
+    assert text.count("reached") == 3 and "not reached" not in text
+    bad = (
+        driven("hybrid", "b", 11.0, 120, "time limit"),
+        driven("theta-star", "b", 10.0, 90),
+        driven("dstar-lite", "b", 8.0, 100),
+    )
+    text = shortfalls((*good, *bad))
+    assert "not reached: b (1.100)" in text and "not reached: b (1.200)" in text and "1 missed" in text
+    assert shortfalls(good[1:]) == ""
+
+
+def test_a_target_missed_counts_in_a_drive_with_a_collision_too() -> None:
+    report = Report(0, "collision", [("gate", "reached"), ("home", "unreachable")], collisions=1)
+    assert Series("hybrid", "a", (report,)).missed == 1
+    assert Series("hybrid", "a", (Report(0, "collision", [("gate", "reached")], collisions=1),)).missed == 0
+
+
+def test_every_shortfall_of_navigation_is_said() -> None:
+    ours = [navigation.Series("hybrid", name, (), over) for name, over in (("a", (1.0, 1.04)), ("b", (1.2, 1.3, 1.1)))]
+    other = [navigation.Series("dstar-lite", name, (), (1.0,)) for name in ("a", "b")]
+    assert "not reached: b (1.200)" in navigation.shortfalls((*ours, *other))
+    assert navigation.shortfalls((ours[0], other[0])).endswith("(reached).")
+    assert navigation.shortfalls(tuple(ours)) == ""
