@@ -9,6 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl import geodesy
+from sitl.autopilot_fence import fence_status
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import arming_faults, base_mode
 from sitl.autopilot_proximity import echoes
@@ -154,6 +155,15 @@ def read_beams(vehicle: Vehicle) -> list[int]:
     return vehicle.sensing.beams_cm(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
 
 
+def mission_current(vehicle: Vehicle, seq: int) -> Any:
+    """MISSION_CURRENT with a given item; the total does not count home."""
+    mission = vehicle.plan.mission
+    state = int(mission.state) if mission.present else mavlink.MISSION_STATE_NO_MISSION
+    return mavlink.MAVLink_mission_current_message(
+        seq, max(len(mission.items) - 1, 0), state, int(vehicle.mode == Mode.AUTO)
+    )
+
+
 def _home(vehicle: Vehicle) -> list[Any]:
     if not vehicle.has_home:
         return []
@@ -201,7 +211,7 @@ MESSAGES: dict[int, Builder] = {
     125: lambda _: [mavlink.MAVLink_power_status_message(5000, 0, 0)],
     152: lambda _: [mavlink.MAVLink_meminfo_message(0, 65535, 524288)],
     62: _navigation,
-    42: lambda _: [mavlink.MAVLink_mission_current_message(0, 0, 1, 0)],
+    42: lambda v: [mission_current(v, v.plan.mission.current)],
     36: _servos,
     65: _rc_channels,
     27: _raw_imu,
@@ -218,6 +228,7 @@ MESSAGES: dict[int, Builder] = {
     87: _position_target,
     132: _distance_sensors,
     173: _rangefinder,
+    162: fence_status,
 }
 """Streamed at 1 Hz unless asked otherwise; a builder gives nothing while there is nothing to tell."""
 
@@ -231,7 +242,7 @@ GROUPS: dict[int, tuple[int, ...]] = {
     6: (33, 32),
     10: (30, 164),
     11: (74,),
-    12: (163, 2, 193, 147, 132, 173, 241),
+    12: (163, 2, 193, 147, 132, 173, 241, 162),
 }
 """REQUEST_DATA_STREAM's groups; 0 means all."""
 
