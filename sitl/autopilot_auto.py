@@ -21,7 +21,7 @@ from sitl.autopilot_targets import change_speed
 from sitl.autopilot_transfer import run_uploads
 from sitl.autopilot_vehicle import ALTITUDE_M, Mode, Vehicle
 from sitl.autopilot_ways import (
-    SAVE_EVERY_S,
+    SAVE_EVERY_US,
     arrived,
     begin_driving,
     begin_return,
@@ -34,13 +34,14 @@ from sitl.autopilot_ways import (
 from sitl.control import HEADING
 
 CRITICAL, WARNING, NOTICE, INFO = 2, 4, 5, 6
-TICK_S = 0.1
+TICK_US = 100_000
 """How often the mission is looked at; arriving somewhere is noticed at once."""
-TELL_TARGET_EVERY_S = 1.0
+HANDED_OVER_EVERY_S = 1.0
 RELATIVE_INT, PLACE_ONLY = 6, 3576
 """Frame and type mask of the place that is handed over."""
 SMALLEST_CIRCLE_M = 0.5
 TURNED_RAD = math.radians(5.0)
+BUSY_MODES = {Mode.AUTO, Mode.RTL, Mode.SMART_RTL}
 STAY, LOITER, ACRO, MANUAL = 0, 1, 2, 3
 """MIS_DONE_BEHAVE."""
 
@@ -248,11 +249,13 @@ class AutoRunner:
 
 def run_plan(vehicle: Vehicle) -> None:
     """What missions, ways back and fences have to do at this moment."""
-    if vehicle.plan.uploads:
+    plan, now_us = vehicle.plan, vehicle.time_us
+    if plan.uploads:
         run_uploads(vehicle)
-    run_fence(vehicle, set_mode, disarm)
-    if vehicle.time_s >= vehicle.plan.way_back_due_s:
-        vehicle.plan.way_back_due_s = vehicle.time_s + SAVE_EVERY_S
+    if plan.fence.enabled or vehicle.parameters["FENCE_ENABLE"] != plan.fence.seen_setting:
+        run_fence(vehicle, set_mode, disarm)
+    if now_us >= plan.way_back_due_us:
+        plan.way_back_due_us = now_us + SAVE_EVERY_US
         remember_path(vehicle)
     if vehicle.mode == Mode.AUTO:
         _run_auto(vehicle)
@@ -317,7 +320,7 @@ def _run_heading(vehicle: Vehicle) -> None:
 def _tell_target(vehicle: Vehicle) -> None:
     """Guided within AUTO: once a second the place goes to the first onboard controller that was heard."""
     task = vehicle.plan.auto.guided
-    if task.place is None or (task.sent_s is not None and vehicle.time_s - task.sent_s <= TELL_TARGET_EVERY_S):
+    if task.place is None or (task.sent_s is not None and vehicle.time_s - task.sent_s <= HANDED_OVER_EVERY_S):
         return
     task.sent_s = vehicle.time_s
     if vehicle.plan.helper is None:
@@ -334,11 +337,10 @@ def _tell_target(vehicle: Vehicle) -> None:
 
 def plan_due_us(vehicle: Vehicle) -> float:
     """When ``run_plan`` is to be called next."""
-    busy = vehicle.plan.uploads or vehicle.plan.fence.enabled or vehicle.mode in (Mode.AUTO, Mode.RTL, Mode.SMART_RTL)
-    due_s = vehicle.plan.way_back_due_s
-    if busy:
-        due_s = min(due_s, vehicle.time_s + TICK_S)
-    return due_s * 1e6
+    plan = vehicle.plan
+    if plan.uploads or plan.fence.enabled or vehicle.mode in BUSY_MODES:
+        return min(plan.way_back_due_us, vehicle.time_us + TICK_US)
+    return plan.way_back_due_us
 
 
 def set_mission_current(vehicle: Vehicle, channel: Channel, message: Any) -> None:

@@ -48,6 +48,10 @@ def move_on_circle(control: Any, tuning: Any, estimate: Any) -> None:
     from_centre = math.hypot(estimate.north_m - control.dest_n, estimate.east_m - control.dest_e)
     if abs(from_centre - radius) <= max(tuning.turn_radius_m, EDGE_M):
         control.on_circle = 1
+    # The pull to the centre comes and goes with the moving point; only what is beside it is shaped.
+    inwards = control.circle_speed**2 / radius
+    beside_n = control.shaped_an + inwards * math.cos(control.circle_angle)
+    beside_e = control.shaped_ae + inwards * math.sin(control.circle_angle)
     wish = control.base_speed if control.on_circle else 0.0
     control.circle_speed += limited(wish - control.circle_speed, control.accel_max * LOOP_S)
     sign = 1.0 if control.circle_radius > 0.0 else -1.0
@@ -65,7 +69,7 @@ def move_on_circle(control: Any, tuning: Any, estimate: Any) -> None:
     gain_n, gain_e = shaped_accel(
         control.dest_n + radius * out_n - control.shaped_n, control.dest_e + radius * out_e - control.shaped_e,
         control.shaped_vn - vel_n, control.shaped_ve - vel_e,
-        control.shaped_an + inwards * out_n, control.shaped_ae + inwards * out_e,
+        beside_n, beside_e,
         control.speed_max, min(control.accel_max, tuning.turn_max_g * GRAVITY_M_S2), control.jerk_max, LOOP_S,
     )  # fmt: skip
     control.shaped_an, control.shaped_ae = gain_n - inwards * out_n, gain_e - inwards * out_e

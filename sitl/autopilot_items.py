@@ -27,7 +27,8 @@ RALLY_POINT = 5100
 LAST_NAV_COMMAND = 95
 
 ABSOLUTE, RELATIVE, TERRAIN = 0, 3, 10
-FRAMES = {0: ABSOLUTE, 2: ABSOLUTE, 5: ABSOLUTE, 3: RELATIVE, 6: RELATIVE, 10: TERRAIN, 11: TERRAIN}
+MISSION_FRAME = 2
+FRAMES = {0: ABSOLUTE, MISSION_FRAME: ABSOLUTE, 5: ABSOLUTE, 3: RELATIVE, 6: RELATIVE, 10: TERRAIN, 11: TERRAIN}
 """Frames a place may come in, and the one it is given back in."""
 
 HIGHEST_M = 83_000.0
@@ -214,7 +215,7 @@ def mission_item(message: Any) -> Item:
 
 def fence_item(message: Any) -> Item:
     """What is kept of MISSION_ITEM(_INT) in the fence. Raises RefusedError."""
-    if message.frame not in FRAMES or message.frame == 2:
+    if message.frame not in FRAMES or message.frame == MISSION_FRAME:
         raise RefusedError(Result.UNSUPPORTED_FRAME)
     if message.command in (FENCE_POLYGON_IN, FENCE_POLYGON_OUT):
         first = _wrapped(message.param1, U8) if math.isfinite(message.param1) else 0.0
@@ -231,13 +232,13 @@ def rally_item(message: Any) -> Item:
     """What is kept of MISSION_ITEM(_INT) among the rally points. Raises RefusedError."""
     if message.command != RALLY_POINT:
         raise RefusedError(Result.UNSUPPORTED)
-    if message.frame not in FRAMES or FRAMES[message.frame] != RELATIVE:
+    if message.frame not in FRAMES or message.frame == MISSION_FRAME:
         raise RefusedError(Result.UNSUPPORTED_FRAME)
     x, y = units(message)
     _check_place(x, y)
     if not -32768.0 <= message.z <= 32767.0:
         raise RefusedError(Result.INVALID_PARAM7)
-    return Item(RALLY_POINT, RELATIVE, (0.0, 0.0, 0.0, 0.0), x, y, float(int(message.z)))
+    return Item(RALLY_POINT, FRAMES[message.frame], (0.0, 0.0, 0.0, 0.0), x, y, float(int(message.z)))
 
 
 def fence_fault(items: list[Item]) -> str | None:

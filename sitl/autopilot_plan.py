@@ -123,7 +123,7 @@ class Plan:
     way_back: WayBack = field(default_factory=WayBack)
     told_arrival: bool = False
     """RTL has said that it is there."""
-    way_back_due_s: float = 0.0
+    way_back_due_us: int = 0
     helper: tuple[int, int, int] | None = None
     """The first onboard controller that was heard: system, component, channel."""
 

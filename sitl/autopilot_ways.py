@@ -14,7 +14,7 @@ from sitl.control import LEG, STOP
 
 CIRCLE_FENCE, POLYGON_FENCE = 2, 4
 """Bits of FENCE_TYPE: the circle round home, and what was uploaded."""
-SAVE_EVERY_S = 0.3
+SAVE_EVERY_US = 300_000
 SIMPLIFY_AT = 50
 """New points on the path after which it is simplified."""
 SLOWEST_M_S = 0.05
