@@ -48,7 +48,8 @@ STAY, LOITER, ACRO, MANUAL = 0, 1, 2, 3
 ELSEWHERE = {181, 182, 183, 184, 202, 203, 205, 206, 208, 211, 215, 216, 218}
 """Servos, relays, cameras, grippers: begun without effect, done at once, as without the part."""
 DONE_AT_ONCE = {
-    items.CHANGE_SPEED, items.SET_HOME, items.SET_REVERSE, items.FENCE_ENABLE, items.GUIDED_LIMITS, 195, 197, 201,
+    items.CHANGE_SPEED, items.SET_HOME, items.SET_REVERSE, items.FENCE_ENABLE, items.GUIDED_LIMITS, items.JUMP_TAG,
+    195, 197, 201,
 }  # fmt: skip
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 WAYPOINT, LOITER_UNLIMITED, LOITER_TURNS, LOITER_TIME, RETURN = 16, 17, 18, 19, 20
 GUIDED_ENABLE, DELAY, CONDITION_DELAY, CONDITION_DISTANCE = 92, 93, 112, 114
+JUMP_TAG, JUMP_TO_TAG = 600, 601
 JUMP, CHANGE_SPEED, SET_HOME, SET_REVERSE, FENCE_ENABLE = 177, 178, 179, 194, 207
 SET_YAW_SPEED, GUIDED_LIMITS = 213, 222
 FENCE_RETURN_POINT, FENCE_POLYGON_IN, FENCE_POLYGON_OUT, FENCE_CIRCLE_IN, FENCE_CIRCLE_OUT = (
@@ -177,6 +178,8 @@ def units(message: Any) -> tuple[int, int]:
     if message.get_type() == "MISSION_ITEM_INT":
         return int(message.x), int(message.y)
     if message.command in RAW_PLACES:
+        if not (math.isfinite(message.x) and math.isfinite(message.y)):
+            raise RefusedError(Result.INVALID_PARAM5_X)
         return int(message.x), int(message.y)
     if not abs(message.x) <= 90.0:
         raise RefusedError(Result.INVALID_PARAM5_X)
@@ -184,6 +187,11 @@ def units(message: Any) -> tuple[int, int]:
         raise RefusedError(Result.INVALID_PARAM6_Y)
     scale = np.float32(1e7)
     return int(np.float32(message.x) * scale), int(np.float32(message.y) * scale)
+
+
+def _raw_place(x: int, y: int, z: float) -> tuple[int, int, float]:
+    """Numbers of a camera command, cut to one byte each."""
+    return int(_wrapped(x, U8)), int(_wrapped(y, U8)), _wrapped(z, U8) if math.isfinite(z) else 0.0
 
 
 def mission_item(message: Any) -> Item:
@@ -201,7 +209,7 @@ def mission_item(message: Any) -> Item:
         raise RefusedError(Result.UNSUPPORTED)
     x, y = units(message)
     if command in RAW_PLACES:
-        return Item(command, ABSOLUTE, kept, x, y, float(message.z))
+        return Item(command, ABSOLUTE, kept, *_raw_place(x, y, message.z))
     if command not in AT_A_PLACE:
         return Item(command, ABSOLUTE, kept)
     _check_place(x, y)

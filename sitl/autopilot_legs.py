@@ -68,7 +68,7 @@ def top_speed(length_m: float, start: float, wish: float, accel: float, jerk: fl
     """The highest speed up to a wish from which there is room to stop at the end of a leg; negative if there is none."""
     if ramp_m(start, wish, accel, jerk) + ramp_m(wish, 0.0, accel, jerk) <= length_m:
         return wish
-    low, high = min(start, wish), wish
+    low, high = min(start, wish), min(wish, start + math.sqrt(accel * length_m))
     if ramp_m(start, low, accel, jerk) + ramp_m(low, 0.0, accel, jerk) > length_m:
         return -1.0
     for _ in range(40):

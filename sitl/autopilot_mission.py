@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
-from sitl.autopilot_items import JUMP, Item
+from sitl.autopilot_items import JUMP, JUMP_TAG, JUMP_TO_TAG, Item
 
 FOREVER = -1
 MOST_SEARCHED = 255
@@ -221,9 +221,9 @@ class Mission:
             if index >= len(self.items):
                 return None
             item = self.items[index]
-            if item.command != JUMP:
+            if item.command not in (JUMP, JUMP_TO_TAG):
                 return index
-            target, times = int(item.params[0]), int(item.params[1])
+            target, times = self._jump_target(item), int(item.params[1])
             if not 0 < target < len(self.items):
                 return None
             if times == FOREVER:
@@ -239,6 +239,13 @@ class Mission:
             else:
                 index += 1
         return None
+
+    def _jump_target(self, item: Item) -> int:
+        """Where a jump goes; a tag is looked for from the beginning, and 0 is nowhere."""
+        if item.command == JUMP:
+            return int(item.params[0])
+        tagged = (n for n, one in enumerate(self.items) if one.command == JUMP_TAG and one.params[0] == item.params[0])
+        return next(tagged, 0)
 
     def next_nav(self, index: int) -> int | None:
         """The next navigation command from ``index`` on, without counting jumps."""

@@ -10,7 +10,7 @@ from sitl.autopilot_vehicle import ARMABLE_S, AUTOPILOT_MODES, HOME_S, PREARM_S,
 from sitl.autopilot_ways import begin_driving, begin_return, begin_way_back, remember_start
 from sitl.control import COAST, STOP
 
-NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.AUTO, Mode.INITIALISING}
+NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.INITIALISING}
 FORCE = {2989, 21196}
 """Magic numbers that arm or disarm against the checks."""
 

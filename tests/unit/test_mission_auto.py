@@ -114,6 +114,12 @@ def test_jumps_are_counted_and_told() -> None:
     assert [text for text in client.texts() if "Jump" in text] == ["Mission: 3 Jump 1/2", "Mission: 3 Jump 2/2"]
 
 
+def test_a_jump_to_a_tag() -> None:
+    client = in_auto(open_ground(), [at(16, 3, 0), do(600, 7), at(16, 0, 0), do(601, 7, 1), at(16, 0, 3)])
+    run_until(client, "Mission Complete")
+    assert [seq for seq in reached(client) if seq != 2] == [1, 3, 3, 5]
+
+
 def test_a_jump_for_ever() -> None:
     client = in_auto(open_ground(), [at(16, 3, 0), at(16, 0, 0), do(177, 1, -1), at(16, 0, 3)])
     client.run_for(200.0)
@@ -242,11 +248,9 @@ def test_arming_starts_a_mission_that_is_waiting() -> None:
     assert client.set_mode(10) == ACCEPTED
     client.run_for(5.0)
     assert place_m(client) == (0.0, 0.0)
-    assert client.arm() == FAILED
-    assert client.set_mode(4) == ACCEPTED
     assert client.arm() == ACCEPTED
-    assert client.set_mode(10) == ACCEPTED
     run_until(client, "Mission Complete")
+    assert place_m(client)[0] == pytest.approx(10.0, abs=0.5)
 
 
 def test_guided_within_auto() -> None:

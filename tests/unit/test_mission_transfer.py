@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_items import KEPT, NAMES, Item, RefusedError, mission_item
 from tests.mission_client import FENCE, MISSION, RALLY, at, do, download, heard, home, in_auto, item, upload
-from tests.sitl_client import Client, open_ground
+from tests.sitl_client import Client, open_ground, ready
 
 ACCEPTED, ERROR, BAD_FRAME, UNSUPPORTED, NO_SPACE, BAD_SEQUENCE, DENIED, CANCELLED = 0, 1, 2, 3, 4, 13, 14, 15
 SQUARE = [at(5001, n, e, (4,)) for n, e in ((-30, -30), (30, -30), (30, 30), (-30, 30))]
@@ -260,6 +260,77 @@ def test_everything_survives_a_reboot(client: Client) -> None:
     assert download(again)[1:] == rows[1:]
     assert len(download(again, FENCE)) == 4
     assert parameter(again, "MIS_TOTAL") == 2
+
+
+any_single = st.floats(width=32)
+any_kind = st.sampled_from([0, 0, 0, 1, 2, 3, 255])
+any_seq = st.one_of(st.integers(0, 4), st.integers(0, 65535))
+any_place = st.one_of(st.integers(-(2**31), 2**31 - 1), st.integers(-900_000_000, 900_000_000))
+any_command = st.one_of(st.sampled_from([*sorted(KEPT), 18, 5000, 5001, 5002, 5003, 5004, 5100]), st.integers(0, 65535))
+any_byte = st.integers(0, 255)
+any_item = st.tuples(
+    any_seq, st.sampled_from([0, 1, 2, 3, 6, 10, 77]), any_command, st.sampled_from([0, 1, 2, 3]), any_byte,
+    any_single, any_single, any_single, any_single,
+)  # fmt: skip
+any_message = st.one_of(
+    st.builds(lambda n, k: mavlink.MAVLink_mission_count_message(1, 1, n, k), any_seq, any_kind),
+    st.builds(
+        lambda head, x, y, z, k: mavlink.MAVLink_mission_item_int_message(1, 1, *head, x, y, z, k),
+        any_item, any_place, any_place, any_single, any_kind,
+    ),
+    st.builds(
+        lambda head, x, y, z, k: mavlink.MAVLink_mission_item_message(1, 1, *head, x, y, z, k),
+        any_item, any_single, any_single, any_single, any_kind,
+    ),
+    st.builds(lambda n, k: mavlink.MAVLink_mission_request_message(1, 1, n, k), any_seq, any_kind),
+    st.builds(lambda n, k: mavlink.MAVLink_mission_request_int_message(1, 1, n, k), any_seq, any_kind),
+    st.builds(lambda k: mavlink.MAVLink_mission_request_list_message(1, 1, k), any_kind),
+    st.builds(lambda k: mavlink.MAVLink_mission_clear_all_message(1, 1, k), any_kind),
+    st.builds(
+        lambda a, b, k: mavlink.MAVLink_mission_write_partial_list_message(1, 1, a, b, k),
+        st.integers(-5, 5), st.integers(-5, 5), any_kind,
+    ),
+    st.builds(lambda n: mavlink.MAVLink_mission_set_current_message(1, 1, n), any_seq),
+    st.builds(
+        lambda c, a, b: mavlink.MAVLink_command_long_message(1, 1, c, 0, a, b, 0, 0, 0, 0, 0),
+        st.sampled_from([207, 224, 300, 20]), any_single, any_single,
+    ),
+)  # fmt: skip
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(any_message, min_size=1, max_size=30))
+def test_whatever_is_sent_the_vehicle_stays_up(messages: list) -> None:
+    client = ready(open_ground(parameters={"FENCE_ENABLE": 1, "FENCE_ACTION": 0}))
+    client.set_mode(10)
+    for message in messages:
+        client.send(message)
+        client.run_for(0.1)
+    client.run_for(10.0)
+    truth = client.simulator.truth
+    assert all(map(math.isfinite, (truth.north_m, truth.east_m, truth.speed_m_s)))
+    client.run_for(1.1)
+    assert client.received[-1].get_srcComponent() == 1
+    client.send(mavlink.MAVLink_mission_request_list_message(1, 1, MISSION))
+    assert heard(client, "MISSION_COUNT")
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.lists(st.tuples(any_item, any_place, any_place, any_single), min_size=1, max_size=6))
+def test_whatever_mission_is_kept_can_be_run(items: list) -> None:
+    client = ready(open_ground())
+    stored: list = [home()]
+    for head, x, y, z in items:
+        row = (head[2], head[1], head[5:], x, y, z)
+        if upload(client, [*stored, row]) == ACCEPTED:
+            stored.append(row)
+        else:
+            upload(client, stored)
+    client.set_mode(10)
+    client.run_for(30.0)
+    truth = client.simulator.truth
+    assert all(map(math.isfinite, (truth.north_m, truth.east_m, truth.speed_m_s)))
+    assert len(download(client)) == len(stored)
 
 
 single = st.floats(width=32, allow_nan=False, allow_infinity=False, min_value=-1e5, max_value=1e5)
