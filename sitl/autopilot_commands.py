@@ -126,15 +126,17 @@ def _set_reverse(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 
 def _mission_start(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    if message.param1 != 0.0 or message.param2 != 0.0:  # only the whole mission
+        return DENIED
     return ACCEPTED if set_mode(vehicle, Mode.AUTO) else FAILED
 
 
 def _set_mission_current(vehicle: Vehicle, channel: Channel, message: Any) -> int:
-    if message.param2 == 1.0 and not vehicle.plan.mission.present:
-        return FAILED
     seq = int(message.param1)
     if seq < 0 or not vehicle.plan.mission.set_current(seq, AutoRunner(vehicle)):
         return FAILED
+    if message.param2 == 1.0:
+        vehicle.plan.mission.jumps.clear()
     for listener in vehicle.channels.values():
         listener.requested.append(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
     return ACCEPTED

@@ -121,6 +121,8 @@ class Plan:
     auto: Auto = field(default_factory=Auto)
     fence: Fence = field(default_factory=Fence)
     way_back: WayBack = field(default_factory=WayBack)
+    warned: set[tuple[int, str]] = field(default_factory=set)
+    """Complaints that were made."""
     told_arrival: bool = False
     """RTL has said that it is there."""
     way_back_due_us: int = 0

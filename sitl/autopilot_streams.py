@@ -25,8 +25,8 @@ from sitl.autopilot_vehicle import (
 
 DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
-PREARM_BIT = 1 << 28
-SENSORS = 322034735
+PREARM_BIT, FENCE_BIT = 1 << 28, 1 << 20
+SENSORS, ENABLED_SENSORS = 322034735, 304208943
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
 
 Builder = Callable[[Vehicle], list[Any]]
@@ -75,7 +75,12 @@ def _vfr_hud(vehicle: Vehicle) -> list[Any]:
 
 def _sys_status(vehicle: Vehicle) -> list[Any]:
     health = SENSORS & ~PREARM_BIT if arming_faults(vehicle) else SENSORS | PREARM_BIT
-    return [mavlink.MAVLink_sys_status_message(SENSORS, 304208943, health, 0, 12600, 0, 100, 0, 0, 0, 0, 0, 0)]
+    enabled = ENABLED_SENSORS
+    if vehicle.plan.fence.enabled and vehicle.parameters["FENCE_ACTION"] > 0.0:
+        enabled |= FENCE_BIT
+    if vehicle.plan.fence.breached:
+        health &= ~FENCE_BIT
+    return [mavlink.MAVLink_sys_status_message(SENSORS, enabled, health, 0, 12600, 0, 100, 0, 0, 0, 0, 0, 0)]
 
 
 def _ekf_status(vehicle: Vehicle) -> list[Any]:

@@ -56,6 +56,13 @@ def _say(channel: Channel, severity: int, text: str) -> None:
         channel.send(piece)
 
 
+def _warn_once(vehicle: Vehicle, kind: int, text: str) -> None:
+    """A complaint that is made once for each list."""
+    if (kind, text) not in vehicle.plan.warned:
+        vehicle.plan.warned.add((kind, text))
+        vehicle.say(WARNING, text)
+
+
 def stored(vehicle: Vehicle, kind: int) -> list[Item]:
     """The items of a type as they are stored; the first of a mission is home."""
     storage = vehicle.plan.storage
@@ -113,6 +120,9 @@ def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     if kind not in MOST:
         _ack(channel, message, Result.UNSUPPORTED)
         return
+    if kind in vehicle.plan.uploads:
+        _ack(channel, message, Result.DENIED)
+        return
     items, first, last = stored(vehicle, kind), message.start_index, message.end_index
     # A negative index is a very large one to the firmware.
     if not 0 <= first <= last <= len(items):
@@ -162,11 +172,13 @@ def item(vehicle: Vehicle, channel: Channel, message: Any) -> None:
             result = _guided(vehicle, message)
         elif kind not in MOST:
             result = Result.UNSUPPORTED
-        elif kind not in vehicle.plan.uploads:
-            result = Result.ERROR
         else:
-            _take(vehicle, channel, message, kind)
-            return
+            if message.get_type() == "MISSION_ITEM":
+                _warn_once(vehicle, kind, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT")
+            if kind in vehicle.plan.uploads:
+                _take(vehicle, channel, message, kind)
+                return
+            result = Result.ERROR
     except RefusedError as refusal:
         result = refusal.result
     _ack(channel, message, result)
@@ -299,18 +311,20 @@ def request_int(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def request(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """MISSION_REQUEST: one item as the older MISSION_ITEM, which has places in single precision."""
-    if _type_of(message) in MOST:
-        _send_item(vehicle, channel, message, _type_of(message), as_int=False)
+    kind = _type_of(message)
+    if kind in MOST and _send_item(vehicle, channel, message, kind, as_int=False):
+        _warn_once(vehicle, kind, "got MISSION_REQUEST; use MISSION_REQUEST_INT!")
 
 
-def _send_item(vehicle: Vehicle, channel: Channel, message: Any, kind: int, as_int: bool) -> None:
+def _send_item(vehicle: Vehicle, channel: Channel, message: Any, kind: int, as_int: bool) -> bool:
+    """Answer with an item; False if there is none."""
     items, seq = stored(vehicle, kind), int(message.seq)
     if seq >= len(items) and not (kind == MISSION and seq == 0):
         if kind == MISSION:
             _send_count(vehicle, channel, message, kind)
         beyond = kind == RALLY or (kind == FENCE and seq > len(items))
         _ack(channel, message, Result.INVALID_SEQUENCE if beyond else Result.ERROR)
-        return
+        return False
     one = Item(WAYPOINT, 0, x=vehicle.home[0], y=vehicle.home[1], z=ALTITUDE_M)
     if kind != MISSION or seq > 0:
         one = items[seq]
@@ -324,6 +338,7 @@ def _send_item(vehicle: Vehicle, channel: Channel, message: Any, kind: int, as_i
             int(kind == MISSION), *one.params, one.x * scale, one.y * scale, one.z, kind,
         )
     )  # fmt: skip
+    return True
 
 
 TRANSFERS: dict[str, Handler] = {

@@ -53,6 +53,9 @@ def test_a_breach_is_told_and_the_rover_holds(rows: list, goal: tuple[float, flo
     assert math.hypot(*place_m(client)) < 18.0
     status = client.of("FENCE_STATUS")
     assert (status[0].breach_status, status[-1].breach_status) == (0, 1)
+    health = client.of("SYS_STATUS")[-1]
+    assert health.onboard_control_sensors_enabled & 1 << 20
+    assert not health.onboard_control_sensors_health & 1 << 20
     assert (status[-1].breach_count, status[-1].breach_type) == (1, mavlink.FENCE_BREACH_BOUNDARY)
     assert status[-1].breach_time > 43_000
 

@@ -10,7 +10,7 @@ from sitl import geodesy
 from tests.mission_client import ORIGIN, at, do, heard, home, in_auto, item, place_m, run_until, upload
 from tests.sitl_client import Client, open_ground, ready
 
-ACCEPTED, FAILED = 0, 4
+ACCEPTED, DENIED, FAILED = 0, 2, 4
 
 
 def reached(client: Client) -> list[int]:
@@ -224,6 +224,7 @@ def test_set_current_by_command() -> None:
     assert client.ask(224, -1) == FAILED
     assert client.ask(224, 2) == ACCEPTED
     assert current(client).seq == 3
+    assert client.ask(300, 2, 3) == DENIED
     assert client.ask(300) == ACCEPTED
     run_until(client, "Mission Complete")
     assert reached(client) == [2, 3]

@@ -98,8 +98,9 @@ def test_a_second_uploader_is_denied_and_the_first_may_begin_again(client: Clien
     second.send(count(1))
     second.send(mavlink.MAVLink_mission_request_list_message(1, 1, MISSION))
     second.send(mavlink.MAVLink_mission_request_int_message(1, 1, 0, MISSION))
+    second.send(mavlink.MAVLink_mission_write_partial_list_message(1, 1, 0, 0, MISSION))
     second.send(mavlink.MAVLink_mission_clear_all_message(1, 1, MISSION))
-    assert acks(second) == [DENIED, DENIED, DENIED, ERROR]
+    assert acks(second) == [DENIED, DENIED, DENIED, DENIED, ERROR]
     second.send(item(0, home()))
     second.run_for(0.06)
     assert acks(client) == [DENIED]
@@ -234,6 +235,12 @@ def test_the_older_messages(client: Client) -> None:
     assert acks(client) == [ACCEPTED]
     client.send(mavlink.MAVLink_mission_request_message(1, 1, 1, MISSION))
     (back,) = heard(client, "MISSION_ITEM")
+    client.send(mavlink.MAVLink_mission_request_message(1, 1, 0, MISSION))
+    client.run_for(0.06)
+    assert [m.text for m in client.of("STATUSTEXT") if m.text.startswith("got")] == [
+        "got MISSION_ITEM; GCS should send MISSION_ITEM_INT",
+        "got MISSION_REQUEST; use MISSION_REQUEST_INT!",
+    ]
     assert (back.x, back.y, back.z) == pytest.approx((-35.3632, 149.16523, 7.5), abs=2e-5)
     client.send(mavlink.MAVLink_mission_item_message(1, 1, 0, 3, 16, 2, 1, 0, 0, 0, 0, -95.0, 149.16523, 7.5))
     assert acks(client) == [10]
