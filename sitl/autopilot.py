@@ -7,11 +7,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot_auto import plan_due_us, run_plan, set_mission_current
 from sitl.autopilot_commands import answer
 from sitl.autopilot_link import AUTOPILOT, Channel, new_channel
 from sitl.autopilot_modes import INFO, WARNING, run_failsafes, set_mode
 from sitl.autopilot_params import REAL32
+from sitl.autopilot_progress import plan_due_us, run_plan, set_mission_current
 from sitl.autopilot_proximity import forget_stale, take_in
 from sitl.autopilot_streams import heartbeat, send_due, set_group, start_streams
 from sitl.autopilot_targets import attitude_target, global_target, local_target

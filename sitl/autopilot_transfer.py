@@ -1,4 +1,4 @@
-"""Uploads and downloads of mission, fence and rally points (behaviour of MissionItemProtocol): one uploader at a time.
+"""Uploads of mission, fence and rally points (behaviour of MissionItemProtocol): one uploader at a time.
 
 Mission and rally points are written as they arrive, the fence only when it is whole. A cancelling MISSION_ACK is not
 listened to: an upload that nobody goes on with ends after eight seconds.
@@ -11,6 +11,17 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.autopilot_download import (
+    MOST,
+    WARNING,
+    acknowledge,
+    request,
+    request_int,
+    request_list,
+    stored,
+    type_of,
+    warn_once,
+)
 from sitl.autopilot_items import (
     JUMP,
     WAYPOINT,
@@ -25,12 +36,10 @@ from sitl.autopilot_items import (
 from sitl.autopilot_link import Channel
 from sitl.autopilot_plan import FENCE, MISSION, RALLY, Upload
 from sitl.autopilot_targets import go_to
-from sitl.autopilot_vehicle import ALTITUDE_M, Mode, Vehicle, text_messages
+from sitl.autopilot_vehicle import Mode, Vehicle, text_messages
 
-MOST = {MISSION: 724, FENCE: 84, RALLY: 50}
-"""How many items fit into the storage of a usual flight controller (16 kB)."""
 ASK_AGAIN_US, GIVE_UP_US = 1_000_000, 8_000_000
-WARNING, INFO = 4, 6
+INFO = 6
 DONE_TEXTS = {MISSION: "Flight plan received", RALLY: "Rally points received"}
 TIMEOUT_TEXTS = {MISSION: "Mission upload timeout", FENCE: "Fence upload timeout", RALLY: "Rally upload timeout"}
 TOTALS = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}
@@ -38,35 +47,10 @@ TOTALS = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}
 Handler = Callable[[Vehicle, Channel, Any], None]
 
 
-def _type_of(message: Any) -> int:
-    return int(getattr(message, "mission_type", 0))
-
-
-def _ack(channel: Channel, message: Any, result: int) -> None:
-    channel.send(
-        mavlink.MAVLink_mission_ack_message(
-            message.get_srcSystem(), message.get_srcComponent(), int(result), _type_of(message)
-        )
-    )
-
-
 def _say(channel: Channel, severity: int, text: str) -> None:
     """A text for this connection alone."""
     for piece in text_messages(channel, severity, text):
         channel.send(piece)
-
-
-def _warn_once(vehicle: Vehicle, kind: int, text: str) -> None:
-    """A complaint that is made once for each list."""
-    if (kind, text) not in vehicle.plan.warned:
-        vehicle.plan.warned.add((kind, text))
-        vehicle.say(WARNING, text)
-
-
-def stored(vehicle: Vehicle, kind: int) -> list[Item]:
-    """The items of a type as they are stored; the first of a mission is home."""
-    storage = vehicle.plan.storage
-    return {MISSION: storage.mission, FENCE: storage.fence, RALLY: storage.rally}[kind]
 
 
 def keep_home(vehicle: Vehicle) -> None:
@@ -88,17 +72,17 @@ def _save_total(vehicle: Vehicle, kind: int) -> None:
 
 def count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """MISSION_COUNT: somebody wants to upload."""
-    kind, uploads = _type_of(message), vehicle.plan.uploads
+    kind, uploads = type_of(message), vehicle.plan.uploads
     if kind not in MOST:
-        _ack(channel, message, Result.UNSUPPORTED)
+        acknowledge(channel, message, Result.UNSUPPORTED)
         return
     upload = uploads.get(kind)
     sender = (message.get_srcSystem(), message.get_srcComponent())
     if upload is not None and (upload.system, upload.component) != sender:
-        _ack(channel, message, Result.DENIED)
+        acknowledge(channel, message, Result.DENIED)
         return
     if message.count > MOST[kind]:
-        _ack(channel, message, Result.NO_SPACE)
+        acknowledge(channel, message, Result.NO_SPACE)
         vehicle.say(WARNING, f"Only {MOST[kind]} items are supported")
         return
     items = stored(vehicle, kind)
@@ -116,17 +100,17 @@ def count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """MISSION_WRITE_PARTIAL_LIST: somebody wants to upload a few items."""
-    kind = _type_of(message)
+    kind = type_of(message)
     if kind not in MOST:
-        _ack(channel, message, Result.UNSUPPORTED)
+        acknowledge(channel, message, Result.UNSUPPORTED)
         return
     if kind in vehicle.plan.uploads:
-        _ack(channel, message, Result.DENIED)
+        acknowledge(channel, message, Result.DENIED)
         return
     items, first, last = stored(vehicle, kind), message.start_index, message.end_index
     # A negative index is a very large one to the firmware.
     if not 0 <= first <= last <= len(items):
-        _ack(channel, message, Result.ERROR)
+        acknowledge(channel, message, Result.ERROR)
         vehicle.say(WARNING, "Flight plan update rejected")
         return
     _begin(vehicle, channel, message, first, last, list(items) if kind == FENCE else [])
@@ -134,10 +118,10 @@ def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def _begin(vehicle: Vehicle, channel: Channel, message: Any, first: int, last: int, fence: list[Item | None]) -> None:
     now_us = vehicle.time_us
-    vehicle.plan.uploads[_type_of(message)] = Upload(
+    vehicle.plan.uploads[type_of(message)] = Upload(
         channel.number, message.get_srcSystem(), message.get_srcComponent(), first, last, now_us, now_us, fence
     )
-    _ask(vehicle, _type_of(message))
+    _ask(vehicle, type_of(message))
 
 
 def _ask(vehicle: Vehicle, kind: int) -> None:
@@ -166,7 +150,7 @@ def run_uploads(vehicle: Vehicle) -> None:
 
 def item(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """MISSION_ITEM and MISSION_ITEM_INT: one of an upload, or (current = 2) a guided target."""
-    kind = _type_of(message)
+    kind = type_of(message)
     try:
         if kind == MISSION and message.current in (2, 3):
             result = _guided(vehicle, message)
@@ -174,14 +158,14 @@ def item(vehicle: Vehicle, channel: Channel, message: Any) -> None:
             result = Result.UNSUPPORTED
         else:
             if message.get_type() == "MISSION_ITEM":
-                _warn_once(vehicle, kind, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT")
+                warn_once(vehicle, kind, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT")
             if kind in vehicle.plan.uploads:
                 _take(vehicle, channel, message, kind)
                 return
             result = Result.ERROR
     except RefusedError as refusal:
         result = refusal.result
-    _ack(channel, message, result)
+    acknowledge(channel, message, result)
 
 
 def _guided(vehicle: Vehicle, message: Any) -> Result:
@@ -199,16 +183,16 @@ def _take(vehicle: Vehicle, channel: Channel, message: Any, kind: int) -> None:
     upload = vehicle.plan.uploads[kind]
     reply = vehicle.channels.get(upload.channel, channel)
     if message.seq != upload.next:
-        _ack(reply, message, Result.INVALID_SEQUENCE)
+        acknowledge(reply, message, Result.INVALID_SEQUENCE)
         return
     if (message.get_srcSystem(), message.get_srcComponent()) != (upload.system, upload.component):
-        _ack(reply, message, Result.DENIED)
+        acknowledge(reply, message, Result.DENIED)
         return
     try:
         _write(vehicle, message, kind, upload)
     except RefusedError as refusal:
         del vehicle.plan.uploads[kind]
-        _ack(reply, message, refusal.result)
+        acknowledge(reply, message, refusal.result)
         return
     upload.heard_us = vehicle.time_us
     upload.next += 1
@@ -249,7 +233,7 @@ def _finish(vehicle: Vehicle, channel: Channel, message: Any, kind: int, fence: 
     result = Result.ACCEPTED
     if kind == FENCE and not _keep_fence(vehicle, [part for part in fence if part is not None]):
         result = Result.ERROR
-    _ack(channel, message, result)
+    acknowledge(channel, message, result)
     if kind in DONE_TEXTS:
         _say(channel, INFO, DONE_TEXTS[kind])
 
@@ -267,9 +251,9 @@ def _keep_fence(vehicle: Vehicle, items: list[Item]) -> bool:
 
 def clear(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """MISSION_CLEAR_ALL; refused during an upload, and for a mission that is running."""
-    kind = _type_of(message)
+    kind = type_of(message)
     if kind not in MOST:
-        _ack(channel, message, Result.UNSUPPORTED)
+        acknowledge(channel, message, Result.UNSUPPORTED)
         return
     cleared = kind not in vehicle.plan.uploads
     if cleared and kind == MISSION:
@@ -278,67 +262,7 @@ def clear(vehicle: Vehicle, channel: Channel, message: Any) -> None:
         stored(vehicle, kind).clear()
     if cleared:
         _save_total(vehicle, kind)
-    _ack(channel, message, Result.ACCEPTED if cleared else Result.ERROR)
-
-
-def request_list(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_REQUEST_LIST: how many items there are."""
-    kind = _type_of(message)
-    if kind not in MOST:
-        _ack(channel, message, Result.UNSUPPORTED)
-    elif kind in vehicle.plan.uploads:
-        _ack(channel, message, Result.DENIED)
-    else:
-        _send_count(vehicle, channel, message, kind)
-
-
-def _send_count(vehicle: Vehicle, channel: Channel, message: Any, kind: int) -> None:
-    channel.send(
-        mavlink.MAVLink_mission_count_message(
-            message.get_srcSystem(), message.get_srcComponent(), len(stored(vehicle, kind)), kind
-        )
-    )
-
-
-def request_int(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_REQUEST_INT: one item; not while a new list is arriving."""
-    kind = _type_of(message)
-    if kind in vehicle.plan.uploads:
-        _ack(channel, message, Result.DENIED)
-    elif kind in MOST:
-        _send_item(vehicle, channel, message, kind, as_int=True)
-
-
-def request(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_REQUEST: one item as the older MISSION_ITEM, which has places in single precision."""
-    kind = _type_of(message)
-    if kind in MOST and _send_item(vehicle, channel, message, kind, as_int=False):
-        _warn_once(vehicle, kind, "got MISSION_REQUEST; use MISSION_REQUEST_INT!")
-
-
-def _send_item(vehicle: Vehicle, channel: Channel, message: Any, kind: int, as_int: bool) -> bool:
-    """Answer with an item; False if there is none."""
-    items, seq = stored(vehicle, kind), int(message.seq)
-    if seq >= len(items) and not (kind == MISSION and seq == 0):
-        if kind == MISSION:
-            _send_count(vehicle, channel, message, kind)
-        beyond = kind == RALLY or (kind == FENCE and seq > len(items))
-        _ack(channel, message, Result.INVALID_SEQUENCE if beyond else Result.ERROR)
-        return False
-    one = Item(WAYPOINT, 0, x=vehicle.home[0], y=vehicle.home[1], z=ALTITUDE_M)
-    if kind != MISSION or seq > 0:
-        one = items[seq]
-    # The firmware compares the command, not the index, with the command under way.
-    current = int(kind == MISSION and one.command == vehicle.plan.mission.nav_index)
-    scale = 1 if as_int or one.command in (mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE, 203) else 1e-7
-    kinds = (mavlink.MAVLink_mission_item_message, mavlink.MAVLink_mission_item_int_message)
-    channel.send(
-        kinds[as_int](
-            message.get_srcSystem(), message.get_srcComponent(), seq, one.frame, one.command, current,
-            int(kind == MISSION), *one.params, one.x * scale, one.y * scale, one.z, kind,
-        )
-    )  # fmt: skip
-    return True
+    acknowledge(channel, message, Result.ACCEPTED if cleared else Result.ERROR)
 
 
 TRANSFERS: dict[str, Handler] = {
