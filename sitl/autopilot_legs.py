@@ -13,13 +13,15 @@ from numba import njit
 
 from sitl.autopilot_guided import (
     ACTIVE_TICKS,
+    PIVOT_ACCURACY_RAD,
     SPEED_CHANGE_TICKS,
+    bearing_to_target,
     check_pivot,
     follow_shaped,
     steer_waypoint,
 )
 from sitl.autopilot_speed import GRAVITY_M_S2, has_steered_wheels, run_stop
-from sitl.control import LEG, LOOP_S
+from sitl.control import LEG, LOOP_S, NEVER
 
 BEFORE, THIS, NEXT = 0, 1, 2
 """Rows of ``control.legs``: the leg that still ends, the one under way, the one after it."""
@@ -163,22 +165,34 @@ def begin_leg(
     if not control.fast:
         control.pivoting = 0
         check_pivot(control, tuning, estimate)
+        if control.corner and moving and off_course(control, estimate) > PIVOT_ACCURACY_RAD:
+            # The rover stopped here in order to turn.
+            control.pivoting = 1
+            control.pivot_done_tick = NEVER
     if control.fast and control.legs[NEXT, TIME] > 0.0:
         control.legs[THIS, :] = control.legs[NEXT, :]
     else:
         lay_leg(control, THIS, from_n, from_e, to_n, to_e)
     clear_leg(control, NEXT)
     control.fast = 0
-    if onwards and not turns_on_the_spot(control, tuning, from_n, from_e, after_n, after_e):
+    control.corner = 1 if onwards and turns_on_the_spot(control, tuning, from_n, from_e, after_n, after_e) else 0
+    if onwards and not control.corner:
         lay_leg(control, NEXT, to_n, to_e, after_n, after_e)
         control.fast = 1
+
+
+@njit(cache=True, nogil=True)
+def off_course(control: Any, estimate: Any) -> float:
+    """How far the heading is from the one to the place, in radians."""
+    error = bearing_to_target(control, estimate) - estimate.heading_rad
+    return float(abs((error + math.pi) % (2.0 * math.pi) - math.pi))
 
 
 @njit(cache=True, nogil=True)
 def turns_on_the_spot(control: Any, tuning: Any, from_n: float, from_e: float, after_n: float, after_e: float) -> bool:
     """Whether the corner at the end of the leg is so sharp that the rover stops there and pivots."""
     limit = math.radians(tuning.pivot_angle_deg)
-    if limit <= 0.0 or has_steered_wheels(tuning):
+    if limit <= PIVOT_ACCURACY_RAD or has_steered_wheels(tuning):
         return False
     first = math.atan2(control.dest_e - from_e, control.dest_n - from_n)
     second = math.atan2(after_e - control.dest_e, after_n - control.dest_n)

@@ -75,7 +75,8 @@ class Mission:
         """The navigation command under way, 0 if none."""
         return self.nav_index or 0
 
-    def _forget(self) -> None:
+    def reset(self) -> None:
+        """Forget where in the mission the vehicle is."""
         self.nav_running = self.do_running = self.do_done = False
         self.nav_index = self.do_index = None
         self.jumps.clear()
@@ -83,7 +84,7 @@ class Mission:
     def start(self, runner: Runner) -> None:
         """From the first command."""
         self.state = State.RUNNING
-        self._forget()
+        self.reset()
         if not self._advance(runner):
             self._complete(runner)
 

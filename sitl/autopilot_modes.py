@@ -110,6 +110,8 @@ def disarm(vehicle: Vehicle) -> None:
     if vehicle.armed:
         vehicle.armed = False
         vehicle.control["armed"] = 0
+        if vehicle.mode != Mode.AUTO:
+            vehicle.plan.mission.reset()
         vehicle.say(INFO, "Throttle disarmed")
 
 

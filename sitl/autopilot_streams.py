@@ -22,6 +22,7 @@ from sitl.autopilot_vehicle import (
     Mode,
     Vehicle,
 )
+from sitl.control import LEG
 
 DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
@@ -104,16 +105,30 @@ def _gps_raw(vehicle: Vehicle) -> list[Any]:
     ]  # fmt: skip
 
 
+def _beside_leg_m(vehicle: Vehicle) -> float:
+    """Metres left (positive) or right of the leg that is driven; 0 where there is none."""
+    control, (north_m, east_m) = vehicle.control[0], vehicle.position_m()
+    leg_n, leg_e = float(control["dest_n"] - control["from_n"]), float(control["dest_e"] - control["from_e"])
+    length_m = math.hypot(leg_n, leg_e)
+    if int(control["task"]) != LEG or length_m == 0.0:
+        return 0.0
+    return float((north_m - control["from_n"]) * leg_e - (east_m - control["from_e"]) * leg_n) / length_m
+
+
 def _navigation(vehicle: Vehicle) -> list[Any]:
     if vehicle.mode not in AUTOPILOT_MODES:
         return []
     bearing = distance = 0
+    beside_m = 0.0
     if vehicle.has_target:
         north, east = geodesy.offset_m(vehicle.place(), vehicle.destination)
         bearing = round(math.degrees(math.atan2(east, north))) % 360
         distance = int(math.hypot(north, east))
+        beside_m = _beside_leg_m(vehicle)
     return [
-        mavlink.MAVLink_nav_controller_output_message(0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, 0.0)
+        mavlink.MAVLink_nav_controller_output_message(
+            0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, beside_m
+        )
     ]
 
 

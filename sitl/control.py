@@ -43,7 +43,7 @@ CONTROL = np.dtype(
             "tick", "armed", "task", "reversed", "fresh_target", "reached", "arrived", "timed_out", "have_target",
             "target_tick", "nav_tick", "speed_change_tick", "pivoting", "pivot_done_tick", "place_tick",
             "place_valid", "speed_error_fresh", "steer_error_fresh", "vel_error_fresh", "speed_tick", "stop_tick",
-            "steer_tick", "left_limited", "right_limited", "throttle_limited", "fast", "halts", "on_circle",
+            "steer_tick", "left_limited", "right_limited", "throttle_limited", "fast", "corner", "halts", "on_circle",
         )
     ]
     + [

@@ -195,6 +195,38 @@ def test_hold_interrupts_and_auto_goes_on() -> None:
     assert reached(client) == [1, 2, 3]
 
 
+def test_disarming_outside_of_auto_forgets_where_it_was() -> None:
+    client = in_auto(open_ground(), [at(16, 10, 0), at(16, 30, 0)])
+    run_until(client, "Mission: 2 WP")
+    assert client.set_mode(4) == ACCEPTED
+    assert client.ask(400, 0) == ACCEPTED
+    assert client.ask(400, 1) == ACCEPTED
+    client.received.clear()
+    assert client.set_mode(10) == ACCEPTED
+    client.run_for(0.3)
+    assert "Mission: 1 WP" in client.texts()
+
+
+def test_home_is_moved_by_a_mission() -> None:
+    client = in_auto(open_ground(), [do(179, 0), at(179, 0, 20, (0,)), at(16, 10, 0), do(20)])
+    run_until(client, "Mission Complete")
+    assert math.dist(place_m(client), (0.0, 20.0)) < 0.6
+    moved = client.of("HOME_POSITION")[-1]
+    assert (moved.latitude, moved.longitude) == at(179, 0, 20)[3:5]
+
+
+def test_the_rover_keeps_to_the_line_and_tells_how_well() -> None:
+    client = in_auto(open_ground(heading_rad=0.9), [at(16, 30, 0), at(16, 60, 0)])
+    client.run_for(8.0)
+    output = client.of("NAV_CONTROLLER_OUTPUT")[-1]
+    north_m, east_m = place_m(client)
+    assert 0.05 < abs(east_m) < 3.0
+    assert output.xtrack_error == pytest.approx(-east_m, abs=0.3)
+    assert output.wp_dist == pytest.approx(30.0 - north_m, abs=2.0)
+    run_until(client, "Mission Complete")
+    assert abs(place_m(client)[1]) < 0.3
+
+
 def test_with_mis_restart_it_begins_anew() -> None:
     client = in_auto(open_ground(parameters={"MIS_RESTART": 1}), [at(16, 10, 0), at(16, 30, 0)])
     run_until(client, "Mission: 2 WP")
