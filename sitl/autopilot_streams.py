@@ -9,6 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl import geodesy
+from sitl.autopilot_fence import fence_status
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import arming_faults, base_mode
 from sitl.autopilot_proximity import echoes
@@ -21,11 +22,12 @@ from sitl.autopilot_vehicle import (
     Mode,
     Vehicle,
 )
+from sitl.control import LEG
 
 DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
-PREARM_BIT = 1 << 28
-SENSORS = 322034735
+PREARM_BIT, FENCE_BIT = 1 << 28, 1 << 20
+SENSORS, ENABLED_SENSORS = 322034735, 304208943
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
 
 Builder = Callable[[Vehicle], list[Any]]
@@ -74,7 +76,12 @@ def _vfr_hud(vehicle: Vehicle) -> list[Any]:
 
 def _sys_status(vehicle: Vehicle) -> list[Any]:
     health = SENSORS & ~PREARM_BIT if arming_faults(vehicle) else SENSORS | PREARM_BIT
-    return [mavlink.MAVLink_sys_status_message(SENSORS, 304208943, health, 0, 12600, 0, 100, 0, 0, 0, 0, 0, 0)]
+    enabled = ENABLED_SENSORS
+    if vehicle.plan.fence.enabled and vehicle.parameters["FENCE_ACTION"] > 0.0:
+        enabled |= FENCE_BIT
+    if vehicle.plan.fence.breached:
+        health &= ~FENCE_BIT
+    return [mavlink.MAVLink_sys_status_message(SENSORS, enabled, health, 0, 12600, 0, 100, 0, 0, 0, 0, 0, 0)]
 
 
 def _ekf_status(vehicle: Vehicle) -> list[Any]:
@@ -98,16 +105,30 @@ def _gps_raw(vehicle: Vehicle) -> list[Any]:
     ]  # fmt: skip
 
 
+def _beside_leg_m(vehicle: Vehicle) -> float:
+    """Metres left (positive) or right of the leg that is driven; 0 where there is none."""
+    control, (north_m, east_m) = vehicle.control[0], vehicle.position_m()
+    leg_n, leg_e = float(control["dest_n"] - control["from_n"]), float(control["dest_e"] - control["from_e"])
+    length_m = math.hypot(leg_n, leg_e)
+    if int(control["task"]) != LEG or length_m == 0.0:
+        return 0.0
+    return float((north_m - control["from_n"]) * leg_e - (east_m - control["from_e"]) * leg_n) / length_m
+
+
 def _navigation(vehicle: Vehicle) -> list[Any]:
     if vehicle.mode not in AUTOPILOT_MODES:
         return []
     bearing = distance = 0
+    beside_m = 0.0
     if vehicle.has_target:
         north, east = geodesy.offset_m(vehicle.place(), vehicle.destination)
         bearing = round(math.degrees(math.atan2(east, north))) % 360
         distance = int(math.hypot(north, east))
+        beside_m = _beside_leg_m(vehicle)
     return [
-        mavlink.MAVLink_nav_controller_output_message(0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, 0.0)
+        mavlink.MAVLink_nav_controller_output_message(
+            0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, beside_m
+        )
     ]
 
 
@@ -152,6 +173,15 @@ def read_beams(vehicle: Vehicle) -> list[int]:
     """The rangefinders' readings at this moment, in centimetres."""
     rover = vehicle.rover[0]
     return vehicle.sensing.beams_cm(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
+
+
+def mission_current(vehicle: Vehicle, seq: int) -> Any:
+    """MISSION_CURRENT with a given item; the total does not count home."""
+    mission = vehicle.plan.mission
+    state = int(mission.state) if mission.present else mavlink.MISSION_STATE_NO_MISSION
+    return mavlink.MAVLink_mission_current_message(
+        seq, max(len(mission.items) - 1, 0), state, int(vehicle.mode == Mode.AUTO)
+    )
 
 
 def _home(vehicle: Vehicle) -> list[Any]:
@@ -201,7 +231,7 @@ MESSAGES: dict[int, Builder] = {
     125: lambda _: [mavlink.MAVLink_power_status_message(5000, 0, 0)],
     152: lambda _: [mavlink.MAVLink_meminfo_message(0, 65535, 524288)],
     62: _navigation,
-    42: lambda _: [mavlink.MAVLink_mission_current_message(0, 0, 1, 0)],
+    42: lambda v: [mission_current(v, v.plan.mission.current)],
     36: _servos,
     65: _rc_channels,
     27: _raw_imu,
@@ -218,6 +248,7 @@ MESSAGES: dict[int, Builder] = {
     87: _position_target,
     132: _distance_sensors,
     173: _rangefinder,
+    162: fence_status,
 }
 """Streamed at 1 Hz unless asked otherwise; a builder gives nothing while there is nothing to tell."""
 
@@ -231,7 +262,7 @@ GROUPS: dict[int, tuple[int, ...]] = {
     6: (33, 32),
     10: (30, 164),
     11: (74,),
-    12: (163, 2, 193, 147, 132, 173, 241),
+    12: (163, 2, 193, 147, 132, 173, 241, 162),
 }
 """REQUEST_DATA_STREAM's groups; 0 means all."""
 

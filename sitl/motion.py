@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sitl.autopilot_guided import run_control
+from sitl.autopilot_loop import run_tasks
 from sitl.control import LOOP_S
 from sitl.movers import Floats, Ints
 from sitl.rover import drive, meet_movers
@@ -90,7 +90,7 @@ def run_loops(
     for loop in range(draws.shape[0]):
         control.tick += 1
         update_estimate(estimate, rover, origin, noise, draws[loop])
-        run_control(control, tuning, estimate)
+        run_tasks(control, tuning, estimate)
         for _ in range(SUBSTEPS):
             drive(rover, obstacles, south_m, west_m, resolution_m, control.servo_1, control.servo_3, LOOP_S / SUBSTEPS)
         if mover_radii_m.size > 0:

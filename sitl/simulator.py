@@ -16,6 +16,7 @@ from sitl import geodesy
 from sitl.autopilot import Autopilot
 from sitl.autopilot_lidar import LidarComponent
 from sitl.autopilot_link import Channel
+from sitl.autopilot_plan import Storage
 from sitl.autopilot_traffic import Traffic
 from sitl.autopilot_vehicle import Vehicle
 from sitl.control import GROUND_STEERING, LOOP_HZ, THROTTLE
@@ -141,6 +142,7 @@ class Simulator:
         self.world = world
         self._start = start
         self._parameters = dict(parameters or {})
+        self._storage = Storage()
         self._noise = settings.as_array()
         self._rng = np.random.default_rng(motion_seed)
         self._sensing = RangeSensing(suite, world, settings.range_m, np.random.default_rng(range_seed))
@@ -159,7 +161,7 @@ class Simulator:
         rover = self._rover[0]
         here = (float(rover["north_m"]), float(rover["east_m"]))
         origin = geodesy.moved(self._geo_start, here[0] - self._start.north_m, here[1] - self._start.east_m)
-        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters)
+        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters, self._storage)
         self._vehicle.control["tick"] = 0
         self._vehicle.estimate["heading_rad"] = rover["heading_rad"]
         self._autopilot = Autopilot(self._vehicle)
