@@ -14,7 +14,7 @@ from rich.table import Table
 
 from companion.app import Status
 from companion.cli.inputs import OutputError, picture, usable_settings, writable
-from companion.mapfiles import MapError, load_map
+from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError, SitlSpec
 from companion.provenance import made_with
@@ -25,6 +25,7 @@ from sitl.lockstep import Drive, Report
 from sitl.picture import save_picture
 from sitl.scenario import ScenarioError, scenario_from_mission
 from sitl.sensors import suite_named
+from sitl.worldfile import ground_grid
 
 EXIT_BAD_INPUT = 2
 LINE_EVERY_S = 60.0
@@ -43,7 +44,9 @@ def drive(
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")] = None,
     sensors: Annotated[str | None, typer.Option(help="lidar-90, lidar-360 or beams; default: the mission's.")] = None,
-    world: Annotated[Path | None, typer.Option(help="Map of the ground (image, ROS yaml, MovingAI .map).")] = None,
+    world: Annotated[
+        Path | None, typer.Option(help="The ground: image, ROS yaml, MovingAI .map or TOML world.")
+    ] = None,
     start: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to start from.")] = None,
     target: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to reach.")] = None,
     top_left: Annotated[bool, typer.Option("--top-left", help="Y counts down from the top row.")] = False,
@@ -121,7 +124,7 @@ def _mission(
         if start or target or top_left or prior or resolution_m is not None:
             raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
         return load_mission(mission_file)
-    ground = load_map(world, resolution_m)
+    ground = ground_grid(world, resolution_m)
     begin = field_at(ground, start, "--start", top_left=top_left) if start else None
     if mission_file is not None:
         if target is not None:
