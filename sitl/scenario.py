@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from companion.frames import GeoPoint
 from companion.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
+from companion.mission.sensor_tables import sensors_from, sensors_given
 from sitl.motion import NoiseSettings
-from sitl.sensors import suite_named
+from sitl.sensors import SensorSuite
 from sitl.simulator import SimStart, Simulator, steered_wheels
+from sitl.suites import suite_of
 from sitl.world import World
 from sitl.worldfile import load_world, movers_of
 
@@ -31,7 +34,7 @@ class Scenario:
 
     world: World
     start: SimStart
-    sensors: str = "lidar-90"
+    sensors: str | SensorSuite = "lidar-90"
     rover_radius_m: float = 0.35
     parameters: dict[str, float] = field(default_factory=dict)
     turning_radius_m: float = 0.0
@@ -60,7 +63,7 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     spec = mission.sitl or SitlSpec()
     name = str(mission.source or mission.name)
     try:
-        suite_named(spec.sensors)
+        described = suite_of(spec.sensors)
     except ValueError as error:
         raise ScenarioError(f"{name}: sitl.sensors: {error}") from error
     world, start_m = _ground(mission, spec, name)
@@ -81,7 +84,8 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     turning_radius_m = _turning_radius_m(mission, spec, name)
     if turning_radius_m > 0.0:
         parameters |= steered_wheels(turning_radius_m)
-    return Scenario(world, start, spec.sensors, radius_m, parameters, turning_radius_m)
+    sensors = spec.sensors if isinstance(spec.sensors, str) else described
+    return Scenario(world, start, sensors, radius_m, parameters, turning_radius_m)
 
 
 def _turning_radius_m(mission: Mission, spec: SitlSpec, name: str) -> float:
@@ -129,3 +133,12 @@ def _home(mission: Mission, spec: SitlSpec) -> GeoPoint:
 def with_parameters(scenario: Scenario, changes: dict[str, float]) -> Scenario:
     """The same scenario with some of ArduRover's parameters changed."""
     return replace(scenario, parameters={**scenario.parameters, **changes})
+
+
+def with_sensors(mission: Mission, sensors: str) -> Mission:
+    """The same mission with other sensors: the name of a suite, or a TOML file. Raises ScenarioError."""
+    try:
+        given = sensors_from(sensors_given(sensors), Path(), ScenarioError)
+    except ValueError as error:
+        raise ScenarioError(f"--sensors: {error}") from error
+    return replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=given))

@@ -260,6 +260,8 @@ class Simulator:
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._doors_move_s - self.time_s))
         if self._lidar is not None:
             due_us = min(due_us, self._lidar.next_due_us())
+        if self._sensing.next_due_s() < math.inf:
+            due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._sensing.next_due_s() - self.time_s))
         if self._traffic.talks:
             # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
@@ -291,12 +293,13 @@ class Simulator:
         return Collision(self.time_s, *here, self.world.movers[struck - 1].name, float(rover["struck_m_s"]))
 
     def _send(self) -> None:
+        rover = self._rover[0]
+        self._sensing.sample(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
         self._autopilot.run_due()
         if self._traffic.talks:
             self._traffic.send_due(self.time_s, (link.channel for link in self._links))
         if self._lidar is None:
             return
-        rover = self._rover[0]
         data = self._lidar.packets(
             self._vehicle.time_us, float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"])
         )

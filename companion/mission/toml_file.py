@@ -11,7 +11,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from companion.frames import GeoPoint
 from companion.grid import Cell
@@ -32,6 +32,7 @@ from companion.mission.mission import (
     open_ring,
 )
 from companion.mission.qgc import load_qgc
+from companion.mission.sensor_tables import SensorsTable, sensors_from, sensors_given
 from companion.mission.tables import (
     Field2,
     FileName,
@@ -187,7 +188,7 @@ class SitlTable(Table):
     resolution_m: Positive | None = None
     start: Field2 | None = None
     heading_deg: float = SitlSpec().heading_deg
-    sensors: Literal["lidar-90", "lidar-360", "beams", "none"] = "lidar-90"
+    sensors: Annotated[SensorsTable | FileName, BeforeValidator(sensors_given)] = "lidar-90"
     home: GeoTable | None = None
     movers: Annotated[list[MoverTable], Field(max_length=100, default_factory=list)]
     steering: Literal["skid", "ackermann"] | None = None
@@ -249,7 +250,7 @@ def _sitl(table: SitlTable, path: Path) -> SitlSpec:
         resolution_m=table.resolution_m,
         start=None if table.start is None else Cell(*table.start),
         heading_deg=table.heading_deg,
-        sensors=table.sensors,
+        sensors=sensors_from(table.sensors, path.parent, MissionError),
         home=None if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
         movers=tuple(_named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)),
         steering=table.steering,

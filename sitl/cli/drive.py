@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -16,15 +15,14 @@ from companion.app import Status
 from companion.cli.inputs import OutputError, picture, usable_settings, writable
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
-from companion.mission.mission import Mission, MissionError, SitlSpec
+from companion.mission.mission import Mission, MissionError
 from companion.provenance import made_with
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
 from sitl.picture import save_picture
-from sitl.scenario import ScenarioError, scenario_from_mission
-from sitl.sensors import suite_named
+from sitl.scenario import ScenarioError, scenario_from_mission, with_sensors
 from sitl.worldfile import ground_grid
 
 EXIT_BAD_INPUT = 2
@@ -43,7 +41,9 @@ def drive(
         Path | None, typer.Option("--map", help="Write what was mapped as STEM.yaml and STEM.pgm.")
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")] = None,
-    sensors: Annotated[str | None, typer.Option(help="lidar-90, lidar-360 or beams; default: the mission's.")] = None,
+    sensors: Annotated[
+        str | None, typer.Option(help="lidar-90, lidar-360, beams or a TOML file; default: the mission's.")
+    ] = None,
     world: Annotated[
         Path | None, typer.Option(help="The ground: image, ROS yaml, MovingAI .map or TOML world.")
     ] = None,
@@ -63,7 +63,7 @@ def drive(
         settings = usable_settings(settings_file)
         mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
         if sensors is not None:
-            mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=_known(sensors)))
+            mission = with_sensors(mission, sensors)
         _refuse_blind(mission)
         scenario = scenario_from_mission(mission)
         recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
@@ -92,16 +92,8 @@ def drive(
     raise typer.Exit(report.exit_code)
 
 
-def _known(sensors: str) -> str:
-    try:
-        suite_named(sensors)
-    except ValueError as error:
-        raise ScenarioError(f"--sensors: {error}") from error
-    return sensors
-
-
 def _refuse_blind(mission: Mission) -> None:
-    if mission.sitl is not None and mission.sitl.sensors == "none":
+    if mission.sitl is not None and str(mission.sitl.sensors) == "none":
         raise MissionError(
             "sensors none: the companion does not drive without range data; none is for rover-sitl serve"
         )
