@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,8 +102,7 @@ class SensorSuite:
     proximity: ProximitySectors | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Reading:
+class Reading(NamedTuple):
     """One range as the autopilot sends it in DISTANCE_SENSOR; centimetres, at ``max_cm`` nothing was seen."""
 
     number: int
@@ -152,10 +152,12 @@ class RangeSensing:
         ]
         self._sectors = _sampler(suite.proximity, noise_m, sector_rng) if suite.proximity else None
         self._samplers = [sampler for _, _, sampler in self._sampled] + ([self._sectors] if self._sectors else [])
+        self.samples = bool(self._samplers)
+        """Whether a sensor measures at a rate of its own, and ``sample`` must be called when that is due."""
 
     def next_due_s(self) -> float:
-        """When a sensor with a rate of its own measures next, on the world's clock; infinity if there is none."""
-        return min((sampler.due_s for sampler in self._samplers), default=math.inf)
+        """When such a sensor measures next, on the world's clock."""
+        return min(sampler.due_s for sampler in self._samplers)
 
     def sample(self, north_m: float, east_m: float, heading_rad: float) -> None:
         """Let every sensor whose time has come measure."""
@@ -196,9 +198,12 @@ class RangeSensing:
 
     def wired(self, north_m: float, east_m: float, heading_rad: float) -> list[Reading]:
         """What the rangefinders say at this moment; one that knows nothing is left out, as the firmware does."""
-        plain = zip(self._plain, self.beams_cm(north_m, east_m, heading_rad), strict=True)
+        if not self.suite.beams:
+            return []
+        ranges_cm = self.beams_cm(north_m, east_m, heading_rad)
         found = [
-            _reading(number, beam.orientation, beam, range_cm / 100.0, NO_TYPE) for (number, beam), range_cm in plain
+            Reading(number, beam.orientation, round(beam.min_m * 100), round(beam.max_m * 100), range_cm)
+            for (number, beam), range_cm in zip(self._plain, ranges_cm, strict=True)
         ]
         for number, beam, sampler in self._sampled:
             newest_m = sampler.newest_m(self.time_s)
@@ -208,9 +213,11 @@ class RangeSensing:
 
     def sectors(self) -> list[Reading]:
         """The proximity sectors; one that knows nothing shows its maximum, as the firmware does."""
-        newest_m = self._sectors.newest_m(self.time_s) if self._sectors else None
         near = self.suite.proximity
-        if newest_m is None or near is None:
+        if near is None or self._sectors is None:
+            return []
+        newest_m = self._sectors.newest_m(self.time_s)
+        if newest_m is None:
             return []
         return [
             _reading(FIRST_SECTOR_ID + sector, sector, near, float(range_m), LASER)

@@ -226,7 +226,8 @@ class Simulator:
         goal = math.floor(time_s * LOOP_HZ + 1e-6)
         while self._tick < goal:
             self._receive()
-            self._move_doors()
+            if self.world.doors:
+                self._move_doors()
             self._run(min(goal - self._tick, self._loops_until_due()))
             self._send()
 
@@ -256,11 +257,11 @@ class Simulator:
 
     def _loops_until_due(self) -> int:
         due_us = self._autopilot.next_due_us()
-        if self._doors_move_s < math.inf:
+        if self.world.doors:
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._doors_move_s - self.time_s))
         if self._lidar is not None:
             due_us = min(due_us, self._lidar.next_due_us())
-        if self._sensing.next_due_s() < math.inf:
+        if self._sensing.samples:
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._sensing.next_due_s() - self.time_s))
         if self._traffic.talks:
             # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
@@ -294,7 +295,8 @@ class Simulator:
 
     def _send(self) -> None:
         rover = self._rover[0]
-        self._sensing.sample(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
+        if self._sensing.samples:
+            self._sensing.sample(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
         self._autopilot.run_due()
         if self._traffic.talks:
             self._traffic.send_due(self.time_s, (link.channel for link in self._links))

@@ -147,9 +147,11 @@ class World:
     black: Obstacles | None = None
     fleet: Fleet = field(init=False)
     _layers: dict[tuple[bool, ...], Layers] = field(init=False, default_factory=dict)
+    _without_doors: Layers = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fleet", fleet_of(self.movers))
+        object.__setattr__(self, "_without_doors", self._made((True,) * len(self.doors)))
 
     @classmethod
     def open(cls, width_m: float = 1.0, height_m: float = 1.0) -> World:
@@ -174,6 +176,8 @@ class World:
 
     def layers(self, time_s: float = 0.0) -> Layers:
         """What stands at a moment; the arrays are kept, one set for each state of the doors."""
+        if not self.doors:
+            return self._without_doors
         state = tuple(door.is_open(time_s) for door in self.doors)
         if state not in self._layers:
             self._layers[state] = self._made(state)
