@@ -5,7 +5,7 @@ the turn rate follows their difference at once. Ackermann steering is the bicycl
 no faster and no farther than they can, so the rover turns only while it moves.
 
 On slippery ground both slide: friction, which is what changes the velocity, ends at grip times gravity. Then the rover
-pulls away and brakes late, drifts on sideways in bends, and turns less than its wheels ask for.
+pulls away and brakes late, and drifts on sideways (skid) or turns less than its wheels ask for (steered wheels).
 """
 
 from __future__ import annotations
@@ -96,11 +96,13 @@ def slide(rover: Any, grip: float, wanted_m_s: float, wanted_rad_s: float, step_
     """Forward speed, turn rate and speed sideways after a step on slippery ground.
 
     The wheels want a speed ahead, none sideways, and a turn rate. Friction changes the velocity by no more than grip times
-    gravity, in whatever direction; the rover cannot turn faster than that keeps it on a circle, nor change its turn rate at once.
+    gravity, in whatever direction, and the turn rate not at once. Steered wheels turn the rover no faster than friction
+    can bend its way (it understeers); a skid rover turns all the same and drifts on sideways.
     """
     most_m_s = grip * GRAVITY_M_S2 * step_s
-    most_rad_s = grip * GRAVITY_M_S2 / max(abs(rover.speed_m_s), 1e-6)
-    wanted_rad_s = min(max(wanted_rad_s, -most_rad_s), most_rad_s)
+    if rover.turning_radius_m > 0.0:
+        most_rad_s = grip * GRAVITY_M_S2 / max(abs(rover.speed_m_s), 1e-6)
+        wanted_rad_s = min(max(wanted_rad_s, -most_rad_s), most_rad_s)
     change_rad_s = grip * TURN_GRIP_RAD_S2 * step_s
     yaw_rate_rad_s = rover.yaw_rate_rad_s + min(max(wanted_rad_s - rover.yaw_rate_rad_s, -change_rad_s), change_rad_s)
     turned_rad = yaw_rate_rad_s * step_s
