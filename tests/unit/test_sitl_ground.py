@@ -1,5 +1,6 @@
 """Slippery and rough ground against the mechanics that it stands for."""
 
+import itertools
 import math
 from typing import Any
 
@@ -139,7 +140,7 @@ def test_what_is_reported_is_the_velocity_over_ground_also_while_it_slides() -> 
     client.run_for(4.0)
     told = client.of("LOCAL_POSITION_NED")
     errors, sideways = [], 0.0
-    for one, two in zip(told[:-1], told[1:], strict=True):
+    for one, two in itertools.pairwise(told):
         span_s = (two.time_boot_ms - one.time_boot_ms) / 1000.0
         errors.append(math.hypot((two.x - one.x) / span_s - 0.5 * (one.vx + two.vx),
                                  (two.y - one.y) / span_s - 0.5 * (one.vy + two.vy)))  # fmt: skip
