@@ -23,6 +23,7 @@ from sitl.autopilot_vehicle import (
     Vehicle,
 )
 from sitl.control import LEG
+from sitl.sensors import Reading
 
 DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
@@ -155,24 +156,24 @@ def _simstate(vehicle: Vehicle) -> list[Any]:
 
 
 def _distance_sensors(vehicle: Vehicle) -> list[Any]:
-    wired = [
+    own = [
         mavlink.MAVLink_distance_sensor_message(
-            _ms(vehicle), round(beam.min_m * 100), round(beam.max_m * 100), reading, 4, number, beam.orientation, 0
+            _ms(vehicle), one.min_cm, one.max_cm, one.range_cm, one.kind, one.number, one.orientation, 0
         )
-        for number, (beam, reading) in enumerate(zip(vehicle.sensing.suite.beams, read_beams(vehicle), strict=True))
+        for one in (*read_beams(vehicle), *vehicle.sensing.sectors())
     ]
-    return wired + echoes(vehicle)
+    return own + echoes(vehicle)
 
 
 def _rangefinder(vehicle: Vehicle) -> list[Any]:
-    readings = read_beams(vehicle)
+    readings = [one.range_cm for one in read_beams(vehicle)]
     return [mavlink.MAVLink_rangefinder_message(min(readings) / 100.0, 0.0)] if readings else []
 
 
-def read_beams(vehicle: Vehicle) -> list[int]:
-    """The rangefinders' readings at this moment, in centimetres."""
+def read_beams(vehicle: Vehicle) -> list[Reading]:
+    """What the rangefinders say at this moment."""
     rover = vehicle.rover[0]
-    return vehicle.sensing.beams_cm(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
+    return vehicle.sensing.wired(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
 
 
 def mission_current(vehicle: Vehicle, seq: int) -> Any:

@@ -14,7 +14,7 @@ from sitl.autopilot_loop import run_tasks
 from sitl.control import LOOP_S
 from sitl.movers import Floats, Ints
 from sitl.rover import drive, meet_movers
-from sitl.world import Obstacles
+from sitl.world import Ground, Obstacles
 
 SUBSTEPS = 4
 """Steps of the plant in one main loop."""
@@ -68,6 +68,9 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
     estimate.east_m = rover.east_m - origin[1] + estimate.bias_e + noise[3] * draw[3]
     estimate.vel_n = rover.speed_m_s * ahead_n + rate_n
     estimate.vel_e = rover.speed_m_s * ahead_e + rate_e
+    if rover.slide_m_s != 0.0:
+        estimate.vel_n -= rover.slide_m_s * ahead_e
+        estimate.vel_e += rover.slide_m_s * ahead_n
     estimate.accel_n = rover.accel_m_s2 * ahead_n - side_m_s2 * ahead_e
     estimate.accel_e = rover.accel_m_s2 * ahead_e + side_m_s2 * ahead_n
     heading_rad = rover.heading_rad + estimate.bias_heading
@@ -78,7 +81,7 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
 @njit(cache=True, nogil=True)
 def run_loops(
     rovers: Any, estimates: Any, controls: Any, tunings: Any, origin: Any, noise: Any, draws: Any,
-    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
+    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
     mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats, time_s: float,
 ) -> int:  # fmt: skip
     """Run main loops from ``time_s`` on, until the draws are used up or something happened that people must be told at once.
@@ -92,7 +95,10 @@ def run_loops(
         update_estimate(estimate, rover, origin, noise, draws[loop])
         run_tasks(control, tuning, estimate)
         for _ in range(SUBSTEPS):
-            drive(rover, obstacles, south_m, west_m, resolution_m, control.servo_1, control.servo_3, LOOP_S / SUBSTEPS)
+            drive(
+                rover, obstacles, south_m, west_m, resolution_m, ground, control.servo_1, control.servo_3,
+                LOOP_S / SUBSTEPS,
+            )  # fmt: skip
         if mover_radii_m.size > 0:
             now_s = time_s + (loop + 1) * LOOP_S
             meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)

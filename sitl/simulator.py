@@ -65,6 +65,8 @@ class Truth:
     heading_rad: float
     speed_m_s: float
     yaw_rate_rad_s: float
+    slide_m_s: float = 0.0
+    """Speed sideways, to the right; only on slippery ground."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +156,7 @@ class Simulator:
         self._tick = 0
         self._links: list[SimLink] = []
         self._collisions: list[Collision] = []
+        self._solid, self._doors_move_s = world.layers(0.0).solid, world.next_change_s(0.0)
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
         self._boot()
 
@@ -184,6 +187,7 @@ class Simulator:
             float(rover["heading_rad"]),
             float(rover["speed_m_s"]),
             float(rover["yaw_rate_rad_s"]),
+            float(rover["slide_m_s"]),
         )
 
     @property
@@ -207,7 +211,8 @@ class Simulator:
         rover = self._rover[0]
         reach_m = 5.0 + float(rover["radius_m"])
         here = (float(rover["north_m"]), float(rover["east_m"]))
-        room_m = min(self.world.clearance_m(*here, reach_m), self.world.mover_gap_m(*here, self.time_s)[0])
+        stands_m = self.world.clearance_m(*here, reach_m, self.time_s)
+        room_m = min(stands_m, self.world.mover_gap_m(*here, self.time_s)[0])
         return max(room_m - float(rover["radius_m"]), 0.0)
 
     def connect(self) -> SimLink:
@@ -228,6 +233,8 @@ class Simulator:
         goal = math.floor(time_s * LOOP_HZ + 1e-6)
         while self._tick < goal:
             self._receive()
+            if self.world.doors:
+                self._move_doors()
             self._run(min(goal - self._tick, self._loops_until_due()))
             self._send()
 
@@ -247,10 +254,22 @@ class Simulator:
             link.dropped = True
         self._links.clear()
 
+    def _move_doors(self) -> None:
+        """A door moves with the first main loop that begins at its time or after it."""
+        if self.time_s >= self._doors_move_s:
+            self._solid, self._doors_move_s = (
+                self.world.layers(self.time_s).solid,
+                self.world.next_change_s(self.time_s),
+            )
+
     def _loops_until_due(self) -> int:
         due_us = self._autopilot.next_due_us()
+        if self.world.doors:
+            due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._doors_move_s - self.time_s))
         if self._lidar is not None:
             due_us = min(due_us, self._lidar.next_due_us())
+        if self._sensing.samples:
+            due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._sensing.next_due_s() - self.time_s))
         if self._traffic.talks:
             # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
@@ -266,7 +285,7 @@ class Simulator:
         done = run_loops(
             self._rover, vehicle.estimate, vehicle.control, vehicle.tuning, vehicle.origin_m, self._noise,
             self._draws[self._row : self._row + loops],
-            world.obstacles, world.south_m, world.west_m, world.resolution_m, *world.fleet, self.time_s,
+            self._solid, world.south_m, world.west_m, world.resolution_m, world.ground, *world.fleet, self.time_s,
         )  # fmt: skip
         self._row += done
         self._tick += done
@@ -282,12 +301,14 @@ class Simulator:
         return Collision(self.time_s, *here, self.world.movers[struck - 1].name, float(rover["struck_m_s"]))
 
     def _send(self) -> None:
+        rover = self._rover[0]
+        if self._sensing.samples:
+            self._sensing.sample(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
         self._autopilot.run_due()
         if self._traffic.talks:
             self._traffic.send_due(self.time_s, (link.channel for link in self._links))
         if self._lidar is None:
             return
-        rover = self._rover[0]
         data = self._lidar.packets(
             self._vehicle.time_us, float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"])
         )

@@ -15,7 +15,7 @@ from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from sitl.news import News
-from sitl.scenario import ScenarioError, scenario_from_mission
+from sitl.scenario import ScenarioError, scenario_from_mission, with_sensors
 from sitl.server import Endpoint, ListenError, open_endpoint
 from sitl.server import serve as run_server
 
@@ -35,6 +35,7 @@ def serve(
     speedup: Annotated[float, typer.Option(min=0.01, max=200.0, help="Times real time.")] = 1.0,
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
+    sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
 ) -> None:
     """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C.
 
@@ -44,7 +45,9 @@ def serve(
     news = News() if quiet else News(_say, clock.now_s)
     endpoints: list[Endpoint] = []
     try:
-        simulator = scenario_from_mission(load_mission(mission_file)).simulator(seed)
+        mission = load_mission(mission_file)
+        mission = mission if sensors is None else with_sensors(mission, sensors)
+        simulator = scenario_from_mission(mission).simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
         simulator.advance_to_s(0.02)
         for url in listen or DEFAULT_LISTEN:
