@@ -31,6 +31,8 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
         return False
     vehicle.mode = mode
     _enter(vehicle)
+    for channel in vehicle.channels.values():
+        channel.requested.append(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     return True
 
 
@@ -52,10 +54,12 @@ def _enter(vehicle: Vehicle) -> None:
     control, tuning, estimate = vehicle.control, vehicle.tuning, vehicle.estimate
     begin_guided(control[0], tuning[0])
     control["task"] = STOP
+    vehicle.destination = vehicle.place()
     # HOLD takes the throttle away at once, it does not brake by a controller.
     if vehicle.mode in (Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.SIMPLE, Mode.HOLD):
         control["task"] = COAST
     elif vehicle.mode in (Mode.RTL, Mode.SMART_RTL):
+        vehicle.destination = vehicle.home
         begin_target(control[0], tuning[0], estimate[0], 0.0, 0.0)
 
 
@@ -63,6 +67,7 @@ def arm(vehicle: Vehicle, force: bool = False) -> bool:
     """Arm, or say why not."""
     if vehicle.armed:
         return True
+    vehicle.clocks.logging_s = vehicle.time_s
     reasons = [] if force else arming_faults(vehicle)
     if vehicle.mode in NOT_ARMABLE and not force:
         reasons = ["Mode not armable"]
@@ -90,6 +95,7 @@ def disarm(vehicle: Vehicle) -> None:
     """Disarm; always possible."""
     if vehicle.armed:
         vehicle.armed = False
+        vehicle.clocks.logging_s = vehicle.time_s
         vehicle.control["armed"] = 0
         vehicle.say(INFO, "Throttle disarmed")
 

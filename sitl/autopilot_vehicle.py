@@ -65,6 +65,8 @@ class Clocks:
     ground_station_s: float | None = None
     prearm_text_s: float = 0.0
     armed_s: float | None = None
+    logging_s: float = -math.inf
+    """When arming was last tried or ended; the log is written for a while after that."""
 
 
 @dataclass
@@ -144,7 +146,9 @@ class Vehicle:
 
     @property
     def has_target(self) -> bool:
-        """A guided position target is being followed or was reached."""
+        """A position target is being followed or was reached."""
+        if self.mode in (Mode.RTL, Mode.SMART_RTL, Mode.LOITER):
+            return True
         return self.mode == Mode.GUIDED and int(self.control[0]["task"]) == WAYPOINT
 
     def position_m(self) -> tuple[float, float]:
