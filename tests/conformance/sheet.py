@@ -3,13 +3,13 @@
 A line of the table is ``name | state | sent | answers | texts | afterwards``:
 
 - state: time of the first packet, then a mode (set at that time), ``armed``, ``PARAMETER=value``, ``sensors=SUITE``, ``wall``
-  (9 m ahead), ``post`` (2 m aside of nothing), ``as=SYSTEM/COMPONENT``, ``facing=DEGREES``.
+  (9 m north), ``post`` (1 m wide, 5.5 m north), ``as=SYSTEM/COMPONENT``, ``facing=DEGREES``.
 - sent, by ``;``: ``LONG n p1..p7``, ``INT n field=value..``, ``LOCAL frame mask field=value..``, ``GLOBAL ...``, ``KIND field=value..``,
   ``wait s``, ``x10 0.5 ...`` (ten times, every 0.5 s), ``@255/190 ...`` (somebody else, on a link of its own), ``forget``.
 - answers, in order: ACCEPTED, ... for COMMAND_ACK; other kinds by name with their first telling field; ``-`` for none at all.
 - texts, by ``//``: ``severity text`` or ``severity beginning...``; ``-`` for none at all; ``*`` for any that may follow.
 - afterwards, by ``;``: ``+s`` lets time pass; ``still``; ``value=number``, with ``~tolerance``, ``<`` or ``>``. A value is one of VALUES,
-  ``n(KIND)`` (received since the last ``+`` or ``forget``) or ``KIND.field`` (of the newest).
+  ``n(KIND)`` (received since the last ``+`` or ``forget``), ``KIND.field`` or ``KIND.field.number`` (of the newest).
 """
 
 from __future__ import annotations
@@ -114,7 +114,9 @@ class Play:
         """Let time pass for everybody."""
         fresh = self.client.run_for(seconds)
         self.heard += fresh
-        self.newest |= {message.get_type(): message for message in fresh if message.get_srcComponent() == 1}
+        # Others' heartbeats come, too; the vehicle's state is told by component 1.
+        told = [one for one in fresh if one.get_srcComponent() == 1 or one.get_type() != "HEARTBEAT"]
+        self.newest |= {message.get_type(): message for message in told}
         for other in self.others.values():
             other.run_for(0.0)
 
@@ -187,6 +189,10 @@ def start(row: Row) -> Play:
         obstacles = np.zeros((20, 40), dtype=np.bool_)
         obstacles[14:16, :] = True
         world, place = World(obstacles), (5.0, 20.0)
+    elif "post" in words:
+        obstacles = np.zeros((40, 40), dtype=np.bool_)
+        obstacles[25, 20] = True
+        world, place = World(obstacles), (19.5, 20.5)
     parameters = {name: float(value) for name, value in options.items()}
     simulator = Simulator(world, SimStart(*place, heading_rad, HOME), sensors, noise=False, parameters=parameters)
     client = Client(simulator, *identity)
@@ -230,8 +236,11 @@ def value_of(play: Play, name: str) -> float:
         return float(VALUES[name](play))
     if counted := re.fullmatch(r"n\((\w+)\)", name):
         return float(sum(message.get_type() == counted[1] for message in play.heard))
-    kind, _, wanted = name.partition(".")
-    return float(getattr(play.newest[kind], wanted)) if kind in play.newest else math.nan
+    kind, wanted, *number = name.split(".")
+    if kind not in play.newest:
+        return math.nan
+    value = getattr(play.newest[kind], wanted)
+    return float(value[int(number[0])] if number else value)
 
 
 def holds(play: Play, check: str) -> bool:

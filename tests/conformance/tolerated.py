@@ -37,5 +37,8 @@ TOLERATED = {
 }
 """Differences from the recordings."""
 
-ROWS = {"Missions: upload and download": MISSIONS}
+ROWS = {
+    "Missions: upload and download": MISSIONS,
+    "The rover's own avoidance: BendyRuler: goes round a post": "BendyRuler and Dijkstra",
+}
 """Rows of the table of measured facts."""
