@@ -177,7 +177,7 @@ def _raw_imu(vehicle: Vehicle) -> list[Any]:
 
 def _second_imu(vehicle: Vehicle) -> list[Any]:
     rate = round(float(vehicle.estimate[0]["yaw_rate_rad_s"]) * 1000)
-    return [mavlink.MAVLink_scaled_imu2_message(_ms(vehicle), 0, 0, -1001, 0, 0, rate, 219, 91, -528, 0)]
+    return [mavlink.MAVLink_scaled_imu2_message(_ms(vehicle), 0, 0, -1001, 0, 0, rate, 219, 91, -528, 2800)]
 
 
 def _second_ahrs(vehicle: Vehicle) -> list[Any]:

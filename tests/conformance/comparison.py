@@ -8,6 +8,23 @@ from typing import Any
 from tests.conformance.recordings import Heard, Replay
 from tests.conformance.sheet import ANSWERS
 
+DRIVABLE_S = 43.5
+NOT_COMPARED = (
+    "time_boot_ms",
+    "time_usec",
+    "time_unix_usec",
+    "lat",
+    "lon",
+    "lng",
+    "lat_int",
+    "lon_int",
+    "hdg",
+    "heading",
+    "cog",
+    "yaw",
+    "bearing",
+)
+"""Fields of a stream whose values are not compared as numbers: clocks, places and directions, which the motion decides."""
 WINDOW_S = 5.0
 """Rates are compared over windows of this length."""
 BOOTED_S = 3.2
@@ -149,6 +166,31 @@ def states_differ(replay: Replay) -> set[str]:
     return wrong
 
 
+def ranges_of(heard: tuple[Heard, ...]) -> dict[str, tuple[float, float]]:
+    """Smallest and largest value of every plain number that is streamed once the rover can be driven."""
+    found: dict[str, tuple[float, float]] = {}
+    for one in heard:
+        kind = one.message.get_type()
+        if one.time_s < DRIVABLE_S or kind in ANSWERS or kind == "STATUSTEXT":
+            continue
+        for name, value in one.message.to_dict().items():
+            if isinstance(value, int | float) and not name.endswith(NOT_COMPARED):
+                least, most = found.get(f"{kind}.{name}", (value, value))
+                found[f"{kind}.{name}"] = min(least, value), max(most, value)
+    return found
+
+
+def values_differ(replay: Replay) -> set[str]:
+    """Streamed numbers that leave the recorded range by more than a tenth of the largest, 0.05 (fractions) or 5 (whole numbers)."""
+    real, ours = ranges_of(replay.real), ranges_of(replay.ours)
+    wrong = set()
+    for name in set(real) & set(ours):
+        room = 0.1 * max(map(abs, real[name])) + (5 if isinstance(real[name][0], int) else 0.05)
+        if not (real[name][0] - room <= ours[name][0] and ours[name][1] <= real[name][1] + room):
+            wrong.add(f"value of {name}")
+    return wrong
+
+
 def places_differ(replay: Replay) -> set[str]:
     """Read-back targets that are not the recorded ones, to 1e-7 degree."""
 
@@ -171,5 +213,5 @@ def differences(replay: Replay) -> set[str]:
     """Everything that is compared message by message."""
     return (
         answers_differ(replay) | texts_differ(replay) | parameters_told(replay) | kinds_differ(replay)
-        | rates_differ(replay) | states_differ(replay) | places_differ(replay)
+        | rates_differ(replay) | states_differ(replay) | places_differ(replay) | values_differ(replay)
     )  # fmt: skip

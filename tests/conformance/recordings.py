@@ -42,6 +42,7 @@ RECORDINGS = (
     # A rover with other parameters, driven by other physics: its EKF was ready a second earlier.
     Recording(
         "rangefinders",
+        heading_deg=-0.2,
         early_s=1.0,
         beams=(Beam(0, 0.2, 20.0), Beam(7, 0.2, 20.0), Beam(1, 0.2, 20.0)),
         post_m=(14.7, 0.1),

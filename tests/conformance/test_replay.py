@@ -1,7 +1,7 @@
 """The sent half of every recording, sent again to the simulator: the same answers, texts, rates, states and motion.
 
 Motion: at every moment of the long drive within 0.25 m and, for 95 % of the moments, 0.1 m/s of the recording; the figures of
-single legs to 0.15 s, 0.06 m/s, 0.1 m. The recording with rangefinders was driven by other physics with slower turns: 1 m.
+single legs to 0.15 s, 0.06 m/s, 0.1 m. The recording with rangefinders was driven by other physics, which turns otherwise: 1 m.
 """
 
 import math

@@ -7,6 +7,13 @@ MISSIONS = "missions and fences in the autopilot"
 TOLERATED = {
     "text missing: 6 Field Elevation Set: 584m": HEIGHTS,
     "text of our own: 6 Field Elevation Set: 120m": HEIGHTS,
+    "value of AHRS2.altitude": HEIGHTS,
+    "value of GLOBAL_POSITION_INT.alt": HEIGHTS,
+    "value of GLOBAL_POSITION_INT.relative_alt": HEIGHTS,
+    "value of GPS_RAW_INT.alt": HEIGHTS,
+    "value of GPS_RAW_INT.alt_ellipsoid": HEIGHTS,
+    "value of POSITION_TARGET_GLOBAL_INT.alt": HEIGHTS,
+    "value of VFR_HUD.alt": HEIGHTS,
     "text missing: 7 INS: alloc 6144 bytes for ISB (free=524288)": HARDWARE,
     "text missing: 7 RCInput: decoding UDP (Pulses)": HARDWARE,
     "parameter untold: BARO": HARDWARE,
