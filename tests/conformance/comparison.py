@@ -88,7 +88,9 @@ def answers_differ(replay: Replay) -> set[str]:
     real_count, our_count = Counter(real), Counter(ours)
     wrong = {f"answer missing: {one}" for one in real_count - our_count}
     wrong |= {f"answer of our own: {one}" for one in our_count - real_count}
-    return wrong if wrong or real == ours else {f"order of answers: {real} / {ours}"}
+    common = {one for one, count in real_count.items() if our_count[one] == count}
+    pairs = zip((one for one in real if one in common), (one for one in ours if one in common), strict=False)
+    return wrong | {f"order of answers: {one} / {other}" for one, other in pairs if one != other}
 
 
 def said(heard: tuple[Heard, ...]) -> list[str]:
