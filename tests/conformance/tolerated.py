@@ -46,6 +46,11 @@ TOLERATED = {
 
 ROWS = {
     "Missions: upload and download": MISSIONS,
+    "Missions: AUTO with a mission": MISSIONS,
+    "Missions: rally points, too": MISSIONS,
+    "Missions: out of a circle fence: HOLD": MISSIONS,
+    "Missions: guided within AUTO: told at 1 Hz": MISSIONS,
+    "Missions: and guided targets are obeyed": MISSIONS,
     "The rover's own avoidance: BendyRuler: goes round a post": "BendyRuler and Dijkstra",
 }
 """Rows of the table of measured facts."""
