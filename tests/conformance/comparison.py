@@ -193,6 +193,15 @@ def values_differ(replay: Replay) -> set[str]:
     return wrong
 
 
+def empty_ranges_differ(replay: Replay) -> set[str]:
+    """What a rangefinder tells when it sees nothing."""
+    real, ours = (
+        max((one.message.current_distance for one in heard if one.message.get_type() == "DISTANCE_SENSOR"), default=0)
+        for heard in (replay.real, replay.ours)
+    )
+    return set() if real == ours else {f"largest range: {real} / {ours}"}
+
+
 def places_differ(replay: Replay) -> set[str]:
     """Read-back targets that are not the recorded ones, to 1e-7 degree."""
 
@@ -215,5 +224,6 @@ def differences(replay: Replay) -> set[str]:
     """Everything that is compared message by message."""
     return (
         answers_differ(replay) | texts_differ(replay) | parameters_told(replay) | kinds_differ(replay)
-        | rates_differ(replay) | states_differ(replay) | places_differ(replay) | values_differ(replay)
+        | rates_differ(replay) | states_differ(replay) | places_differ(replay)
+        | values_differ(replay) | empty_ranges_differ(replay)
     )  # fmt: skip

@@ -16,6 +16,7 @@ TOLERATED = {
     "value of VFR_HUD.alt": HEIGHTS,
     "text missing: 7 INS: alloc 6144 bytes for ISB (free=524288)": HARDWARE,
     "text missing: 7 RCInput: decoding UDP (Pulses)": HARDWARE,
+    "largest range: 2100 / 2000": "readings beyond a rangefinder's maximum",
     "parameter untold: BARO": HARDWARE,
     "parameter untold: CAM": HARDWARE,
     "parameter untold: EK": HARDWARE,
