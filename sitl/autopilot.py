@@ -16,20 +16,22 @@ from sitl.autopilot_proximity import forget_stale, take_in
 from sitl.autopilot_streams import heartbeat, send_due, set_group, start_streams
 from sitl.autopilot_targets import attitude_target, global_target, local_target
 from sitl.autopilot_transfer import TRANSFERS, keep_home
-from sitl.autopilot_vehicle import HOME_S, ORIGIN_S, POSITION_S, Vehicle, parameter_message
+from sitl.autopilot_vehicle import ALTITUDE_M, HOME_S, ORIGIN_S, POSITION_S, Vehicle, parameter_message
 from sitl.control import LOOP_HZ
 
 PARAMETERS_PER_LOOP = 5
+TIMESYNC_S = 10.0
 
 TIMETABLE: tuple[tuple[float, tuple[str, ...]], ...] = (
-    (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "ArduPilot Ready")),
-    (4.0, ("EKF3 IMU0 initialised",)),
-    (5.0, ("EKF3 IMU0 tilt alignment complete",)),
-    (6.0, ("EKF3 IMU0 MAG0 initial yaw alignment complete",)),
-    (9.0, ("GPS 1: detected u-blox",)),
+    (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "Barometer 2 calibration complete")),
+    (1.0, ("Beginning INS calibration. Do not move vehicle", "ArduPilot Ready", "AHRS: DCM active")),
+    (4.0, ("EKF3 IMU0 initialised", "EKF3 IMU1 initialised")),
+    (5.0, ("EKF3 IMU0 tilt alignment complete", "EKF3 IMU1 tilt alignment complete")),
+    (6.0, ("EKF3 IMU0 MAG0 initial yaw alignment complete", "EKF3 IMU1 MAG0 initial yaw alignment complete")),
+    (9.0, ("GPS 1: probing for u-blox at 230400 baud", "GPS 1: detected u-blox")),
     (HOME_S, ()),
-    (ORIGIN_S, ("EKF3 IMU0 origin set",)),
-    (POSITION_S, ("EKF3 IMU0 is using GPS", "AHRS: EKF3 active")),
+    (ORIGIN_S, ("EKF3 IMU0 origin set", "EKF3 IMU1 origin set", f"Field Elevation Set: {ALTITUDE_M:.0f}m")),
+    (POSITION_S, ("EKF3 IMU0 is using GPS", "EKF3 IMU1 is using GPS", "AHRS: EKF3 active")),
 )
 """What is said when, seconds since boot (measured)."""
 
@@ -110,6 +112,8 @@ class Autopilot:
             for channel in vehicle.channels.values():
                 for message in heartbeat(vehicle):
                     channel.send(message)
+                if channel.spoken and vehicle.time_s % TIMESYNC_S < 1.0:
+                    channel.send(mavlink.MAVLink_timesync_message(0, vehicle.time_us * 1000))
         for channel in vehicle.channels.values():
             send_due(vehicle, channel)
             for name in channel.parameter_queue[:PARAMETERS_PER_LOOP]:

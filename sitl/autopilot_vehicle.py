@@ -69,6 +69,8 @@ class Clocks:
     ground_station_s: float | None = None
     prearm_text_s: float = 0.0
     armed_s: float | None = None
+    logging_s: float = -math.inf
+    """When arming was last tried or ended; the log is written for a while after that."""
 
 
 @dataclass
@@ -159,6 +161,8 @@ class Vehicle:
     @property
     def has_target(self) -> bool:
         """A place is being driven to, or was reached."""
+        if self.mode in (Mode.RTL, Mode.SMART_RTL, Mode.LOITER):
+            return True
         return self.mode in DRIVEN_MODES and int(self.control[0]["task"]) in (WAYPOINT, CIRCLE, LEG)
 
     def position_m(self) -> tuple[float, float]:
