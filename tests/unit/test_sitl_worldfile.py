@@ -247,6 +247,13 @@ def test_a_world_may_be_driven_without_a_mission(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
 
 
+def test_a_world_of_shapes_is_no_map_for_the_companion() -> None:
+    arguments = ["drive", "--world", str(MISSIONS / "worlds" / "depot.toml"), "--start", "4,20", "--target", "9,20"]
+    result = CliRunner().invoke(app, [*arguments, "--prior"])
+    assert result.exit_code == 2
+    assert "--prior" in result.output and len(result.output.strip().splitlines()) == 1
+
+
 def test_mission_check_leaves_a_world_file_to_the_simulator() -> None:
     from companion.cli.commands import app as companion_app
 
