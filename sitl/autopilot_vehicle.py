@@ -12,9 +12,11 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl import geodesy
-from sitl.autopilot_link import Channel, Router
+from sitl.autopilot_link import Channel
 from sitl.autopilot_params import Parameters
 from sitl.autopilot_plan import Plan, Storage, Submode, new_plan
+from sitl.autopilot_routing import Router
+from sitl.autopilot_signing import Signing
 from sitl.control import CIRCLE, LEG, LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
 from sitl.sensors import RangeSensing
 
@@ -110,6 +112,7 @@ class Vehicle:
         self.system = int(self.parameters["MAV_SYSID"])
         self.channels: dict[int, Channel] = {}
         self.router = Router()
+        self.signing = Signing()
         self.clocks = Clocks()
         self.texts: list[tuple[int, str]] = []
         self.rebooting = False

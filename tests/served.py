@@ -15,8 +15,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.clock import WallClock
 from companion.mission.mission import Mission
+from sitl.endpoints import open_endpoint
 from sitl.scenario import scenario_from_mission
-from sitl.server import open_endpoint, serve
+from sitl.server import serve
 from sitl.simulator import Simulator
 from tests.unit.test_sitl_server import free_port
 
