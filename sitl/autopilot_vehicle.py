@@ -109,7 +109,7 @@ class Vehicle:
         self.home = origin
         self.mode = Mode.MANUAL
         self.armed = False
-        self.system = int(self.parameters["MAV_SYSID"])
+        self.system = min(max(int(self.parameters["MAV_SYSID"]), 1), 255)
         self.channels: dict[int, Channel] = {}
         self.router = Router()
         self.signing = Signing()
