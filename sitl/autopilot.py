@@ -139,9 +139,8 @@ def _list_parameters(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def _set_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     name = _text_of(message.param_id)
-    if name not in vehicle.parameters:
-        return
-    vehicle.parameters.set(name, message.param_value)
+    if not vehicle.parameters.set(name, message.param_value):
+        return  # without a word: no such name, or no number
     vehicle.retune()
     for listener in vehicle.channels.values():
         listener.send(parameter_message(vehicle.parameters, name))

@@ -34,6 +34,9 @@ POSITION_S = 42.0
 ARMABLE_S = 43.0
 """The firmware's start-up, seconds since boot (measured)."""
 
+MOST_TEXTS = 30
+"""Texts that wait to be sent; more push the oldest ones out, as in the firmware's queue."""
+
 EKF_UNINITIALISED, EKF_CONSTANT_POSITION, EKF_ABSOLUTE = 1024, 167, 831
 """EKF_STATUS_REPORT flags: nothing yet; attitude and velocity but a constant position; everything."""
 
@@ -195,6 +198,7 @@ class Vehicle:
     def say(self, severity: int, text: str) -> None:
         """Queue a STATUSTEXT for every channel; it goes out after the answers of this moment."""
         self.texts.append((severity, text))
+        del self.texts[:-MOST_TEXTS]
 
     def flush_texts(self) -> None:
         """Send the queued texts, longer ones in chunks of 50 characters."""
