@@ -40,11 +40,10 @@ def pass_on(vehicle: Vehicle, channel: Channel, message: Any) -> bool:
     if (system, component) == (vehicle.system, AUTOPILOT):
         return False  # our own words, from a line that is wired back to us
     router = vehicle.router
-    beats = kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT
-    router.learn(system, component, channel.number, message.type if beats else 0)
+    router.learn(system, component, channel.number)
     if kind in ACCEPTED_UNSIGNED:
         return True  # what a radio says of itself is for its own end only
-    if beats:
+    if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
         active = (number for number, other in vehicle.channels.items() if other.spoken)
         _copy(vehicle, message, router.heartbeat_to(system, component, channel.number, active))
         return True

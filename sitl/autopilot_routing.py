@@ -7,17 +7,15 @@ from dataclasses import dataclass
 
 AUTOPILOT = 1
 MOST_ROUTES = 20
-UNKNOWN_KIND = 0
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class Route:
-    """A component was heard on a channel; ``kind`` is the MAV_TYPE of its heartbeat."""
+    """A component was heard on a channel."""
 
     system: int
     component: int
     channel: int
-    kind: int = UNKNOWN_KIND
 
 
 class Router:
@@ -27,22 +25,15 @@ class Router:
         """Nobody heard yet."""
         self._routes: list[Route] = []
 
-    def learn(self, system: int, component: int, channel: int, kind: int = UNKNOWN_KIND) -> None:
-        """Remember that a component was heard on a channel; ``kind`` if this was its heartbeat."""
-        for route in self._routes:
-            if (route.system, route.component, route.channel) == (system, component, channel):
-                route.kind = route.kind or kind
-                return
-        if system != 0 and len(self._routes) < MOST_ROUTES:
-            self._routes.append(Route(system, component, channel, kind))
+    def learn(self, system: int, component: int, channel: int) -> None:
+        """Remember that a component was heard on a channel."""
+        route = Route(system, component, channel)
+        if route not in self._routes and system != 0 and len(self._routes) < MOST_ROUTES:
+            self._routes.append(route)
 
     def forget(self, channel: int) -> None:
         """A channel was closed."""
         self._routes = [route for route in self._routes if route.channel != channel]
-
-    def find_kind(self, kind: int) -> Route | None:
-        """The first component heard whose heartbeat said that it is of this MAV_TYPE."""
-        return next((route for route in self._routes if route.kind == kind), None)
 
     def heartbeat_to(self, system: int, component: int, source: int, active: Iterable[int]) -> set[int]:
         """Where a heartbeat is passed on: to every active channel but those on which its sender was heard."""

@@ -293,6 +293,31 @@ def test_edges_of_everything_there_is() -> None:
     assert driving.alive()
 
 
+@pytest.mark.parametrize("value", [0.0, -1.0, 3.4e38, -3.4e38])
+def test_every_parameter_alone_at_an_extreme(value: float) -> None:
+    driving = Driving()
+    defaults = driving.simulator._vehicle.parameters.as_dict()
+    for name, default in defaults.items():
+        driving.client.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+        driving.client.send(target())
+        driving.client.raw(0.3)
+        driving.client.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), default, 9))
+        driving.client.raw(0.04)
+    assert driving.alive()
+    assert driving.simulator._vehicle.parameters.as_dict() == pytest.approx(defaults)
+
+
+@pytest.mark.parametrize(("value", "system"), [(0.0, 1), (-5.0, 1), (300.0, 255), (7.0, 7)])
+def test_a_system_id_that_does_not_exist(value: float, system: int) -> None:
+    simulator = open_ground()
+    client = Party(simulator, 255, 190)
+    client.send(mavlink.MAVLink_param_set_message(1, 1, b"MAV_SYSID", value, 4))
+    client.command(246, 1)
+    client.raw()
+    client.reconnect()
+    assert {m.get_srcSystem() for m in client.heard(5.0)} == {system}
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_absurd_parameters_and_reboots(seed: int) -> None:
     rng = np.random.default_rng(seed)

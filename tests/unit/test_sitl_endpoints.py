@@ -14,6 +14,7 @@ import serial
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.endpoints import Endpoint, ListenError, open_endpoint
+from sitl.endpoints.serial import SerialEndpoint
 from sitl.endpoints.udp import MOST_PARTNERS, SILENT_S
 from sitl.simulator import Simulator
 from tests.party import split
@@ -100,6 +101,45 @@ def test_a_line_that_nobody_reads_loses_whole_packets(bench: Bench, tmp_path: Pa
     assert len(kinds(data)) == len([packet for packet in packets if len(packet) > 12])
     assert len(data) > 4000
     assert "HEARTBEAT" in kinds(data)
+
+
+class SlowLine:
+    """Takes so many bytes in each exchange, in bites of ten."""
+
+    def __init__(self, room: int) -> None:
+        self.room = self.left = room
+        self.sent = b""
+
+    def descriptor(self) -> None:
+        return None
+
+    def reopen(self, now_s: float) -> None:
+        """Called before every exchange."""
+        self.left = self.room
+
+    def read(self) -> bytes:
+        return b""
+
+    def write(self, data: bytes) -> int:
+        taken = min(self.left, 10, len(data))
+        self.left -= taken
+        self.sent += data[:taken]
+        return taken
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+@pytest.mark.parametrize("room", [7, 10, 95, 1000])
+def test_packets_stay_whole_on_a_line_that_takes_little(bench: Bench, room: int) -> None:
+    line = SlowLine(room)
+    bench.endpoints.append(SerialEndpoint(line, bench.simulator, 0))
+    bench.run(60.0)
+    packets = split(line.sent)
+    found = kinds(line.sent)
+    assert len(found) > 10
+    assert len(found) in (len(packets), len(packets) - 1), "the last one may still be under way"
+    assert all(packet[0] == 0xFD for packet in packets)
 
 
 class Terminal:

@@ -145,16 +145,11 @@ def test_the_echo_trap(simulator: Simulator) -> None:
     assert both.count("DISTANCE_SENSOR") > 100
 
 
-def test_a_component_is_found_by_its_kind_and_may_be_on_two_channels() -> None:
+def test_a_component_may_be_on_two_channels() -> None:
     router = Router()
-    router.learn(1, 191, 0)
-    router.learn(1, 191, 0, kind=18)
-    router.learn(1, 191, 3, kind=18)
+    for channel in (0, 0, 3):
+        router.learn(1, 191, channel)
     router.learn(0, 5, 4)
-    found = router.find_kind(18)
-    assert found is not None
-    assert (found.component, found.channel) == (191, 0)
-    assert router.find_kind(26) is None
     assert router.forward_to(1, 1, 191, source=2) == {0, 3}
     assert router.heartbeat_to(1, 191, 5, active={0, 3, 4, 5}) == {4}
     assert router.forward_to(1, 0, 0, source=2) == {0, 3}

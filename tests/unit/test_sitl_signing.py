@@ -156,6 +156,21 @@ def test_the_key_outlives_a_reboot_and_zeros_end_it(signed: tuple[Party, Party])
     assert other.acks() == [0]
 
 
+def test_the_newest_timestamp_heard_is_gone_on_from_also_after_a_reboot(signed: tuple[Party, Party]) -> None:
+    owner, other = signed
+    other.raw(40.0)  # the first saving is over
+    late = TIME + 20 * MINUTE
+    other.sign(timestamp=late)
+    other.command(SET_MODE, 1, HOLD)
+    assert other.acks() == [0]
+    assert int.from_bytes(split(other.raw(2.0))[0][-12:-6], "little") > late
+    other.raw(35.0)
+    owner.command(REBOOT, 1)
+    owner.raw()
+    other.reconnect()
+    assert int.from_bytes(split(other.raw(5.0))[0][-12:-6], "little") >= late + MINUTE
+
+
 def test_a_key_can_be_changed_only_by_who_has_it(signed: tuple[Party, Party]) -> None:
     owner, other = signed
     other.set_up(bytes([9] * 32))
