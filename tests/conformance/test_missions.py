@@ -11,14 +11,13 @@ from companion.frames import GeoPoint
 from sitl import geodesy
 from sitl.simulator import SimStart, Simulator
 from sitl.world import World
+from tests.conformance.recordings import RECORDINGS
+from tests.conformance.recordings import replay as replayed
 from tests.mission_client import FENCE, MISSION, RALLY, Row, download, place_m, rows_of_file, run_until, upload
 from tests.shared_data import SHARED, needs_shared
 from tests.sitl_client import Client, open_ground, ready
-from tests.tlog import raw_packets, timed
 
-RECORDING = SHARED / "data" / "ardurover-4.7-transcripts" / "commands-and-acks.tlog"
 FILES = SHARED / "data" / "missions"
-LATENCY_S = 0.06
 PLACED = {16, 17, 18, 19, 22}
 MISSIONS = [
     "ardupilot/ArduRover_Tests__ArmFeatures__test_arming.txt",
@@ -38,14 +37,8 @@ FENCES = [
 @pytest.fixture(scope="module")
 def replay() -> tuple[list[Any], list[Any]]:
     """What the vehicle said in the recording, and what the simulator said to the same."""
-    recorded = timed(list(raw_packets(RECORDING)))
-    client = Client(open_ground(), system=255, component=190)
-    for time_s, message in recorded:
-        if message.get_srcSystem() == 255:
-            client.run_to(time_s + LATENCY_S)
-            client.link.receive(bytes(message.get_msgbuf()))
-    client.run_for(1.0)
-    return [m for _, m in recorded if (m.get_srcSystem(), m.get_srcComponent()) == (1, 1)], client.received
+    one = replayed(RECORDINGS[1])
+    return [heard.message for heard in one.real], [heard.message for heard in one.ours]
 
 
 def of(messages: list[Any], *kinds: str) -> list[Any]:
