@@ -46,7 +46,8 @@ def _packed_1(message: Any, codec: Any) -> bytes:
 class Channel:
     """A connection of the vehicle through its serial port ``port``.
 
-    ``codec`` packs and signs, ``reader`` unpacks. ``due_us``: next time of each streamed message, ``interval_us``: how often. ``spoken``: somebody was heard here.
+    ``codec`` packs and signs, ``reader`` unpacks. ``due_us``: next time of each streamed message, ``interval_us``: how often.
+    ``spoken``: somebody was heard here.
     """
 
     number: int

@@ -32,7 +32,9 @@ class Served:
         self.simulator: Simulator = scenario_from_mission(mission).simulator(0)
         self.simulator.advance_to_s(READY_S)
         self.url = f"tcp:127.0.0.1:{free_port()}"
-        self._endpoints = [open_endpoint(url, self.simulator, port) for port, url in enumerate((self.url, *more))]
+        self._endpoints = [
+            open_endpoint(url, self.simulator, serial_port=port) for port, url in enumerate((self.url, *more))
+        ]
         self._running = True
         self._pilot = self.simulator.connect()
         self._pilot_mav = mavlink.MAVLink(None, 255, 190)

@@ -36,10 +36,10 @@ class Line:
         return [part for url in self.listen for part in ("--listen", url)]
 
 
-@pytest.fixture(autouse=True)
-def mavlink_2(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What mavutil wants to see before it knows MAVLink 2's messages."""
-    monkeypatch.setenv("MAVLINK20", "1")
+@pytest.fixture(autouse=True, scope="module")
+def mavlink_2() -> None:
+    """What mavutil wants to see before it knows MAVLink 2's messages; it sets this itself when it has heard some."""
+    os.environ["MAVLINK20"] = "1"
 
 
 @pytest.fixture(scope="module")
