@@ -41,7 +41,7 @@ class LidarComponent:
             data += mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3).pack(self._codec)
         if time_us >= self._scan_us:
             self._scan_us = max(self._scan_us + self._interval_us, float(time_us - HEARTBEAT_US))
-            data += self._scan(time_us, north_m, east_m, heading_rad)
+            data += b"" if self._sensing.lidar_fault == "silent" else self._scan(time_us, north_m, east_m, heading_rad)
         return data
 
     def _scan(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> bytes:

@@ -9,6 +9,7 @@ from companion.frames import GeoPoint
 from companion.grid import Cell, Grid
 from companion.mapfiles import load_map
 from companion.mission.mission import Mission, SitlSpec
+from sitl.faults import FaultPlan, SensorFault
 from sitl.motion import NoiseSettings
 from sitl.movers import Mover, timed_track
 from sitl.sensors import suite_named
@@ -37,6 +38,7 @@ class Scenario:
     parameters: dict[str, float] = field(default_factory=dict)
     turning_radius_m: float = 0.0
     """0: skid steering; else Ackermann."""
+    faults: FaultPlan | None = None
 
     def simulator(self, seed: int, noise: bool | NoiseSettings = True) -> Simulator:
         """A rover that has just been switched on."""
@@ -49,6 +51,7 @@ class Scenario:
             self.parameters,
             noise,
             turning_radius_m=self.turning_radius_m,
+            faults=self.faults,
         )
 
 
@@ -141,3 +144,16 @@ def _home(mission: Mission, spec: SitlSpec) -> GeoPoint:
 def with_parameters(scenario: Scenario, changes: dict[str, float]) -> Scenario:
     """The same scenario with some of ArduRover's parameters changed."""
     return replace(scenario, parameters={**scenario.parameters, **changes})
+
+
+def with_faults(scenario: Scenario, plan: FaultPlan | None) -> Scenario:
+    """The same scenario with what goes wrong. Raises ScenarioError for a fault of something that it does not have."""
+    beams = len(suite_named(scenario.sensors).beams)
+    for number, fault in enumerate(plan.faults if plan else (), 1):
+        missing = [one for one in fault.beams if one > beams] if isinstance(fault, SensorFault) else []
+        if missing:
+            raise ScenarioError(
+                f"{plan.source if plan else ''}: fault {number}: beams {missing[0]}: the sensors {scenario.sensors} have "
+                f"{beams} beams; leave beams out to mean all sensors"
+            )
+    return replace(scenario, faults=plan)

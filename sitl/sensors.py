@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,9 @@ from sitl.world import World
 
 SECTORS = 72
 UNKNOWN = 65535
+
+Defect = Literal["", "stuck", "silent"]
+"""What is wrong with a sensor: it repeats its last reading, or gives none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +81,11 @@ class RangeSensing:
         self.suite = suite
         self.time_s = 0.0
         """The world's time at which is measured; the simulator keeps it."""
+        self.lidar_fault: Defect = ""
+        self.beam_faults: dict[int, Defect] = {}
+        """What is wrong with which rangefinder, by its place in the suite."""
+        self._last_scan_cm: list[int] = []
+        self._last_beams_cm: list[int] = []
         self._world = world
         self._noise_m = noise_m
         self._rng = rng
@@ -87,12 +96,15 @@ class RangeSensing:
         """The scanner's 72 ranges; maximum + 1 where nothing was seen."""
         lidar = self.suite.lidar
         assert lidar is not None
+        if self.lidar_fault == "stuck" and self._last_scan_cm:
+            return list(self._last_scan_cm)
         true_m = self._world.rays_m(north_m, east_m, self._lidar_rad + heading_rad, lidar.max_m, self.time_s)
         seen_m = true_m + self._noise(SECTORS)
         nothing = round(lidar.max_m * 100) + 1
         cells = np.clip(np.rint(seen_m * 100.0), 0, nothing - 1)
         cells[(true_m >= lidar.max_m) | (seen_m >= lidar.max_m)] = nothing
-        return [int(cell) for cell in cells.tolist()]
+        self._last_scan_cm = [int(cell) for cell in cells.tolist()]
+        return list(self._last_scan_cm)
 
     def beams_cm(self, north_m: float, east_m: float, heading_rad: float) -> list[int]:
         """Each rangefinder's range; its maximum where nothing was seen."""
@@ -102,10 +114,19 @@ class RangeSensing:
         true_m = self._world.rays_m(north_m, east_m, self._beam_rad + heading_rad, reach_m, self.time_s)
         seen_m = true_m + self._noise(len(self.suite.beams))
         limits = [round(beam.max_m * 100) for beam in self.suite.beams]
-        return [
+        readings = [
             limit if true >= limit / 100 else min(max(round(float(seen) * 100), 0), limit)
             for limit, true, seen in zip(limits, true_m, seen_m, strict=True)
         ]
+        for number, before in enumerate(self._last_beams_cm):
+            if self.beam_faults.get(number) == "stuck":
+                readings[number] = before
+        self._last_beams_cm = readings
+        return list(readings)
+
+    def beam_is_silent(self, number: int) -> bool:
+        """Whether this rangefinder gives no readings now."""
+        return self.beam_faults.get(number) == "silent"
 
     def _noise(self, count: int) -> NDArray[np.float64]:
         return self._rng.standard_normal(count) * self._noise_m

@@ -70,9 +70,9 @@ def place_text(place: tuple[str, int]) -> str:
 
 
 def datagrams(data: bytes) -> list[bytes]:
-    """The same bytes in pieces of whole packets, as many as fit into one datagram."""
+    """The same bytes in pieces of whole packets, as many as fit into one datagram; a damaged header may put the cuts elsewhere."""
     pieces, start, at = [], 0, 0
-    while at < len(data):
+    while at + 2 < len(data):
         size = data[at + 1] + (12 if data[at] == MAVLINK_2 else 8)
         if data[at] == MAVLINK_2 and data[at + 2] & SIGNED:
             size += 13
