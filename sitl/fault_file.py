@@ -31,6 +31,8 @@ MAX_BYTES = 1_000_000
 REBOOT_S = 3.0
 OVERTAKEN_S = 0.2
 
+PILOT_MODES = ("MANUAL", "ACRO", "STEERING", "HOLD", "LOITER", "AUTO", "RTL", "SMART_RTL", "GUIDED")
+
 Seconds = Annotated[float, Field(ge=0.0, le=1e6)]
 Span = Annotated[float, Field(gt=0.0, le=1e6)]
 Share = Annotated[float, Field(gt=0.0, le=1.0)]
@@ -158,12 +160,14 @@ class RebootTable(FaultTable):
 class PilotTable(FaultTable):
     """``pilot``."""
 
-    mode: Literal["MANUAL", "ACRO", "STEERING", "HOLD", "LOITER", "AUTO", "RTL", "SMART_RTL", "GUIDED"]
+    mode: str
     steering: Stick = 0.0
     throttle: Stick = 0.0
 
     def fault(self) -> Fault:
-        """As a value. Raises ValueError for sticks that would do nothing."""
+        """As a value. Raises ValueError for a mode that is not on the switch, and for sticks that would do nothing."""
+        if self.mode not in PILOT_MODES:
+            raise ValueError(f"mode: unknown mode {self.mode!r:.40}; modes are {', '.join(PILOT_MODES)}")
         if self.mode != "MANUAL" and (self.steering or self.throttle):
             raise ValueError(f'steering and throttle do nothing in {self.mode}; use mode = "MANUAL" or leave them out')
         return PilotTakesOver(**self.window(), mode=self.mode, steering=self.steering, throttle=self.throttle)
@@ -265,7 +269,7 @@ class PlanTable(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
     seed: Annotated[int, Field(ge=0, le=2**31)] = 0
-    fault: Annotated[list[dict[str, Any]], Field(min_length=1, max_length=1000)]
+    fault: Annotated[list[dict[str, Any]], Field(max_length=1000)] = []
 
 
 def load_faults(path: Path) -> FaultPlan:
@@ -286,6 +290,8 @@ def load_faults(path: Path) -> FaultPlan:
     except ValidationError as error:
         reason = " ".join(describe_first(error, PlanTable).split())
         raise FaultFileError(f"{path}: {reason}; write one [[fault]] table for each fault") from error
+    if not table.fault:
+        raise FaultFileError(f"{path}: fault: there is none; write one [[fault]] table for each fault")
     faults = tuple(_fault(path, number, one) for number, one in enumerate(table.fault, 1))
     return FaultPlan(faults, table.seed, str(path))
 

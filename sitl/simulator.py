@@ -267,11 +267,11 @@ class Simulator:
 
     @property
     def _is_off(self) -> bool:
-        return self.time_s < self._off_until_s - 1e-6
+        return self._off_until_s > 0.0
 
     def _meet_faults(self) -> None:
         """Begin and end what the plan says; a failure of the autopilot's power, and its return."""
-        if self._off_until_s > 0.0 and not self._is_off:
+        if self._is_off and self.time_s >= self._off_until_s - 1e-6:
             self._off_until_s = 0.0
             self._reboot()
         if self.time_s >= self._player.next_due_s() - 1e-6:

@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 import companion.cli.commands
 import sitl.cli.commands
 from companion.settings import parse_settings
+from sitl.fault_file import load_faults
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -46,6 +47,10 @@ def blocks(language: str) -> list[tuple[str, str]]:
 def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path) -> None:
     if text.startswith("# settings"):
         assert parse_settings(tomllib.loads(text), where).profile
+        return
+    if text.startswith("# faults"):
+        (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+        assert load_faults(tmp_path / "plan.toml").faults
         return
     shutil.copytree(ROOT / "missions" / "maps", tmp_path / "maps")
     shutil.copy(ROOT / "missions" / "field.plan", tmp_path)
