@@ -26,6 +26,7 @@ DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
 PREARM_BIT = 1 << 28
 BATTERY_BIT = 1 << 25
+GPS_BIT = 1 << 5
 SENSORS = 322034735
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
 
@@ -77,9 +78,11 @@ def _sys_status(vehicle: Vehicle) -> list[Any]:
     health = SENSORS & ~PREARM_BIT if arming_faults(vehicle) else SENSORS | PREARM_BIT
     if vehicle.battery.worst:
         health &= ~BATTERY_BIT
+    present = SENSORS if vehicle.ekf.gps_has_fix else SENSORS & ~GPS_BIT
+    health &= present | ~GPS_BIT
     volts_mv, amps_ca, percent = battery_readings(vehicle)
     return [
-        mavlink.MAVLink_sys_status_message(SENSORS, 304208943, health, 0, volts_mv, amps_ca, percent, 0, 0, 0, 0, 0, 0)
+        mavlink.MAVLink_sys_status_message(present, 304208943, health, 0, volts_mv, amps_ca, percent, 0, 0, 0, 0, 0, 0)
     ]
 
 

@@ -47,6 +47,8 @@ class FaultPlayer:
         self._faults = [(fault, np.random.default_rng(one)) for fault, one in zip(plan.faults, seeds, strict=False)]
         self._ekf_rng = np.random.default_rng(seeds[-1])
         self._links: list[Active] = [(fault, rng) for fault, rng in self._faults if isinstance(fault, LinkFault)]
+        self.touches_links = bool(self._links)
+        """Whether any link fault is planned."""
         self._has_gps = any(isinstance(fault, GpsLoss | GpsGlitch | GpsNoise) for fault in plan.faults)
         self._awaits_driving = any(fault.since == "driving" for fault in plan.faults)
         self._driving_s = math.inf
@@ -57,15 +59,12 @@ class FaultPlayer:
         self._glitch_rad: dict[int, float] = {}
         self._mode_before: dict[int, Mode] = {}
         self._was_started = False
+        self.due_s = 0.0
+        """When ``step`` must be called next."""
         self.reboot_until_s: float | None = None
         """Set when the autopilot's power fails now: until when it is off. Whoever acts on it sets it back."""
 
     # Time ------------------------------------------------------------------------------------------------------------
-
-    def next_due_s(self) -> float:
-        """When ``step`` must be called next."""
-        steps = self._has_gps or (self._awaits_driving and math.isinf(self._driving_s))
-        return min(self._changes_s, self._steps * STEP_S if steps else math.inf)
 
     def is_active(self, fault: Fault, now_s: float) -> bool:
         """Whether a fault is there."""
@@ -86,6 +85,8 @@ class FaultPlayer:
             if self._has_gps:
                 self._move_gps(vehicle)
                 self._step_ekf(vehicle)
+        steps = self._has_gps or (self._awaits_driving and math.isinf(self._driving_s))
+        self.due_s = min(self._changes_s, self._steps * STEP_S if steps else math.inf)
 
     def rebooted(self, vehicle: Vehicle, rover: Record, sensing: RangeSensing) -> None:
         """A fresh autopilot: it meets what goes on."""
@@ -224,8 +225,3 @@ class FaultPlayer:
     def pass_on(self, way: Way, data: bytes, now_s: float) -> None:
         """Put bytes on their way through a link with its faults."""
         way.pass_on(data, now_s, lambda fault: self.is_active(fault, now_s), self._links)
-
-    @property
-    def touches_links(self) -> bool:
-        """Whether any link fault is planned."""
-        return bool(self._links)

@@ -183,6 +183,7 @@ class Simulator:
         self._collisions: list[Collision] = []
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
         self._player = FaultPlayer(faults or FaultPlan(), seed)
+        self._has_faults = faults is not None and bool(faults.faults)
         self._off_until_s = 0.0
         self._boot()
 
@@ -260,7 +261,8 @@ class Simulator:
         """Run the vehicle up to a time (in whole main loops of 20 ms); times in the past do nothing."""
         goal = math.floor(time_s * LOOP_HZ + 1e-6)
         while self._tick < goal:
-            self._meet_faults()
+            if self._has_faults:
+                self._meet_faults()
             self._receive()
             self._run(min(goal - self._tick, self._loops_until_due()))
             self._send()
@@ -274,7 +276,7 @@ class Simulator:
         if self._is_off and self.time_s >= self._off_until_s - 1e-6:
             self._off_until_s = 0.0
             self._reboot()
-        if self.time_s >= self._player.next_due_s() - 1e-6:
+        if self.time_s >= self._player.due_s - 1e-6:
             self._player.step(self.time_s, self._vehicle, self._rover, self._sensing)
         if self._player.reboot_until_s is not None:
             self._off_until_s, self._player.reboot_until_s = self._player.reboot_until_s, None
@@ -282,7 +284,7 @@ class Simulator:
 
     def _receive(self) -> None:
         for link in self._links:
-            data = link.pass_in(self._player, self.time_s)
+            data = link.pass_in(self._player, self.time_s) if link.inbox or link.ways else b""
             if data and not self._is_off:
                 self._autopilot.receive(link.channel, data)
                 link.pass_out(self._player, self.time_s)
@@ -306,12 +308,17 @@ class Simulator:
         if self._traffic.talks:
             # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
-        due_s = min(self._player.next_due_s(), self._off_until_s if self._is_off else math.inf)
+        if self._has_faults:
+            due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._fault_due_s() - self.time_s))
+        return max(1, math.ceil((due_us - self._vehicle.time_us) * 1e-6 * LOOP_HZ - 1e-6))
+
+    def _fault_due_s(self) -> float:
+        """When a fault begins or ends, power returns, or a packet that is late comes through."""
+        due_s = min(self._player.due_s, self._off_until_s) if self._is_off else self._player.due_s
         for link in self._links:
             if link.ways is not None:
                 due_s = min(due_s, link.ways[0].next_due_s(), link.ways[1].next_due_s())
-        due_us = min(due_us, self._vehicle.time_us + 1e6 * (due_s - self.time_s))
-        return max(1, math.ceil((due_us - self._vehicle.time_us) * 1e-6 * LOOP_HZ - 1e-6))
+        return due_s
 
     def _run(self, loops: int) -> None:
         """Run main loops until they are done or something happened that must be told at once."""
@@ -339,11 +346,11 @@ class Simulator:
         return Collision(self.time_s, *here, self.world.movers[struck - 1].name, float(rover["struck_m_s"]))
 
     def _send(self) -> None:
-        if self._is_off:
-            return
-        self._speak()
-        for link in self._links:
-            link.pass_out(self._player, self.time_s)
+        if not self._is_off:
+            self._speak()
+        if self._player.touches_links:
+            for link in self._links:
+                link.pass_out(self._player, self.time_s)
 
     def _speak(self) -> None:
         """Everything that is due now is put into the channels."""

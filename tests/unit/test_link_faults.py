@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
+import itertools
 import math
+import socket
 from itertools import pairwise
 from typing import Any
 
@@ -15,9 +18,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.faults import FaultPlan, LinkFault
 from sitl.link_faults import Packets, Way
-from sitl.server import datagrams
+from sitl.server import datagrams, open_endpoint, serve
 from sitl.simulator import Simulator
 from tests.sitl_client import Client, open_ground, ready
+from tests.unit.test_sitl_server import free_port
 
 SENT = 4000
 """Packets in each statistic. With probability p the share differs by more than 5 standard deviations in one run of 1.7 million."""
@@ -243,3 +247,42 @@ def test_the_bytes_do_not_depend_on_how_often_one_looks() -> None:
 
 def test_a_plan_that_does_nothing_changes_no_byte() -> None:
     assert fingerprint(None, 3) == fingerprint(plan(LinkFault(1000.0, what="outage")), 3)
+
+
+def test_on_the_network_links_count_in_the_order_in_which_they_open() -> None:
+    """Two TCP clients of a served rover; the second one hears nothing for two seconds."""
+    simulator = open_ground(faults=plan(LinkFault(4.0, 6.0, what="outage", direction="from_vehicle", links=(2,))))
+    port = free_port()
+    endpoint = open_endpoint(f"tcp:127.0.0.1:{port}", simulator)
+    looks = itertools.count(1)
+    heard: list[list[int]] = []
+
+    def run(until_s: float) -> None:
+        began_s = simulator.time_s
+        serve(
+            simulator,
+            [endpoint],
+            lambda: began_s / 10.0 + 0.005 * next(looks),
+            10.0,
+            lambda: simulator.time_s < until_s,
+        )
+
+    try:
+        with socket.create_connection(("127.0.0.1", port)) as first:
+            run(1.0)
+            with socket.create_connection(("127.0.0.1", port)) as second:
+                run(8.5)
+                for client in (first, second):
+                    client.settimeout(0.2)
+                    parser = mavlink.MAVLink(None)
+                    data = b""
+                    with contextlib.suppress(TimeoutError):
+                        while piece := client.recv(65536):
+                            data += piece
+                    heard.append(
+                        [m.time_boot_ms for m in parser.parse_buffer(data) or [] if m.get_type() == "ATTITUDE"]
+                    )
+    finally:
+        endpoint.close()
+    assert heard[0] == [3000, 4000, 5000, 6000, 7000, 8000]
+    assert heard[1] == [3000, 6000, 7000, 8000]
