@@ -229,7 +229,8 @@ def _heartbeat(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def _override(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """RC_CHANNELS_OVERRIDE of the ground station: steering and throttle; 0 lets go, 65535 leaves as it is."""
-    if message.get_srcSystem() != int(vehicle.parameters["MAV_GCS_SYSID"]):
+    is_station = message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"])
+    if not is_station or vehicle.parameters["RC_OVERRIDE_TIME"] == 0.0:
         return
     sticks = vehicle.sticks
     steering, throttle = (
