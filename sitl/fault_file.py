@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import tomllib
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from companion.settings import describe_first
+from companion.settings import alike, describe_first
 from sitl.faults import (
     BatteryLow,
     Direction,
@@ -301,8 +300,9 @@ def _fault(path: Path, number: int, table: dict[str, Any]) -> Fault:
     kind = table.get("kind")
     model = KINDS.get(kind) if isinstance(kind, str) else None
     if model is None:
-        near = difflib.get_close_matches(str(kind), KINDS, n=1, cutoff=0.0)[0]
-        said = "kind: missing" if kind is None else f"kind: unknown kind {kind!r:.40}, did you mean '{near}'?"
+        near = alike(str(kind), list(KINDS))
+        said = "kind: missing" if kind is None else f"kind: unknown kind {kind!r:.40}"
+        said += f", did you mean '{near}'?" if near else ""
         raise FaultFileError(f"{path}: fault {number}: {said}; kinds are {', '.join(KINDS)}")
     try:
         return model.model_validate(table).fault()
