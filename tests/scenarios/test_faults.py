@@ -27,7 +27,6 @@ from sitl.faults import (
     PilotTakesOver,
     Reboot,
     SensorFault,
-    WheelSlip,
 )
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
@@ -83,6 +82,7 @@ def on_companion(what: Any, probability: float = 1.0, start_s: float = 45.0, **m
     return LinkFault(start_s, what=what, probability=probability, links=(1,), **more)
 
 
+# GPS lost for long, sensors, wheels and battery come with the shipped plans below.
 OVERCOME: dict[str, tuple[Fault, ...]] = {
     "lost and damaged": (on_companion("loss", 0.1), on_companion("corrupt", 0.05)),
     "late": (on_companion("delay", delay_s=0.15, jitter_s=0.1),),
@@ -93,9 +93,6 @@ OVERCOME: dict[str, tuple[Fault, ...]] = {
     ),
     "pilot": (PilotTakesOver(55.0, 60.0, mode="HOLD"), PilotTakesOver(70.0, 72.0, mode="MANUAL", throttle=0.3)),
     "gps for a moment": (GpsLoss(55.0, 60.0), GpsGlitch(70.0, 73.0, metres=10.0), GpsNoise(45.0, metres=0.3)),
-    "gps and a hand": (GpsLoss(60.0, 75.0), PilotTakesOver(80.0, mode="GUIDED")),
-    "sensors for a moment": (SensorFault(55.0, 57.0, what="silent"), SensorFault(65.0, 66.0, what="stuck")),
-    "wheels and battery": (WheelSlip(50.0, 60.0, share=0.4, side="left"), BatteryLow(60.0, volts=10.6)),
 }
 
 
@@ -119,7 +116,7 @@ STOPPED: dict[str, tuple[tuple[Fault, ...], int, str]] = {
 @pytest.mark.parametrize("name", STOPPED)
 def test_a_rover_that_stops_says_why(name: str) -> None:
     faults, armed, words = STOPPED[name]
-    run = Run(FaultPlan(faults), limit_s=100.0)
+    run = Run(FaultPlan(faults), limit_s=85.0)
     assert run.report.collisions == 0
     assert not run.reached
     assert run.drive.simulator.truth.speed_m_s == pytest.approx(0.0, abs=0.01)
@@ -142,7 +139,7 @@ def test_a_low_battery_that_must_stop_the_rover_does() -> None:
 def test_same_seed_same_run() -> None:
     plan = load_faults(MISSIONS / "faults" / "gps.toml")
     plan = replace(plan, faults=plan.faults + load_faults(MISSIONS / "faults" / "radio.toml").faults)
-    runs = [Run(replace(plan, seed=seed), limit_s=75.0) for seed in (1, 1, 2)]
+    runs = [Run(replace(plan, seed=seed), limit_s=58.0) for seed in (1, 1, 2)]
     digests = [hashlib.sha256(run.raw).hexdigest() for run in runs]
     assert digests[0] == digests[1] != digests[2]
 
@@ -156,7 +153,7 @@ def test_the_plan_of_a_poor_radio_is_driven_from_the_command_line() -> None:
 
 @pytest.mark.parametrize(("name", "reached"), [("gps", True), ("vehicle", True), ("interrupted", False)])
 def test_the_shipped_plans_do_no_harm(name: str, reached: bool) -> None:
-    run = Run(load_faults(MISSIONS / "faults" / f"{name}.toml"), limit_s=140.0)
+    run = Run(load_faults(MISSIONS / "faults" / f"{name}.toml"), limit_s=140.0 if reached else 100.0)
     assert run.report.collisions == 0
     assert run.reached == reached
     assert reached or not run.last_beat().base_mode & ARMED
