@@ -277,9 +277,10 @@ def _off(
     free_m = min(line.clear_m, line.seen_m)
     if free_m < 0.3 or speed_m_s > settings.roll_out_m_s + settings.back_out_speed_m_s:
         return []
-    back_m = np.minimum(np.maximum(times_s - settings.brake_delay_s, 0.0) * settings.back_out_speed_m_s, free_m)
+    stands_s = settings.brake_delay_s + speed_m_s / settings.deceleration_m_s2
+    back_m = np.minimum(np.maximum(times_s - stands_s, 0.0) * settings.back_out_speed_m_s, free_m)
     guide = Guide(Motion.LOOK, GuidedVelocity(-settings.back_out_speed_m_s, 0.0), settings.back_out_speed_m_s)
-    return [Choice(guide, ahead(pose, -back_m))]
+    return [Choice(guide, ahead(pose, braked_m(speed_m_s, times_s, settings) - back_m))]
 
 
 def _on_arcs(

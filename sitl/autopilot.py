@@ -11,15 +11,16 @@ from sitl.autopilot_commands import answer
 from sitl.autopilot_link import AUTOPILOT, Channel, new_channel
 from sitl.autopilot_modes import INFO, WARNING, apply_sticks, run_failsafes, set_mode
 from sitl.autopilot_params import REAL32
+from sitl.autopilot_progress import plan_due_us, run_plan, set_mission_current
 from sitl.autopilot_proximity import forget_stale, take_in
 from sitl.autopilot_streams import heartbeat, send_due, set_group, start_streams
-from sitl.autopilot_targets import GLOBAL_FRAMES, attitude_target, global_target, go_to, local_target
-from sitl.autopilot_vehicle import HOME_S, ORIGIN_S, POSITION_S, Mode, Sticks, Vehicle
+from sitl.autopilot_targets import attitude_target, global_target, local_target
+from sitl.autopilot_transfer import TRANSFERS, keep_home
+from sitl.autopilot_vehicle import HOME_S, ORIGIN_S, POSITION_S, Sticks, Vehicle, parameter_message
 from sitl.control import LOOP_HZ
 
 PARAMETERS_PER_LOOP = 5
 UNCHANGED = 65535
-MISSION_OK, MISSION_ERROR, MISSION_FRAME, MISSION_UNSUPPORTED = 0, 1, 2, 3
 
 TIMETABLE: tuple[tuple[float, tuple[str, ...]], ...] = (
     (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "ArduPilot Ready")),
@@ -56,6 +57,8 @@ class Autopilot:
         """Forget a connection and who was heard there."""
         self.vehicle.channels.pop(channel.number, None)
         self.vehicle.router.forget(channel.number)
+        if self.vehicle.plan.helper is not None and self.vehicle.plan.helper[2] == channel.number:
+            self.vehicle.plan.helper = None
 
     def receive(self, channel: Channel, data: bytes) -> None:
         """Handle what arrived on a channel."""
@@ -87,6 +90,7 @@ class Autopilot:
         due_us = float(self._next_second_us)
         if self._next_event < len(TIMETABLE):
             due_us = min(due_us, self._event_s() * 1e6)
+        due_us = min(due_us, plan_due_us(self.vehicle))
         for channel in self.vehicle.channels.values():
             if channel.requested or channel.parameter_queue:
                 return 0.0
@@ -99,6 +103,7 @@ class Autopilot:
         vehicle = self.vehicle
         self._report_motion()
         self._follow_timetable()
+        run_plan(vehicle)
         if vehicle.time_us >= self._next_second_us:
             self._next_second_us += 1_000_000
             run_failsafes(vehicle)
@@ -109,7 +114,7 @@ class Autopilot:
         for channel in vehicle.channels.values():
             send_due(vehicle, channel)
             for name in channel.parameter_queue[:PARAMETERS_PER_LOOP]:
-                channel.send(parameter_message(vehicle, name, in_list=True))
+                channel.send(parameter_message(vehicle.parameters, name, in_list=True))
             del channel.parameter_queue[:PARAMETERS_PER_LOOP]
         vehicle.flush_texts()
 
@@ -117,7 +122,7 @@ class Autopilot:
         vehicle, control = self.vehicle, self.vehicle.control
         if control[0]["arrived"]:
             control["arrived"] = 0
-            if vehicle.mode == Mode.GUIDED:
+            if vehicle.in_guided:
                 for channel in vehicle.channels.values():
                     channel.send(mavlink.MAVLink_mission_item_reached_message(0))
         if control[0]["timed_out"]:
@@ -137,15 +142,9 @@ class Autopilot:
             for text in texts:
                 vehicle.say(INFO, text)
             if moment_s == HOME_S:
+                keep_home(vehicle)
                 for channel in vehicle.channels.values():
                     channel.requested.append(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
-
-
-def parameter_message(vehicle: Vehicle, name: str, in_list: bool = False) -> Any:
-    """PARAM_VALUE of a known parameter; the index is only told in a list."""
-    table = vehicle.parameters
-    index = table.index_of(name) if in_list else 65535
-    return mavlink.MAVLink_param_value_message(name.encode(), table[name], table.type_of(name), len(table), index)
 
 
 def _text_of(name: Any) -> str:
@@ -155,7 +154,7 @@ def _text_of(name: Any) -> str:
 def _read_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     name = _text_of(message.param_id) if message.param_index < 0 else vehicle.parameters.name_of(message.param_index)
     if name is not None and name in vehicle.parameters:
-        channel.send(parameter_message(vehicle, name, in_list=message.param_index >= 0))
+        channel.send(parameter_message(vehicle.parameters, name, in_list=message.param_index >= 0))
 
 
 def _list_parameters(vehicle: Vehicle, channel: Channel, message: Any) -> None:
@@ -169,52 +168,7 @@ def _set_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     vehicle.parameters.set(name, message.param_value)
     vehicle.retune()
     for listener in vehicle.channels.values():
-        listener.send(parameter_message(vehicle, name))
-
-
-def _mission_ack(channel: Channel, message: Any, result: int) -> None:
-    channel.send(
-        mavlink.MAVLink_mission_ack_message(
-            message.get_srcSystem(), message.get_srcComponent(), result, getattr(message, "mission_type", 0)
-        )
-    )
-
-
-def _mission_item(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_ITEM(_INT) with current = 2 is a guided target."""
-    if message.current != 2:
-        _mission_ack(channel, message, MISSION_ERROR)
-        return
-    if message.command != mavlink.MAV_CMD_NAV_WAYPOINT:
-        _mission_ack(channel, message, MISSION_UNSUPPORTED)
-        return
-    if message.frame not in GLOBAL_FRAMES:
-        _mission_ack(channel, message, MISSION_FRAME)
-        return
-    scale = 1 if message.get_type() == "MISSION_ITEM_INT" else 1e7
-    fits = abs(message.x * scale) <= 9e8 and abs(message.y * scale) <= 18e8
-    if vehicle.mode != Mode.GUIDED or not vehicle.has_origin or not fits:
-        _mission_ack(channel, message, MISSION_ERROR)
-        return
-    go_to(vehicle, (round(message.x * scale), round(message.y * scale)))
-    _mission_ack(channel, message, MISSION_OK)
-
-
-def _mission_count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """Uploads are refused: this rover drives no missions of its own."""
-    _mission_ack(channel, message, MISSION_UNSUPPORTED)
-
-
-def _mission_list(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    channel.send(
-        mavlink.MAVLink_mission_count_message(
-            message.get_srcSystem(), message.get_srcComponent(), 0, getattr(message, "mission_type", 0)
-        )
-    )
-
-
-def _mission_clear(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    _mission_ack(channel, message, MISSION_OK)
+        listener.send(parameter_message(vehicle.parameters, name))
 
 
 def _old_set_mode(vehicle: Vehicle, channel: Channel, message: Any) -> None:
@@ -225,6 +179,10 @@ def _old_set_mode(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 def _heartbeat(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     if message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"]):
         vehicle.clocks.ground_station_s = vehicle.time_s
+    if message.type == mavlink.MAV_TYPE_ONBOARD_CONTROLLER:
+        who, known = (message.get_srcSystem(), message.get_srcComponent()), vehicle.plan.helper
+        if known is None or known[:2] == who:
+            vehicle.plan.helper = (*who, channel.number)
 
 
 def _override(vehicle: Vehicle, channel: Channel, message: Any) -> None:
@@ -272,11 +230,7 @@ HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
     "COMMAND_LONG": answer,
     "COMMAND_INT": answer,
     "HEARTBEAT": _heartbeat,
-    "MISSION_CLEAR_ALL": _mission_clear,
-    "MISSION_COUNT": _mission_count,
-    "MISSION_ITEM": _mission_item,
-    "MISSION_ITEM_INT": _mission_item,
-    "MISSION_REQUEST_LIST": _mission_list,
+    "MISSION_SET_CURRENT": set_mission_current,
     "OBSTACLE_DISTANCE": _obstacles,
     "PARAM_REQUEST_LIST": _list_parameters,
     "PARAM_REQUEST_READ": _read_parameter,
@@ -288,6 +242,7 @@ HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
     "SET_POSITION_TARGET_GLOBAL_INT": _global,
     "SET_POSITION_TARGET_LOCAL_NED": _local,
     "TIMESYNC": _timesync,
+    **TRANSFERS,
 }
 """Everything else is taken in and ignored."""
 

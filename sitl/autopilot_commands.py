@@ -8,6 +8,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.autopilot_auto import AutoRunner
+from sitl.autopilot_fence import enable_fence
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import FORCE, INFO, arm, disarm, set_mode
 from sitl.autopilot_streams import DEFAULT_INTERVAL_US, MESSAGES, requested_messages, set_interval, streamable
@@ -42,11 +44,11 @@ def _reposition(vehicle: Vehicle, message: Any) -> int:
     if message.get_type() != "COMMAND_INT":
         return UNSUPPORTED
     change_mode = math.isfinite(message.param2) and int(message.param2) & 1
-    if vehicle.mode != Mode.GUIDED and not change_mode:
+    if not vehicle.in_guided and not change_mode:
         return DENIED
     if message.frame not in GLOBAL_FRAMES or not valid_place(message.x, message.y) or (message.x, message.y) == (0, 0):
         return DENIED
-    if vehicle.mode != Mode.GUIDED and not set_mode(vehicle, Mode.GUIDED):
+    if not vehicle.in_guided and not set_mode(vehicle, Mode.GUIDED):
         return FAILED
     if message.param1 > 0.0 and not change_speed(vehicle, message.param1):
         return FAILED
@@ -124,7 +126,24 @@ def _set_reverse(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 
 def _mission_start(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    if message.param1 != 0.0 or message.param2 != 0.0:  # only the whole mission
+        return DENIED
     return ACCEPTED if set_mode(vehicle, Mode.AUTO) else FAILED
+
+
+def _set_mission_current(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    seq = int(message.param1)
+    if seq < 0 or not vehicle.plan.mission.set_current(seq, AutoRunner(vehicle)):
+        return FAILED
+    if message.param2 == 1.0:
+        vehicle.plan.mission.jumps.clear()
+    for listener in vehicle.channels.values():
+        listener.requested.append(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
+    return ACCEPTED
+
+
+def _fence_enable(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    return ACCEPTED if enable_fence(vehicle, int(message.param1)) else FAILED
 
 
 def _return(vehicle: Vehicle, channel: Channel, message: Any) -> int:
@@ -150,6 +169,8 @@ HANDLERS: dict[int, Handler] = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
     mavlink.MAV_CMD_DO_SET_REVERSE: _set_reverse,
     mavlink.MAV_CMD_MISSION_START: _mission_start,
+    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: _set_mission_current,
+    mavlink.MAV_CMD_DO_FENCE_ENABLE: _fence_enable,
     mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _return,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
 }

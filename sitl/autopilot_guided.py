@@ -191,6 +191,13 @@ def run_waypoint(control: Any, tuning: Any, estimate: Any) -> None:
         if not control.pivoting:
             shape_target(control, tuning, estimate)
         follow_shaped(control, tuning, estimate)
+    steer_waypoint(control, tuning, estimate)
+
+
+@njit(cache=True, nogil=True)
+def steer_waypoint(control: Any, tuning: Any, estimate: Any) -> None:
+    """Throttle and steering after the inner target, or for turning on the spot."""
+    if control.armed:
         if control.pivoting:
             control.nav_speed = accel_limited(control, tuning, 0.0)
             control.nav_turn_rate = 0.0

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections import deque
+
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_link import new_codec
@@ -28,10 +31,12 @@ class LidarComponent:
         self._interval_us = 1e6 / lidar.rate_hz
         self._scan_us = self._interval_us
         self._heartbeat_us = 0.0
+        self._late_us = lidar.flaws.latency_s * 1e6
+        self._waiting: deque[tuple[float, list[int]]] = deque()
 
     def next_due_us(self) -> float:
         """Time of the next packet."""
-        return min(self._scan_us, self._heartbeat_us)
+        return min(self._scan_us, self._heartbeat_us, self._waiting[0][0] if self._waiting else math.inf)
 
     def packets(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> bytes:
         """What the scanner sends at this moment; empty when nothing is due."""
@@ -41,12 +46,16 @@ class LidarComponent:
             data += mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3).pack(self._codec)
         if time_us >= self._scan_us:
             self._scan_us = max(self._scan_us + self._interval_us, float(time_us - HEARTBEAT_US))
-            data += b"" if self._sensing.lidar_fault == "silent" else self._scan(time_us, north_m, east_m, heading_rad)
+            cells = self._sensing.scan_cm(north_m, east_m, heading_rad)
+            if self._sensing.lidar_fault != "silent":
+                self._waiting.append((time_us + self._late_us, cells))
+        while self._waiting and self._waiting[0][0] <= time_us + 0.5:
+            data += self._packed(time_us, self._waiting.popleft()[1])
         return data
 
-    def _scan(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> bytes:
+    def _packed(self, time_us: int, cells: list[int]) -> bytes:
+        """A late scan bears the time at which it is sent: few drivers know how long theirs took."""
         lidar = self._lidar
-        cells = self._sensing.scan_cm(north_m, east_m, heading_rad)
         message = mavlink.MAVLink_obstacle_distance_message(
             time_us, 0, cells, round(lidar.increment_deg), round(lidar.min_m * 100), round(lidar.max_m * 100),
             lidar.increment_deg, lidar.offset_deg, 12,

@@ -6,11 +6,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_battery import LOW, NAMES, OK, arming_complaint
 from sitl.autopilot_ekf import Change
-from sitl.autopilot_guided import begin_guided, begin_target
+from sitl.autopilot_fence import arming_fault
+from sitl.autopilot_plan import GuidedTask, Submode
 from sitl.autopilot_vehicle import ARMABLE_S, AUTOPILOT_MODES, PREARM_S, Mode, Sticks, Vehicle
+from sitl.autopilot_ways import begin_driving, begin_return, begin_way_back, remember_start
 from sitl.control import COAST, STOP
 
-NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.AUTO, Mode.INITIALISING}
+NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.INITIALISING}
 FORCE = {2989, 21196}
 """Magic numbers that arm or disarm against the checks."""
 
@@ -42,13 +44,18 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
     if not _may_enter(vehicle, mode):
         vehicle.say(WARNING, "Flight mode change failed")
         return False
+    if vehicle.mode == Mode.AUTO:
+        vehicle.plan.mission.stop()
     vehicle.mode = mode
     _enter(vehicle)
+    if vehicle.plan.fence.breached:
+        # Whoever changes the mode now is taken to be driving back by hand.
+        vehicle.plan.fence.recovering_since_s = vehicle.time_s
     return True
 
 
 def _may_enter(vehicle: Vehicle, mode: Mode) -> bool:
-    if mode == Mode.AUTO:
+    if mode == Mode.AUTO and not vehicle.plan.mission.present:
         vehicle.say(NOTICE, "No Mission. Can't set AUTO.")
         return False
     if mode == Mode.DOCK:
@@ -58,19 +65,27 @@ def _may_enter(vehicle: Vehicle, mode: Mode) -> bool:
         return False
     if mode in (Mode.RTL, Mode.SMART_RTL, Mode.LOITER) and not vehicle.has_position:
         return False
+    if mode == Mode.SMART_RTL and not vehicle.plan.way_back.active:
+        return False
     return not (vehicle.armed and mode in AUTOPILOT_MODES and not vehicle.has_position)
 
 
 def _enter(vehicle: Vehicle) -> None:
-    control, tuning, estimate = vehicle.control, vehicle.tuning, vehicle.estimate
-    begin_guided(control[0], tuning[0])
+    control = vehicle.control
+    begin_driving(vehicle)
     control["task"] = STOP
     apply_sticks(vehicle)
     # HOLD takes the throttle away at once, it does not brake by a controller.
     if vehicle.mode in (Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.SIMPLE, Mode.HOLD):
         control["task"] = COAST
-    elif vehicle.mode in (Mode.RTL, Mode.SMART_RTL):
-        begin_target(control[0], tuning[0], estimate[0], 0.0, 0.0)
+    elif vehicle.mode == Mode.RTL:
+        begin_return(vehicle)
+    elif vehicle.mode == Mode.SMART_RTL:
+        begin_way_back(vehicle)
+    elif vehicle.mode == Mode.AUTO:
+        vehicle.plan.auto.waiting = True
+        vehicle.plan.auto.submode = Submode.STOP
+        vehicle.plan.auto.guided = GuidedTask()
 
 
 def apply_sticks(vehicle: Vehicle) -> None:
@@ -94,6 +109,7 @@ def arm(vehicle: Vehicle, force: bool = False) -> bool:
     vehicle.armed = True
     vehicle.clocks.armed_s = vehicle.time_s
     vehicle.control["armed"] = 1
+    remember_start(vehicle)
     vehicle.say(INFO, "Throttle armed")
     return True
 
@@ -104,10 +120,13 @@ def arming_faults(vehicle: Vehicle) -> list[str]:
         return ["Accels inconsistent", "AHRS: waiting for home"]
     battery = arming_complaint(vehicle.parameters, vehicle.volts(), vehicle.used_mah())
     faults = [battery] if battery else []
-    if vehicle.mode in AUTOPILOT_MODES:
-        located = vehicle.has_position and vehicle.time_s >= ARMABLE_S + vehicle.gps_late.position_s
-        return faults if located else [*faults, "AHRS: not using configured AHRS type"]
-    return faults if vehicle.time_s >= PREARM_S else [*faults, "Accels inconsistent"]
+    located = vehicle.has_position and vehicle.time_s >= ARMABLE_S + vehicle.gps_late.position_s
+    if vehicle.mode in AUTOPILOT_MODES and not located:
+        return [*faults, "AHRS: not using configured AHRS type"]
+    if vehicle.time_s < PREARM_S:
+        return [*faults, "Accels inconsistent"]
+    fence = arming_fault(vehicle)
+    return faults if fence is None else [*faults, fence]
 
 
 def disarm(vehicle: Vehicle) -> None:
@@ -115,6 +134,8 @@ def disarm(vehicle: Vehicle) -> None:
     if vehicle.armed:
         vehicle.armed = False
         vehicle.control["armed"] = 0
+        if vehicle.mode != Mode.AUTO:
+            vehicle.plan.mission.reset()
         vehicle.say(INFO, "Throttle disarmed")
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl import geodesy
+from sitl.autopilot_fence import fence_status
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import arming_faults, base_mode
 from sitl.autopilot_proximity import echoes
@@ -21,13 +22,13 @@ from sitl.autopilot_vehicle import (
     Mode,
     Vehicle,
 )
+from sitl.control import LEG
+from sitl.sensors import Reading
 
 DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
-PREARM_BIT = 1 << 28
-BATTERY_BIT = 1 << 25
-GPS_BIT = 1 << 5
-SENSORS = 322034735
+PREARM_BIT, BATTERY_BIT, FENCE_BIT, GPS_BIT = 1 << 28, 1 << 25, 1 << 20, 1 << 5
+SENSORS, ENABLED_SENSORS = 322034735, 304208943
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
 
 Builder = Callable[[Vehicle], list[Any]]
@@ -76,13 +77,19 @@ def _vfr_hud(vehicle: Vehicle) -> list[Any]:
 
 def _sys_status(vehicle: Vehicle) -> list[Any]:
     health = SENSORS & ~PREARM_BIT if arming_faults(vehicle) else SENSORS | PREARM_BIT
+    present, enabled = SENSORS, ENABLED_SENSORS
+    if not vehicle.ekf.gps_has_fix:
+        present &= ~GPS_BIT
+        health &= ~GPS_BIT
     if vehicle.battery.worst:
         health &= ~BATTERY_BIT
-    present = SENSORS if vehicle.ekf.gps_has_fix else SENSORS & ~GPS_BIT
-    health &= present | ~GPS_BIT
+    if vehicle.plan.fence.enabled and vehicle.parameters["FENCE_ACTION"] > 0.0:
+        enabled |= FENCE_BIT
+    if vehicle.plan.fence.breached:
+        health &= ~FENCE_BIT
     volts_mv, amps_ca, percent = battery_readings(vehicle)
     return [
-        mavlink.MAVLink_sys_status_message(present, 304208943, health, 0, volts_mv, amps_ca, percent, 0, 0, 0, 0, 0, 0)
+        mavlink.MAVLink_sys_status_message(present, enabled, health, 0, volts_mv, amps_ca, percent, 0, 0, 0, 0, 0, 0)
     ]
 
 
@@ -115,16 +122,30 @@ def _gps_raw(vehicle: Vehicle) -> list[Any]:
     ]  # fmt: skip
 
 
+def _beside_leg_m(vehicle: Vehicle) -> float:
+    """Metres left (positive) or right of the leg that is driven; 0 where there is none."""
+    control, (north_m, east_m) = vehicle.control[0], vehicle.position_m()
+    leg_n, leg_e = float(control["dest_n"] - control["from_n"]), float(control["dest_e"] - control["from_e"])
+    length_m = math.hypot(leg_n, leg_e)
+    if int(control["task"]) != LEG or length_m == 0.0:
+        return 0.0
+    return float((north_m - control["from_n"]) * leg_e - (east_m - control["from_e"]) * leg_n) / length_m
+
+
 def _navigation(vehicle: Vehicle) -> list[Any]:
     if vehicle.mode not in AUTOPILOT_MODES:
         return []
     bearing = distance = 0
+    beside_m = 0.0
     if vehicle.has_target:
         north, east = geodesy.offset_m(vehicle.place(), vehicle.destination)
         bearing = round(math.degrees(math.atan2(east, north))) % 360
         distance = int(math.hypot(north, east))
+        beside_m = _beside_leg_m(vehicle)
     return [
-        mavlink.MAVLink_nav_controller_output_message(0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, 0.0)
+        mavlink.MAVLink_nav_controller_output_message(
+            0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, beside_m
+        )
     ]
 
 
@@ -151,27 +172,33 @@ def _simstate(vehicle: Vehicle) -> list[Any]:
 
 
 def _distance_sensors(vehicle: Vehicle) -> list[Any]:
-    wired = [
+    own = [
         mavlink.MAVLink_distance_sensor_message(
-            _ms(vehicle), round(beam.min_m * 100), round(beam.max_m * 100), reading, 4, number, beam.orientation, 0
+            _ms(vehicle), one.min_cm, one.max_cm, one.range_cm, one.kind, one.number, one.orientation, 0
         )
-        for number, (beam, reading) in enumerate(zip(vehicle.sensing.suite.beams, read_beams(vehicle), strict=True))
-        if not vehicle.sensing.beam_is_silent(number)
+        for one in (*read_beams(vehicle), *vehicle.sensing.sectors())
     ]
-    return wired + echoes(vehicle)
+    return own + echoes(vehicle)
 
 
 def _rangefinder(vehicle: Vehicle) -> list[Any]:
-    readings = [
-        reading for number, reading in enumerate(read_beams(vehicle)) if not vehicle.sensing.beam_is_silent(number)
-    ]
+    readings = [one.range_cm for one in read_beams(vehicle)]
     return [mavlink.MAVLink_rangefinder_message(min(readings) / 100.0, 0.0)] if readings else []
 
 
-def read_beams(vehicle: Vehicle) -> list[int]:
-    """The rangefinders' readings at this moment, in centimetres."""
+def read_beams(vehicle: Vehicle) -> list[Reading]:
+    """What the rangefinders say at this moment."""
     rover = vehicle.rover[0]
-    return vehicle.sensing.beams_cm(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
+    return vehicle.sensing.wired(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
+
+
+def mission_current(vehicle: Vehicle, seq: int) -> Any:
+    """MISSION_CURRENT with a given item; the total does not count home."""
+    mission = vehicle.plan.mission
+    state = int(mission.state) if mission.present else mavlink.MISSION_STATE_NO_MISSION
+    return mavlink.MAVLink_mission_current_message(
+        seq, max(len(mission.items) - 1, 0), state, int(vehicle.mode == Mode.AUTO)
+    )
 
 
 def _home(vehicle: Vehicle) -> list[Any]:
@@ -245,7 +272,7 @@ MESSAGES: dict[int, Builder] = {
     125: lambda _: [mavlink.MAVLink_power_status_message(5000, 0, 0)],
     152: lambda _: [mavlink.MAVLink_meminfo_message(0, 65535, 524288)],
     62: _navigation,
-    42: lambda _: [mavlink.MAVLink_mission_current_message(0, 0, 1, 0)],
+    42: lambda v: [mission_current(v, v.plan.mission.current)],
     36: _servos,
     65: _rc_channels,
     27: _raw_imu,
@@ -262,6 +289,7 @@ MESSAGES: dict[int, Builder] = {
     87: _position_target,
     132: _distance_sensors,
     173: _rangefinder,
+    162: fence_status,
 }
 """Streamed at 1 Hz unless asked otherwise; a builder gives nothing while there is nothing to tell."""
 
@@ -275,7 +303,7 @@ GROUPS: dict[int, tuple[int, ...]] = {
     6: (33, 32),
     10: (30, 164),
     11: (74,),
-    12: (163, 2, 193, 147, 132, 173, 241),
+    12: (163, 2, 193, 147, 132, 173, 241, 162),
 }
 """REQUEST_DATA_STREAM's groups; 0 means all."""
 

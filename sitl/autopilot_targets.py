@@ -8,8 +8,9 @@ from typing import Any
 from sitl import geodesy
 from sitl.autopilot_guided import begin_target
 from sitl.autopilot_modes import INFO
-from sitl.autopilot_vehicle import Mode, Vehicle
-from sitl.control import HEADING, TURN_RATE, WAYPOINT
+from sitl.autopilot_plan import Submode
+from sitl.autopilot_vehicle import DRIVEN_MODES, Mode, Vehicle
+from sitl.control import CIRCLE, HEADING, LEG, TURN_RATE, WAYPOINT
 
 LOCAL_NED, LOCAL_OFFSET, BODY, BODY_OFFSET = 1, 7, 8, 9
 LOCAL_FRAMES = {LOCAL_NED, LOCAL_OFFSET, BODY, BODY_OFFSET}
@@ -36,7 +37,7 @@ def valid_place(lat: int, lon: int) -> bool:
 def local_target(vehicle: Vehicle, message: Any) -> None:
     """SET_POSITION_TARGET_LOCAL_NED."""
     frame, mask = message.coordinate_frame, message.type_mask
-    if vehicle.mode != Mode.GUIDED or not vehicle.has_origin or frame not in LOCAL_FRAMES:
+    if not vehicle.in_guided or not vehicle.has_origin or frame not in LOCAL_FRAMES:
         return
     if not mask & NO_ACCELERATION:
         vehicle.say(INFO, "Ignoring SET_POSITION_TARGET_LOCAL_NED; set ACC_IGNORE in mask")
@@ -56,7 +57,7 @@ def local_target(vehicle: Vehicle, message: Any) -> None:
 
 def global_target(vehicle: Vehicle, message: Any) -> None:
     """SET_POSITION_TARGET_GLOBAL_INT; the altitude is ignored."""
-    if vehicle.mode != Mode.GUIDED or message.coordinate_frame not in GLOBAL_FRAMES:
+    if not vehicle.in_guided or message.coordinate_frame not in GLOBAL_FRAMES:
         return
     if not message.type_mask & NO_ACCELERATION:
         vehicle.say(INFO, "Ignoring SET_POSITION_TARGET_GLOBAL_INT; set ACC_IGNORE in mask")
@@ -95,7 +96,7 @@ def _motion_target(vehicle: Vehicle, message: Any, body: bool) -> None:
 
 def attitude_target(vehicle: Vehicle, message: Any) -> None:
     """SET_ATTITUDE_TARGET: thrust is a share of WP_SPEED, with a heading or a turn rate."""
-    if vehicle.mode != Mode.GUIDED or message.type_mask & (1 << 6) or not math.isfinite(message.thrust):
+    if not vehicle.in_guided or message.type_mask & (1 << 6) or not math.isfinite(message.thrust):
         return
     w, x, y, z = message.q
     rate, heading = message.body_yaw_rate, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
@@ -112,9 +113,15 @@ def attitude_target(vehicle: Vehicle, message: Any) -> None:
 
 
 def change_speed(vehicle: Vehicle, speed_m_s: float) -> bool:
-    """DO_CHANGE_SPEED: only with a position target in GUIDED."""
-    following = vehicle.mode in (Mode.GUIDED, Mode.RTL, Mode.SMART_RTL)
-    if not following or int(vehicle.control[0]["task"]) != WAYPOINT or not speed_m_s >= SLOWEST_M_S:
+    """DO_CHANGE_SPEED: while there is a place to drive to; AUTO takes it at any time."""
+    task = int(vehicle.control[0]["task"])
+    if vehicle.mode == Mode.AUTO and task == HEADING:
+        vehicle.control["target_speed"] = speed_m_s
+        return math.isfinite(speed_m_s)
+    waiting = vehicle.mode == Mode.AUTO and vehicle.plan.auto.submode == Submode.STOP
+    if vehicle.mode not in DRIVEN_MODES or not speed_m_s >= SLOWEST_M_S:
+        return False
+    if task not in (WAYPOINT, CIRCLE, LEG) and not waiting:
         return False
     vehicle.control["base_speed"] = speed_m_s
     return True

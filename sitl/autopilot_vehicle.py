@@ -16,7 +16,8 @@ from sitl.autopilot_battery import Battery, rest_volts
 from sitl.autopilot_ekf import Ekf
 from sitl.autopilot_link import Channel, Router
 from sitl.autopilot_params import Parameters
-from sitl.control import LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
+from sitl.autopilot_plan import Plan, Storage, Submode, new_plan
+from sitl.control import CIRCLE, LEG, LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
 from sitl.sensors import RangeSensing
 
 ALTITUDE_M = 120.0
@@ -58,6 +59,9 @@ class Mode(IntEnum):
 
 AUTOPILOT_MODES = {Mode.LOITER, Mode.CIRCLE, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED}
 """Modes that drive by themselves and need a position."""
+
+DRIVEN_MODES = {Mode.GUIDED, Mode.AUTO, Mode.RTL, Mode.SMART_RTL}
+"""Modes that may have a place to drive to."""
 
 
 @dataclass
@@ -108,8 +112,12 @@ class Vehicle:
         origin_m: tuple[float, float],
         sensing: RangeSensing,
         parameters: Mapping[str, float],
+        storage: Storage | None = None,
     ) -> None:
-        """``origin``: where it boots, 1e-7 degree; ``origin_m``: the same place in the world frame."""
+        """``origin``: where it boots, 1e-7 degree; ``origin_m``: the same place in the world frame.
+
+        ``storage``: missions and fences kept over a reboot.
+        """
         self.rover = rover
         self.sensing = sensing
         self.parameters = Parameters(parameters)
@@ -136,6 +144,7 @@ class Vehicle:
         self.stale_m: tuple[float, float] | None = None
         """The last position that was known, while none is; it is told again and again."""
         self.control["rest_v"] = self.parameters["SIM_BATT_VOLTAGE"]
+        self.plan: Plan = new_plan(storage or Storage())
 
     @property
     def time_us(self) -> int:
@@ -177,9 +186,14 @@ class Vehicle:
         return 0 if self.time_s >= ATTITUDE_S - 1.0 else EKF_UNINITIALISED
 
     @property
+    def in_guided(self) -> bool:
+        """Guided targets are obeyed: in GUIDED, and in AUTO while a mission item hands over."""
+        return self.mode == Mode.GUIDED or (self.mode == Mode.AUTO and self.plan.auto.submode == Submode.GUIDED)
+
+    @property
     def has_target(self) -> bool:
-        """A guided position target is being followed or was reached."""
-        return self.mode == Mode.GUIDED and int(self.control[0]["task"]) == WAYPOINT
+        """A place is being driven to, or was reached."""
+        return self.mode in DRIVEN_MODES and int(self.control[0]["task"]) in (WAYPOINT, CIRCLE, LEG)
 
     def position_m(self) -> tuple[float, float]:
         """Estimated metres north and east of the EKF origin; zeros before there is a position, later the last one known."""
@@ -258,10 +272,21 @@ class Vehicle:
                     channel.send(message)
         self.texts.clear()
 
+    def tell_parameter(self, name: str) -> None:
+        """Tell every channel a parameter's value."""
+        for channel in self.channels.values():
+            channel.send(parameter_message(self.parameters, name))
+
     def retune(self) -> None:
         """Take changed parameters over into the compiled controllers."""
         fresh = new_tuning(self.parameters.as_dict())
         self.tuning[:] = fresh
+
+
+def parameter_message(table: Parameters, name: str, in_list: bool = False) -> Any:
+    """PARAM_VALUE of a known parameter; the index is only told in a list."""
+    index = table.index_of(name) if in_list else 65535
+    return mavlink.MAVLink_param_value_message(name.encode(), table[name], table.type_of(name), len(table), index)
 
 
 def text_messages(channel: Channel, severity: int, text: str) -> list[Any]:

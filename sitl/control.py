@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 LOOP_HZ = 50
 LOOP_S = 1.0 / LOOP_HZ
 
-STOP, WAYPOINT, HEADING, TURN_RATE, COAST = 0, 1, 2, 3, 4
-"""What the motion controller is doing: braking, driving to a place, holding a heading or a turn rate, nothing."""
+STOP, WAYPOINT, HEADING, TURN_RATE, COAST, CIRCLE, LEG = 0, 1, 2, 3, 4, 5, 6
+"""What the motion controller is doing: braking, driving to a place, holding a heading or a turn rate, nothing, circling,
+driving along a leg of a mission."""
 
 GROUND_STEERING, THROTTLE = 26, 70
 """SERVO1_FUNCTION and SERVO3_FUNCTION of a rover with steered wheels."""
@@ -45,7 +46,7 @@ CONTROL = np.dtype(
             "tick", "armed", "task", "reversed", "fresh_target", "reached", "arrived", "timed_out", "have_target",
             "target_tick", "nav_tick", "speed_change_tick", "pivoting", "pivot_done_tick", "place_tick",
             "place_valid", "speed_error_fresh", "steer_error_fresh", "vel_error_fresh", "speed_tick", "stop_tick",
-            "steer_tick", "left_limited", "right_limited", "throttle_limited",
+            "steer_tick", "left_limited", "right_limited", "throttle_limited", "fast", "corner", "halts", "on_circle",
         )
     ]
     + [
@@ -59,8 +60,10 @@ CONTROL = np.dtype(
             "desired_turn_rate", "steer_error", "steer_integral",
             "throttle", "throttle_before", "steering", "servo_1", "servo_3", "room_m",
             "stick_steering", "stick_throttle", "amps", "used_mah", "used_wh", "rest_v",
+            "from_n", "from_e", "pace", "circle_radius", "circle_turned", "circle_angle", "circle_speed",
         )
     ]
+    + [("legs", "f8", (3, 7))]
 )  # fmt: skip
 """Everything the motion controllers remember; metres, m/s, radians, outputs -1 to 1.
 

@@ -148,7 +148,7 @@ class FaultPlayer:
                         grips[side] *= 1.0 - fault.share if fault.side in ("both", name) else 1.0
                 case SensorFault():
                     lidar = lidar if fault.beams else fault.what
-                    numbers = [number - 1 for number in fault.beams] or range(len(sensing.suite.beams))
+                    numbers = [number - 1 for number in fault.beams] or sensing.numbers()
                     beams |= dict.fromkeys(numbers, fault.what)
                 case BatteryLow():
                     volts = min(volts, fault.volts)

@@ -11,11 +11,11 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sitl.autopilot_battery import FULL_A, RESISTANCE_OHM
-from sitl.autopilot_guided import run_control
+from sitl.autopilot_loop import run_tasks
 from sitl.control import LOOP_S
 from sitl.movers import Floats, Ints
 from sitl.rover import drive, meet_movers
-from sitl.world import Obstacles
+from sitl.world import Ground, Obstacles
 
 SUBSTEPS = 4
 """Steps of the plant in one main loop."""
@@ -69,6 +69,9 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
     estimate.east_m = rover.east_m - origin[1] + estimate.bias_e + noise[3] * draw[3] + estimate.offset_e
     estimate.vel_n = rover.speed_m_s * ahead_n + rate_n + estimate.offset_vn
     estimate.vel_e = rover.speed_m_s * ahead_e + rate_e + estimate.offset_ve
+    if rover.slide_m_s != 0.0:
+        estimate.vel_n -= rover.slide_m_s * ahead_e
+        estimate.vel_e += rover.slide_m_s * ahead_n
     estimate.accel_n = rover.accel_m_s2 * ahead_n - side_m_s2 * ahead_e
     estimate.accel_e = rover.accel_m_s2 * ahead_e + side_m_s2 * ahead_n
     heading_rad = rover.heading_rad + estimate.bias_heading
@@ -90,7 +93,7 @@ def draw_current(rover: Any, control: Any) -> None:
 @njit(cache=True, nogil=True)
 def run_loops(
     rovers: Any, estimates: Any, controls: Any, tunings: Any, origin: Any, noise: Any, draws: Any,
-    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
+    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
     mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats, time_s: float,
 ) -> int:  # fmt: skip
     """Run main loops from ``time_s`` on, until the draws are used up or something happened that people must be told at once.
@@ -102,11 +105,11 @@ def run_loops(
     for loop in range(draws.shape[0]):
         control.tick += 1
         update_estimate(estimate, rover, origin, noise, draws[loop])
-        run_control(control, tuning, estimate)
+        run_tasks(control, tuning, estimate)
         draw_current(rover, control)
         first, third = control.servo_1 * rover.grip_1, control.servo_3 * rover.grip_3
         for _ in range(SUBSTEPS):
-            drive(rover, obstacles, south_m, west_m, resolution_m, first, third, LOOP_S / SUBSTEPS)
+            drive(rover, obstacles, south_m, west_m, resolution_m, ground, first, third, LOOP_S / SUBSTEPS)
         if mover_radii_m.size > 0:
             now_s = time_s + (loop + 1) * LOOP_S
             meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)

@@ -15,9 +15,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
     from sitl.lockstep import Drive
+    from sitl.world import World
 
 LEGEND_COLUMNS = 5
 PART_COLOURS = {"B": "#1f6fd6", "C": "#e07b00", "A": "#c2185b", "-": "#1f6fd6"}
+GROUND_COLOURS = {"slippery": "#4fa8d8", "rough": "#c9a800"}
+DOOR_COLOUR, GLASS_COLOUR, BLACK_COLOUR = "#e53935", "#00acc1", "#4a148c"
 MOVER_COLOUR, MOVER_STEP_S = "#7b1fa2", 0.5
 PART_NAMES = {"B": "exploring (B)", "C": "new path (C)", "A": "returning (A)"}
 
@@ -35,6 +38,8 @@ def save_picture(run: Drive, path: Path) -> None:
     axes = figure.add_subplot()
     _draw_world(axes, run)
     _draw_map(axes, run)
+    _draw_ground(axes, run.simulator.world)
+    _draw_special(axes, run.simulator.world, run.report.sim_time_s)
     _draw_movers(axes, run)
     _draw_track(axes, north, east, [p.part for p in track])
     _draw_places(axes, run)
@@ -51,17 +56,58 @@ def save_picture(run: Drive, path: Path) -> None:
     figure.savefig(path)
 
 
+def _extent(world: World) -> tuple[float, float, float, float]:
+    """West, east, south and north edge of the world's fields."""
+    return (world.west_m, world.west_m + world.width_m, world.south_m, world.south_m + world.height_m)
+
+
 def _draw_world(axes: Axes, run: Drive) -> None:
     """The truth in light grey."""
     world = run.simulator.world
     if not world.obstacles.any():
         return
-    height, width = world.obstacles.shape
-    left, low = world.west_m, world.south_m
-    extent = (left, left + width * world.resolution_m, low, low + height * world.resolution_m)
     picture = np.where(world.obstacles, 0.0, np.nan)
-    axes.imshow(picture, origin="lower", extent=extent, cmap="gray", vmin=-3.2, vmax=1.0, interpolation="nearest")
+    axes.imshow(
+        picture, origin="lower", extent=_extent(world), cmap="gray", vmin=-3.2, vmax=1.0, interpolation="nearest"
+    )
     axes.plot([], [], "s", color="#c2c2c2", label="obstacle, not seen")
+
+
+def _tint(
+    axes: Axes, world: World, mask: NDArray[np.bool_], colour: str, strength: NDArray[np.float64] | float
+) -> None:
+    """Colour some fields of the world, more or less strongly."""
+    from matplotlib.colors import to_rgb
+
+    picture: NDArray[np.float64] = np.zeros((*mask.shape, 4))
+    picture[..., :3] = to_rgb(colour)
+    picture[..., 3] = np.where(mask, strength, 0.0)
+    axes.imshow(picture, origin="lower", extent=_extent(world), interpolation="nearest")
+
+
+def _draw_ground(axes: Axes, world: World) -> None:
+    """Slippery and rough ground, the stronger the worse."""
+    for (name, colour), layer in zip(GROUND_COLOURS.items(), world.ground, strict=True):
+        if layer.size and (layer < 1.0).any():
+            _tint(axes, world, layer < 1.0, colour, 0.15 + 0.45 * (1.0 - layer.astype(np.float64)))
+            axes.plot([], [], "s", color=colour, alpha=0.5, label=f"{name} ground")
+
+
+def _draw_special(axes: Axes, world: World, ended_s: float) -> None:
+    """Doors as they were at the end, and what rays go through or do not come back from."""
+    labels: set[str] = set()
+    for door in world.doors:
+        is_open = door.is_open(ended_s)
+        label = "door, open at the end" if is_open else "door, closed at the end"
+        _tint(axes, world, door.fields, DOOR_COLOUR, 0.35 if is_open else 1.0)
+        axes.plot(
+            [], [], "s", color=DOOR_COLOUR, alpha=0.35 if is_open else 1.0, label=None if label in labels else label
+        )
+        labels.add(label)
+    for mask, colour, name in ((world.glass, GLASS_COLOUR, "glass"), (world.black, BLACK_COLOUR, "black")):
+        if mask is not None:
+            _tint(axes, world, mask, colour, 1.0)
+            axes.plot([], [], "s", color=colour, label=f"{name}, sends no ray back")
 
 
 def _draw_map(axes: Axes, run: Drive) -> None:

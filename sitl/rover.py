@@ -3,6 +3,9 @@
 Skid steering is that of the firmware's own simulated skid rover: speed follows the mean of both motors with a first-order lag,
 the turn rate follows their difference at once. Ackermann steering is the bicycle model: the same drive, and front wheels that turn
 no faster and no farther than they can, so the rover turns only while it moves.
+
+On slippery ground both slide: friction, which is what changes the velocity, ends at grip times gravity. Then the rover
+pulls away and brakes late, and drifts on sideways (skid) or turns less than its wheels ask for (steered wheels).
 """
 
 from __future__ import annotations
@@ -15,7 +18,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sitl.movers import Floats, Ints, nearest_mover
-from sitl.world import Obstacles, clearance_m
+from sitl.world import Ground, Obstacles, clearance_m, ground_under
 
 TOP_SPEED_M_S = 4.0
 SPEED_LAG_S = 4.0 / 14.0
@@ -26,6 +29,10 @@ WHEEL_MOST_RAD = math.radians(35.0)
 """Steering angle at full lock, where the rover drives its turning radius; that of the firmware's simulated rover."""
 WHEEL_RATE_RAD_S = math.radians(60.0)
 """How fast the steered wheels turn: 0.6 s from straight ahead to full lock."""
+
+GRAVITY_M_S2 = 9.81
+TURN_GRIP_RAD_S2 = 20.0
+"""How fast the turn rate can change with full grip; matters only where there is less."""
 
 RELEASE_M = 0.05
 """A contact has ended when the rover has come this far away from the obstacle."""
@@ -46,6 +53,7 @@ ROVER = np.dtype(
         ("struck_m_s", "f8"),
         ("turning_radius_m", "f8"),
         ("wheel_rad", "f8"),
+        ("slide_m_s", "f8"),
         ("grip_1", "f8"),
         ("grip_3", "f8"),
         ("drawn_ah", "f8"),
@@ -55,6 +63,7 @@ ROVER = np.dtype(
 
 ``struck``: number of the mover it touches, from 1; ``struck_m_s``: the rover's own speed when that began.
 ``turning_radius_m``: 0 for skid steering; ``wheel_rad``: where the steered wheels point, clockwise.
+``slide_m_s``: speed sideways, to the right; 0 unless the ground is slippery.
 ``grip_1``, ``grip_3``: the share of each servo output that comes to the ground; ``drawn_ah``: taken from the battery so far.
 """
 
@@ -88,8 +97,32 @@ def turn_wheels(rover: Any, steering: float, step_s: float) -> None:
 
 
 @njit(cache=True, nogil=True)
+def slide(rover: Any, grip: float, wanted_m_s: float, wanted_rad_s: float, step_s: float) -> tuple[float, float, float]:
+    """Forward speed, turn rate and speed sideways after a step on slippery ground.
+
+    The wheels want a speed ahead, none sideways, and a turn rate. Friction changes the velocity by no more than grip times
+    gravity, in whatever direction, and the turn rate not at once. Steered wheels turn the rover no faster than friction
+    can bend its way (it understeers); a skid rover turns all the same and drifts on sideways.
+    """
+    most_m_s = grip * GRAVITY_M_S2 * step_s
+    if rover.turning_radius_m > 0.0:
+        most_rad_s = grip * GRAVITY_M_S2 / max(abs(rover.speed_m_s), 1e-6)
+        wanted_rad_s = min(max(wanted_rad_s, -most_rad_s), most_rad_s)
+    change_rad_s = grip * TURN_GRIP_RAD_S2 * step_s
+    yaw_rate_rad_s = rover.yaw_rate_rad_s + min(max(wanted_rad_s - rover.yaw_rate_rad_s, -change_rad_s), change_rad_s)
+    turned_rad = yaw_rate_rad_s * step_s
+    ahead_m_s = rover.speed_m_s * math.cos(turned_rad) + rover.slide_m_s * math.sin(turned_rad)
+    aside_m_s = rover.slide_m_s * math.cos(turned_rad) - rover.speed_m_s * math.sin(turned_rad)
+    missing_m_s = math.hypot(wanted_m_s - ahead_m_s, aside_m_s)
+    if missing_m_s <= most_m_s:
+        return wanted_m_s, yaw_rate_rad_s, 0.0
+    share = most_m_s / missing_m_s
+    return ahead_m_s + share * (wanted_m_s - ahead_m_s), yaw_rate_rad_s, aside_m_s - share * aside_m_s
+
+
+@njit(cache=True, nogil=True)
 def drive(
-    rover: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
+    rover: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
     servo_1: float, servo_3: float, step_s: float,
 ) -> None:  # fmt: skip
     """Move the rover for ``step_s`` (a few milliseconds) with servo outputs -1 to 1.
@@ -97,22 +130,29 @@ def drive(
     As in the firmware they are the left and the right motor of a skid rover, steering and throttle of one with Ackermann steering.
     """
     ackermann = rover.turning_radius_m > 0.0
+    grip, pace = ground_under(ground, south_m, west_m, resolution_m, rover.north_m, rover.east_m)
     goal_m_s = servo_3 * TOP_SPEED_M_S if ackermann else 0.5 * (servo_1 + servo_3) * TOP_SPEED_M_S
-    before_m_s = rover.speed_m_s
-    speed_m_s = goal_m_s + (before_m_s - goal_m_s) * math.exp(-step_s / SPEED_LAG_S)
-    rover.accel_m_s2 = (speed_m_s - before_m_s) / step_s
+    before_m_s, aside_m_s = rover.speed_m_s, 0.0
+    speed_m_s = goal_m_s * pace + (before_m_s - goal_m_s * pace) * math.exp(-step_s / SPEED_LAG_S)
     from_rad = rover.heading_rad
     if ackermann:
         turn_wheels(rover, servo_1, step_s)
         curvature = wheel_curvature(rover.wheel_rad, rover.turning_radius_m)
-        rover.yaw_rate_rad_s = 0.5 * (before_m_s + speed_m_s) * curvature
+        yaw_rate_rad_s = 0.5 * (before_m_s + speed_m_s) * curvature
     else:
-        rover.yaw_rate_rad_s = (servo_1 - servo_3) * TURN_RATE_RAD_S
+        yaw_rate_rad_s = (servo_1 - servo_3) * TURN_RATE_RAD_S * pace
+    if grip < 1.0 or rover.slide_m_s != 0.0:
+        speed_m_s, yaw_rate_rad_s, aside_m_s = slide(rover, grip, speed_m_s, yaw_rate_rad_s, step_s)
+    rover.accel_m_s2 = (speed_m_s - before_m_s) / step_s
+    rover.yaw_rate_rad_s = yaw_rate_rad_s
     heading_rad = rover.heading_rad + rover.yaw_rate_rad_s * step_s
     rover.heading_rad = (heading_rad + math.pi) % (2.0 * math.pi) - math.pi
     way_m = 0.5 * (before_m_s + speed_m_s) * step_s
     north_m = rover.north_m + way_m * math.cos(rover.heading_rad)
     east_m = rover.east_m + way_m * math.sin(rover.heading_rad)
+    if aside_m_s != 0.0:
+        north_m -= aside_m_s * step_s * math.sin(rover.heading_rad)
+        east_m += aside_m_s * step_s * math.cos(rover.heading_rad)
     reach_m = rover.radius_m + RELEASE_M
     room_m = clearance_m(obstacles, south_m, west_m, resolution_m, north_m, east_m, reach_m)
     if room_m < rover.radius_m:
@@ -122,6 +162,7 @@ def drive(
                 rover.contacts += 1
             rover.touching = 1
             rover.speed_m_s = 0.0
+            rover.slide_m_s = 0.0
             rover.accel_m_s2 = 0.0
             if ackermann:
                 rover.heading_rad = from_rad
@@ -130,6 +171,7 @@ def drive(
     elif room_m >= reach_m:
         rover.touching = 0
     rover.speed_m_s = speed_m_s
+    rover.slide_m_s = aside_m_s
     rover.driven_m += abs(way_m)
     rover.north_m = north_m
     rover.east_m = east_m
@@ -146,4 +188,5 @@ def meet_movers(rover: Any, rows: Floats, begins: Ints, radii_m: Floats, periods
         rover.struck = mover + 1
         rover.struck_m_s = rover.speed_m_s
         rover.speed_m_s = 0.0
+        rover.slide_m_s = 0.0
         rover.accel_m_s2 = 0.0

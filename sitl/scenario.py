@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
 from companion.frames import GeoPoint
-from companion.grid import Cell, Grid
-from companion.mapfiles import load_map
+from companion.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
+from companion.mission.sensor_tables import sensors_from, sensors_given
 from sitl.faults import FaultPlan, SensorFault
 from sitl.motion import NoiseSettings
-from sitl.movers import Mover, timed_track
-from sitl.sensors import suite_named
+from sitl.sensors import SensorSuite
 from sitl.simulator import SimStart, Simulator, steered_wheels
+from sitl.suites import suite_of
 from sitl.world import World
+from sitl.worldfile import load_world, movers_of
 
 SOMEWHERE = GeoPoint(53.1325, 23.1688)
 """Where the rover stands on earth when no place in the mission says."""
@@ -33,7 +35,7 @@ class Scenario:
 
     world: World
     start: SimStart
-    sensors: str = "lidar-90"
+    sensors: str | SensorSuite = "lidar-90"
     rover_radius_m: float = 0.35
     parameters: dict[str, float] = field(default_factory=dict)
     turning_radius_m: float = 0.0
@@ -64,7 +66,7 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     spec = mission.sitl or SitlSpec()
     name = str(mission.source or mission.name)
     try:
-        suite_named(spec.sensors)
+        described = suite_of(spec.sensors)
     except ValueError as error:
         raise ScenarioError(f"{name}: sitl.sensors: {error}") from error
     world, start_m = _ground(mission, spec, name)
@@ -74,18 +76,19 @@ def scenario_from_mission(mission: Mission) -> Scenario:
             f"{name}: sitl.start: a rover of {radius_m} m radius touches an obstacle of {spec.world} there; "
             "choose a free field"
         )
-    world = replace(world, movers=_movers(spec, start_m))
+    own = len(world.movers)
+    world = replace(world, movers=world.movers + movers_of(list(spec.movers), start_m))
     gap_m, touching = world.mover_gap_m(*start_m, 0.0)
     if gap_m < radius_m:
-        raise ScenarioError(
-            f"{name}: sitl.movers {touching + 1}: begins where the rover stands; let it begin farther from home"
-        )
+        which = f"sitl.movers {touching + 1 - own}" if touching >= own else f"{spec.world}: mover {touching + 1}"
+        raise ScenarioError(f"{name}: {which}: begins where the rover stands; let it begin farther from home")
     start = SimStart(*start_m, math.radians(spec.heading_deg), _home(mission, spec))
     parameters = {"WP_SPEED": mission.rover.cruise_speed_m_s, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
     turning_radius_m = _turning_radius_m(mission, spec, name)
     if turning_radius_m > 0.0:
         parameters |= steered_wheels(turning_radius_m)
-    return Scenario(world, start, spec.sensors, radius_m, parameters, turning_radius_m)
+    sensors = spec.sensors if isinstance(spec.sensors, str) else described
+    return Scenario(world, start, sensors, radius_m, parameters, turning_radius_m)
 
 
 def _turning_radius_m(mission: Mission, spec: SitlSpec, name: str) -> float:
@@ -103,28 +106,17 @@ def _ground(mission: Mission, spec: SitlSpec, name: str) -> tuple[World, tuple[f
     cell = spec.start or mission.grid.home
     if spec.world is None:
         return World.open(), _middle(cell, mission.grid.resolution_m) if cell else (0.0, 0.0)
-    grid = load_map(spec.world, spec.resolution_m or mission.grid.resolution_m)
-    grid = Grid(grid.weights, grid.resolution_m)
+    world = load_world(spec.world, spec.resolution_m or mission.grid.resolution_m)
     if cell is None:
         raise ScenarioError(f"{name}: sitl.start: missing; say in which field of {spec.world} the rover stands")
-    resolution_m = grid.resolution_m if spec.start else mission.grid.resolution_m
-    start_m = _middle(cell, resolution_m)
-    if not (0.0 <= start_m[0] < grid.height * grid.resolution_m and 0.0 <= start_m[1] < grid.width * grid.resolution_m):
-        raise ScenarioError(
-            f"{name}: sitl.start: field {cell.x}, {cell.y} lies outside {spec.world} "
-            f"({grid.width} x {grid.height} fields of {grid.resolution_m} m)"
-        )
-    return World.from_grid(grid), start_m
-
-
-def _movers(spec: SitlSpec, home_m: tuple[float, float]) -> tuple[Mover, ...]:
-    """What moves, in the world frame; the mission counts metres from home, where the rover begins."""
-    movers = []
-    for one in spec.movers:
-        places_m = [(home_m[0] + place.north_m, home_m[1] + place.east_m) for place in one.route]
-        track = timed_track(places_m, one.speed_m_s, one.start_s, repeats=one.repeat)
-        movers.append(Mover(one.name, one.radius_m, track, one.repeat, one.announce or ""))
-    return tuple(movers)
+    shapes = spec.world.suffix.lower() == ".toml"
+    own_m = (spec.resolution_m or mission.grid.resolution_m) if shapes else world.resolution_m
+    start_m = _middle(cell, own_m if spec.start else mission.grid.resolution_m)
+    if not (0.0 <= start_m[0] < world.height_m and 0.0 <= start_m[1] < world.width_m):
+        fields = f"{world.obstacles.shape[1]} x {world.obstacles.shape[0]} fields of {world.resolution_m} m"
+        size = f"{world.width_m:g} m east, {world.height_m:g} m north" if shapes else fields
+        raise ScenarioError(f"{name}: sitl.start: field {cell.x}, {cell.y} lies outside {spec.world} ({size})")
+    return world, start_m
 
 
 def _middle(cell: Cell, resolution_m: float) -> tuple[float, float]:
@@ -148,12 +140,23 @@ def with_parameters(scenario: Scenario, changes: dict[str, float]) -> Scenario:
 
 def with_faults(scenario: Scenario, plan: FaultPlan | None) -> Scenario:
     """The same scenario with what goes wrong. Raises ScenarioError for a fault of something that it does not have."""
-    beams = len(suite_named(scenario.sensors).beams)
+    described = isinstance(scenario.sensors, SensorSuite)
+    beams = len((scenario.sensors if isinstance(scenario.sensors, SensorSuite) else suite_of(scenario.sensors)).beams)
+    name = "of the mission" if described else scenario.sensors
     for number, fault in enumerate(plan.faults if plan else (), 1):
         missing = [one for one in fault.beams if one > beams] if isinstance(fault, SensorFault) else []
         if missing:
             raise ScenarioError(
-                f"{plan.source if plan else ''}: fault {number}: beams {missing[0]}: the sensors {scenario.sensors} have "
+                f"{plan.source if plan else ''}: fault {number}: beams {missing[0]}: the sensors {name} have "
                 f"{beams} beams; leave beams out to mean all sensors"
             )
     return replace(scenario, faults=plan)
+
+
+def with_sensors(mission: Mission, sensors: str) -> Mission:
+    """The same mission with other sensors: the name of a suite, or a TOML file. Raises ScenarioError."""
+    try:
+        given = sensors_from(sensors_given(sensors), Path(), ScenarioError)
+    except ValueError as error:
+        raise ScenarioError(f"--sensors: {error}") from error
+    return replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=given))

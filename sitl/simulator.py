@@ -16,6 +16,7 @@ from sitl import geodesy
 from sitl.autopilot import Autopilot
 from sitl.autopilot_lidar import LidarComponent
 from sitl.autopilot_link import Channel
+from sitl.autopilot_plan import Storage
 from sitl.autopilot_traffic import Traffic
 from sitl.autopilot_vehicle import Vehicle
 from sitl.control import GROUND_STEERING, LOOP_HZ, THROTTLE
@@ -67,6 +68,8 @@ class Truth:
     heading_rad: float
     speed_m_s: float
     yaw_rate_rad_s: float
+    slide_m_s: float = 0.0
+    """Speed sideways, to the right; only on slippery ground."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +173,7 @@ class Simulator:
         self.world = world
         self._start = start
         self._parameters = dict(parameters or {})
+        self._storage = Storage()
         self._noise = settings.as_array()
         self._rng = np.random.default_rng(motion_seed)
         self._sensing = RangeSensing(suite, world, settings.range_m, np.random.default_rng(range_seed))
@@ -181,6 +185,7 @@ class Simulator:
         self._tick = 0
         self._links: list[SimLink] = []
         self._collisions: list[Collision] = []
+        self._solid, self._doors_move_s = world.layers(0.0).solid, world.next_change_s(0.0)
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
         self._player = FaultPlayer(faults or FaultPlan(), seed)
         self._has_faults = faults is not None and bool(faults.faults)
@@ -191,7 +196,7 @@ class Simulator:
         rover = self._rover[0]
         here = (float(rover["north_m"]), float(rover["east_m"]))
         origin = geodesy.moved(self._geo_start, here[0] - self._start.north_m, here[1] - self._start.east_m)
-        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters)
+        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters, self._storage)
         self._vehicle.control["tick"] = 0
         self._vehicle.estimate["heading_rad"] = rover["heading_rad"]
         self._autopilot = Autopilot(self._vehicle)
@@ -215,6 +220,7 @@ class Simulator:
             float(rover["heading_rad"]),
             float(rover["speed_m_s"]),
             float(rover["yaw_rate_rad_s"]),
+            float(rover["slide_m_s"]),
         )
 
     @property
@@ -238,7 +244,8 @@ class Simulator:
         rover = self._rover[0]
         reach_m = 5.0 + float(rover["radius_m"])
         here = (float(rover["north_m"]), float(rover["east_m"]))
-        room_m = min(self.world.clearance_m(*here, reach_m), self.world.mover_gap_m(*here, self.time_s)[0])
+        stands_m = self.world.clearance_m(*here, reach_m, self.time_s)
+        room_m = min(stands_m, self.world.mover_gap_m(*here, self.time_s)[0])
         return max(room_m - float(rover["radius_m"]), 0.0)
 
     def connect(self) -> SimLink:
@@ -264,6 +271,8 @@ class Simulator:
             if self._has_faults:
                 self._meet_faults()
             self._receive()
+            if self.world.doors:
+                self._move_doors()
             self._run(min(goal - self._tick, self._loops_until_due()))
             self._send()
 
@@ -301,10 +310,22 @@ class Simulator:
             link.dropped = True
         self._links.clear()
 
+    def _move_doors(self) -> None:
+        """A door moves with the first main loop that begins at its time or after it."""
+        if self.time_s >= self._doors_move_s:
+            self._solid, self._doors_move_s = (
+                self.world.layers(self.time_s).solid,
+                self.world.next_change_s(self.time_s),
+            )
+
     def _loops_until_due(self) -> int:
         due_us = self._autopilot.next_due_us()
+        if self.world.doors:
+            due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._doors_move_s - self.time_s))
         if self._lidar is not None:
             due_us = min(due_us, self._lidar.next_due_us())
+        if self._sensing.samples:
+            due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._sensing.next_due_s() - self.time_s))
         if self._traffic.talks:
             # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
@@ -330,7 +351,7 @@ class Simulator:
         done = run_loops(
             self._rover, vehicle.estimate, vehicle.control, vehicle.tuning, vehicle.origin_m, self._noise,
             self._draws[self._row : self._row + loops],
-            world.obstacles, world.south_m, world.west_m, world.resolution_m, *world.fleet, self.time_s,
+            self._solid, world.south_m, world.west_m, world.resolution_m, world.ground, *world.fleet, self.time_s,
         )  # fmt: skip
         self._row += done
         self._tick += done
@@ -353,13 +374,15 @@ class Simulator:
                 link.pass_out(self._player, self.time_s)
 
     def _speak(self) -> None:
-        """Everything that is due now is put into the channels."""
+        """Everything that is due now is measured and put into the channels."""
+        rover = self._rover[0]
+        if self._sensing.samples:
+            self._sensing.sample(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
         self._autopilot.run_due()
         if self._traffic.talks:
             self._traffic.send_due(self.time_s, (link.channel for link in self._links))
         if self._lidar is None:
             return
-        rover = self._rover[0]
         data = self._lidar.packets(
             self._vehicle.time_us, float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"])
         )

@@ -1,23 +1,38 @@
-"""The truth: where the obstacles are, how far a ray flies, how much room a round rover has.
+"""The truth: where the obstacles are, how far a ray flies, how much room a round rover has, what the ground is like.
 
 The world frame is metres north and east; obstacles are the fields of a boolean array indexed ``[y, x]`` (y grows
-north, x grows east) whose outer south-west corner may lie anywhere. Ground outside the array is open.
+north, x grows east) whose outer south-west corner may lie anywhere. Ground outside the array is open and firm.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from companion.grid import OBSTACLE, Grid
+from sitl.doors import Door, next_change_s
 from sitl.movers import Fleet, Mover, fleet_of, nearest_mover, place, shorten_rays
 
 Obstacles = NDArray[np.bool_]
 Floats = NDArray[np.float64]
+Ground = NDArray[np.float32]
+"""Shape (2, height, width): grip and the share of its speed that the rover keeps on a field, both 0 to 1; size 0: 1 everywhere."""
+
+FIRM: Ground = np.ones((2, 0, 0), dtype=np.float32)
+"""Ordinary ground everywhere."""
+
+
+class Layers(NamedTuple):
+    """What stands at a moment, field by field: what the rover touches, what sends rays back, what swallows them (None: nothing)."""
+
+    solid: Obstacles
+    echoing: Obstacles
+    dark: Obstacles | None
 
 
 @njit(cache=True, nogil=True)
@@ -80,6 +95,20 @@ def ray_lengths(
 
 
 @njit(cache=True, nogil=True)
+def ground_under(
+    ground: Ground, south_m: float, west_m: float, resolution_m: float, north_m: float, east_m: float
+) -> tuple[float, float]:
+    """Grip and the share of its speed that the rover keeps, where its middle is."""
+    if ground.size == 0:
+        return 1.0, 1.0
+    column = math.floor((east_m - west_m) / resolution_m)
+    row = math.floor((north_m - south_m) / resolution_m)
+    if row < 0 or column < 0 or row >= ground.shape[1] or column >= ground.shape[2]:
+        return 1.0, 1.0
+    return float(ground[0, row, column]), float(ground[1, row, column])
+
+
+@njit(cache=True, nogil=True)
 def clearance_m(
     obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
     north_m: float, east_m: float, reach_m: float,
@@ -101,17 +130,28 @@ def clearance_m(
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Obstacles and where they lie: ``obstacles[y, x]``, the south-west corner of field (0, 0) in metres; and what moves."""
+    """Obstacles and where they lie: ``obstacles[y, x]``, the south-west corner of field (0, 0) in metres; and what changes.
+
+    ``glass`` and ``black`` are those obstacle fields that rays go through, and those that swallow them. ``doors`` are obstacles
+    besides ``obstacles``, of their own fields; theirs may be glass or black too. All arrays have one shape.
+    """
 
     obstacles: Obstacles
     resolution_m: float = 1.0
     south_m: float = 0.0
     west_m: float = 0.0
     movers: tuple[Mover, ...] = ()
+    doors: tuple[Door, ...] = ()
+    ground: Ground = field(default_factory=FIRM.copy)
+    glass: Obstacles | None = None
+    black: Obstacles | None = None
     fleet: Fleet = field(init=False)
+    _layers: dict[tuple[bool, ...], Layers] = field(init=False, default_factory=dict)
+    _without_doors: Layers = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "fleet", fleet_of(self.movers))
+        object.__setattr__(self, "_without_doors", self._made((True,) * len(self.doors)))
 
     @classmethod
     def open(cls, width_m: float = 1.0, height_m: float = 1.0) -> World:
@@ -134,25 +174,65 @@ class World:
         """Metres from the south edge of the array to the north edge."""
         return int(self.obstacles.shape[0]) * self.resolution_m
 
-    def ray_m(self, north_m: float, east_m: float, bearing_rad: float, max_m: float) -> float:
-        """Metres to the first obstacle along a bearing, or ``max_m``."""
-        return float(
-            ray_length(
-                self.obstacles, self.south_m, self.west_m, self.resolution_m, north_m, east_m, bearing_rad, max_m
-            )
-        )
+    def layers(self, time_s: float = 0.0) -> Layers:
+        """What stands at a moment; the arrays are kept, one set for each state of the doors."""
+        if not self.doors:
+            return self._without_doors
+        state = tuple(door.is_open(time_s) for door in self.doors)
+        if state not in self._layers:
+            self._layers[state] = self._made(state)
+        return self._layers[state]
+
+    def _made(self, opened: tuple[bool, ...]) -> Layers:
+        solid = self.obstacles
+        for door, is_open in zip(self.doors, opened, strict=True):
+            solid = solid if is_open else solid | door.fields
+        echoing = solid if self.glass is None else solid & ~self.glass
+        dark = None if self.black is None else echoing & self.black
+        return Layers(solid, echoing if dark is None else echoing & ~dark, dark)
+
+    def next_change_s(self, time_s: float) -> float:
+        """When a door next opens or closes, after a moment; infinity if none ever does."""
+        return next_change_s(self.doors, time_s)
+
+    def ray_m(self, north_m: float, east_m: float, bearing_rad: float, max_m: float, time_s: float = 0.0) -> float:
+        """Metres along a bearing to the first thing that stands and sends a ray back, or ``max_m``."""
+        frame = (self.south_m, self.west_m, self.resolution_m)
+        echoing = self.layers(time_s).echoing
+        return float(ray_length(echoing, *frame, north_m, east_m, bearing_rad, max_m))
 
     def rays_m(self, north_m: float, east_m: float, bearings_rad: Floats, max_m: float, time_s: float = 0.0) -> Floats:
         """The shortest ray of each row of bearings (sectors x rays) at a moment, ``max_m`` where nothing was hit."""
+        layers = self.layers(time_s)
+        if layers.dark is not None:
+            return self._rays_in_the_dark_m(layers, north_m, east_m, bearings_rad, max_m, time_s)
         lengths_m = np.empty(bearings_rad.shape[0])
-        ray_lengths(
-            self.obstacles, self.south_m, self.west_m, self.resolution_m, north_m, east_m, bearings_rad, max_m,
-            lengths_m,
-        )  # fmt: skip
+        frame = (self.south_m, self.west_m, self.resolution_m)
+        ray_lengths(layers.echoing, *frame, north_m, east_m, bearings_rad, max_m, lengths_m)
+        self._meet_movers(north_m, east_m, bearings_rad, time_s, lengths_m)
+        return lengths_m
+
+    def _rays_in_the_dark_m(
+        self, layers: Layers, north_m: float, east_m: float, bearings_rad: Floats, max_m: float, time_s: float
+    ) -> Floats:
+        """Ray by ray, because one that is swallowed must not see what moves behind that place."""
+        assert layers.dark is not None
+        each_rad = np.ascontiguousarray(bearings_rad.reshape(-1, 1))
+        lengths_m, swallowed_m = np.empty(len(each_rad)), np.empty(len(each_rad))
+        frame = (self.south_m, self.west_m, self.resolution_m)
+        ray_lengths(layers.echoing, *frame, north_m, east_m, each_rad, max_m, lengths_m)
+        ray_lengths(layers.dark, *frame, north_m, east_m, each_rad, max_m, swallowed_m)
+        self._meet_movers(north_m, east_m, each_rad, time_s, lengths_m)
+        lengths_m[swallowed_m < lengths_m] = max_m
+        nearest_m: Floats = lengths_m.reshape(bearings_rad.shape).min(axis=1)
+        return nearest_m
+
+    def _meet_movers(
+        self, north_m: float, east_m: float, bearings_rad: Floats, time_s: float, lengths_m: Floats
+    ) -> None:
         if self.movers:
             rows, begins, radii_m, periods_s = self.fleet
             shorten_rays(rows, begins, radii_m, periods_s, time_s, north_m, east_m, bearings_rad, lengths_m)
-        return lengths_m
 
     def mover_gap_m(self, north_m: float, east_m: float, time_s: float) -> tuple[float, int]:
         """Metres from a place to the nearest mover's rim at a moment, negative inside it, and its number; inf and -1 if none."""
@@ -164,8 +244,7 @@ class World:
         """Where a mover is at a moment, north and east, and its velocity."""
         return place(self.fleet.rows, self.fleet.begins, self.fleet.periods_s, number, time_s)
 
-    def clearance_m(self, north_m: float, east_m: float, reach_m: float) -> float:
-        """Metres from a place to the nearest obstacle that stands, at most ``reach_m``."""
-        return float(
-            clearance_m(self.obstacles, self.south_m, self.west_m, self.resolution_m, north_m, east_m, reach_m)
-        )
+    def clearance_m(self, north_m: float, east_m: float, reach_m: float, time_s: float = 0.0) -> float:
+        """Metres from a place to the nearest obstacle that stands at a moment, at most ``reach_m``."""
+        solid = self.layers(time_s).solid
+        return float(clearance_m(solid, self.south_m, self.west_m, self.resolution_m, north_m, east_m, reach_m))

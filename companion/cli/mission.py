@@ -97,7 +97,9 @@ def _maps(mission: Mission) -> list[str]:
     resolution_m = mission.grid.resolution_m
     if mission.prior_map is not None:
         lines.append(f"known map: {mission.prior_map}: {_map_text(load_map(mission.prior_map, resolution_m))}")
-    if sitl is not None and sitl.world is not None:
+    if sitl is not None and sitl.world is not None and sitl.world.suffix.lower() == ".toml":
+        lines.append(f"simulator's world: {sitl.world}: a world file, which only rover-sitl reads")
+    elif sitl is not None and sitl.world is not None:
         world = load_map(sitl.world, sitl.resolution_m or resolution_m)
         lines.append(f"simulator's world: {sitl.world}: {_map_text(world)}")
     return lines

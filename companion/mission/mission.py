@@ -8,6 +8,7 @@ from pathlib import Path
 
 from companion.frames import GeoPoint
 from companion.grid import Cell
+from companion.mission.sensor_tables import Sensors
 
 
 class MissionError(Exception):
@@ -125,7 +126,7 @@ class SitlSpec:
     resolution_m: float | None = None
     start: Cell | None = None
     heading_deg: float = 90.0
-    sensors: str = "lidar-90"
+    sensors: Sensors = "lidar-90"
     home: GeoPoint | None = None
     movers: tuple[MoverSpec, ...] = ()
     steering: str | None = None

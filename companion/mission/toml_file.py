@@ -6,14 +6,12 @@ and longitude in degrees. Lists of places say which by their name: ``polygon_fie
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BeforeValidator, Field
 
 from companion.frames import GeoPoint
 from companion.grid import Cell
@@ -34,28 +32,22 @@ from companion.mission.mission import (
     open_ring,
 )
 from companion.mission.qgc import load_qgc
-from companion.settings import describe_first
-
-MAX_BYTES = 5_000_000
-
-T = TypeVar("T")
-
-Metres = Annotated[float, Field(ge=-1e6, le=1e6)]
-Index = Annotated[int, Field(ge=-1_000_000, le=1_000_000)]
-Pair = Annotated[tuple[Metres, Metres], Field(strict=False)]
-Field2 = Annotated[tuple[Index, Index], Field(strict=False)]
-Lat = Annotated[float, Field(ge=-90.0, le=90.0)]
-Lon = Annotated[float, Field(ge=-180.0, le=180.0)]
-LatLon = Annotated[tuple[Lat, Lon], Field(strict=False)]
-Positive = Annotated[float, Field(gt=0.0, le=1e6)]
-Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\x00-\x1f\x7f\u2028\u2029\x85]+$")]
-FileName = Annotated[str, Field(min_length=1, max_length=1000, pattern=r"^[^\x00-\x1f\x7f]+$")]
-
-
-class Table(BaseModel):
-    """A TOML table: unknown keys, wrong types, inf and nan are refused."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+from companion.mission.sensor_tables import SensorsTable, sensors_from, sensors_given
+from companion.mission.tables import (
+    Field2,
+    FileName,
+    Lat,
+    LatLon,
+    Lon,
+    Metres,
+    Name,
+    Pair,
+    Positive,
+    T,
+    Table,
+    named,
+    read_table,
+)
 
 
 class PlaceTable(Table):
@@ -196,9 +188,9 @@ class SitlTable(Table):
     resolution_m: Positive | None = None
     start: Field2 | None = None
     heading_deg: float = SitlSpec().heading_deg
-    sensors: Literal["lidar-90", "lidar-360", "beams", "none"] = "lidar-90"
+    sensors: Annotated[SensorsTable | FileName, BeforeValidator(sensors_given)] = "lidar-90"
     home: GeoTable | None = None
-    movers: Annotated[list[MoverTable], Field(max_length=100)] = []
+    movers: Annotated[list[MoverTable], Field(max_length=100, default_factory=list)]
     steering: Literal["skid", "ackermann"] | None = None
 
 
@@ -210,32 +202,16 @@ class MissionTable(Table):
     fence: FileName | None = None
     grid: GridTable = GridTable()
     rover: RoverTable = RoverTable()
-    target: list[TargetTable] = []
-    keep_out: list[AreaTable] = []
-    keep_in: list[AreaTable] = []
-    corridor: list[CorridorTable] = []
+    target: list[TargetTable] = Field(default_factory=list)
+    keep_out: list[AreaTable] = Field(default_factory=list)
+    keep_in: list[AreaTable] = Field(default_factory=list)
+    corridor: list[CorridorTable] = Field(default_factory=list)
     sitl: SitlTable | None = None
 
 
 def load(path: Path) -> Mission:
     """Read one of our mission files. Raises MissionError: one line with file, place and reason."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise MissionError(f"{path}: larger than {MAX_BYTES} bytes")
-        table = MissionTable.model_validate(tomllib.loads(data.decode("utf-8")))
-    except OSError as error:
-        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise MissionError(f"{path}: not UTF-8 text (byte {error.start})") from error
-    except tomllib.TOMLDecodeError as error:
-        raise MissionError(f"{path}: not valid TOML: {error}") from error
-    except RecursionError as error:
-        raise MissionError(f"{path}: not valid TOML: nested too deeply") from error
-    except ValidationError as error:
-        raise MissionError(f"{path}: {_counted(describe_first(error, MissionTable))}") from error
-    mission = _mission(table, path)
+    mission = _mission(read_table(path, MissionTable, MissionError), path)
     check_mission(mission)
     return mission
 
@@ -274,7 +250,7 @@ def _sitl(table: SitlTable, path: Path) -> SitlSpec:
         resolution_m=table.resolution_m,
         start=None if table.start is None else Cell(*table.start),
         heading_deg=table.heading_deg,
-        sensors=table.sensors,
+        sensors=sensors_from(table.sensors, path.parent, MissionError),
         home=None if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
         movers=tuple(_named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)),
         steering=table.steering,
@@ -296,13 +272,4 @@ def _places(
 
 
 def _named(path: Path, kind: str, number: int, make: Callable[[], T]) -> T:
-    try:
-        return make()
-    except ValueError as error:
-        raise MissionError(f"{path}: {kind} {number}: {error}") from None
-
-
-def _counted(fault: str) -> str:
-    """People count tables from 1: ``target.0.hold_s: ...`` becomes ``target 1.hold_s: ...``."""
-    place, colon, reason = " ".join(fault.split()).partition(": ")
-    return re.sub(r"\.(\d+)", lambda found: f" {int(found[1]) + 1}", place) + colon + reason
+    return named(path, kind, number, make, MissionError)

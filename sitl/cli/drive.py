@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -15,9 +14,9 @@ from rich.table import Table
 from companion.app import Status
 from companion.cli.inputs import OutputError, picture, usable_settings, writable
 from companion.itinerary import TargetStatus
-from companion.mapfiles import MapError, load_map
+from companion.mapfiles import MapError
 from companion.mission.load import load_mission
-from companion.mission.mission import Mission, MissionError, SitlSpec
+from companion.mission.mission import Mission, MissionError
 from companion.provenance import made_with
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
@@ -25,8 +24,8 @@ from sitl.fault_file import FaultFileError, load_faults
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
 from sitl.picture import save_picture
-from sitl.scenario import ScenarioError, scenario_from_mission, with_faults
-from sitl.sensors import suite_named
+from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_sensors
+from sitl.worldfile import ground_grid
 
 EXIT_BAD_INPUT, EXIT_STOPPED = 2, 130
 LINE_EVERY_S = 60.0
@@ -44,8 +43,12 @@ def drive(
         Path | None, typer.Option("--map", metavar="STEM", help="Write what was mapped as STEM.yaml and STEM.pgm.")
     ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")] = None,
-    sensors: Annotated[str | None, typer.Option(help="lidar-90, lidar-360 or beams; default: the mission's.")] = None,
-    world: Annotated[Path | None, typer.Option(help="Map of the ground (image, ROS yaml, MovingAI .map).")] = None,
+    sensors: Annotated[
+        str | None, typer.Option(help="lidar-90, lidar-360, beams or a TOML file; default: the mission's.")
+    ] = None,
+    world: Annotated[
+        Path | None, typer.Option(help="The ground: image, ROS yaml, MovingAI .map or TOML world.")
+    ] = None,
     start: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to start from.")] = None,
     target: Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to reach.")] = None,
     top_left: Annotated[bool, typer.Option("--top-left", help="With --world: Y counts down from the top row.")] = False,
@@ -68,7 +71,7 @@ def drive(
         settings = usable_settings(settings_file)
         mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
         if sensors is not None:
-            mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=_known(sensors)))
+            mission = with_sensors(mission, sensors)
         _refuse_blind(mission)
         scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
         if record is not None:
@@ -129,16 +132,8 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
     return f"stopped by Ctrl-C: {what}; {kept}"
 
 
-def _known(sensors: str) -> str:
-    try:
-        suite_named(sensors)
-    except ValueError as error:
-        raise ScenarioError(f"--sensors: {error}") from error
-    return sensors
-
-
 def _refuse_blind(mission: Mission) -> None:
-    if mission.sitl is not None and mission.sitl.sensors == "none":
+    if mission.sitl is not None and str(mission.sitl.sensors) == "none":
         raise MissionError(
             "sensors none: the companion does not drive without range data; none is for rover-sitl serve"
         )
@@ -161,7 +156,7 @@ def _mission(
         if start or target or top_left or prior or resolution_m is not None:
             raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
         return load_mission(mission_file)
-    ground = load_map(world, resolution_m)
+    ground = ground_grid(world, resolution_m)
     begin = field_at(ground, start, "--start", top_left=top_left) if start else None
     if mission_file is not None:
         if target is not None:

@@ -16,7 +16,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.news import News
-from sitl.scenario import ScenarioError, scenario_from_mission, with_faults
+from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_sensors
 from sitl.server import Endpoint, ListenError, open_endpoint
 from sitl.server import serve as run_server
 
@@ -36,6 +36,7 @@ def serve(
     speedup: Annotated[float, typer.Option(min=0.01, max=200.0, help="Times real time.")] = 1.0,
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
+    sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
     faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
 ) -> None:
     """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C.
@@ -46,8 +47,10 @@ def serve(
     news = News() if quiet else News(_say, clock.now_s)
     endpoints: list[Endpoint] = []
     try:
-        scenario = scenario_from_mission(load_mission(mission_file))
-        simulator = with_faults(scenario, load_faults(faults) if faults else None).simulator(seed)
+        mission = load_mission(mission_file)
+        mission = mission if sensors is None else with_sensors(mission, sensors)
+        scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
+        simulator = scenario.simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
         simulator.advance_to_s(0.02)
         for url in listen or DEFAULT_LISTEN:

@@ -16,8 +16,11 @@ from typer.testing import CliRunner
 
 import companion.cli.commands
 import sitl.cli.commands
+from companion.mission.sensor_tables import BeamTable, LidarTable, ProximityTable, SensorsTable, SunTable
 from companion.settings import parse_settings
 from sitl.fault_file import load_faults
+from sitl.suites import suite_of
+from sitl.worldfile import DoorTable, ObstacleTable, RoughTable, SlipperyTable, WorldTable, load_world
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = [
@@ -52,6 +55,13 @@ def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path) -> 
         (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
         assert load_faults(tmp_path / "plan.toml").faults
         return
+    if text.startswith("# world"):
+        (tmp_path / "world.toml").write_text(text, encoding="utf-8")
+        assert load_world(tmp_path / "world.toml").obstacles.any()
+        return
+    if text.startswith("# sensors"):
+        assert suite_of(SensorsTable.model_validate(tomllib.loads(text))).lidar
+        return
     shutil.copytree(ROOT / "missions" / "maps", tmp_path / "maps")
     shutil.copy(ROOT / "missions" / "field.plan", tmp_path)
     mission = tmp_path / "example.toml"
@@ -76,6 +86,14 @@ def test_every_key_of_a_mission_is_explained() -> None:
     for key in {key for table in tables for key in table.model_fields}:
         stem = "line_..." if key.startswith("line_") else key
         assert key in text or stem in text, f"docs/missions.md does not mention {key}"
+
+
+def test_every_key_of_a_world_and_of_sensors_is_explained() -> None:
+    text = (ROOT / "docs" / "worlds.md").read_text(encoding="utf-8")
+    tables = [WorldTable, ObstacleTable, DoorTable, SlipperyTable, RoughTable]
+    tables += [SensorsTable, LidarTable, BeamTable, ProximityTable, SunTable]
+    for key in {key for table in tables for key in table.model_fields}:
+        assert re.search(rf"\b{key}\b", text), f"docs/worlds.md does not mention {key}"
 
 
 def usages() -> list[tuple[str, list[str]]]:

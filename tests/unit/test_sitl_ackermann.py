@@ -28,7 +28,17 @@ def car(radius_m: float = RADIUS_M, **changes: float) -> Simulator:
 
 def pushed(rover, servo_1: float, servo_3: float, seconds: float, step_s: float = 0.005):
     for _ in range(round(seconds / step_s)):
-        drive(rover[0], OPEN.obstacles, OPEN.south_m, OPEN.west_m, OPEN.resolution_m, servo_1, servo_3, step_s)
+        drive(
+            rover[0],
+            OPEN.obstacles,
+            OPEN.south_m,
+            OPEN.west_m,
+            OPEN.resolution_m,
+            OPEN.ground,
+            servo_1,
+            servo_3,
+            step_s,
+        )
     return rover[0]
 
 
@@ -84,11 +94,11 @@ def test_what_it_runs_into_does_not_turn_it() -> None:
     world = World.from_grid(Grid(weights, 1.0))
     rover = new_rover(9.0, 10.0, 0.0, 0.3, RADIUS_M)
     for _ in range(400):
-        drive(rover[0], world.obstacles, world.south_m, world.west_m, world.resolution_m, 1.0, 0.5, 0.005)
+        drive(rover[0], world.obstacles, world.south_m, world.west_m, world.resolution_m, world.ground, 1.0, 0.5, 0.005)
     heading = float(rover[0]["heading_rad"])
     assert rover[0]["contacts"] == 1
     for _ in range(400):
-        drive(rover[0], world.obstacles, world.south_m, world.west_m, world.resolution_m, 1.0, 0.5, 0.005)
+        drive(rover[0], world.obstacles, world.south_m, world.west_m, world.resolution_m, world.ground, 1.0, 0.5, 0.005)
     assert rover[0]["heading_rad"] == heading
 
 

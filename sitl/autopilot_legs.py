@@ -1,0 +1,311 @@
+"""Compiled driving along legs, as AUTO, RTL and SMART_RTL do (behaviour of AR_WPNav with S-curves).
+
+An inner target runs along the straight leg with limited speed, acceleration and jerk, and no faster than the rover can follow;
+before a corner that is no pivot turn the next leg begins while this one ends, so that the corner is rounded without stopping.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from numba import njit
+
+from sitl.autopilot_guided import (
+    ACTIVE_TICKS,
+    PIVOT_ACCURACY_RAD,
+    SPEED_CHANGE_TICKS,
+    bearing_to_target,
+    check_pivot,
+    follow_shaped,
+    steer_waypoint,
+)
+from sitl.autopilot_speed import GRAVITY_M_S2, has_steered_wheels, run_stop
+from sitl.control import LEG, LOOP_S, NEVER
+
+BEFORE, THIS, NEXT = 0, 1, 2
+"""Rows of ``control.legs``: the leg that still ends, the one under way, the one after it."""
+AHEAD_N, AHEAD_E, LENGTH, START_SPEED, SPEED, TIME, DONE = 0, 1, 2, 3, 4, 5, 6
+"""Columns: direction, metres, m/s at the beginning and on the way, seconds since, metres before the time began."""
+PACE_BUFFER = 0.05
+
+
+@njit(cache=True, nogil=True)
+def ramp_s(change: float, accel: float, jerk: float) -> float:
+    """How long a change of speed takes with limited acceleration and jerk."""
+    if change <= accel * accel / jerk:
+        return 2.0 * math.sqrt(change / jerk)
+    return change / accel + accel / jerk
+
+
+@njit(cache=True, nogil=True)
+def ramp(time_s: float, change: float, accel: float, jerk: float) -> tuple[float, float, float]:
+    """Metres, m/s and m/s^2 gained after a time in a change of speed from rest."""
+    total_s = ramp_s(change, accel, jerk)
+    rise_s = min(accel / jerk, 0.5 * total_s)
+    if time_s < rise_s:
+        return jerk * time_s**3 / 6.0, 0.5 * jerk * time_s**2, jerk * time_s
+    left_s = total_s - time_s
+    if left_s < rise_s:
+        left_s = max(left_s, 0.0)
+        return (
+            0.5 * change * total_s - change * left_s + jerk * left_s**3 / 6.0,
+            change - 0.5 * jerk * left_s**2,
+            jerk * left_s,
+        )
+    even_s = time_s - rise_s
+    top = jerk * rise_s
+    speed = 0.5 * top * rise_s
+    return top * rise_s**2 / 6.0 + speed * even_s + 0.5 * top * even_s**2, speed + top * even_s, top
+
+
+@njit(cache=True, nogil=True)
+def ramp_m(start: float, end: float, accel: float, jerk: float) -> float:
+    """Metres driven while the speed changes."""
+    return 0.5 * (start + end) * ramp_s(abs(end - start), accel, jerk)
+
+
+@njit(cache=True, nogil=True)
+def top_speed(length_m: float, start: float, wish: float, accel: float, jerk: float) -> float:
+    """The highest speed up to a wish from which there is room to stop at the end of a leg; negative if there is none."""
+    if ramp_m(start, wish, accel, jerk) + ramp_m(wish, 0.0, accel, jerk) <= length_m:
+        return wish
+    low, high = min(start, wish), min(wish, start + math.sqrt(accel * length_m))
+    if ramp_m(start, low, accel, jerk) + ramp_m(low, 0.0, accel, jerk) > length_m:
+        return -1.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        if ramp_m(start, middle, accel, jerk) + ramp_m(middle, 0.0, accel, jerk) <= length_m:
+            low = middle
+        else:
+            high = middle
+    return low
+
+
+@njit(cache=True, nogil=True)
+def leg_times(leg: Any, accel: float, jerk: float) -> tuple[float, float]:
+    """Seconds until a leg begins to brake, and until it ends."""
+    speed, start = leg[SPEED], leg[START_SPEED]
+    if speed <= 0.0:
+        return 0.0, 0.0
+    even_m = leg[LENGTH] - leg[DONE] - ramp_m(start, speed, accel, jerk) - ramp_m(speed, 0.0, accel, jerk)
+    braking_s = ramp_s(abs(speed - start), accel, jerk) + max(even_m, 0.0) / speed
+    return braking_s, braking_s + ramp_s(speed, accel, jerk)
+
+
+@njit(cache=True, nogil=True)
+def along(leg: Any, time_s: float, accel: float, jerk: float) -> tuple[float, float, float]:
+    """Metres along a leg, speed and acceleration at a time of it."""
+    speed, start = leg[SPEED], leg[START_SPEED]
+    braking_s, end_s = leg_times(leg, accel, jerk)
+    if time_s >= end_s:
+        return leg[LENGTH], 0.0, 0.0
+    if time_s >= braking_s:
+        left_m, left_m_s, left_m_s2 = ramp(end_s - time_s, speed, accel, jerk)
+        return leg[LENGTH] - left_m, left_m_s, -left_m_s2
+    ramp_end_s = ramp_s(abs(speed - start), accel, jerk)
+    if time_s >= ramp_end_s:
+        return leg[DONE] + ramp_m(start, speed, accel, jerk) + speed * (time_s - ramp_end_s), speed, 0.0
+    gained_m, gained_m_s, gained_m_s2 = ramp(time_s, abs(speed - start), accel, jerk)
+    sign = 1.0 if speed >= start else -1.0
+    return leg[DONE] + start * time_s + sign * gained_m, start + sign * gained_m_s, sign * gained_m_s2
+
+
+@njit(cache=True, nogil=True)
+def lay_leg(control: Any, row: int, from_n: float, from_e: float, to_n: float, to_e: float) -> None:
+    """Plan a leg from rest to rest."""
+    leg = control.legs[row]
+    leg[LENGTH] = math.hypot(to_n - from_n, to_e - from_e)
+    leg[START_SPEED] = leg[TIME] = leg[DONE] = 0.0
+    leg[SPEED] = leg[AHEAD_N] = leg[AHEAD_E] = 0.0
+    if leg[LENGTH] > 0.0:
+        leg[AHEAD_N], leg[AHEAD_E] = (to_n - from_n) / leg[LENGTH], (to_e - from_e) / leg[LENGTH]
+        leg[SPEED] = top_speed(leg[LENGTH], 0.0, control.speed_max, control.accel_max, control.jerk_max)
+
+
+@njit(cache=True, nogil=True)
+def change_leg_speed(control: Any, row: int) -> None:
+    """Plan what is left of a leg with the new top speed; one that already brakes stays as it is."""
+    leg, accel, jerk = control.legs[row], control.accel_max, control.jerk_max
+    done_m, speed, _ = along(leg, leg[TIME], accel, jerk)
+    wish = top_speed(leg[LENGTH] - done_m, speed, control.speed_max, accel, jerk)
+    if leg[LENGTH] > 0.0 and leg[TIME] < leg_times(leg, accel, jerk)[0] and wish > 0.0:
+        leg[START_SPEED], leg[SPEED], leg[DONE], leg[TIME] = speed, wish, done_m, 0.0
+
+
+@njit(cache=True, nogil=True)
+def clear_leg(control: Any, row: int) -> None:
+    """No leg."""
+    for column in range(7):
+        control.legs[row, column] = 0.0
+
+
+@njit(cache=True, nogil=True)
+def begin_leg(
+    control: Any, tuning: Any, estimate: Any, to_n: float, to_e: float, after_n: float, after_e: float, onwards: bool
+) -> None:
+    """Drive to a place (metres from the EKF origin); ``onwards``: and from there to the next without stopping."""
+    control.halts = 0
+    moving = control.task == LEG and control.tick - control.nav_tick < ACTIVE_TICKS and control.reached
+    from_n, from_e = control.dest_n, control.dest_e
+    if not moving:
+        speed = math.hypot(estimate.vel_n, estimate.vel_e)
+        room = 0.5 * speed / max(control.accel_max, 0.01)
+        from_n, from_e = estimate.north_m + estimate.vel_n * room, estimate.east_m + estimate.vel_e * room
+        control.fast = 0
+        control.pace = 1.0
+        clear_leg(control, THIS)
+        clear_leg(control, NEXT)
+    control.legs[BEFORE, :] = control.legs[THIS, :]
+    control.dest_n, control.dest_e = to_n, to_e
+    control.from_n, control.from_e = from_n, from_e
+    control.reached = control.arrived = 0
+    control.fresh_target = 1
+    control.task = LEG
+    if not control.fast:
+        control.pivoting = 0
+        check_pivot(control, tuning, estimate)
+        if control.corner and moving and off_course(control, estimate) > PIVOT_ACCURACY_RAD:
+            # The rover stopped here in order to turn.
+            control.pivoting = 1
+            control.pivot_done_tick = NEVER
+    if control.fast and control.legs[NEXT, TIME] > 0.0:
+        control.legs[THIS, :] = control.legs[NEXT, :]
+    else:
+        lay_leg(control, THIS, from_n, from_e, to_n, to_e)
+    clear_leg(control, NEXT)
+    control.fast = 0
+    control.corner = 1 if onwards and turns_on_the_spot(control, tuning, from_n, from_e, after_n, after_e) else 0
+    if onwards and not control.corner:
+        lay_leg(control, NEXT, to_n, to_e, after_n, after_e)
+        control.fast = 1
+
+
+@njit(cache=True, nogil=True)
+def off_course(control: Any, estimate: Any) -> float:
+    """How far the heading is from the one to the place, in radians."""
+    error = bearing_to_target(control, estimate) - estimate.heading_rad
+    return float(abs((error + math.pi) % (2.0 * math.pi) - math.pi))
+
+
+@njit(cache=True, nogil=True)
+def turns_on_the_spot(control: Any, tuning: Any, from_n: float, from_e: float, after_n: float, after_e: float) -> bool:
+    """Whether the corner at the end of the leg is so sharp that the rover stops there and pivots."""
+    limit = math.radians(tuning.pivot_angle_deg)
+    if limit <= PIVOT_ACCURACY_RAD or has_steered_wheels(tuning):
+        return False
+    first = math.atan2(control.dest_e - from_e, control.dest_n - from_n)
+    second = math.atan2(after_e - control.dest_e, after_n - control.dest_n)
+    return abs((second - first + math.pi) % (2.0 * math.pi) - math.pi) > limit
+
+
+@njit(cache=True, nogil=True)
+def may_turn(control: Any, tuning: Any) -> bool:
+    """Whether the next leg may begin: the corner is cut by no more than WP_RADIUS and no harder than allowed."""
+    this, after, accel, jerk = control.legs[THIS], control.legs[NEXT], control.accel_max, control.jerk_max
+    braking_s, end_s = leg_times(this, accel, jerk)
+    next_end_s = leg_times(after, accel, jerk)[1]
+    left_s = end_s - this[TIME]
+    turn_in_s = max(ramp_s(after[SPEED], accel, jerk) - accel / jerk, 0.0)
+    if this[TIME] < braking_s - turn_in_s or along(this, this[TIME], accel, jerk)[0] < 0.5 * this[LENGTH]:
+        return False
+    if left_s >= 0.5 * next_end_s:
+        return False
+    here, here_v, here_a = along(this, this[TIME] + 0.5 * left_s, accel, jerk)
+    there, there_v, there_a = along(after, 0.5 * left_s, accel, jerk)
+    back = here - this[LENGTH]
+    cut_n, cut_e = back * this[AHEAD_N] + there * after[AHEAD_N], back * this[AHEAD_E] + there * after[AHEAD_E]
+    vel_n, vel_e = here_v * this[AHEAD_N] + there_v * after[AHEAD_N], here_v * this[AHEAD_E] + there_v * after[AHEAD_E]
+    acc_n, acc_e = here_a * this[AHEAD_N] + there_a * after[AHEAD_N], here_a * this[AHEAD_E] + there_a * after[AHEAD_E]
+    radius = max(tuning.wp_radius, tuning.turn_radius_m if has_steered_wheels(tuning) else 0.0)
+    slower = min(this[SPEED], after[SPEED])
+    side = tuning.turn_max_g * GRAVITY_M_S2
+    gentle = math.hypot(vel_n, vel_e) < slower and math.hypot(acc_n, acc_e) < side
+    return bool(gentle and math.hypot(cut_n, cut_e) < radius)
+
+
+@njit(cache=True, nogil=True)
+def add_leg(control: Any, row: int, step_s: float, from_end: bool) -> None:
+    """Move on a leg and add it to the inner target; ``from_end``: counted from where it ends."""
+    leg = control.legs[row]
+    leg[TIME] += step_s
+    done, speed, accel = along(leg, leg[TIME], control.accel_max, control.jerk_max)
+    if from_end:
+        done -= leg[LENGTH]
+    control.shaped_n += done * leg[AHEAD_N]
+    control.shaped_e += done * leg[AHEAD_E]
+    control.shaped_vn += speed * leg[AHEAD_N]
+    control.shaped_ve += speed * leg[AHEAD_E]
+    control.shaped_an += accel * leg[AHEAD_N]
+    control.shaped_ae += accel * leg[AHEAD_E]
+
+
+@njit(cache=True, nogil=True)
+def keep_pace(control: Any, tuning: Any, estimate: Any) -> float:
+    """Seconds by which the inner target moves on: fewer while the rover falls behind it."""
+    pace, speed = 1.0, math.hypot(control.shaped_vn, control.shaped_ve)
+    if control.tick - control.place_tick >= ACTIVE_TICKS:
+        speed = 0.0
+    if speed > 0.0:
+        ahead_n, ahead_e = control.shaped_vn / speed, control.shaped_ve / speed
+        behind = (control.shaped_n - estimate.north_m) * ahead_n + (control.shaped_e - estimate.east_m) * ahead_e
+        driven = estimate.vel_n * ahead_n + estimate.vel_e * ahead_e
+        pace = min(max(PACE_BUFFER + (driven - tuning.pos_p * behind) / speed, 0.0), 1.0)
+    slack_s = control.accel_max / control.jerk_max
+    control.pace += (pace - control.pace) * LOOP_S / slack_s
+    return float(control.pace) * LOOP_S
+
+
+@njit(cache=True, nogil=True)
+def shape_legs(control: Any, tuning: Any, estimate: Any) -> None:
+    """Move the inner target one loop on along the legs, and see whether this one is done."""
+    step_s = keep_pace(control, tuning, estimate)
+    control.shaped_n, control.shaped_e = control.from_n, control.from_e
+    control.shaped_vn = control.shaped_ve = control.shaped_an = control.shaped_ae = 0.0
+    add_leg(control, BEFORE, step_s, True)
+    add_leg(control, THIS, step_s, False)
+    left_s = leg_times(control.legs[THIS], control.accel_max, control.jerk_max)[1] - control.legs[THIS, TIME]
+    done = left_s <= 0.0
+    if control.fast:
+        if control.legs[NEXT, TIME] > 0.0:
+            add_leg(control, NEXT, step_s, False)
+            done |= control.legs[NEXT, TIME] >= left_s
+        elif may_turn(control, tuning):
+            add_leg(control, NEXT, step_s, False)
+    control.place_valid = 1
+    if done and not control.reached:
+        near = math.hypot(control.dest_n - estimate.north_m, control.dest_e - estimate.east_m) <= tuning.wp_radius
+        control.reached = 1 if control.fast or near or is_past(control, estimate) else 0
+
+
+@njit(cache=True, nogil=True)
+def is_past(control: Any, estimate: Any) -> bool:
+    """Whether the rover is beyond the line across the end of the leg."""
+    leg_n, leg_e = control.dest_n - control.from_n, control.dest_e - control.from_e
+    beyond_n, beyond_e = estimate.north_m - control.dest_n, estimate.east_m - control.dest_e
+    return bool(leg_n * beyond_n + leg_e * beyond_e >= 0.0)
+
+
+@njit(cache=True, nogil=True)
+def run_leg(control: Any, tuning: Any, estimate: Any) -> None:
+    """One loop of driving along the leg; the one in which it ends is told to the autopilot."""
+    if control.armed:
+        control.nav_tick = control.tick
+        changed = control.base_speed != control.speed_max
+        if changed and control.tick - control.speed_change_tick >= SPEED_CHANGE_TICKS:
+            control.speed_change_tick = control.tick
+            control.speed_max = control.base_speed
+            change_leg_speed(control, THIS)
+            if control.legs[NEXT, TIME] == 0.0 and control.fast:
+                change_leg_speed(control, NEXT)
+        if not control.pivoting:
+            shape_legs(control, tuning, estimate)
+        follow_shaped(control, tuning, estimate)
+    if control.reached and control.halts:
+        run_stop(control, tuning, estimate)
+        control.steering = 0.0
+    else:
+        steer_waypoint(control, tuning, estimate)
+    if control.reached and control.fresh_target:
+        control.fresh_target = 0
+        control.arrived = 1
