@@ -8,29 +8,33 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_commands import answer
-from sitl.autopilot_link import AUTOPILOT, Channel, new_channel
+from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import INFO, WARNING, apply_sticks, run_failsafes, set_mode
+from sitl.autopilot_network import close_channel, open_channel, pass_on, set_up_signing
 from sitl.autopilot_params import REAL32
 from sitl.autopilot_progress import plan_due_us, run_plan, set_mission_current
 from sitl.autopilot_proximity import forget_stale, take_in
-from sitl.autopilot_streams import heartbeat, send_due, set_group, start_streams
+from sitl.autopilot_signing import SECURE_PORT
+from sitl.autopilot_streams import heartbeat, send_due, set_group
 from sitl.autopilot_targets import attitude_target, global_target, local_target
 from sitl.autopilot_transfer import TRANSFERS, keep_home
-from sitl.autopilot_vehicle import HOME_S, ORIGIN_S, POSITION_S, Sticks, Vehicle, parameter_message
+from sitl.autopilot_vehicle import ALTITUDE_M, HOME_S, ORIGIN_S, POSITION_S, Sticks, Vehicle, parameter_message
 from sitl.control import LOOP_HZ
 
 PARAMETERS_PER_LOOP = 5
+TIMESYNC_S = 10.0
 UNCHANGED = 65535
 
 TIMETABLE: tuple[tuple[float, tuple[str, ...]], ...] = (
-    (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "ArduPilot Ready")),
-    (4.0, ("EKF3 IMU0 initialised",)),
-    (5.0, ("EKF3 IMU0 tilt alignment complete",)),
-    (6.0, ("EKF3 IMU0 MAG0 initial yaw alignment complete",)),
-    (9.0, ("GPS 1: detected u-blox",)),
+    (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "Barometer 2 calibration complete")),
+    (1.0, ("Beginning INS calibration. Do not move vehicle", "ArduPilot Ready", "AHRS: DCM active")),
+    (4.0, ("EKF3 IMU0 initialised", "EKF3 IMU1 initialised")),
+    (5.0, ("EKF3 IMU0 tilt alignment complete", "EKF3 IMU1 tilt alignment complete")),
+    (6.0, ("EKF3 IMU0 MAG0 initial yaw alignment complete", "EKF3 IMU1 MAG0 initial yaw alignment complete")),
+    (9.0, ("GPS 1: probing for u-blox at 230400 baud", "GPS 1: detected u-blox")),
     (HOME_S, ()),
-    (ORIGIN_S, ("EKF3 IMU0 origin set",)),
-    (POSITION_S, ("EKF3 IMU0 is using GPS", "AHRS: EKF3 active")),
+    (ORIGIN_S, ("EKF3 IMU0 origin set", "EKF3 IMU1 origin set", f"Field Elevation Set: {ALTITUDE_M:.0f}m")),
+    (POSITION_S, ("EKF3 IMU0 is using GPS", "EKF3 IMU1 is using GPS", "AHRS: EKF3 active")),
 )
 """What is said when, seconds since boot (measured)."""
 
@@ -45,45 +49,24 @@ class Autopilot:
         self._next_event = 0
         self._next_second_us = 0
 
-    def open_channel(self) -> Channel:
-        """A new connection; it is streamed to at once."""
-        channel = new_channel(self._opened, self.vehicle.system)
+    def open_channel(self, port: int = SECURE_PORT) -> Channel:
+        """A new connection through a serial port; it is streamed to at once."""
         self._opened += 1
-        start_streams(channel, self.vehicle.time_us)
-        self.vehicle.channels[channel.number] = channel
-        return channel
+        return open_channel(self.vehicle, self._opened - 1, port)
 
     def close_channel(self, channel: Channel) -> None:
         """Forget a connection and who was heard there."""
-        self.vehicle.channels.pop(channel.number, None)
-        self.vehicle.router.forget(channel.number)
+        close_channel(self.vehicle, channel)
         if self.vehicle.plan.helper is not None and self.vehicle.plan.helper[2] == channel.number:
             self.vehicle.plan.helper = None
 
     def receive(self, channel: Channel, data: bytes) -> None:
         """Handle what arrived on a channel."""
         for message in channel.parse(data):
-            self._route(channel, message)
-        self.vehicle.flush_texts()
-
-    def _route(self, channel: Channel, message: Any) -> None:
-        vehicle = self.vehicle
-        source = (message.get_srcSystem(), message.get_srcComponent())
-        channel.spoken = True
-        if source == (vehicle.system, AUTOPILOT):
-            return
-        vehicle.router.learn(*source, channel.number)
-        target_system = getattr(message, "target_system", 0)
-        target_component = getattr(message, "target_component", 0)
-        for number in sorted(
-            vehicle.router.forward_to(vehicle.system, target_system, target_component, channel.number)
-        ):
-            if number in vehicle.channels:
-                vehicle.channels[number].outbox += message.get_msgbuf()
-        if vehicle.router.is_for_autopilot(vehicle.system, target_system, target_component, channel.number):
             handler = HANDLERS.get(message.get_type())
-            if handler is not None:
-                handler(vehicle, channel, message)
+            if pass_on(self.vehicle, channel, message) and handler is not None:
+                handler(self.vehicle, channel, message)
+        self.vehicle.flush_texts()
 
     def next_due_us(self) -> float:
         """When something must be sent or said next."""
@@ -108,9 +91,12 @@ class Autopilot:
             self._next_second_us += 1_000_000
             run_failsafes(vehicle)
             forget_stale(vehicle)
+            vehicle.signing.save([channel.codec for channel in vehicle.channels.values()], vehicle.time_s)
             for channel in vehicle.channels.values():
                 for message in heartbeat(vehicle):
                     channel.send(message)
+                if channel.spoken and vehicle.time_s % TIMESYNC_S < 1.0:
+                    channel.send(mavlink.MAVLink_timesync_message(0, vehicle.time_us * 1000))
         for channel in vehicle.channels.values():
             send_due(vehicle, channel)
             for name in channel.parameter_queue[:PARAMETERS_PER_LOOP]:
@@ -163,9 +149,8 @@ def _list_parameters(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def _set_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     name = _text_of(message.param_id)
-    if name not in vehicle.parameters:
-        return
-    vehicle.parameters.set(name, message.param_value)
+    if not vehicle.parameters.set(name, message.param_value):
+        return  # without a word: no such name, or no number
     vehicle.retune()
     for listener in vehicle.channels.values():
         listener.send(parameter_message(vehicle.parameters, name))
@@ -241,6 +226,7 @@ HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
     "SET_MODE": _old_set_mode,
     "SET_POSITION_TARGET_GLOBAL_INT": _global,
     "SET_POSITION_TARGET_LOCAL_NED": _local,
+    "SETUP_SIGNING": set_up_signing,
     "TIMESYNC": _timesync,
     **TRANSFERS,
 }

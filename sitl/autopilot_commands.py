@@ -12,7 +12,7 @@ from sitl.autopilot_auto import AutoRunner
 from sitl.autopilot_fence import enable_fence
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import FORCE, INFO, arm, disarm, set_mode
-from sitl.autopilot_streams import DEFAULT_INTERVAL_US, MESSAGES, requested_messages, set_interval, streamable
+from sitl.autopilot_streams import DEFAULT_INTERVAL_US, MESSAGES, set_interval, streamable
 from sitl.autopilot_targets import GLOBAL_FRAMES, change_speed, go_to, valid_place
 from sitl.autopilot_vehicle import Mode, Vehicle
 from sitl.control import LOOP_HZ
@@ -109,8 +109,7 @@ def _request_message(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 
 def _request_version(vehicle: Vehicle, channel: Channel, message: Any) -> int:
-    for version in requested_messages(vehicle, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION):
-        channel.send(version)
+    channel.requested.append(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
     return ACCEPTED
 
 

@@ -1,4 +1,4 @@
-"""The scanner: a component of its own (196) whose OBSTACLE_DISTANCE the autopilot's router forwards to every link."""
+"""The scanner: a component of its own (196). The autopilot's router forwards its OBSTACLE_DISTANCE wherever somebody was heard."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections import deque
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot_link import new_codec
+from sitl.autopilot_link import new_codec, packed
 from sitl.autopilot_proximity import take_in
 from sitl.autopilot_vehicle import Vehicle
 from sitl.sensors import Lidar, RangeSensing
@@ -16,6 +16,8 @@ OBSTACLE_AVOIDANCE = 196
 HEARTBEAT_US = 1_000_000
 OWN_CHANNEL = -1
 """The scanner's place in the router: packets for it are not for the autopilot, and it answers none."""
+SIGNING_LINK = 255
+"""With a signing key on the vehicle the scanner signs as well, as a link of its own."""
 
 
 class LidarComponent:
@@ -41,9 +43,10 @@ class LidarComponent:
     def packets(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> bytes:
         """What the scanner sends at this moment; empty when nothing is due."""
         data = b""
+        self._vehicle.signing.follow(self._codec, SIGNING_LINK)
         if time_us >= self._heartbeat_us:
             self._heartbeat_us += HEARTBEAT_US
-            data += mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3).pack(self._codec)
+            data += packed(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3), self._codec)
         if time_us >= self._scan_us:
             self._scan_us = max(self._scan_us + self._interval_us, float(time_us - HEARTBEAT_US))
             cells = self._sensing.scan_cm(north_m, east_m, heading_rad)
@@ -61,4 +64,4 @@ class LidarComponent:
             lidar.increment_deg, lidar.offset_deg, 12,
         )  # fmt: skip
         take_in(self._vehicle, message)
-        return bytes(message.pack(self._codec))
+        return packed(message, self._codec)

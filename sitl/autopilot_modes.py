@@ -51,6 +51,8 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
     if vehicle.plan.fence.breached:
         # Whoever changes the mode now is taken to be driving back by hand.
         vehicle.plan.fence.recovering_since_s = vehicle.time_s
+    for channel in vehicle.channels.values():
+        channel.requested.append(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     return True
 
 
@@ -75,6 +77,7 @@ def _enter(vehicle: Vehicle) -> None:
     begin_driving(vehicle)
     control["task"] = STOP
     apply_sticks(vehicle)
+    vehicle.destination = vehicle.place()
     # HOLD takes the throttle away at once, it does not brake by a controller.
     if vehicle.mode in (Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.SIMPLE, Mode.HOLD):
         control["task"] = COAST
@@ -99,6 +102,7 @@ def arm(vehicle: Vehicle, force: bool = False) -> bool:
     """Arm, or say why not."""
     if vehicle.armed:
         return True
+    vehicle.clocks.logging_s = vehicle.time_s
     reasons = [] if force else arming_faults(vehicle)
     if vehicle.mode in NOT_ARMABLE and not force:
         reasons = ["Mode not armable"]
@@ -133,6 +137,7 @@ def disarm(vehicle: Vehicle) -> None:
     """Disarm; always possible."""
     if vehicle.armed:
         vehicle.armed = False
+        vehicle.clocks.logging_s = vehicle.time_s
         vehicle.control["armed"] = 0
         if vehicle.mode != Mode.AUTO:
             vehicle.plan.mission.reset()

@@ -90,6 +90,7 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "RNGFND3_TYPE": (0, INT8),
     "RTL_SPEED": (0.0, REAL32),
     "SCHED_LOOP_RATE": (50, INT16),
+    **{f"SERIAL{port}_PROTOCOL": (2, INT8) for port in range(8)},
     "SERVO1_FUNCTION": (73, INT16),
     "SERVO3_FUNCTION": (74, INT16),
     "SIM_BATT_CAP_AH": (0.0, REAL32),

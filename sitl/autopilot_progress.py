@@ -34,7 +34,7 @@ def run_plan(vehicle: Vehicle) -> None:
     if plan.fence.enabled or vehicle.parameters["FENCE_ENABLE"] != plan.fence.seen_setting:
         run_fence(vehicle, set_mode, disarm)
     if now_us >= plan.way_back_due_us:
-        plan.way_back_due_us = now_us + SAVE_EVERY_US
+        plan.way_back_due_us = (now_us // SAVE_EVERY_US + 1) * SAVE_EVERY_US
         remember_path(vehicle)
     if vehicle.mode == Mode.AUTO:
         _run_auto(vehicle)
@@ -118,7 +118,8 @@ def plan_due_us(vehicle: Vehicle) -> float:
     """When ``run_plan`` is to be called next."""
     plan = vehicle.plan
     if plan.uploads or plan.fence.enabled or vehicle.mode in BUSY_MODES:
-        return min(plan.way_back_due_us, vehicle.time_us + TICK_US)
+        # On the beat of the streams, so that both are done at once.
+        return min(plan.way_back_due_us, (vehicle.time_us // TICK_US + 1) * TICK_US)
     return plan.way_back_due_us
 
 

@@ -11,8 +11,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl import geodesy
 from sitl.autopilot_fence import fence_status
 from sitl.autopilot_link import Channel
-from sitl.autopilot_modes import arming_faults, base_mode
+from sitl.autopilot_modes import base_mode
 from sitl.autopilot_proximity import echoes
+from sitl.autopilot_status import battery_readings, sys_status
 from sitl.autopilot_vehicle import (
     ALTITUDE_M,
     AUTOPILOT_MODES,
@@ -27,8 +28,6 @@ from sitl.sensors import Reading
 
 DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
-PREARM_BIT, BATTERY_BIT, FENCE_BIT, GPS_BIT = 1 << 28, 1 << 25, 1 << 20, 1 << 5
-SENSORS, ENABLED_SENSORS = 322034735, 304208943
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
 
 Builder = Callable[[Vehicle], list[Any]]
@@ -73,29 +72,6 @@ def _vfr_hud(vehicle: Vehicle) -> list[Any]:
     speed = math.hypot(*vehicle.velocity_m_s())
     throttle = min(abs(round(100.0 * float(vehicle.control[0]["throttle_before"]))), 100)
     return [mavlink.MAVLink_vfr_hud_message(0.0, speed, vehicle.heading_cdeg() // 100, throttle, ALTITUDE_M, 0.0)]
-
-
-def _sys_status(vehicle: Vehicle) -> list[Any]:
-    health = SENSORS & ~PREARM_BIT if arming_faults(vehicle) else SENSORS | PREARM_BIT
-    present, enabled = SENSORS, ENABLED_SENSORS
-    if not vehicle.ekf.gps_has_fix:
-        present &= ~GPS_BIT
-        health &= ~GPS_BIT
-    if vehicle.battery.worst:
-        health &= ~BATTERY_BIT
-    if vehicle.plan.fence.enabled and vehicle.parameters["FENCE_ACTION"] > 0.0:
-        enabled |= FENCE_BIT
-    if vehicle.plan.fence.breached:
-        health &= ~FENCE_BIT
-    volts_mv, amps_ca, percent = battery_readings(vehicle)
-    return [
-        mavlink.MAVLink_sys_status_message(present, enabled, health, 0, volts_mv, amps_ca, percent, 0, 0, 0, 0, 0, 0)
-    ]
-
-
-def battery_readings(vehicle: Vehicle) -> tuple[int, int, int]:
-    """The battery's millivolts, hundredths of an ampere and per cent that are left."""
-    return round(1000.0 * vehicle.volts()), int(100.0 * vehicle.amps()), vehicle.battery_percent()
 
 
 def _ekf_status(vehicle: Vehicle) -> list[Any]:
@@ -168,7 +144,7 @@ def _simstate(vehicle: Vehicle) -> list[Any]:
     north, east = float(rover["north_m"]) - vehicle.origin_m[0], float(rover["east_m"]) - vehicle.origin_m[1]
     lat, lon = geodesy.moved(vehicle.origin, north, east)
     rate = float(rover["yaw_rate_rad_s"])
-    return [mavlink.MAVLink_simstate_message(0, 0, float(rover["heading_rad"]), 0, 0, -9.81, 0, 0, rate, lat, lon)]
+    return [mavlink.MAVLink_simstate_message(0, 0, float(rover["heading_rad"]), 0, 0, -9.80665, 0, 0, rate, lat, lon)]
 
 
 def _distance_sensors(vehicle: Vehicle) -> list[Any]:
@@ -228,6 +204,17 @@ def _raw_imu(vehicle: Vehicle) -> list[Any]:
     return [mavlink.MAVLink_raw_imu_message(vehicle.time_us, 0, 0, -1001, 0, 0, rate, 219, 91, -528, 0, 2756)]
 
 
+def _second_imu(vehicle: Vehicle) -> list[Any]:
+    rate = round(float(vehicle.estimate[0]["yaw_rate_rad_s"]) * 1000)
+    return [mavlink.MAVLink_scaled_imu2_message(_ms(vehicle), 0, 0, -1001, 0, 0, rate, 219, 91, -528, 2800)]
+
+
+def _second_ahrs(vehicle: Vehicle) -> list[Any]:
+    if vehicle.time_s < EKF_SEEN_S:
+        return []
+    return [mavlink.MAVLink_ahrs2_message(0.0, 0.0, vehicle.heading_rad(), ALTITUDE_M, *vehicle.place())]
+
+
 def _rc_channels(vehicle: Vehicle) -> list[Any]:
     return [
         mavlink.MAVLink_rc_channels_message(
@@ -268,7 +255,7 @@ MESSAGES: dict[int, Builder] = {
     30: _attitude,
     33: _global_position,
     74: _vfr_hud,
-    1: _sys_status,
+    1: sys_status,
     125: lambda _: [mavlink.MAVLink_power_status_message(5000, 0, 0)],
     152: lambda _: [mavlink.MAVLink_meminfo_message(0, 65535, 524288)],
     62: _navigation,
@@ -276,7 +263,10 @@ MESSAGES: dict[int, Builder] = {
     36: _servos,
     65: _rc_channels,
     27: _raw_imu,
+    116: _second_imu,
+    129: lambda v: [mavlink.MAVLink_scaled_imu3_message(_ms(v), 0, 0, 0, 0, 0, 0, 219, 91, -528, 0)],
     29: lambda v: [mavlink.MAVLink_scaled_pressure_message(_ms(v), 1000.0, 0.0, 2972)],
+    137: lambda v: [mavlink.MAVLink_scaled_pressure2_message(_ms(v), 1000.0, 0.0, 2972)],
     24: _gps_raw,
     2: lambda v: [mavlink.MAVLink_system_time_message(0, _ms(v))],
     34: lambda v: [mavlink.MAVLink_rc_channels_scaled_message(_ms(v), 0, 0, 0, 0, 0, 0, 0, 0, 0, 255)],
@@ -285,6 +275,7 @@ MESSAGES: dict[int, Builder] = {
     32: _local_position,
     241: lambda v: [mavlink.MAVLink_vibration_message(v.time_us, 0.003, 0.003, 0.003, 0, 0, 0)],
     147: _battery,
+    178: _second_ahrs,
     163: lambda _: [mavlink.MAVLink_ahrs_message(0.0, 0.0, 0.0, 0.0, 0.0, 0.003, 0.004)],
     87: _position_target,
     132: _distance_sensors,
@@ -296,14 +287,14 @@ MESSAGES: dict[int, Builder] = {
 ON_REQUEST: dict[int, Builder] = {0: heartbeat, 49: _gps_origin, 148: _version, 242: _home}
 
 GROUPS: dict[int, tuple[int, ...]] = {
-    1: (27, 29),
+    1: (27, 116, 129, 29, 137),
     2: (1, 125, 152, 42, 24, 62, 87),
     3: (36, 65),
     4: (34,),
     6: (33, 32),
     10: (30, 164),
     11: (74,),
-    12: (163, 2, 193, 147, 132, 173, 241, 162),
+    12: (163, 178, 2, 193, 147, 132, 173, 241, 162),
 }
 """REQUEST_DATA_STREAM's groups; 0 means all."""
 

@@ -13,7 +13,8 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl import geodesy
-from sitl.autopilot_link import AUTOPILOT, Channel, new_codec
+from sitl.autopilot_link import Channel, new_codec, packed
+from sitl.autopilot_routing import AUTOPILOT
 from sitl.autopilot_vehicle import ALTITUDE_M
 from sitl.world import World
 
@@ -63,10 +64,10 @@ class Traffic:
                 continue
             self._due_s[number] += INTERVALS_S[self._world.movers[number].announce]
             for message in self._messages(number, time_s):
-                packed = bytes(message.pack(self._codecs[number])) if number in self._codecs else b""
+                data = packed(message, self._codecs[number]) if number in self._codecs else b""
                 for channel in channels:
-                    if packed:
-                        channel.outbox += packed
+                    if data:
+                        channel.outbox += data
                     else:
                         channel.send(message)
 

@@ -14,9 +14,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl import geodesy
 from sitl.autopilot_battery import Battery, rest_volts
 from sitl.autopilot_ekf import Ekf
-from sitl.autopilot_link import Channel, Router
+from sitl.autopilot_link import Channel
 from sitl.autopilot_params import Parameters
 from sitl.autopilot_plan import Plan, Storage, Submode, new_plan
+from sitl.autopilot_routing import Router
+from sitl.autopilot_signing import Signing
 from sitl.control import CIRCLE, LEG, LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
 from sitl.sensors import RangeSensing
 
@@ -33,6 +35,9 @@ PREARM_S = 24.0
 POSITION_S = 42.0
 ARMABLE_S = 43.0
 """The firmware's start-up, seconds since boot (measured)."""
+
+MOST_TEXTS = 30
+"""Texts that wait to be sent; more push the oldest ones out, as in the firmware's queue."""
 
 EKF_UNINITIALISED, EKF_CONSTANT_POSITION = 1024, 167
 """EKF_STATUS_REPORT flags of the start-up: nothing yet; attitude and velocity but a constant position."""
@@ -72,6 +77,8 @@ class Clocks:
     prearm_text_s: float = 0.0
     armed_s: float | None = None
     variance_text_s: float = 0.0
+    logging_s: float = -math.inf
+    """When arming was last tried or ended; the log is written for a while after that."""
 
 
 @dataclass
@@ -129,9 +136,10 @@ class Vehicle:
         self.home = origin
         self.mode = Mode.MANUAL
         self.armed = False
-        self.system = int(self.parameters["MAV_SYSID"])
+        self.system = min(max(int(self.parameters["MAV_SYSID"]), 1), 255)
         self.channels: dict[int, Channel] = {}
         self.router = Router()
+        self.signing = Signing()
         self.clocks = Clocks()
         self.texts: list[tuple[int, str]] = []
         self.rebooting = False
@@ -193,6 +201,8 @@ class Vehicle:
     @property
     def has_target(self) -> bool:
         """A place is being driven to, or was reached."""
+        if self.mode in (Mode.RTL, Mode.SMART_RTL, Mode.LOITER):
+            return True
         return self.mode in DRIVEN_MODES and int(self.control[0]["task"]) in (WAYPOINT, CIRCLE, LEG)
 
     def position_m(self) -> tuple[float, float]:
@@ -263,6 +273,7 @@ class Vehicle:
     def say(self, severity: int, text: str) -> None:
         """Queue a STATUSTEXT for every channel; it goes out after the answers of this moment."""
         self.texts.append((severity, text))
+        del self.texts[:-MOST_TEXTS]
 
     def flush_texts(self) -> None:
         """Send the queued texts, longer ones in chunks of 50 characters."""

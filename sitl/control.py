@@ -5,6 +5,7 @@ Each is an array of one record, so that compiled code changes it in place.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -112,6 +113,9 @@ TUNING_NAMES = {
 }
 """Fields of a tuning record and the parameters they come from."""
 
+LEAST = {"turn_max_g": 0.1, "pos_p": 0.001}
+"""What the controllers divide by is never less, whatever the parameter says (0.1 g is the firmware's own limit)."""
+
 TUNING = np.dtype([(name, "f8") for name in TUNING_NAMES])
 
 
@@ -136,5 +140,5 @@ def new_tuning(parameters: dict[str, float]) -> Record:
     """A tuning record with the values of these parameters."""
     tuning = np.zeros(1, dtype=TUNING)
     for field, parameter in TUNING_NAMES.items():
-        tuning[field] = parameters[parameter]
+        tuning[field] = max(parameters[parameter], LEAST.get(field, -math.inf))
     return tuning

@@ -18,7 +18,9 @@ CORNER_SHARE = 1.0 / math.sqrt(2.0)
 
 @njit(cache=True, nogil=True)
 def limited(value: float, limit: float) -> float:
-    """The value within plus or minus the limit."""
+    """The value within plus or minus the limit; what is no number becomes the middle, as in the firmware."""
+    if math.isnan(value):
+        return 0.0
     return min(max(value, -limit), limit)
 
 

@@ -17,6 +17,7 @@ from sitl.autopilot import Autopilot
 from sitl.autopilot_lidar import LidarComponent
 from sitl.autopilot_link import Channel
 from sitl.autopilot_plan import Storage
+from sitl.autopilot_signing import SECURE_PORT, StoredKey
 from sitl.autopilot_traffic import Traffic
 from sitl.autopilot_vehicle import Vehicle
 from sitl.control import GROUND_STEERING, LOOP_HZ, THROTTLE
@@ -184,6 +185,7 @@ class Simulator:
         self._row = NOISE_ROWS
         self._tick = 0
         self._links: list[SimLink] = []
+        self._signing_key = StoredKey()
         self._collisions: list[Collision] = []
         self._solid, self._doors_move_s = world.layers(0.0).solid, world.next_change_s(0.0)
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
@@ -199,6 +201,7 @@ class Simulator:
         self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters, self._storage)
         self._vehicle.control["tick"] = 0
         self._vehicle.estimate["heading_rad"] = rover["heading_rad"]
+        self._vehicle.signing.restore(self._signing_key)
         self._autopilot = Autopilot(self._vehicle)
         lidar = self._sensing.suite.lidar
         self._lidar = LidarComponent(lidar, self._sensing, self._vehicle) if lidar else None
@@ -248,10 +251,13 @@ class Simulator:
         room_m = min(stands_m, self.world.mover_gap_m(*here, self.time_s)[0])
         return max(room_m - float(rover["radius_m"]), 0.0)
 
-    def connect(self) -> SimLink:
-        """A new link to the vehicle; several may be open at once. It gets the lowest number, from 1, that no other has."""
+    def connect(self, port: int = SECURE_PORT) -> SimLink:
+        """A new link to the vehicle, through its serial port ``port`` (SERIALn); several may be open at once.
+
+        It gets the lowest number, from 1, that no other has.
+        """
         taken = {one.number for one in self._links}
-        link = SimLink(self._autopilot.open_channel(), next(n for n in range(1, len(taken) + 2) if n not in taken))
+        link = SimLink(self._autopilot.open_channel(port), next(n for n in range(1, len(taken) + 2) if n not in taken))
         if self._player.touches_links:
             link.ways = (Way(link.number, "to_vehicle"), Way(link.number, "from_vehicle"))
         self._links.append(link)
@@ -303,6 +309,7 @@ class Simulator:
     def _reboot(self) -> None:
         self._links_dropped()
         self._parameters = self._vehicle.parameters.as_dict()
+        self._signing_key = self._vehicle.signing.stored
         self._boot()
 
     def _links_dropped(self) -> None:
@@ -388,4 +395,5 @@ class Simulator:
         )
         if data:
             for link in self._links:
-                link.channel.outbox += data
+                if link.channel.spoken:  # the router knows no other way to anybody
+                    link.channel.outbox += data

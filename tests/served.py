@@ -15,8 +15,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.clock import WallClock
 from companion.mission.mission import Mission
+from sitl.endpoints import open_endpoint
 from sitl.scenario import scenario_from_mission
-from sitl.server import open_endpoint, serve
+from sitl.server import serve
 from sitl.simulator import Simulator
 from tests.unit.test_sitl_server import free_port
 
@@ -26,11 +27,12 @@ READY_S = 45.0
 class Served:
     """The simulator runs in a thread in real time; it has been switched on long enough to be armed."""
 
-    def __init__(self, mission: Mission) -> None:
+    def __init__(self, mission: Mission, *more: str) -> None:
+        """``more``: addresses to listen on besides TCP."""
         self.simulator: Simulator = scenario_from_mission(mission).simulator(0)
         self.simulator.advance_to_s(READY_S)
         self.url = f"tcp:127.0.0.1:{free_port()}"
-        self._endpoint = open_endpoint(self.url, self.simulator)
+        self._endpoints = [open_endpoint(url, self.simulator, port) for port, url in enumerate((self.url, *more))]
         self._running = True
         self._pilot = self.simulator.connect()
         self._pilot_mav = mavlink.MAVLink(None, 255, 190)
@@ -39,7 +41,7 @@ class Served:
         self._thread.start()
 
     def _serve(self) -> None:
-        serve(self.simulator, [self._endpoint], WallClock().now_s, 1.0, lambda: self._running)
+        serve(self.simulator, self._endpoints, WallClock().now_s, 1.0, lambda: self._running)
 
     def pilot(self, command: int, *parameters: float) -> None:
         filled = [*parameters, *([0.0] * (7 - len(parameters)))]
@@ -63,7 +65,8 @@ class Served:
     def close(self) -> None:
         self._running = False
         self._thread.join(timeout=5.0)
-        self._endpoint.close()
+        for endpoint in self._endpoints:
+            endpoint.close()
 
 
 def wait_until(done: Callable[[], bool], limit_s: float) -> None:

@@ -20,3 +20,14 @@ def raw_packets(path: Path) -> Iterator[bytes]:
 def messages(data: bytes) -> list[mavlink.MAVLink_message]:
     """All messages in a stream, by pymavlink's own parser; fails on anything else."""
     return mavlink.MAVLink(None).parse_buffer(data) or []
+
+
+def timed(packets: list[bytes]) -> list[tuple[float, mavlink.MAVLink_message]]:
+    """Each message with the newest vehicle time, in seconds, before it."""
+    parser, now_s, result = mavlink.MAVLink(None), 0.0, []
+    for packet in packets:
+        for message in parser.parse_buffer(packet) or []:
+            if message.get_srcComponent() == 1 and hasattr(message, "time_boot_ms"):
+                now_s = message.time_boot_ms / 1000
+            result.append((now_s, message))
+    return result

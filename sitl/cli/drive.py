@@ -156,6 +156,8 @@ def _mission(
         if start or target or top_left or prior or resolution_m is not None:
             raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
         return load_mission(mission_file)
+    if prior and world.suffix.lower() == ".toml":
+        raise MissionError(f"drive: --prior: {world} is drawn in shapes; the companion can be given a map only")
     ground = ground_grid(world, resolution_m)
     begin = field_at(ground, start, "--start", top_left=top_left) if start else None
     if mission_file is not None:

@@ -14,10 +14,10 @@ from companion.clock import WallClock
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from sitl.endpoints import FORMS, Endpoint, ListenError, open_endpoint
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.news import News
 from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_sensors
-from sitl.server import Endpoint, ListenError, open_endpoint
 from sitl.server import serve as run_server
 
 DEFAULT_LISTEN = ["udpout:127.0.0.1:14550", "tcp:127.0.0.1:5760"]
@@ -29,7 +29,7 @@ def serve(
     listen: Annotated[
         list[str] | None,
         typer.Option(
-            help="tcp:HOST:PORT (listens), udpout:HOST:PORT, udpin:HOST:PORT; several times for several. "
+            help=f"{FORMS}; several times for several. The first is the vehicle's SERIAL0, and so on. "
             f"Default: {', '.join(DEFAULT_LISTEN)}."
         ),
     ] = None,
@@ -53,8 +53,8 @@ def serve(
         simulator = scenario.simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
         simulator.advance_to_s(0.02)
-        for url in listen or DEFAULT_LISTEN:
-            endpoints.append(open_endpoint(url, simulator, news))
+        for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
+            endpoints.append(open_endpoint(url, simulator, news, serial_port))
     except (MissionError, MapError, ScenarioError, ListenError, FaultFileError) as error:
         for endpoint in endpoints:
             endpoint.close()

@@ -11,11 +11,10 @@ from companion.frames import GeoPoint
 from sitl import geodesy
 from sitl.simulator import SimStart, Simulator
 from sitl.world import World
-from tests.conformance.test_motion import timed
 from tests.mission_client import FENCE, MISSION, RALLY, Row, download, place_m, rows_of_file, run_until, upload
 from tests.shared_data import SHARED, needs_shared
 from tests.sitl_client import Client, open_ground, ready
-from tests.tlog import raw_packets
+from tests.tlog import raw_packets, timed
 
 RECORDING = SHARED / "data" / "ardurover-4.7-transcripts" / "commands-and-acks.tlog"
 FILES = SHARED / "data" / "missions"

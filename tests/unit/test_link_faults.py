@@ -16,9 +16,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.endpoints import open_endpoint
+from sitl.endpoints.endpoint import datagrams
 from sitl.faults import FaultPlan, LinkFault
 from sitl.link_faults import Packets, Way
-from sitl.server import datagrams, open_endpoint, serve
+from sitl.server import serve
 from sitl.simulator import Simulator
 from tests.sitl_client import Client, open_ground, ready
 from tests.unit.test_sitl_server import free_port

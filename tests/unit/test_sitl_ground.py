@@ -71,7 +71,7 @@ def test_friction_is_all_that_changes_the_velocity(
         for _ in range(10):
             before = velocity(rover)
             step(rover, world, servo_1, servo_3)
-            assert abs(velocity(rover) - before) <= np.float32(grip) * GRAVITY_M_S2 * STEP_S + 1e-9
+            assert abs(velocity(rover) - before) <= float(np.float32(grip)) * GRAVITY_M_S2 * STEP_S + 1e-9
 
 
 def test_a_skid_rover_slides_on_sideways_when_it_turns_fast() -> None:

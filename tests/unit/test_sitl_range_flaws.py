@@ -288,6 +288,7 @@ def test_a_mission_describes_sensors_or_names_them(tmp_path: Path) -> None:
 def test_the_shipped_description_is_understood() -> None:
     mission = with_sensors(load_mission(MISSIONS / "open.toml"), str(MISSIONS / "sensors" / "weathered.toml"))
     client = Client(scenario_from_mission(mission).simulator(0))
+    client.set_mode(4)  # whoever has not spoken is told nothing by the scanner
     client.run_to(5.0)
     assert client.of("OBSTACLE_DISTANCE")
     assert {m.orientation for m in client.of("DISTANCE_SENSOR")} == {2, 6, 25}

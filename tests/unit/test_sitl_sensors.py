@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.sensors import SUITES, RangeSensing, suite_named
 from sitl.simulator import SimStart, Simulator
@@ -79,6 +80,8 @@ def test_noise_has_the_size_asked_for_and_never_touches_the_no_echo_value() -> N
 def test_the_lidar_is_a_component_of_its_own_heard_on_every_link(rate_hz: float) -> None:
     simulator = Simulator(wall_north(), SimStart(7.0, 5.0, 0.0, HOME), "lidar-90", lidar_rate_hz=rate_hz)
     one, other = Client(simulator), Client(simulator, system=255, component=190)
+    for client in (one, other):  # nobody is heard before he has spoken
+        client.send(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
     one.run_to(1.0)
     one.received.clear()
     one.run_to(11.0)

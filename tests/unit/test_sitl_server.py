@@ -11,8 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from sitl.cli.commands import app
+from sitl.endpoints import Endpoint, ListenError, open_endpoint
+from sitl.endpoints.endpoint import datagrams
 from sitl.news import News
-from sitl.server import Endpoint, ListenError, datagrams, open_endpoint, serve
+from sitl.server import serve
 from sitl.simulator import Collision, Simulator
 from tests.sitl_client import open_ground
 
@@ -219,7 +221,9 @@ def test_an_address_of_another_computer_is_not_taken_for_a_busy_port(bench: Benc
         bench.open("tcp:192.0.2.1:5760")
 
 
-@pytest.mark.parametrize("url", ["tcp", "serial:/dev/x:57600", "tcp:127.0.0.1", "tcp:127.0.0.1:0", "udpin:x:99999"])
+@pytest.mark.parametrize(
+    "url", ["tcp", "serial", "pty:", "usb:/dev/x:57600", "tcp:127.0.0.1", "tcp:127.0.0.1:0", "udpin:x:99999"]
+)
 def test_bad_addresses_are_told(bench: Bench, url: str) -> None:
     with pytest.raises(ListenError, match="not an address"):
         bench.open(url)

@@ -141,7 +141,8 @@ def test_parameters_are_listed_read_and_set_with_effect() -> None:
     client.run_for(0.2)
     values = [(m.param_id, m.param_value) for m in client.of("PARAM_VALUE")]
     first = next(iter(DEFAULTS))
-    assert values == [(first, DEFAULTS[first][0]), ("WP_SPEED", 1.0), ("OA_TYPE", 1.0), ("WP_RADIUS", 3.0)]
+    assert values == [(first, DEFAULTS[first][0]), ("WP_SPEED", 1.0), ("OA_TYPE", 1.0)]
+    assert client.simulator._vehicle.parameters["WP_RADIUS"] == 3.0  # no number: dropped without a word
     assert client.set_mode(15) == 0
     assert client.arm() == 0
     client.drive_to(50.0, 0.0)

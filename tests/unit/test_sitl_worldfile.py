@@ -1,6 +1,7 @@
 """World files: shapes become fields, surfaces become what rays meet, and bad files one line."""
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -246,9 +247,65 @@ def test_a_world_may_be_driven_without_a_mission(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
 
 
+def test_a_world_of_shapes_is_no_map_for_the_companion() -> None:
+    arguments = ["drive", "--world", str(MISSIONS / "worlds" / "depot.toml"), "--start", "4,20", "--target", "9,20"]
+    result = CliRunner().invoke(app, [*arguments, "--prior"])
+    assert result.exit_code == 2
+    assert "--prior" in result.output and len(result.output.strip().splitlines()) == 1
+
+
 def test_mission_check_leaves_a_world_file_to_the_simulator() -> None:
     from companion.cli.commands import app as companion_app
 
     result = CliRunner().invoke(companion_app, ["mission", "check", str(MISSIONS / "depot.toml")])
     assert result.exit_code == 0
     assert "only rover-sitl reads" in " ".join(result.output.split())
+
+
+EVERYTHING = """size_m = [6.0, 4.0]
+[[obstacle]]
+polygon_m = [[1.0, 1.0], [1.0, 2.0], [2.0, 1.5]]
+material = "glass"
+[[obstacle]]
+line_m = [[0.5, 3.0], [3.0, 3.0]]
+width_m = 0.4
+[[door]]
+north_m = 3.0
+east_m = 5.0
+radius_m = 0.5
+open_s = [[1.0, 2.0], [5.0]]
+[[slippery]]
+polygon_m = [[1.0, 1.0], [1.0, 5.0], [3.0, 5.0]]
+grip = 0.1
+edge_m = 1.0
+[[rough]]
+line_m = [[0.5, 3.0], [3.0, 3.0]]
+width_m = 0.4
+top_speed_m_s = 0.8
+[[mover]]
+radius_m = 0.7
+speed_m_s = 0.8
+route_m = [[6.0, 5.0], [3.0, 5.0]]
+"""
+NUMBERS = st.sampled_from(
+    ["0.0", "-1.0", "1e6", "-1e6", "1e-9", "nan", "inf", "1e308", "7", "0.1", "[]", "''", "true", "3.999999999"]
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(changes=st.lists(st.tuples(st.integers(0, 60), NUMBERS), min_size=1, max_size=3))
+def test_whatever_numbers_stand_in_it_a_world_is_understood_or_refused(
+    changes: list[tuple[int, str]], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    pieces = re.split(r"(\d+\.\d+)", EVERYTHING)
+    for which, number in changes:
+        pieces[2 * (which % (len(pieces) // 2)) + 1] = number
+    path = tmp_path_factory.getbasetemp() / "fuzzed.toml"
+    path.write_text("".join(pieces))
+    try:
+        world = load_world(path)
+    except MapError as error:
+        assert len(str(error).splitlines()) == 1
+    else:
+        assert world.ground.min() > 0.0 and world.ground.max() <= 1.0
+        assert world.ray_m(0.1, 0.1, 0.5, 5.0, 3.0) >= 0.0

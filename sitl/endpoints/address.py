@@ -1,0 +1,57 @@
+"""From what is written after ``--listen`` to an open endpoint."""
+
+from __future__ import annotations
+
+import errno
+
+from sitl.endpoints.endpoint import Endpoint, ListenError
+from sitl.endpoints.serial import DEFAULT_BAUD, Device, PseudoTerminal, SerialEndpoint
+from sitl.endpoints.tcp import TcpServer
+from sitl.endpoints.udp import UdpEndpoint
+from sitl.news import News
+from sitl.simulator import Simulator
+
+FORMS = "tcp:HOST:PORT, udpout:HOST:PORT, udpin:HOST:PORT, serial:PATH[:BAUD] or pty:PATH"
+TAKEN, ELSEWHERE = "choose another port", "is that an address of this computer?"
+REMEDIES = {
+    "serial": "see that the device is there and that you may use it",
+    "pty": "name a link that can be made, in a folder that is there",
+}
+
+
+def open_endpoint(url: str, simulator: Simulator, news: News | None = None, serial_port: int = 0) -> Endpoint:
+    """Open one of ``FORMS``; whoever connects comes through the vehicle's serial port ``serial_port`` (SERIALn).
+
+    ``tcp`` listens, ``udpout`` sends first, ``udpin`` waits, ``serial`` is a device, ``pty`` makes a pseudo-terminal and a link
+    to it. ``news`` is told who comes and goes. Raises ListenError.
+    """
+    kind, _, place = url.partition(":")
+    news = news or News()
+    try:
+        if kind in ("serial", "pty") and place:
+            return SerialEndpoint(_line(kind, place), simulator, serial_port)
+        host, port = _address(url, kind, place)
+        if kind == "tcp":
+            return TcpServer(host, port, news, serial_port)
+        return UdpEndpoint(host, port, kind == "udpin", simulator, news, serial_port)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        remedy = REMEDIES.get(kind, TAKEN if getattr(error, "errno", None) == errno.EADDRINUSE else ELSEWHERE)
+        raise ListenError(f"{url}: cannot be opened: {reason}; {remedy}") from error
+
+
+def _address(url: str, kind: str, place: str) -> tuple[str, int]:
+    host, _, port = place.rpartition(":")
+    known = kind in ("tcp", "udpout", "udpin")
+    if not known or not host or not (port.isascii() and port.isdigit()) or not 0 < int(port) < 65536:
+        raise ListenError(f"{url}: not an address; write {FORMS}")
+    return host, int(port)
+
+
+def _line(kind: str, place: str) -> Device | PseudoTerminal:
+    if kind == "pty":
+        return PseudoTerminal(place)
+    path, _, baud = place.rpartition(":")
+    if path and baud.isascii() and baud.isdigit():
+        return Device(path, int(baud))
+    return Device(place, DEFAULT_BAUD)

@@ -1,0 +1,59 @@
+"""What every way to the outside has in common."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from sitl.autopilot_framing import packet_size
+from sitl.simulator import Simulator
+
+READ_BYTES = 65536
+DATAGRAM_BYTES = 1400
+BACKLOG_BYTES = 1_000_000
+"""A TCP client that does not read is dropped when so much is waiting for it."""
+
+
+class ListenError(Exception):
+    """An address that cannot be used; the text is one line."""
+
+
+class Endpoint(Protocol):
+    """Something that exchanges bytes with the simulator."""
+
+    def descriptors(self) -> list[int]:
+        """The open files to wait on for input."""
+        ...
+
+    def exchange(self, simulator: Simulator, now_s: float) -> None:
+        """Take in what arrived and send what is queued; never blocks. ``now_s``: real seconds."""
+        ...
+
+    def close(self) -> None:
+        """Let go of everything that is open."""
+        ...
+
+
+def place_text(place: tuple[str, int]) -> str:
+    """An address of the other side as people write it."""
+    return f"{place[0]}:{place[1]}"
+
+
+def packets(data: bytes) -> list[bytes]:
+    """What a link has sent, packet by packet."""
+    pieces, at = [], 0
+    while at < len(data):
+        size = packet_size(data, at) or len(data) - at
+        pieces.append(data[at : at + size])
+        at += size
+    return pieces
+
+
+def datagrams(data: bytes) -> list[bytes]:
+    """The same bytes in pieces of whole packets, as many as fit into one datagram."""
+    pieces: list[bytes] = []
+    for packet in packets(data):
+        if pieces and len(pieces[-1]) + len(packet) <= DATAGRAM_BYTES:
+            pieces[-1] += packet
+        else:
+            pieces.append(packet)
+    return pieces
