@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_commands import answer
 from sitl.autopilot_link import Channel
-from sitl.autopilot_modes import INFO, WARNING, run_failsafes, set_mode
+from sitl.autopilot_modes import INFO, WARNING, apply_sticks, run_failsafes, set_mode
 from sitl.autopilot_network import close_channel, open_channel, pass_on, set_up_signing
 from sitl.autopilot_params import REAL32
 from sitl.autopilot_progress import plan_due_us, run_plan, set_mission_current
@@ -18,11 +18,12 @@ from sitl.autopilot_signing import SECURE_PORT
 from sitl.autopilot_streams import heartbeat, send_due, set_group
 from sitl.autopilot_targets import attitude_target, global_target, local_target
 from sitl.autopilot_transfer import TRANSFERS, keep_home
-from sitl.autopilot_vehicle import ALTITUDE_M, HOME_S, ORIGIN_S, POSITION_S, Vehicle, parameter_message
+from sitl.autopilot_vehicle import ALTITUDE_M, HOME_S, ORIGIN_S, POSITION_S, Sticks, Vehicle, parameter_message
 from sitl.control import LOOP_HZ
 
 PARAMETERS_PER_LOOP = 5
 TIMESYNC_S = 10.0
+UNCHANGED = 65535
 
 TIMETABLE: tuple[tuple[float, tuple[str, ...]], ...] = (
     (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "Barometer 2 calibration complete")),
@@ -71,7 +72,7 @@ class Autopilot:
         """When something must be sent or said next."""
         due_us = float(self._next_second_us)
         if self._next_event < len(TIMETABLE):
-            due_us = min(due_us, TIMETABLE[self._next_event][0] * 1e6)
+            due_us = min(due_us, self._event_s() * 1e6)
         due_us = min(due_us, plan_due_us(self.vehicle))
         for channel in self.vehicle.channels.values():
             if channel.requested or channel.parameter_queue:
@@ -114,9 +115,14 @@ class Autopilot:
             control["timed_out"] = 0
             vehicle.say(WARNING, f"target not received last {vehicle.parameters['GUID_TIMEOUT']:.0f}secs, stopping")
 
+    def _event_s(self) -> float:
+        """When the next event of the timetable is, which for some is later when the GPS is."""
+        moment_s, late = TIMETABLE[self._next_event][0], self.vehicle.gps_late
+        return moment_s + {HOME_S: late.home_s, ORIGIN_S: late.origin_s, POSITION_S: late.position_s}.get(moment_s, 0.0)
+
     def _follow_timetable(self) -> None:
         vehicle = self.vehicle
-        while self._next_event < len(TIMETABLE) and vehicle.time_s >= TIMETABLE[self._next_event][0]:
+        while self._next_event < len(TIMETABLE) and vehicle.time_s >= self._event_s():
             moment_s, texts = TIMETABLE[self._next_event]
             self._next_event += 1
             for text in texts:
@@ -164,6 +170,21 @@ def _heartbeat(vehicle: Vehicle, channel: Channel, message: Any) -> None:
             vehicle.plan.helper = (*who, channel.number)
 
 
+def _override(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """RC_CHANNELS_OVERRIDE of the ground station: steering and throttle; 0 lets go, 65535 leaves as it is."""
+    is_station = message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"])
+    if not is_station or vehicle.parameters["RC_OVERRIDE_TIME"] == 0.0:
+        return
+    sticks = vehicle.sticks
+    steering, throttle = (
+        before if raw_us == UNCHANGED else 0.0 if raw_us == 0 else min(max((raw_us - 1500) / 500.0, -1.0), 1.0)
+        for raw_us, before in ((message.chan1_raw, sticks.steering), (message.chan3_raw, sticks.throttle))
+    )
+    released = message.chan1_raw == 0 and message.chan3_raw == 0
+    vehicle.sticks = Sticks(steering, throttle, None if released else vehicle.time_s)
+    apply_sticks(vehicle)
+
+
 def _data_stream(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     rate_hz = message.req_message_rate if message.start_stop else 0
     set_group(channel, message.req_stream_id, rate_hz, vehicle.time_us)
@@ -199,6 +220,7 @@ HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
     "PARAM_REQUEST_LIST": _list_parameters,
     "PARAM_REQUEST_READ": _read_parameter,
     "PARAM_SET": _set_parameter,
+    "RC_CHANNELS_OVERRIDE": _override,
     "REQUEST_DATA_STREAM": _data_stream,
     "SET_ATTITUDE_TARGET": _attitude,
     "SET_MODE": _old_set_mode,

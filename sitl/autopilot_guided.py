@@ -254,7 +254,7 @@ def run_control(control: Any, tuning: Any, estimate: Any) -> None:
     elif control.task in (HEADING, TURN_RATE):
         run_heading_or_rate(control, tuning, estimate)
     elif control.task == COAST:
-        control.throttle = control.steering = 0.0
+        control.throttle, control.steering = control.stick_throttle, control.stick_steering
     else:
         if control.task == WAYPOINT and control.fresh_target:
             control.fresh_target = 0

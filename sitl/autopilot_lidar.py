@@ -50,7 +50,8 @@ class LidarComponent:
         if time_us >= self._scan_us:
             self._scan_us = max(self._scan_us + self._interval_us, float(time_us - HEARTBEAT_US))
             cells = self._sensing.scan_cm(north_m, east_m, heading_rad)
-            self._waiting.append((time_us + self._late_us, cells))
+            if self._sensing.lidar_fault != "silent":
+                self._waiting.append((time_us + self._late_us, cells))
         while self._waiting and self._waiting[0][0] <= time_us + 0.5:
             data += self._packed(time_us, self._waiting.popleft()[1])
         return data

@@ -21,7 +21,7 @@ LOGGING_S = 15.0
 
 def sys_status(vehicle: Vehicle) -> list[Any]:
     """SYS_STATUS of this moment."""
-    gps = GPS if vehicle.has_home else 0
+    gps = GPS if vehicle.has_home and vehicle.ekf.gps_has_fix else 0
     laser = LASER if vehicle.sensing.suite.beams else 0
     control = 0 if vehicle.mode in (Mode.MANUAL, Mode.HOLD, Mode.INITIALISING) else STABILISED
     control |= NAVIGATING if vehicle.mode in AUTOPILOT_MODES else 0
@@ -35,4 +35,13 @@ def sys_status(vehicle: Vehicle) -> list[Any]:
     health |= 0 if arming_faults(vehicle) or vehicle.mode in NOT_ARMABLE else PREARM
     enabled |= GEOFENCE if vehicle.plan.fence.enabled and vehicle.parameters["FENCE_ACTION"] > 0.0 else 0
     health &= ~GEOFENCE if vehicle.plan.fence.breached else ~0
-    return [mavlink.MAVLink_sys_status_message(present, enabled, health, 0, 12600, 0, 100, 0, 0, 0, 0, 0, 0)]
+    health &= ~BATTERY if vehicle.battery.worst else ~0
+    volts_mv, amps_ca, percent = battery_readings(vehicle)
+    return [
+        mavlink.MAVLink_sys_status_message(present, enabled, health, 0, volts_mv, amps_ca, percent, 0, 0, 0, 0, 0, 0)
+    ]
+
+
+def battery_readings(vehicle: Vehicle) -> tuple[int, int, int]:
+    """The battery's millivolts, hundredths of an ampere and per cent that are left."""
+    return round(1000.0 * vehicle.volts()), int(100.0 * vehicle.amps()), vehicle.battery_percent()

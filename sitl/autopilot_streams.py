@@ -13,7 +13,7 @@ from sitl.autopilot_fence import fence_status
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import base_mode
 from sitl.autopilot_proximity import echoes
-from sitl.autopilot_status import sys_status
+from sitl.autopilot_status import battery_readings, sys_status
 from sitl.autopilot_vehicle import (
     ALTITUDE_M,
     AUTOPILOT_MODES,
@@ -51,7 +51,7 @@ def _attitude(vehicle: Vehicle) -> list[Any]:
 
 
 def _local_position(vehicle: Vehicle) -> list[Any]:
-    if vehicle.time_s < LOCAL_POSITION_S:
+    if vehicle.time_s < LOCAL_POSITION_S or vehicle.stale_m is not None:
         return []
     place, speed = vehicle.position_m(), vehicle.velocity_m_s()
     return [mavlink.MAVLink_local_position_ned_message(_ms(vehicle), *place, 0.0, *speed, 0.0)]
@@ -77,13 +77,16 @@ def _vfr_hud(vehicle: Vehicle) -> list[Any]:
 def _ekf_status(vehicle: Vehicle) -> list[Any]:
     if vehicle.time_s < EKF_SEEN_S:
         return []
-    return [mavlink.MAVLink_ekf_status_report_message(vehicle.ekf_flags, 0.004, 0.002, 0.01, 0.03, 0.0)]
+    position = max(0.002, vehicle.ekf.test_ratio) if vehicle.is_started else 0.002
+    return [mavlink.MAVLink_ekf_status_report_message(vehicle.ekf_flags, 0.004, position, 0.01, 0.03, 0.0)]
 
 
 def _gps_raw(vehicle: Vehicle) -> list[Any]:
-    if not vehicle.has_home:
+    if vehicle.has_home and vehicle.ekf.gps_has_fix and not vehicle.ekf.gps.talks:
+        return []  # while a receiver counts as there, only what is new is sent
+    if not vehicle.has_home or not vehicle.ekf.gps_has_fix:
         return [mavlink.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, 65535, 65535, 0, 0, 0)]
-    lat, lon = vehicle.place()
+    lat, lon = vehicle.gps_place()
     north, east = vehicle.velocity_m_s()
     course = round(math.degrees(math.atan2(east, north)) * 100.0) % 36000
     altitude = round(ALTITUDE_M * 1000)
@@ -215,13 +218,37 @@ def _second_ahrs(vehicle: Vehicle) -> list[Any]:
 def _rc_channels(vehicle: Vehicle) -> list[Any]:
     return [
         mavlink.MAVLink_rc_channels_message(
-            _ms(vehicle), 8, 1500, 1500, 1500, 1500, 1800, 1000, 1000, 1800, *([0] * 10), 255
+            _ms(vehicle),
+            8,
+            stick_us(vehicle.sticks.steering),
+            1500,
+            stick_us(vehicle.sticks.throttle),
+            1500,
+            1800,
+            1000,
+            1000,
+            1800,
+            *([0] * 10),
+            255,
         )
     ]
 
 
+def stick_us(share: float) -> int:
+    """A stick's place, -1 to 1, as the length of its pulse in microseconds."""
+    return 1500 + round(500.0 * share)
+
+
 def _battery(vehicle: Vehicle) -> list[Any]:
-    return [mavlink.MAVLink_battery_status_message(0, 0, 0, 32767, [12600] + [65535] * 9, 0, 0, 0, 100, 0, 1)]
+    volts_mv, amps_ca, percent = battery_readings(vehicle)
+    used_hj = int(36.0 * float(vehicle.control[0]["used_wh"]))
+    voltages = [min(volts_mv, 65534)] + [65535] * 9
+    state = 1 + vehicle.battery.worst
+    return [
+        mavlink.MAVLink_battery_status_message(
+            0, 0, 0, 32767, voltages, amps_ca, int(vehicle.used_mah()), used_hj, percent, 0, state
+        )
+    ]
 
 
 MESSAGES: dict[int, Builder] = {

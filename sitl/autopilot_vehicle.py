@@ -12,6 +12,8 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl import geodesy
+from sitl.autopilot_battery import Battery, rest_volts
+from sitl.autopilot_ekf import Ekf
 from sitl.autopilot_link import Channel
 from sitl.autopilot_params import Parameters
 from sitl.autopilot_plan import Plan, Storage, Submode, new_plan
@@ -37,8 +39,8 @@ ARMABLE_S = 43.0
 MOST_TEXTS = 30
 """Texts that wait to be sent; more push the oldest ones out, as in the firmware's queue."""
 
-EKF_UNINITIALISED, EKF_CONSTANT_POSITION, EKF_ABSOLUTE = 1024, 167, 831
-"""EKF_STATUS_REPORT flags: nothing yet; attitude and velocity but a constant position; everything."""
+EKF_UNINITIALISED, EKF_CONSTANT_POSITION = 1024, 167
+"""EKF_STATUS_REPORT flags of the start-up: nothing yet; attitude and velocity but a constant position."""
 
 
 class Mode(IntEnum):
@@ -74,6 +76,7 @@ class Clocks:
     ground_station_s: float | None = None
     prearm_text_s: float = 0.0
     armed_s: float | None = None
+    variance_text_s: float = 0.0
     logging_s: float = -math.inf
     """When arming was last tried or ended; the log is written for a while after that."""
 
@@ -85,6 +88,25 @@ class Proximity:
     octants_cm: list[int] = field(default_factory=list)
     limits_cm: tuple[int, int] = (0, 0)
     heard_s: float = -1.0
+
+
+@dataclass
+class Sticks:
+    """What the pilot gives, -1 to 1, by the transmitter or by a ground station's RC_CHANNELS_OVERRIDE."""
+
+    steering: float = 0.0
+    throttle: float = 0.0
+    overridden_s: float | None = None
+    """When an override was heard last; the sticks fall back to the middle when none comes any more."""
+
+
+@dataclass
+class GpsLate:
+    """How much later than without faults the parts of the start-up come that need GPS, seconds."""
+
+    home_s: float = 0.0
+    origin_s: float = 0.0
+    position_s: float = 0.0
 
 
 class Vehicle:
@@ -123,6 +145,13 @@ class Vehicle:
         self.rebooting = False
         self.destination: tuple[int, int] = origin
         self.proximity = Proximity()
+        self.ekf = Ekf()
+        self.battery = Battery()
+        self.sticks = Sticks()
+        self.gps_late = GpsLate()
+        self.stale_m: tuple[float, float] | None = None
+        """The last position that was known, while none is; it is told again and again."""
+        self.control["rest_v"] = self.parameters["SIM_BATT_VOLTAGE"]
         self.plan: Plan = new_plan(storage or Storage())
 
     @property
@@ -138,23 +167,28 @@ class Vehicle:
     @property
     def has_home(self) -> bool:
         """GPS fix and home are there."""
-        return self.time_s >= HOME_S
+        return self.time_s >= HOME_S + self.gps_late.home_s
 
     @property
     def has_origin(self) -> bool:
         """The EKF has an origin."""
-        return self.time_s >= ORIGIN_S
+        return self.time_s >= ORIGIN_S + self.gps_late.origin_s
+
+    @property
+    def is_started(self) -> bool:
+        """The start-up is over: the EKF has had an absolute position."""
+        return self.time_s >= POSITION_S + self.gps_late.position_s
 
     @property
     def has_position(self) -> bool:
         """The EKF has an absolute position."""
-        return self.time_s >= POSITION_S
+        return self.is_started and self.ekf.has_position
 
     @property
     def ekf_flags(self) -> int:
         """EKF_STATUS_REPORT's flags at this moment."""
-        if self.has_position:
-            return EKF_ABSOLUTE
+        if self.is_started:
+            return self.ekf.flags
         if self.time_s >= ATTITUDE_S:
             return EKF_CONSTANT_POSITION
         return 0 if self.time_s >= ATTITUDE_S - 1.0 else EKF_UNINITIALISED
@@ -172,15 +206,17 @@ class Vehicle:
         return self.mode in DRIVEN_MODES and int(self.control[0]["task"]) in (WAYPOINT, CIRCLE, LEG)
 
     def position_m(self) -> tuple[float, float]:
-        """Estimated metres north and east of the EKF origin; zeros before there is a position."""
-        if not self.has_position:
+        """Estimated metres north and east of the EKF origin; zeros before there is a position, later the last one known."""
+        if not self.is_started:
             return 0.0, 0.0
+        if self.stale_m is not None:
+            return self.stale_m
         believed = self.estimate[0]
         return float(believed["north_m"]), float(believed["east_m"])
 
     def velocity_m_s(self) -> tuple[float, float]:
-        """Estimated speed north and east; zeros before there is a position."""
-        if not self.has_position:
+        """Estimated speed north and east; zeros without a position."""
+        if not self.is_started or self.stale_m is not None:
             return 0.0, 0.0
         believed = self.estimate[0]
         return float(believed["vel_n"]), float(believed["vel_e"])
@@ -190,6 +226,41 @@ class Vehicle:
         if not self.has_home:
             return 0, 0
         return geodesy.moved(self.origin, *self.position_m())
+
+    def gps_place(self) -> tuple[int, int]:
+        """Latitude and longitude as the GPS receiver has it, 1e-7 degree; zeros without a fix."""
+        error_n, error_e = self.ekf.gps.error_m
+        believed = self.estimate[0]
+        believed_n, believed_e = float(believed["offset_n"]), float(believed["offset_e"])
+        if (error_n, error_e) == (believed_n, believed_e) and self.stale_m is None:
+            return self.place()
+        if not self.has_home:
+            return 0, 0
+        north_m, east_m = (float(believed[name]) if self.is_started else 0.0 for name in ("north_m", "east_m"))
+        return geodesy.moved(self.origin, north_m + error_n - believed_n, east_m + error_e - believed_e)
+
+    def amps(self) -> float:
+        """What the motors take from the battery."""
+        return float(self.control[0]["amps"])
+
+    def volts(self) -> float:
+        """The battery's voltage."""
+        return self.battery.volts(self.parameters, float(self.rover[0]["drawn_ah"]), self.amps())
+
+    def used_mah(self) -> float:
+        """What the battery monitor has counted since boot."""
+        return float(self.control[0]["used_mah"])
+
+    def battery_percent(self) -> int:
+        """What the battery monitor believes is left, by the capacity it was told."""
+        capacity_mah = self.parameters["BATT_CAPACITY"]
+        if capacity_mah <= 10.0:
+            return 0
+        return min(max(int(100.0 * (capacity_mah - self.used_mah()) / capacity_mah), 0), 100)
+
+    def drain(self) -> None:
+        """Keep the voltage at rest that the compiled loop counts energy with."""
+        self.control["rest_v"] = rest_volts(self.parameters, float(self.rover[0]["drawn_ah"]))
 
     def heading_rad(self) -> float:
         """Estimated heading, -pi to pi."""

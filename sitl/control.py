@@ -31,11 +31,14 @@ ESTIMATE = np.dtype(
         (name, "f8")
         for name in (
             "north_m", "east_m", "vel_n", "vel_e", "accel_n", "accel_e", "heading_rad", "yaw_rate_rad_s",
-            "bias_n", "bias_e", "drift_n", "drift_e", "bias_heading",
+            "bias_n", "bias_e", "drift_n", "drift_e", "bias_heading", "offset_n", "offset_e", "offset_vn", "offset_ve",
         )
     ]
 )  # fmt: skip
-"""What the autopilot believes, from the EKF origin, and the slowly wandering errors in it."""
+"""What the autopilot believes, from the EKF origin, and the slowly wandering errors in it.
+
+``offset_...``: what a faulty GPS adds to place and speed.
+"""
 
 CONTROL = np.dtype(
     [
@@ -57,6 +60,7 @@ CONTROL = np.dtype(
             "desired_speed", "speed_error", "speed_integral",
             "desired_turn_rate", "steer_error", "steer_integral",
             "throttle", "throttle_before", "steering", "servo_1", "servo_3", "room_m",
+            "stick_steering", "stick_throttle", "amps", "used_mah", "used_wh", "rest_v",
             "from_n", "from_e", "pace", "circle_radius", "circle_turned", "circle_angle", "circle_speed",
         )
     ]
@@ -65,6 +69,8 @@ CONTROL = np.dtype(
 """Everything the motion controllers remember; metres, m/s, radians, outputs -1 to 1.
 
 ``servo_1`` and ``servo_3`` are the left and right motor of a skid rover, steering and throttle of one with steered wheels.
+``stick_...``: what the pilot gives in MANUAL; ``amps``: what the motors take; ``used_...``: what the battery monitor has counted;
+``rest_v``: the battery's voltage at rest.
 """
 
 TUNING_NAMES = {

@@ -45,6 +45,9 @@ class LockstepClock:
         self._vehicle_end.receive(self._companion_end.read())
         self._simulator.advance_to_s(time_s)
         self._companion_end.write(self._vehicle_end.take())
+        if self._vehicle_end.dropped:
+            # The autopilot has rebooted: whoever holds the line opens it again at once.
+            self._vehicle_end = self._simulator.connect()
         self._now_s = time_s
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from sitl.autopilot_battery import FULL_A, RESISTANCE_OHM
 from sitl.autopilot_loop import run_tasks
 from sitl.control import LOOP_S
 from sitl.movers import Floats, Ints
@@ -64,10 +65,10 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
     estimate.bias_heading = keep * estimate.bias_heading + noise[4] * math.sqrt(1.0 - keep * keep) * draw[4]
     ahead_n, ahead_e = math.cos(rover.heading_rad), math.sin(rover.heading_rad)
     side_m_s2 = rover.yaw_rate_rad_s * rover.speed_m_s
-    estimate.north_m = rover.north_m - origin[0] + estimate.bias_n + noise[3] * draw[2]
-    estimate.east_m = rover.east_m - origin[1] + estimate.bias_e + noise[3] * draw[3]
-    estimate.vel_n = rover.speed_m_s * ahead_n + rate_n
-    estimate.vel_e = rover.speed_m_s * ahead_e + rate_e
+    estimate.north_m = rover.north_m - origin[0] + estimate.bias_n + noise[3] * draw[2] + estimate.offset_n
+    estimate.east_m = rover.east_m - origin[1] + estimate.bias_e + noise[3] * draw[3] + estimate.offset_e
+    estimate.vel_n = rover.speed_m_s * ahead_n + rate_n + estimate.offset_vn
+    estimate.vel_e = rover.speed_m_s * ahead_e + rate_e + estimate.offset_ve
     if rover.slide_m_s != 0.0:
         estimate.vel_n -= rover.slide_m_s * ahead_e
         estimate.vel_e += rover.slide_m_s * ahead_n
@@ -76,6 +77,17 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
     heading_rad = rover.heading_rad + estimate.bias_heading
     estimate.heading_rad = (heading_rad + math.pi) % (2.0 * math.pi) - math.pi
     estimate.yaw_rate_rad_s = rover.yaw_rate_rad_s
+
+
+@njit(cache=True, nogil=True)
+def draw_current(rover: Any, control: Any) -> None:
+    """Take one loop's current from the battery, and count it: by the motors' mean output, on steered wheels by the throttle."""
+    first, third = abs(control.servo_1), abs(control.servo_3)
+    control.amps = FULL_A * (third if rover.turning_radius_m > 0.0 else 0.5 * (first + third))
+    drawn_ah = control.amps * LOOP_S / 3600.0
+    rover.drawn_ah += drawn_ah
+    control.used_mah += 1000.0 * drawn_ah
+    control.used_wh += drawn_ah * (control.rest_v - RESISTANCE_OHM * control.amps)
 
 
 @njit(cache=True, nogil=True)
@@ -94,11 +106,10 @@ def run_loops(
         control.tick += 1
         update_estimate(estimate, rover, origin, noise, draws[loop])
         run_tasks(control, tuning, estimate)
+        draw_current(rover, control)
+        first, third = control.servo_1 * rover.grip_1, control.servo_3 * rover.grip_3
         for _ in range(SUBSTEPS):
-            drive(
-                rover, obstacles, south_m, west_m, resolution_m, ground, control.servo_1, control.servo_3,
-                LOOP_S / SUBSTEPS,
-            )  # fmt: skip
+            drive(rover, obstacles, south_m, west_m, resolution_m, ground, first, third, LOOP_S / SUBSTEPS)
         if mover_radii_m.size > 0:
             now_s = time_s + (loop + 1) * LOOP_S
             meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)

@@ -54,6 +54,9 @@ ROVER = np.dtype(
         ("turning_radius_m", "f8"),
         ("wheel_rad", "f8"),
         ("slide_m_s", "f8"),
+        ("grip_1", "f8"),
+        ("grip_3", "f8"),
+        ("drawn_ah", "f8"),
     ]
 )
 """The truth about the rover, world frame, heading clockwise from north; ``contacts`` counts collisions so far.
@@ -61,6 +64,7 @@ ROVER = np.dtype(
 ``struck``: number of the mover it touches, from 1; ``struck_m_s``: the rover's own speed when that began.
 ``turning_radius_m``: 0 for skid steering; ``wheel_rad``: where the steered wheels point, clockwise.
 ``slide_m_s``: speed sideways, to the right; 0 unless the ground is slippery.
+``grip_1``, ``grip_3``: the share of each servo output that comes to the ground; ``drawn_ah``: taken from the battery so far.
 """
 
 RoverState = NDArray[Any]
@@ -72,6 +76,7 @@ def new_rover(
     """A rover at rest: an array of one ``ROVER`` record. A turning radius makes it one with Ackermann steering."""
     state = np.zeros(1, dtype=ROVER)
     state["turning_radius_m"] = turning_radius_m
+    state["grip_1"] = state["grip_3"] = 1.0
     state["north_m"], state["east_m"] = north_m, east_m
     state["heading_rad"], state["radius_m"] = heading_rad, radius_m
     return state

@@ -10,6 +10,7 @@ from companion.frames import GeoPoint
 from companion.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
+from sitl.faults import FaultPlan, SensorFault
 from sitl.motion import NoiseSettings
 from sitl.sensors import SensorSuite
 from sitl.simulator import SimStart, Simulator, steered_wheels
@@ -39,6 +40,7 @@ class Scenario:
     parameters: dict[str, float] = field(default_factory=dict)
     turning_radius_m: float = 0.0
     """0: skid steering; else Ackermann."""
+    faults: FaultPlan | None = None
 
     def simulator(self, seed: int, noise: bool | NoiseSettings = True) -> Simulator:
         """A rover that has just been switched on."""
@@ -51,6 +53,7 @@ class Scenario:
             self.parameters,
             noise,
             turning_radius_m=self.turning_radius_m,
+            faults=self.faults,
         )
 
 
@@ -133,6 +136,21 @@ def _home(mission: Mission, spec: SitlSpec) -> GeoPoint:
 def with_parameters(scenario: Scenario, changes: dict[str, float]) -> Scenario:
     """The same scenario with some of ArduRover's parameters changed."""
     return replace(scenario, parameters={**scenario.parameters, **changes})
+
+
+def with_faults(scenario: Scenario, plan: FaultPlan | None) -> Scenario:
+    """The same scenario with what goes wrong. Raises ScenarioError for a fault of something that it does not have."""
+    described = isinstance(scenario.sensors, SensorSuite)
+    beams = len((scenario.sensors if isinstance(scenario.sensors, SensorSuite) else suite_of(scenario.sensors)).beams)
+    name = "of the mission" if described else scenario.sensors
+    for number, fault in enumerate(plan.faults if plan else (), 1):
+        missing = [one for one in fault.beams if one > beams] if isinstance(fault, SensorFault) else []
+        if missing:
+            raise ScenarioError(
+                f"{plan.source if plan else ''}: fault {number}: beams {missing[0]}: the sensors {name} have "
+                f"{beams} beams; leave beams out to mean all sensors"
+            )
+    return replace(scenario, faults=plan)
 
 
 def with_sensors(mission: Mission, sensors: str) -> Mission:

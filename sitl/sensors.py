@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,10 @@ def spread_rad(middle_deg: NDArray[np.float64], width_deg: float, rays: int) -> 
     """Shape (sectors, rays): bearings from straight ahead, spread evenly over each sector."""
     spread = (np.arange(rays) + 0.5) / rays - 0.5
     return np.asarray(np.radians(middle_deg[:, None] + spread[None, :] * width_deg), dtype=np.float64)
+
+
+Defect = Literal["", "stuck", "silent"]
+"""What is wrong with a sensor: it repeats its last reading, or gives none."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,6 +140,11 @@ class RangeSensing:
         self.suite = suite
         self.time_s = 0.0
         """The world's time at which is measured; the simulator keeps it."""
+        self.lidar_fault: Defect = ""
+        self.beam_faults: dict[int, Defect] = {}
+        """What is wrong with which rangefinder or proximity sector, by the number it is told with."""
+        self._last_scan_cm: list[int] = []
+        self._last_readings: dict[int, Reading] = {}
         self._world = world
         self._noise_m = noise_m
         self._rng = rng
@@ -168,6 +177,8 @@ class RangeSensing:
         """The scanner's 72 ranges; maximum + 1 where nothing was seen, 65535 where that is not known."""
         lidar = self.suite.lidar
         assert lidar is not None
+        if self.lidar_fault == "stuck" and self._last_scan_cm:
+            return list(self._last_scan_cm)
         true_m = self._world.rays_m(north_m, east_m, self._lidar_rad + heading_rad, lidar.max_m, self.time_s)
         nothing = round(lidar.max_m * 100) + 1
         if lidar.flaws != NO_FLAWS:
@@ -181,7 +192,8 @@ class RangeSensing:
             seen_m = true_m + self._noise(lidar.sectors)
             cells = np.clip(np.rint(seen_m * 100.0), 0, nothing - 1)
             cells[(true_m >= lidar.max_m) | (seen_m >= lidar.max_m)] = nothing
-        return [int(cell) for cell in cells.tolist()] + [UNKNOWN] * (SECTORS - lidar.sectors)
+        self._last_scan_cm = [int(cell) for cell in cells.tolist()] + [UNKNOWN] * (SECTORS - lidar.sectors)
+        return list(self._last_scan_cm)
 
     def beams_cm(self, north_m: float, east_m: float, heading_rad: float) -> list[int]:
         """Ranges of the rangefinders that measure when asked; their maximum where nothing was seen."""
@@ -209,7 +221,24 @@ class RangeSensing:
             newest_m = sampler.newest_m(self.time_s)
             if newest_m is not None and not math.isnan(newest_m[0]):
                 found.append(_reading(number, beam.orientation, beam, float(newest_m[0]), NO_TYPE))
-        return sorted(found, key=lambda reading: reading.number)
+        return self._with_faults(sorted(found, key=lambda reading: reading.number))
+
+    def numbers(self) -> list[int]:
+        """The numbers of all rangefinders and proximity sectors."""
+        sectors = self.suite.proximity.sectors if self.suite.proximity else ()
+        return [*range(len(self.suite.beams)), *(FIRST_SECTOR_ID + sector for sector in sectors)]
+
+    def _with_faults(self, readings: list[Reading]) -> list[Reading]:
+        """Without what silent rangefinders say; a stuck one says again what it said last."""
+        told = []
+        for reading in readings:
+            fault = self.beam_faults.get(reading.number, "")
+            if fault == "stuck":
+                told.append(self._last_readings.get(reading.number, reading))
+            elif not fault:
+                self._last_readings[reading.number] = reading
+                told.append(reading)
+        return told
 
     def sectors(self) -> list[Reading]:
         """The proximity sectors; one that knows nothing shows its maximum, as the firmware does."""
@@ -219,10 +248,11 @@ class RangeSensing:
         newest_m = self._sectors.newest_m(self.time_s)
         if newest_m is None:
             return []
-        return [
+        readings = [
             _reading(FIRST_SECTOR_ID + sector, sector, near, float(range_m), LASER)
             for sector, range_m in zip(near.sectors, np.nan_to_num(newest_m, nan=math.inf), strict=True)
         ]
+        return self._with_faults(readings)
 
     def _noise(self, count: int) -> NDArray[np.float64]:
         return self._rng.standard_normal(count) * self._noise_m

@@ -21,6 +21,9 @@ from sitl.autopilot_signing import SECURE_PORT, StoredKey
 from sitl.autopilot_traffic import Traffic
 from sitl.autopilot_vehicle import Vehicle
 from sitl.control import GROUND_STEERING, LOOP_HZ, THROTTLE
+from sitl.fault_player import FaultPlayer
+from sitl.faults import FaultPlan
+from sitl.link_faults import Way
 from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.rover import new_rover
 from sitl.sensors import RangeSensing, SensorSuite, suite_named
@@ -100,11 +103,15 @@ def steered_wheels(turning_radius_m: float) -> dict[str, float]:
 class SimLink:
     """One connection to the vehicle and to the components on its network."""
 
-    def __init__(self, channel: Channel) -> None:
+    def __init__(self, channel: Channel, number: int) -> None:
         """Use ``Simulator.connect``."""
         self.channel = channel
+        self.number = number
         self.inbox = bytearray()
         self.dropped = False
+        self.ways: tuple[Way, Way] | None = None
+        """Where packets are under way to the vehicle and from it, on links with faults."""
+        self._arrived = bytearray()
 
     def receive(self, data: bytes) -> None:
         """Bytes on their way to the vehicle; it handles them with its next main loop."""
@@ -112,7 +119,26 @@ class SimLink:
 
     def take(self) -> bytes:
         """What was sent to this link since the last call."""
-        return self.channel.take()
+        if self.ways is None:
+            return self.channel.take()
+        data = bytes(self._arrived)
+        self._arrived.clear()
+        return data
+
+    def pass_in(self, player: FaultPlayer, now_s: float) -> bytes:
+        """What reaches the vehicle now."""
+        data = bytes(self.inbox)
+        self.inbox.clear()
+        if self.ways is None:
+            return data
+        player.pass_on(self.ways[0], data, now_s)
+        return self.ways[0].arrived(now_s)
+
+    def pass_out(self, player: FaultPlayer, now_s: float) -> None:
+        """What the vehicle has sent goes on its way, what was under way arrives."""
+        if self.ways is not None:
+            player.pass_on(self.ways[1], self.channel.take(), now_s)
+            self._arrived += self.ways[1].arrived(now_s)
 
 
 class Simulator:
@@ -129,11 +155,14 @@ class Simulator:
         noise: bool | NoiseSettings = True,
         lidar_rate_hz: float | None = None,
         turning_radius_m: float = 0.0,
+        faults: FaultPlan | None = None,
     ) -> None:
         """``sensors`` is a suite or its name; ``parameters`` are ArduRover's, other than the defaults.
 
         ``turning_radius_m``: 0 for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
         (``steered_wheels``), as on a real rover.
+
+        ``faults``: what goes wrong, and when.
 
         Raises ValueError for an unknown suite, KeyError for an unknown parameter.
         """
@@ -160,6 +189,9 @@ class Simulator:
         self._collisions: list[Collision] = []
         self._solid, self._doors_move_s = world.layers(0.0).solid, world.next_change_s(0.0)
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
+        self._player = FaultPlayer(faults or FaultPlan(), seed)
+        self._has_faults = faults is not None and bool(faults.faults)
+        self._off_until_s = 0.0
         self._boot()
 
     def _boot(self) -> None:
@@ -173,6 +205,7 @@ class Simulator:
         self._autopilot = Autopilot(self._vehicle)
         lidar = self._sensing.suite.lidar
         self._lidar = LidarComponent(lidar, self._sensing, self._vehicle) if lidar else None
+        self._player.rebooted(self._vehicle, self._rover, self._sensing)
 
     @property
     def time_s(self) -> float:
@@ -219,8 +252,14 @@ class Simulator:
         return max(room_m - float(rover["radius_m"]), 0.0)
 
     def connect(self, port: int = SECURE_PORT) -> SimLink:
-        """A new link to the vehicle, through its serial port ``port`` (SERIALn); several may be open at once."""
-        link = SimLink(self._autopilot.open_channel(port))
+        """A new link to the vehicle, through its serial port ``port`` (SERIALn); several may be open at once.
+
+        It gets the lowest number, from 1, that no other has.
+        """
+        taken = {one.number for one in self._links}
+        link = SimLink(self._autopilot.open_channel(port), next(n for n in range(1, len(taken) + 2) if n not in taken))
+        if self._player.touches_links:
+            link.ways = (Way(link.number, "to_vehicle"), Way(link.number, "from_vehicle"))
         self._links.append(link)
         return link
 
@@ -235,23 +274,43 @@ class Simulator:
         """Run the vehicle up to a time (in whole main loops of 20 ms); times in the past do nothing."""
         goal = math.floor(time_s * LOOP_HZ + 1e-6)
         while self._tick < goal:
+            if self._has_faults:
+                self._meet_faults()
             self._receive()
             if self.world.doors:
                 self._move_doors()
             self._run(min(goal - self._tick, self._loops_until_due()))
             self._send()
 
+    @property
+    def _is_off(self) -> bool:
+        return self._off_until_s > 0.0
+
+    def _meet_faults(self) -> None:
+        """Begin and end what the plan says; a failure of the autopilot's power, and its return."""
+        if self._is_off and self.time_s >= self._off_until_s - 1e-6:
+            self._off_until_s = 0.0
+            self._reboot()
+        if self.time_s >= self._player.due_s - 1e-6:
+            self._player.step(self.time_s, self._vehicle, self._rover, self._sensing)
+        if self._player.reboot_until_s is not None:
+            self._off_until_s, self._player.reboot_until_s = self._player.reboot_until_s, None
+            self._reboot()
+
     def _receive(self) -> None:
         for link in self._links:
-            if link.inbox:
-                data = bytes(link.inbox)
-                link.inbox.clear()
+            data = link.pass_in(self._player, self.time_s) if link.inbox or link.ways else b""
+            if data and not self._is_off:
                 self._autopilot.receive(link.channel, data)
+                link.pass_out(self._player, self.time_s)
         if self._vehicle.rebooting:
-            self._links_dropped()
-            self._parameters = self._vehicle.parameters.as_dict()
-            self._signing_key = self._vehicle.signing.stored
-            self._boot()
+            self._reboot()
+
+    def _reboot(self) -> None:
+        self._links_dropped()
+        self._parameters = self._vehicle.parameters.as_dict()
+        self._signing_key = self._vehicle.signing.stored
+        self._boot()
 
     def _links_dropped(self) -> None:
         for link in self._links:
@@ -277,7 +336,17 @@ class Simulator:
         if self._traffic.talks:
             # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
+        if self._has_faults:
+            due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._fault_due_s() - self.time_s))
         return max(1, math.ceil((due_us - self._vehicle.time_us) * 1e-6 * LOOP_HZ - 1e-6))
+
+    def _fault_due_s(self) -> float:
+        """When a fault begins or ends, power returns, or a packet that is late comes through."""
+        due_s = min(self._player.due_s, self._off_until_s) if self._is_off else self._player.due_s
+        for link in self._links:
+            if link.ways is not None:
+                due_s = min(due_s, link.ways[0].next_due_s(), link.ways[1].next_due_s())
+        return due_s
 
     def _run(self, loops: int) -> None:
         """Run main loops until they are done or something happened that must be told at once."""
@@ -305,6 +374,14 @@ class Simulator:
         return Collision(self.time_s, *here, self.world.movers[struck - 1].name, float(rover["struck_m_s"]))
 
     def _send(self) -> None:
+        if not self._is_off:
+            self._speak()
+        if self._player.touches_links:
+            for link in self._links:
+                link.pass_out(self._player, self.time_s)
+
+    def _speak(self) -> None:
+        """Everything that is due now is measured and put into the channels."""
         rover = self._rover[0]
         if self._sensing.samples:
             self._sensing.sample(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))

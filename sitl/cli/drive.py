@@ -20,10 +20,11 @@ from companion.mission.mission import Mission, MissionError
 from companion.provenance import made_with
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
+from sitl.fault_file import FaultFileError, load_faults
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
 from sitl.picture import save_picture
-from sitl.scenario import ScenarioError, scenario_from_mission, with_sensors
+from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_sensors
 from sitl.worldfile import ground_grid
 
 EXIT_BAD_INPUT, EXIT_STOPPED = 2, 130
@@ -55,6 +56,7 @@ def drive(
     prior: Annotated[
         bool, typer.Option("--prior", help="With --world: the companion knows the map from the start.")
     ] = False,
+    faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
     time_limit_s: Annotated[float, typer.Option(min=1.0, help="Simulated seconds before giving up.")] = 3600.0,
 ) -> None:
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
@@ -71,7 +73,7 @@ def drive(
         if sensors is not None:
             mission = with_sensors(mission, sensors)
         _refuse_blind(mission)
-        scenario = scenario_from_mission(mission)
+        scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
         if record is not None:
             recorder = Recorder(record, mission_file, settings, seed)
         picture(image)
@@ -81,7 +83,7 @@ def drive(
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
         report = _run_with_progress(run, console)
-    except (SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError) as error:
+    except (SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     except KeyboardInterrupt:

@@ -15,8 +15,9 @@ from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from sitl.endpoints import FORMS, Endpoint, ListenError, open_endpoint
+from sitl.fault_file import FaultFileError, load_faults
 from sitl.news import News
-from sitl.scenario import ScenarioError, scenario_from_mission, with_sensors
+from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_sensors
 from sitl.server import serve as run_server
 
 DEFAULT_LISTEN = ["udpout:127.0.0.1:14550", "tcp:127.0.0.1:5760"]
@@ -36,6 +37,7 @@ def serve(
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
     sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
+    faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
 ) -> None:
     """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C.
 
@@ -47,12 +49,13 @@ def serve(
     try:
         mission = load_mission(mission_file)
         mission = mission if sensors is None else with_sensors(mission, sensors)
-        simulator = scenario_from_mission(mission).simulator(seed)
+        scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
+        simulator = scenario.simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
         simulator.advance_to_s(0.02)
         for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
             endpoints.append(open_endpoint(url, simulator, news, serial_port))
-    except (MissionError, MapError, ScenarioError, ListenError) as error:
+    except (MissionError, MapError, ScenarioError, ListenError, FaultFileError) as error:
         for endpoint in endpoints:
             endpoint.close()
         typer.echo(str(error), err=True)

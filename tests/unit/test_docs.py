@@ -18,6 +18,7 @@ import companion.cli.commands
 import sitl.cli.commands
 from companion.mission.sensor_tables import BeamTable, LidarTable, ProximityTable, SensorsTable, SunTable
 from companion.settings import parse_settings
+from sitl.fault_file import load_faults
 from sitl.suites import suite_of
 from sitl.worldfile import DoorTable, ObstacleTable, RoughTable, SlipperyTable, WorldTable, load_world
 
@@ -49,6 +50,10 @@ def blocks(language: str) -> list[tuple[str, str]]:
 def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path) -> None:
     if text.startswith("# settings"):
         assert parse_settings(tomllib.loads(text), where).profile
+        return
+    if text.startswith("# faults"):
+        (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+        assert load_faults(tmp_path / "plan.toml").faults
         return
     if text.startswith("# world"):
         (tmp_path / "world.toml").write_text(text, encoding="utf-8")
