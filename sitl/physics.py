@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -134,25 +134,39 @@ class Physics:
         if frame is None:
             self.tally.bad += 1
             return b""
-        last = self._last
-        if last is not None and sender != self._sender and frame.count != 0:
+        kind = self._kind(frame, sender)
+        if kind == "stranger":
             self.tally.strangers += 1
             return b""
-        if last is not None and sender == self._sender and frame.count == last.count:
-            self.tally.repeated += 1
-            return self._answer
-        ahead = 1 if last is None else (frame.count - last.count) % COUNTS
-        if last is None or (frame.count == 0 and ahead != 1):
-            self.tally.starts += 1
-            self._begin()
-        elif ahead > COUNTS // 2:
+        if kind == "late":
             self.tally.late += 1
             return b""
-        else:
-            self.tally.lost += ahead - 1
-        self._last, self._sender = frame, sender
+        self._sender = sender
+        if kind == "repeated":
+            self.tally.repeated += 1
+            return self._answer
+        if kind == "start":
+            self.tally.starts += 1
+            self._begin()
+        elif self._last is not None:
+            self.tally.lost += (frame.count - self._last.count) % COUNTS - 1
+        self._last = frame
         self._answer = self._stepped(frame)
         return self._answer
+
+    def _kind(self, frame: ServoFrame, sender: object) -> Literal["start", "next", "repeated", "late", "stranger"]:
+        """What a frame is after the last one. A firmware counts from 0, and one that goes on where it was may have moved."""
+        if self._last is None:
+            return "start"
+        ahead = (frame.count - self._last.count) % COUNTS
+        moved = sender != self._sender
+        if frame.count == 0 and ahead != 1 and (moved or ahead != 0):
+            return "start"
+        if ahead == 0:
+            return "repeated"
+        if moved and ahead != 1:
+            return "stranger"
+        return "next" if ahead <= COUNTS // 2 else "late"
 
     def rehearse(self) -> None:
         """Take one step and forget it: compiles what is not compiled yet, before anybody waits for an answer."""

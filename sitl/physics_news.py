@@ -50,11 +50,13 @@ class PhysicsNews:
 
 def summary(physics: Physics) -> str:
     """One line about everything that came in."""
-    tally = physics.tally
+    tally, collisions = physics.tally, len(physics.collisions)
     counts = {
         "steps": tally.steps, "asked again": tally.repeated, "lost": tally.lost, "late": tally.late,
         "from strangers": tally.strangers, "no frames": tally.bad,
     }  # fmt: skip
-    frames = ", ".join(f"{count} {what}" for what, count in counts.items() if count or what == "steps")
-    since = f"since the firmware's last start {physics.time_s:.0f} s and {len(physics.collisions)} collisions"
-    return f"stopped; {frames}; {since}"
+    frames = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    if not tally.starts:
+        return f"stopped; no firmware has asked{f' ({frames})' if frames else ''}"
+    touched = f"{collisions} collision{'s' if collisions != 1 else ''}"
+    return f"stopped; {frames}; since the firmware's last start {physics.time_s:.0f} s and {touched}"

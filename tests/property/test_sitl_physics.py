@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.frames import GeoPoint
+from sitl.autopilot_scanner import ScannerPort
 from sitl.json_frames import decode
 from sitl.physics import Physics, frame_step_s
 from sitl.rover import SPEED_LAG_S
@@ -132,3 +134,19 @@ def test_any_bytes_leave_it_up_and_only_frames_move_it(datagrams: list[bytes]) -
         else:
             assert (behind.time_s, behind.motion) == before
     assert behind.answer(frame(0))
+
+
+beat = bytes(mavlink.MAVLink_heartbeat_message(10, 3, 0, 0, 4, 3).pack(mavlink.MAVLink(None, 7, 1)))
+damaged = st.tuples(st.integers(0, len(beat) - 1), st.integers(1, 255)).map(
+    lambda change: bytes(byte ^ change[1] if at == change[0] else byte for at, byte in enumerate(beat))
+)
+
+
+@settings(max_examples=200, deadline=None)
+@given(pieces=st.lists(st.one_of(st.binary(max_size=50), damaged, st.just(beat[:5])), max_size=10))
+def test_any_bytes_on_the_lidars_line_leave_it_its_name(pieces: list[bytes]) -> None:
+    port = ScannerPort()
+    for piece in pieces:
+        port.hear(piece)
+    packed = port.packed([mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)])
+    assert (packed[5], packed[6]) == (1, 196)

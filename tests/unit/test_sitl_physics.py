@@ -266,6 +266,15 @@ def test_of_two_firmwares_the_one_that_began_last_is_answered() -> None:
     assert behind.tally.starts == 2
 
 
+def test_a_firmware_may_go_on_from_another_address() -> None:
+    behind = physics()
+    first = [behind.answer(frame(count), "here") for count in range(10)]
+    assert behind.answer(frame(9), "there") == first[9]
+    assert behind.answer(frame(10), "there")
+    assert behind.answer(frame(11), "elsewhere")
+    assert (behind.tally.starts, behind.tally.strangers, behind.tally.steps) == (1, 0, 12)
+
+
 @pytest.mark.parametrize(
     "datagram",
     [
@@ -428,6 +437,13 @@ def test_seeds_change_ranges_only() -> None:
     assert run(1).ranges_m != run(2).ranges_m
 
 
+def test_without_a_firmware_there_is_nothing_to_sum_up() -> None:
+    behind = physics()
+    assert summary(behind) == "stopped; no firmware has asked"
+    behind.answer(b"noise")
+    assert summary(behind) == "stopped; no firmware has asked (1 no frames)"
+
+
 def test_news_are_told_once_and_summed_up() -> None:
     behind = physics(walled())
     said: list[str] = []
@@ -454,7 +470,7 @@ def test_news_are_told_once_and_summed_up() -> None:
     ]
     assert summary(behind) == (
         f"stopped; {behind.tally.steps} steps, 2 lost, 1 from strangers, 3 no frames; "
-        f"since the firmware's last start {behind.time_s:.0f} s and 1 collisions"
+        f"since the firmware's last start {behind.time_s:.0f} s and 1 collision"
     )
     behind.answer(frame(0, 1500, 1500))
     news.look()
