@@ -20,6 +20,8 @@ driving along a leg of a mission."""
 
 GROUND_STEERING, THROTTLE = 26, 70
 """SERVO1_FUNCTION and SERVO3_FUNCTION of a rover with steered wheels."""
+THROTTLE_LEFT, THROTTLE_RIGHT = 73, 74
+"""The same of a skid rover."""
 
 NEVER = -1_000_000
 """Tick of something that has not happened."""

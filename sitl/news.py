@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from sitl.simulator import Collision, Simulator
+from sitl.simulator import Collision, SimStart, Simulator
 
 SILENT_S = 5.0
 """A UDP partner that has said nothing for so long has gone: there is no other way to know."""
@@ -49,12 +49,11 @@ class News:
         collisions = simulator.collisions
         if len(collisions) > self._collisions and now_s - self._collisions_told_s >= COLLISIONS_EVERY_S:
             self._collisions, self._collisions_told_s = len(collisions), now_s
-            self._tell(collision_line(collisions[-1], len(collisions), simulator))
+            self._tell(collision_line(collisions[-1], len(collisions), simulator.start))
 
 
-def collision_line(collision: Collision, count: int, simulator: Simulator) -> str:
+def collision_line(collision: Collision, count: int, start: SimStart) -> str:
     """What was touched, when and where; the place counts from where the rover was switched on, as LOCAL_POSITION_NED does."""
-    start = simulator.start
     north_m, east_m = collision.north_m - start.north_m, collision.east_m - start.east_m
     what = "an obstacle" if collision.mover is None else collision.mover
     where = f"north {north_m:.1f} m, east {east_m:.1f} m of its start"

@@ -12,7 +12,8 @@ from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
 from sitl.faults import FaultPlan, SensorFault
 from sitl.motion import NoiseSettings
-from sitl.sensors import SensorSuite
+from sitl.physics import Physics
+from sitl.sensors import SensorSuite, suite_named
 from sitl.simulator import SimStart, Simulator, steered_wheels
 from sitl.suites import suite_of
 from sitl.world import World
@@ -55,6 +56,14 @@ class Scenario:
             turning_radius_m=self.turning_radius_m,
             faults=self.faults,
         )
+
+    def physics(self, seed: int, *, scans: bool = False) -> Physics:
+        """The same rover and world for the real firmware. Raises ScenarioError for sensors that it does not take."""
+        suite = suite_named(self.sensors) if isinstance(self.sensors, str) else self.sensors
+        try:
+            return Physics(self.world, self.start, suite, seed, self.rover_radius_m, self.turning_radius_m, scans=scans)
+        except ValueError as error:
+            raise ScenarioError(f"sensors: {error}; describe fewer beams") from error
 
 
 def scenario_from_mission(mission: Mission) -> Scenario:

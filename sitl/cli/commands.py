@@ -9,6 +9,7 @@ import typer
 from companion.cli.version import version_option
 from sitl.cli.drive import drive
 from sitl.cli.experiment import experiment
+from sitl.cli.physics import physics
 from sitl.cli.serve import serve
 
 app = typer.Typer(
@@ -26,4 +27,5 @@ def options(version: Annotated[bool, version_option("rover-sitl")] = False) -> N
 
 app.command()(drive)
 app.command()(serve)
+app.command()(physics)
 app.command()(experiment)

@@ -44,7 +44,7 @@ def serve(
     One line tells of each client that comes or goes, and of each collision.
     """
     clock = WallClock()
-    news = News() if quiet else News(_say, clock.now_s)
+    news = News() if quiet else News(say, clock.now_s)
     endpoints: list[Endpoint] = []
     try:
         mission = load_mission(mission_file)
@@ -62,9 +62,9 @@ def serve(
         raise typer.Exit(BAD_INPUT) from error
     if not quiet:
         for url in listen or DEFAULT_LISTEN:
-            _say(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
+            say(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
         if not listen:
-            _say("a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760")
+            say("a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760")
     stop: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:
@@ -78,10 +78,10 @@ def serve(
         for endpoint in endpoints:
             endpoint.close()
     if not quiet:
-        _say(f"stopped after {simulator.time_s:.0f} s of the rover's time")
+        say(f"stopped after {simulator.time_s:.0f} s of the rover's time")
 
 
-def _say(line: str) -> None:
+def say(line: str) -> None:
     """A line on standard output; the simulator goes on when nobody reads it any more."""
     with contextlib.suppress(OSError):
         typer.echo(line)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 
-from sitl.endpoints.endpoint import Endpoint, ListenError
+from sitl.endpoints.endpoint import Endpoint, ListenError, network_address
 from sitl.endpoints.serial import DEFAULT_BAUD, Device, PseudoTerminal, SerialEndpoint
 from sitl.endpoints.tcp import TcpServer
 from sitl.endpoints.udp import UdpEndpoint
@@ -30,7 +30,7 @@ def open_endpoint(url: str, simulator: Simulator, news: News | None = None, seri
     try:
         if kind in ("serial", "pty") and place:
             return SerialEndpoint(_line(kind, place), simulator, serial_port)
-        host, port = _address(url, kind, place)
+        host, port = network_address(url, FORMS)
         if kind == "tcp":
             return TcpServer(host, port, news, serial_port)
         return UdpEndpoint(host, port, kind == "udpin", simulator, news, serial_port)
@@ -38,14 +38,6 @@ def open_endpoint(url: str, simulator: Simulator, news: News | None = None, seri
         reason = getattr(error, "strerror", None) or error
         remedy = REMEDIES.get(kind, TAKEN if getattr(error, "errno", None) == errno.EADDRINUSE else ELSEWHERE)
         raise ListenError(f"{url}: cannot be opened: {reason}; {remedy}") from error
-
-
-def _address(url: str, kind: str, place: str) -> tuple[str, int]:
-    host, _, port = place.rpartition(":")
-    known = kind in ("tcp", "udpout", "udpin")
-    if not known or not host or not (port.isascii() and port.isdigit()) or not 0 < int(port) < 65536:
-        raise ListenError(f"{url}: not an address; write {FORMS}")
-    return host, int(port)
 
 
 def _line(kind: str, place: str) -> Device | PseudoTerminal:

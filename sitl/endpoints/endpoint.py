@@ -38,6 +38,16 @@ def place_text(place: tuple[str, int]) -> str:
     return f"{place[0]}:{place[1]}"
 
 
+def network_address(url: str, forms: str) -> tuple[str, int]:
+    """Host and port of ``tcp:``, ``udpout:`` or ``udpin:``. Raises ListenError, which names the ``forms`` that are known."""
+    kind, _, place = url.partition(":")
+    host, _, port = place.rpartition(":")
+    known = kind in ("tcp", "udpout", "udpin")
+    if not known or not host or not (port.isascii() and port.isdigit()) or not 0 < int(port) < 65536:
+        raise ListenError(f"{url}: not an address; write {forms}")
+    return host, int(port)
+
+
 def packets(data: bytes) -> list[bytes]:
     """What a link has sent, packet by packet."""
     pieces, at = [], 0

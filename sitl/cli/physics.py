@@ -1,0 +1,96 @@
+"""``rover-sitl physics``: our world and rover behind the real ArduRover firmware."""
+
+from __future__ import annotations
+
+import math
+import signal
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from companion.cli.inputs import OutputError, writable
+from companion.clock import WallClock
+from companion.mapfiles import MapError
+from companion.mission.load import load_mission
+from companion.mission.mission import MissionError
+from sitl.cli.serve import BAD_INPUT, say
+from sitl.endpoints import ListenError
+from sitl.endpoints.client import FORMS, ClientLink, open_link
+from sitl.firmware_parameters import firmware_parameters, parameter_file
+from sitl.physics import Physics
+from sitl.physics_news import PhysicsNews, summary
+from sitl.physics_server import open_port, run
+from sitl.scenario import ScenarioError, scenario_from_mission, with_sensors
+
+
+def physics(
+    mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.")],
+    port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port at which the firmware asks.")] = 9002,
+    host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 for other computers.")] = "127.0.0.1",
+    mavlink: Annotated[
+        str | None, typer.Option(metavar="URL", help=f"Where the lidar publishes its scans: {FORMS}.")
+    ] = None,
+    parameters: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Write the parameters that the firmware needs for this rover.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
+    sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
+) -> None:
+    """Answer the ArduRover firmware, started with --model JSON:127.0.0.1, with the rover and world of MISSION; ends with Ctrl-C."""
+    clock = WallClock()
+    link: ClientLink | None = None
+    try:
+        mission = load_mission(mission_file)
+        mission = mission if sensors is None else with_sensors(mission, sensors)
+        scenario = scenario_from_mission(mission)
+        behind = scenario.physics(seed, scans=mavlink is not None)
+        writable(parameters)
+        if parameters is not None:
+            text = parameter_file(firmware_parameters(scenario.parameters, behind.suite))
+            parameters.write_text(text, encoding="ascii")
+        link = open_link(mavlink) if mavlink else None
+        # Compiles what is not compiled yet before the firmware waits for answers.
+        behind.rehearse()
+        listening = open_port(host, port)
+    except (MissionError, MapError, ScenarioError, ListenError, OutputError) as error:
+        if link is not None:
+            link.close()
+        typer.echo(str(error), err=True)
+        raise typer.Exit(BAD_INPUT) from error
+    tell = (lambda line: None) if quiet else say
+    for line in _greeting(behind, host, port, mavlink, parameters):
+        tell(line)
+    stop: list[int] = []
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        stop.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    try:
+        run(behind, listening, link, clock.now_s, lambda: not stop, PhysicsNews(behind, tell, clock.now_s).look)
+    finally:
+        listening.close()
+        if link is not None:
+            link.close()
+    tell(summary(behind))
+
+
+def _greeting(behind: Physics, host: str, port: int, mavlink: str | None, parameters: Path | None) -> list[str]:
+    """How to start the firmware, and what it will not get."""
+    start = behind.start
+    heading_deg = math.degrees(start.heading_rad) % 360.0
+    home = f"{start.home.lat_deg:.7f},{start.home.lon_deg:.7f},0,{heading_deg:.0f}"
+    defaults = f" --defaults {parameters}" if parameters else ""
+    lines = [
+        f"listening on udp {host}:{port}",
+        f"start the firmware with --model JSON:127.0.0.1 --home {home}{defaults}",
+    ]
+    if behind.suite.lidar and mavlink is None:
+        lines.append("the lidar is not published: give --mavlink URL, for instance tcp:127.0.0.1:5762")
+    if behind.suite.proximity:
+        lines.append("the proximity sectors are left out: the firmware makes its own from rangefinders or scans")
+    return lines

@@ -1,0 +1,55 @@
+"""What the real firmware is told of our rover."""
+
+from __future__ import annotations
+
+import pytest
+
+from sitl.autopilot_params import DEFAULTS
+from sitl.firmware_parameters import firmware_parameters, parameter_file
+from sitl.physics import servo_output
+from sitl.sensors import SUITES
+from sitl.simulator import steered_wheels
+
+MISSION = {"WP_SPEED": 2.0, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
+
+
+@pytest.mark.parametrize("suite", ["none", "beams", "lidar-360"])
+def test_a_skid_rover_is_tuned_as_the_simulated_autopilot(suite: str) -> None:
+    told = firmware_parameters(MISSION, SUITES[suite])
+    ours = {name: value for name, (value, _) in DEFAULTS.items()} | MISSION
+    shared = {name for name in told if name in ours and not name.startswith("RNGFND")}
+    assert {name: told[name] for name in shared} == {name: ours[name] for name in shared}
+    assert shared >= {
+        "SERVO1_FUNCTION",
+        "SERVO3_FUNCTION",
+        "CRUISE_SPEED",
+        "CRUISE_THROTTLE",
+        "ATC_STR_RAT_FF",
+        *MISSION,
+    }
+
+
+def test_steered_wheels_win_over_motors() -> None:
+    told = firmware_parameters(MISSION | steered_wheels(2.5), SUITES["none"])
+    assert (told["SERVO1_FUNCTION"], told["SERVO3_FUNCTION"], told["TURN_RADIUS"]) == (26.0, 70.0, 2.5)
+
+
+@pytest.mark.parametrize("servo", [1, 3])
+def test_pulses_span_what_the_plant_takes(servo: int) -> None:
+    told = firmware_parameters({}, SUITES["none"])
+    pulses = [int(told[f"SERVO{servo}_{end}"]) for end in ("MIN", "TRIM", "MAX")]
+    assert [servo_output(pulse) for pulse in pulses] == [-1.0, 0.0, 1.0]
+
+
+def test_every_rangefinder_is_switched_on_where_it_looks() -> None:
+    told = firmware_parameters({}, SUITES["beams"])
+    for number, beam in enumerate(SUITES["beams"].beams, 1):
+        values = [told[f"RNGFND{number}_{what}"] for what in ("TYPE", "ORIENT", "MIN", "MAX")]
+        assert values == [100.0, beam.orientation, beam.min_m, beam.max_m]
+    assert "RNGFND4_TYPE" not in told
+
+
+def test_the_file_has_one_parameter_a_line() -> None:
+    assert parameter_file({"WP_SPEED": 2.0, "RNGFND1_MIN": 0.2, "AVOID_ENABLE": 0.0}) == (
+        "WP_SPEED 2\nRNGFND1_MIN 0.2\nAVOID_ENABLE 0\n"
+    )
