@@ -33,10 +33,10 @@ class Kind(IntEnum):
     TRACK = 5
     HIDDEN = 6
     CLOSED = 7
-    BLACK = 8
-    GLASS = 9
-    DOOR = 10
-    WALL = 11
+    WALL = 8
+    BLACK = 9
+    GLASS = 10
+    DOOR = 11
     MOVER = 12
 
 
@@ -182,10 +182,14 @@ def _runs(offset_m: float, dot_m: float, dots: int, field_m: float, fields: int)
 
 
 def _paint_track(track: NDArray[np.float64], frame: Frame, dots: Dots) -> None:
-    if track.size == 0:
+    """A line through the points, without gaps."""
+    if len(track) == 0:
         return
-    rows = np.floor((frame.north_m - track[:, 0]) / frame.dot_m).astype(np.intp)
-    columns = np.floor((track[:, 1] - frame.west_m) / frame.dot_m).astype(np.intp)
+    steps = np.abs(np.diff(track, axis=0)).max(axis=1, initial=0.0) / frame.dot_m
+    along = np.concatenate(([0.0], np.cumsum(np.maximum(steps, 1e-9))))
+    fine = np.linspace(0.0, along[-1], max(len(track), math.ceil(2.0 * along[-1])))
+    rows = np.floor((frame.north_m - np.interp(fine, along, track[:, 0])) / frame.dot_m).astype(np.intp)
+    columns = np.floor((np.interp(fine, along, track[:, 1]) - frame.west_m) / frame.dot_m).astype(np.intp)
     inside = (rows >= 0) & (rows < frame.rows) & (columns >= 0) & (columns < frame.columns)
     here = (rows[inside], columns[inside])
     dots[here] = np.maximum(dots[here], Kind.TRACK)

@@ -18,8 +18,8 @@ from rich.text import Text
 
 from sitl.sketch import Dots, Frame, Kind, Scene, frame_for, paint
 
-PANEL_COLUMNS = 34
-NAME_COLUMNS = 10
+PANEL_COLUMNS = 32
+NAME_COLUMNS = 11
 SMALLEST = (60, 16)
 """Columns and rows below which there is no room for a picture."""
 
@@ -111,7 +111,7 @@ def map_lines(scene: Scene, frame: Frame, dots: Dots, *, colour: bool) -> list[T
     marks = _marks(scene, frame)
     lines = []
     for row in range(0, frame.rows, 2):
-        line = Text(no_wrap=True, overflow="crop", end="")
+        line = Text(no_wrap=True, overflow="crop")
         upper, lower = dots[row].tolist(), dots[row + 1].tolist()
         for column in range(frame.columns):
             sign, style = _character(Kind(upper[column]), Kind(lower[column]), colour=colour)
@@ -155,7 +155,7 @@ def arrow(heading_rad: float) -> str:
 
 def _legend(dots: Dots, *, colour: bool) -> Text:
     """What the kinds are that the map shows, the most important first."""
-    legend = Text(no_wrap=True, end="")
+    legend = Text(no_wrap=True)
     there = set(dots.ravel().tolist())
     for kind, look in sorted(LOOKS.items(), reverse=True):
         if look.name and kind in there:

@@ -18,7 +18,7 @@ TRACK_STEP_M = 0.2
 TRACK_POINTS = 20_000
 NEWS_KEPT = 50
 RATE_SPAN_S = 2.0
-"""Rates are counted over so many real seconds."""
+"""Rates are counted over so many seconds of the rover's time, at least."""
 
 
 @dataclass
@@ -34,11 +34,11 @@ class Rates:
             self._seen.popleft()
         then_s, before = self._seen[0]
         span_s = max(now_s - then_s, 1e-3)
-        none = (0, 0)
-        return {
-            name: tuple((now - was) / span_s for now, was in zip(pair, before.get(name, none), strict=True))
-            for name, pair in counts.items()
-        }  # type: ignore[return-value]
+        rates = {}
+        for name, (heard, sent) in counts.items():
+            heard_then, sent_then = before.get(name, (0, 0))
+            rates[name] = ((heard - heard_then) / span_s, (sent - sent_then) / span_s)
+        return rates
 
 
 @dataclass
@@ -58,13 +58,13 @@ class Watching:
 
     def view(self, now_s: float) -> View:
         """What there is to see at a moment (real seconds)."""
-        sections = (self.vehicle_section(now_s), self.links_section(now_s))
+        sections = (self.vehicle_section(now_s), self.links_section())
         return View(self.title, self.scene(), sections, tuple(self.news))
 
     def scene(self) -> Scene:
         """The truth: world, rover and track."""
         simulator, truth = self.simulator, self.simulator.truth
-        self._note_track(truth.north_m, truth.east_m)
+        self.note_track()
         world = simulator.world
         start = Place("start", simulator.start.north_m, simulator.start.east_m, "start")
         return Scene(
@@ -82,9 +82,12 @@ class Watching:
         """Where the rover has been, shape (n, 2)."""
         return np.array(self._track).reshape(-1, 2)
 
-    def _note_track(self, north_m: float, east_m: float) -> None:
-        if not self._track or math.dist(self._track[-1], (north_m, east_m)) >= TRACK_STEP_M:
-            self._track.append((north_m, east_m))
+    def note_track(self) -> None:
+        """Remember where the rover is, if it has moved."""
+        truth = self.simulator.truth
+        here = (truth.north_m, truth.east_m)
+        if not self._track or math.dist(self._track[-1], here) >= TRACK_STEP_M:
+            self._track.append(here)
 
     def _destination(self) -> tuple[Place, ...]:
         """Where the autopilot is driving to, if anywhere."""
@@ -104,7 +107,7 @@ class Watching:
         collisions = len(simulator.collisions)
         facts = (
             Fact("mode", f"{vehicle.mode.name}, {'armed' if vehicle.armed else 'disarmed'}"),
-            Fact("time", f"{simulator.time_s:.0f} s, {times:.1f} x real time"),
+            Fact("time", f"{simulator.time_s:.0f} s, {times:.1f} times"),
             Fact("speed", f"{truth.speed_m_s:.2f} m/s"),
             Fact("heading", f"{math.degrees(truth.heading_rad) % 360.0:.0f}° {arrow_word(truth.heading_rad)}"),
             Fact("position", f"{north_m:.1f} m N, {east_m:.1f} m E"),
@@ -114,14 +117,14 @@ class Watching:
         )
         return Section("Rover", facts)
 
-    def links_section(self, now_s: float) -> Section:
+    def links_section(self) -> Section:
         """Messages a second to and from each link."""
-        counts = {link.name: (link.channel.heard, link.channel.sent) for link in self.simulator.links}
-        rates = self._rates.update(now_s, counts)
-        facts = [Fact("", "nobody is connected")] if not rates else []
+        counts = {link.name: (link.heard.packets, link.sent.packets) for link in self.simulator.links}
+        rates = self._rates.update(self.simulator.time_s, counts)
+        facts = [Fact("nobody is connected", "")] if not rates else []
         for name, (heard, sent) in rates.items():
-            facts.append(Fact("", name))
-            facts.append(Fact("", f"  in {heard:.0f}/s, out {sent:.0f}/s"))
+            facts.append(Fact(name, ""))
+            facts.append(Fact("", f"in {heard:.0f}/s, out {sent:.0f}/s"))
         return Section("Links", tuple(facts))
 
 

@@ -20,6 +20,8 @@ from companion.mission.mission import Mission, MissionError
 from companion.provenance import made_with
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
+from sitl.cli.drive_view import run_with_view
+from sitl.cli.viewer import ViewError, terminal
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
@@ -28,6 +30,9 @@ from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, wit
 from sitl.worldfile import ground_grid
 
 EXIT_BAD_INPUT, EXIT_STOPPED = 2, 130
+BAD_INPUT = (
+    SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
+)  # fmt: skip
 LINE_EVERY_S = 60.0
 
 
@@ -58,6 +63,7 @@ def drive(
     ] = False,
     faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
     time_limit_s: Annotated[float, typer.Option(min=1.0, help="Simulated seconds before giving up.")] = 3600.0,
+    view: Annotated[bool, typer.Option("--view", help="Show map, rover and decisions on this terminal.")] = False,
 ) -> None:
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
@@ -68,6 +74,7 @@ def drive(
     recorder: Recorder | NullRecorder = NullRecorder()
     run: Drive | None = None
     try:
+        screen = terminal() if view else None
         settings = usable_settings(settings_file)
         mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
         if sensors is not None:
@@ -82,8 +89,8 @@ def drive(
         writable(map_stem, ".yaml")
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
-        report = _run_with_progress(run, console)
-    except (SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError) as error:
+        report = _run_with_progress(run, console) if screen is None else run_with_view(run, screen)
+    except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     except KeyboardInterrupt:
