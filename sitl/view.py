@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
 
 from rich.console import Group, RenderableType
 from rich.layout import Layout
@@ -111,15 +113,15 @@ def map_lines(scene: Scene, frame: Frame, dots: Dots, *, colour: bool) -> list[T
     marks = _marks(scene, frame)
     lines = []
     for row in range(0, frame.rows, 2):
+        pairs = zip(dots[row].tolist(), dots[row + 1].tolist(), strict=True)
+        characters = [_character(Kind(upper), Kind(lower), colour=colour) for upper, lower in pairs]
+        for column, (sign, style) in marks.get(row // 2, {}).items():
+            # A mark lies on the ground that is there, unless it brings its own.
+            ground = "" if " on " in style or not colour else f" on {LOOKS[Kind(int(dots[row, column]))].colour}"
+            characters[column] = (sign, style + ground)
         line = Text(no_wrap=True, overflow="crop")
-        upper, lower = dots[row].tolist(), dots[row + 1].tolist()
-        for column in range(frame.columns):
-            sign, style = _character(Kind(upper[column]), Kind(lower[column]), colour=colour)
-            if (row // 2, column) in marks:
-                sign, over = marks[row // 2, column]
-                # A mark lies on the ground that is there, unless it brings its own.
-                style = over if " on " in over or not colour else f"{over} on {LOOKS[Kind(upper[column])].colour}"
-            line.append(sign, style)
+        for style, run in groupby(characters, itemgetter(1)):
+            line.append("".join(sign for sign, _ in run), style)
         lines.append(line)
     return lines
 
@@ -135,16 +137,15 @@ def _character(upper: Kind, lower: Kind, *, colour: bool) -> tuple[str, str]:
     return LOOKS[max(upper, lower)].sign, ""
 
 
-def _marks(scene: Scene, frame: Frame) -> dict[tuple[int, int], tuple[str, str]]:
-    """Signs that take a whole character, by row and column of characters; the rover is on top."""
-    marks: dict[tuple[int, int], tuple[str, str]] = {}
-    for place in scene.places:
-        where = frame.dot(place.north_m, place.east_m)
+def _marks(scene: Scene, frame: Frame) -> dict[int, dict[int, tuple[str, str]]]:
+    """Signs that take a whole character, and their styles, by row and column of characters; the rover is on top."""
+    marks: dict[int, dict[int, tuple[str, str]]] = {}
+    signs = [(one.north_m, one.east_m, STATE_SIGNS[one.state], STATE_STYLES[one.state]) for one in scene.places]
+    signs.append((scene.rover.north_m, scene.rover.east_m, arrow(scene.heading_rad), ROVER_STYLE))
+    for north_m, east_m, sign, style in signs:
+        where = frame.dot(north_m, east_m)
         if where is not None:
-            marks[where[0] // 2, where[1]] = (STATE_SIGNS[place.state], STATE_STYLES[place.state])
-    where = frame.dot(scene.rover.north_m, scene.rover.east_m)
-    if where is not None:
-        marks[where[0] // 2, where[1]] = (arrow(scene.heading_rad), ROVER_STYLE)
+            marks.setdefault(where[0] // 2, {})[where[1]] = (sign, style)
     return marks
 
 

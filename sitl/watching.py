@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from array import array
 from collections import deque
 from dataclasses import dataclass, field
 
@@ -48,7 +49,7 @@ class Watching:
     title: str
     simulator: Simulator
     news: deque[str] = field(default_factory=lambda: deque(maxlen=NEWS_KEPT))
-    _track: deque[tuple[float, float]] = field(default_factory=lambda: deque(maxlen=TRACK_POINTS))
+    _track: array[float] = field(default_factory=lambda: array("d"))
     _rates: Rates = field(default_factory=Rates)
     _began: tuple[float, float] | None = None
 
@@ -86,8 +87,9 @@ class Watching:
         """Remember where the rover is, if it has moved."""
         truth = self.simulator.truth
         here = (truth.north_m, truth.east_m)
-        if not self._track or math.dist(self._track[-1], here) >= TRACK_STEP_M:
-            self._track.append(here)
+        if not self._track or math.dist(self._track[-2:], here) >= TRACK_STEP_M:
+            self._track.extend(here)
+            del self._track[: -2 * TRACK_POINTS]
 
     def _destination(self) -> tuple[Place, ...]:
         """Where the autopilot is driving to, if anywhere."""
