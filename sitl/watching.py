@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.control import LEG, WAYPOINT
 from sitl.simulator import Simulator
 from sitl.sketch import Disc, Kind, Layer, Place, Scene
 from sitl.view import Fact, Section, View
@@ -94,9 +95,9 @@ class Watching:
     def _destination(self) -> tuple[Place, ...]:
         """Where the autopilot is driving to, if anywhere."""
         vehicle = self.simulator.vehicle
-        if not vehicle.has_target:
-            return ()
         goal = vehicle.control[0]
+        if not vehicle.has_target or int(goal["task"]) not in (WAYPOINT, LEG):
+            return ()
         north_m, east_m = float(goal["dest_n"]) + vehicle.origin_m[0], float(goal["dest_e"]) + vehicle.origin_m[1]
         return (Place("target", north_m, east_m),)
 
@@ -113,7 +114,7 @@ class Watching:
             Fact("speed", f"{truth.speed_m_s:.2f} m/s"),
             Fact("heading", f"{math.degrees(truth.heading_rad) % 360.0:.0f}° {arrow_word(truth.heading_rad)}"),
             Fact("position", f"{north_m:.1f} m N, {east_m:.1f} m E"),
-            _estimate(simulator),
+            *_health(simulator),
             Fact("driven", f"{simulator.driven_m:.0f} m"),
             Fact("collisions", f"{collisions}", alarm=collisions > 0),
         )
@@ -130,12 +131,18 @@ class Watching:
         return Section("Links", tuple(facts))
 
 
-def _estimate(simulator: Simulator) -> Fact:
-    """What the autopilot knows of where it is."""
+def _health(simulator: Simulator) -> tuple[Fact, ...]:
+    """GPS, EKF, and the battery where one is monitored."""
     vehicle = simulator.vehicle
-    if vehicle.has_position:
-        return Fact("EKF, GPS", "position known")
-    return Fact("EKF, GPS", "3D fix, EKF not ready" if vehicle.has_home else "no fix yet", alarm=True)
+    fix = vehicle.has_home and vehicle.ekf.gps_has_fix
+    position = "position known" if vehicle.has_position else "no position"
+    facts = [
+        Fact("GPS", "3D fix" if fix else "no fix", alarm=not fix),
+        Fact("EKF", position, alarm=not vehicle.has_position),
+    ]
+    if int(vehicle.parameters["BATT_MONITOR"]) != 0:
+        facts.append(Fact("battery", f"{vehicle.volts():.1f} V, {vehicle.battery_percent()} %"))
+    return tuple(facts)
 
 
 WORDS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
