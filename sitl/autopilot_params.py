@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from sitl.control import OUTPUTS
+
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
 """MAV_PARAM_TYPE."""
 
@@ -15,15 +17,22 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "ATC_ACCEL_MAX": (1.0, REAL32),
     "ATC_BRAKE": (1, INT8),
     "ATC_DECEL_MAX": (0.0, REAL32),
+    "ATC_SPEED_D": (0.0, REAL32),
+    "ATC_SPEED_FF": (0.0, REAL32),
+    "ATC_SPEED_FLTD": (0.0, REAL32),
     "ATC_SPEED_FLTE": (10.0, REAL32),
+    "ATC_SPEED_FLTT": (0.0, REAL32),
     "ATC_SPEED_I": (0.2, REAL32),
     "ATC_SPEED_IMAX": (1.0, REAL32),
     "ATC_SPEED_P": (0.1, REAL32),
     "ATC_STOP_SPEED": (0.1, REAL32),
     "ATC_STR_ACC_MAX": (120.0, REAL32),
     "ATC_STR_ANG_P": (2.0, REAL32),
+    "ATC_STR_RAT_D": (0.0, REAL32),
     "ATC_STR_RAT_FF": (0.2, REAL32),
+    "ATC_STR_RAT_FLTD": (0.0, REAL32),
     "ATC_STR_RAT_FLTE": (10.0, REAL32),
+    "ATC_STR_RAT_FLTT": (0.0, REAL32),
     "ATC_STR_RAT_I": (0.2, REAL32),
     "ATC_STR_RAT_IMAX": (1.0, REAL32),
     "ATC_STR_RAT_MAX": (120.0, REAL32),
@@ -52,6 +61,7 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "FENCE_TOTAL": (0, INT8),
     "FENCE_TYPE": (6, INT8),
     "FRAME_CLASS": (1, INT8),
+    "FRAME_TYPE": (0, INT8),
     "FS_ACTION": (2, INT8),
     "FS_CRASH_CHECK": (0, INT8),
     "FS_EKF_ACTION": (1, INT8),
@@ -67,6 +77,11 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "MIS_TOTAL": (0, INT16),
     "MOT_SLEWRATE": (100, INT16),
     "MOT_SPD_SCA_BASE": (1.0, REAL32),
+    "MOT_STR_THR_MIX": (0.5, REAL32),
+    "MOT_THR_MAX": (100, INT8),
+    "MOT_THR_MIN": (0, INT8),
+    "MOT_THST_ASYM": (1.0, REAL32),
+    "MOT_THST_EXPO": (0.0, REAL32),
     "OA_TYPE": (0, INT8),
     "PRX1_TYPE": (0, INT8),
     "PSC_POS_P": (0.2, REAL32),
@@ -91,8 +106,8 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "RTL_SPEED": (0.0, REAL32),
     "SCHED_LOOP_RATE": (50, INT16),
     **{f"SERIAL{port}_PROTOCOL": (2, INT8) for port in range(8)},
-    "SERVO1_FUNCTION": (73, INT16),
-    "SERVO3_FUNCTION": (74, INT16),
+    **{f"SERVO{n}_FUNCTION": ({1: 73, 3: 74}.get(n, 0), INT16) for n in range(1, OUTPUTS + 1)},
+    **{f"SERVO{n}_REVERSED": (0, INT8) for n in range(1, OUTPUTS + 1)},
     "SIM_BATT_CAP_AH": (0.0, REAL32),
     "SIM_BATT_VOLTAGE": (12.6, REAL32),
     "SRTL_ACCURACY": (2.0, REAL32),
