@@ -129,10 +129,15 @@ LIMITS = {INT8: (-128.0, 127.0), INT16: (-32768.0, 32767.0), INT32: (-(2.0**31),
 class Parameters:
     """The parameter table: read by name or index, set with the firmware's rounding of integers."""
 
-    def __init__(self, changes: Mapping[str, float] | None = None) -> None:
-        """Start from the defaults; KeyError names an unknown parameter of ``changes``."""
-        self._values = {name: float(value) for name, (value, _) in DEFAULTS.items()}
-        self._names = list(DEFAULTS)
+    def __init__(self, changes: Mapping[str, float] | None = None, kept: Mapping[str, int] | None = None) -> None:
+        """Start from the defaults, with ``changes``.
+
+        ``kept``: types of names that are not simulated: they can be read and set, and change nothing. KeyError names a parameter
+        of ``changes`` that is neither.
+        """
+        self._types = {name: kind for name, (_, kind) in DEFAULTS.items()} | dict(kept or {})
+        self._values = {name: float(value) for name, (value, _) in DEFAULTS.items()} | dict.fromkeys(kept or (), 0.0)
+        self._names = list(self._types)
         for name, value in (changes or {}).items():
             if not self.set(name, value):
                 raise KeyError(f"the simulated rover has no parameter {name}")
@@ -159,13 +164,13 @@ class Parameters:
 
     def type_of(self, name: str) -> int:
         """MAV_PARAM_TYPE of a known parameter."""
-        return DEFAULTS[name][1]
+        return self._types[name]
 
     def set(self, name: str, value: float) -> bool:
         """Change a parameter; False if there is none of this name or the value is no number."""
         if name not in self._values or not math.isfinite(value):
             return False
-        limits = LIMITS.get(DEFAULTS[name][1])
+        limits = LIMITS.get(self._types[name])
         if limits is not None:
             value = min(max(float(round(value)), limits[0]), limits[1])
         self._values[name] = float(value)

@@ -163,8 +163,11 @@ class Simulator:
         lidar_rate_hz: float | None = None,
         turning_radius_m: float = 0.0,
         faults: FaultPlan | None = None,
+        kept: Mapping[str, int] | None = None,
     ) -> None:
         """``sensors`` is a suite or its name; ``parameters`` are ArduRover's, other than the defaults.
+
+        ``kept``: those among them that are not simulated, and their types: they can be read and set.
 
         ``turning_radius_m``: 0 for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
         (``steered_wheels``), as on a real rover.
@@ -181,6 +184,7 @@ class Simulator:
         self.world = world
         self._start = start
         self._parameters = dict(parameters or {})
+        self._kept = dict(kept or {})
         self._storage = Storage()
         self._noise = settings.as_array()
         self._rng = np.random.default_rng(motion_seed)
@@ -205,7 +209,7 @@ class Simulator:
         rover = self._rover[0]
         here = (float(rover["north_m"]), float(rover["east_m"]))
         origin = geodesy.moved(self._geo_start, here[0] - self._start.north_m, here[1] - self._start.east_m)
-        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters, self._storage)
+        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters, self._storage, self._kept)
         self._vehicle.control["tick"] = 0
         self._vehicle.estimate["heading_rad"] = rover["heading_rad"]
         self._vehicle.signing.restore(self._signing_key)

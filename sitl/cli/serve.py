@@ -20,7 +20,8 @@ from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.endpoints import FORMS, Endpoint, ListenError, open_endpoint
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.news import News
-from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_sensors
+from sitl.paramfile import ParameterFileError
+from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
 from sitl.server import serve as run_server
 from sitl.watching import Watching
 
@@ -41,6 +42,7 @@ def serve(
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
     sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
+    params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
     faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Show map, rover and rates on this terminal.")] = False,
 ) -> None:
@@ -54,7 +56,10 @@ def serve(
         console = terminal() if view else None
         mission = load_mission(mission_file)
         mission = mission if sensors is None else with_sensors(mission, sensors)
+        mission = mission if params is None else with_parameter_file(mission, params)
         scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
+        for note in scenario.notes:
+            typer.echo(note, err=True)
         simulator = scenario.simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
         simulator.advance_to_s(0.02)
@@ -63,7 +68,7 @@ def serve(
         news = News() if quiet else News(say, clock.now_s)
         for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
             endpoints.append(open_endpoint(url, simulator, news, serial_port))
-    except (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ViewError) as error:
+    except (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ParameterFileError, ViewError) as error:
         for endpoint in endpoints:
             endpoint.close()
         typer.echo(str(error), err=True)
