@@ -8,7 +8,7 @@ from typing import Any
 from numba import njit
 
 from sitl.autopilot_speed import forward_speed
-from sitl.control import GROUND_STEERING, LOOP_S, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
+from sitl.control import COAST, GROUND_STEERING, LOOP_S, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
 from sitl.shaping import limited
 
 EVEN_MIX = 0.5
@@ -120,7 +120,9 @@ def run_motors(control: Any, tuning: Any, estimate: Any) -> None:
     control.throttle_before = throttle
     left = right = 0.0
     if has_steered_wheels(tuning):
-        steering = run_wheels(control, tuning, forward_speed(estimate), throttle, steering)
+        # In MANUAL nothing is scaled; then the throttle tells which way it rolls.
+        speed = forward_speed(estimate) if control.task != COAST else 0.0 if throttle >= 0.0 else -1e-9
+        steering = run_wheels(control, tuning, speed, throttle, steering)
     else:
         left, right = run_skid(control, tuning, throttle, steering)
     throttle = thrust(throttle, tuning)
