@@ -113,8 +113,8 @@ def frame_for(scene: Scene, rows: int, columns: int) -> Frame:
     middle_n = _kept_inside(scene.rover.north_m, south_m, north_m, rows * dot_m)
     middle_e = _kept_inside(scene.rover.east_m, west_m, east_m, columns * dot_m)
     # Whole dots, so that walls do not shimmer while the rover moves.
-    top_m = math.ceil(middle_n / dot_m + rows / 2.0) * dot_m
-    return Frame(top_m, math.floor(middle_e / dot_m - columns / 2.0) * dot_m, dot_m, rows, columns)
+    top_m = (math.floor(middle_n / dot_m) + 1 + (rows - 1) // 2) * dot_m
+    return Frame(top_m, (math.floor(middle_e / dot_m) - columns // 2) * dot_m, dot_m, rows, columns)
 
 
 def _kept_inside(middle_m: float, low_m: float, high_m: float, shown_m: float) -> float:
