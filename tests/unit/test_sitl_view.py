@@ -101,22 +101,25 @@ def test_with_colours_two_dots_share_a_character() -> None:
     assert "▀" in "".join(lines) and "\x1b[38;2;" in "".join(lines)
 
 
-@given(
-    north_m=st.floats(-500.0, 500.0), east_m=st.floats(-500.0, 500.0),
-    rows=st.integers(2, 120), columns=st.integers(1, 300), dot=st.sampled_from([0.05, 0.3, 1.0, 7.0]),
-)  # fmt: skip
-def test_every_wall_in_sight_is_painted(north_m: float, east_m: float, rows: int, columns: int, dot: float) -> None:
+PLACES_M = st.integers(-5000, 5000).map(lambda tenths: tenths / 10.0 + 0.05)
+
+
+@given(PLACES_M, PLACES_M, st.integers(2, 120), st.integers(1, 300), st.sampled_from([0.05, 0.3, 1.0, 7.0]))
+def test_every_wall_in_sight_is_painted(north_m: float, east_m: float, rows: int, columns: int, field_m: float) -> None:
     where = np.zeros((60, 80), dtype=np.bool_)
     where[37, 11] = True
-    one = Scene((Layer(Kind.WALL, where, dot, -3.0, 5.0),), Disc(north_m, east_m, 0.3), 0.0, np.empty((0, 2)))
+    one = Scene((Layer(Kind.WALL, where, field_m, -3.0, 5.0),), Disc(north_m, east_m, 0.3), 0.0, np.empty((0, 2)))
     frame = frame_for(one, rows, columns)
     dots = paint(one, frame)
-    here = frame.dot(-3.0 + 37.5 * dot, 5.0 + 11.5 * dot)
     assert dots.shape == (rows, columns)
     assert frame.dot(north_m, east_m) is not None
-    assert (dots == Kind.WALL).any() == (here is not None) or dot > frame.dot_m
-    if here is not None:
-        assert dots[here] == Kind.WALL
+    here = frame.dot(-3.0 + 37.5 * field_m, 5.0 + 11.5 * field_m)
+    if here is not None and 0 < here[0] < rows - 1 and 0 < here[1] < columns - 1:
+        # A field's middle may lie on the edge between two dots.
+        row, column = here
+        assert (dots[row - 1 : row + 2, column - 1 : column + 2] == Kind.WALL).any()
+    side = math.ceil(field_m / frame.dot_m) + 1
+    assert (dots == Kind.WALL).sum() <= side * side
 
 
 def test_a_large_world_is_shown_round_the_rover_and_not_beyond_its_edges() -> None:
