@@ -20,7 +20,8 @@ from rich.text import Text
 
 from sitl.sketch import Dots, Frame, Kind, Scene, frame_for, paint
 
-PANEL_COLUMNS = 32
+PANEL_COLUMNS = (32, 44)
+"""At least and at most; between them a third of the terminal."""
 NAME_COLUMNS = 11
 SMALLEST = (60, 16)
 """Columns and rows below which there is no room for a picture."""
@@ -90,9 +91,10 @@ def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableTy
         small = f"{columns} x {rows} characters are too few for a picture (at least {SMALLEST[0]} x {SMALLEST[1]})"
         return Group(Text(small), *(_line(fact, columns) for section in view.sections for fact in section.facts))
     layout = Layout()
-    layout.split_row(Layout(name="map"), Layout(name="panel", size=PANEL_COLUMNS))
-    layout["map"].update(_map_panel(view, columns - PANEL_COLUMNS - 2, rows - 3, colour=colour))
-    layout["panel"].update(Panel(_facts(view, rows - 2), border_style="dim"))
+    beside = min(max(PANEL_COLUMNS[0], columns // 3), PANEL_COLUMNS[1])
+    layout.split_row(Layout(name="map"), Layout(name="panel", size=beside))
+    layout["map"].update(_map_panel(view, columns - beside - 2, rows - 3, colour=colour))
+    layout["panel"].update(Panel(_facts(view, beside - 4, rows - 2), border_style="dim"))
     return layout
 
 
@@ -165,35 +167,35 @@ def _legend(dots: Dots, *, colour: bool) -> Text:
     return legend
 
 
-def _facts(view: View, rows: int) -> Table:
+def _facts(view: View, columns: int, rows: int) -> Table:
     """All sections, then as much of the news as there is room for."""
     table = Table.grid()
-    table.add_column(width=PANEL_COLUMNS - 4, no_wrap=True, overflow="ellipsis")
+    table.add_column(width=columns, no_wrap=True, overflow="ellipsis")
     room = rows
     for section in view.sections:
-        lines = [Text(section.title, "bold"), *(_line(fact, PANEL_COLUMNS - 4) for fact in section.facts)]
+        lines = [Text(section.title, "bold"), *(_line(fact, columns) for fact in section.facts)]
         for line in lines[: max(room, 0)]:
             table.add_row(line)
         room -= len(lines)
     if room > 1 and view.news:
         table.add_row(Text("News", "bold"))
-        for text in _newest(view.news, room - 1):
+        for text in _newest(view.news, columns, room - 1):
             table.add_row(text)
     return table
 
 
 def _line(fact: Fact, columns: int) -> Text:
     line = Text(fact.name.ljust(NAME_COLUMNS), "dim", no_wrap=True)
-    line.append(fact.value, "bold #ff5f5f" if fact.alarm else "not dim")
+    line.append(fact.value, "bold not dim #ff5f5f" if fact.alarm else "not dim")
     line.truncate(columns, overflow="ellipsis")
     return line
 
 
-def _newest(news: Iterable[str], rows: int) -> list[Text]:
+def _newest(news: Iterable[str], columns: int, rows: int) -> list[Text]:
     """The last lines that fit, broken where they are too long; a text that does not fit whole is left out."""
     lines: list[Text] = []
     for text in reversed(tuple(news)):
-        wrapped = _wrapped(text, PANEL_COLUMNS - 4)
+        wrapped = _wrapped(text, columns)
         if len(lines) + len(wrapped) > rows:
             return lines
         lines = [*wrapped, *lines]

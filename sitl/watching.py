@@ -113,7 +113,7 @@ class Watching:
             Fact("time", f"{simulator.time_s:.0f} s, {times:.1f} times"),
             Fact("speed", f"{truth.speed_m_s:.2f} m/s"),
             Fact("heading", f"{math.degrees(truth.heading_rad) % 360.0:.0f}° {arrow_word(truth.heading_rad)}"),
-            Fact("position", f"{north_m:.1f} m N, {east_m:.1f} m E"),
+            Fact("position", f"N {north_m:.1f}, E {east_m:.1f} m"),
             *_health(simulator),
             Fact("driven", f"{simulator.driven_m:.0f} m"),
             Fact("collisions", f"{collisions}", alarm=collisions > 0),

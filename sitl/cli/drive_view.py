@@ -12,6 +12,7 @@ from companion.clock import stopwatch_s
 from companion.grid import OBSTACLE
 from companion.itinerary import TargetStatus
 from companion.mapping import EvidenceMap, known_fields
+from companion.navigator import Decision, Part
 from sitl.cli.viewer import Viewer
 from sitl.lockstep import Drive, Report
 from sitl.sketch import Kind, Layer, Place, Scene
@@ -48,7 +49,7 @@ class DriveView:
         self._run = run
         self._viewer = viewer
         self._watching = Watching(run.mission.name, run.simulator)
-        self._decided = ""
+        self._decided: Decision | None = None
 
     def observe(self, status: Status) -> None:
         """A new moment of the run; drawn if the last picture is old enough."""
@@ -56,9 +57,10 @@ class DriveView:
         for text in status.news:
             self._watching.tell(f"{status.time_s:.0f} s: {text}")
         decision = status.decision
-        if decision is not None and decision.reason != self._decided:
-            self._decided = decision.reason
-            self._watching.tell(f"{status.time_s:.0f} s: {decision.part.value}: {decision.reason}")
+        if decision is not None and decision is not self._decided and decision.part is not Part.EXPLORE:
+            # Going on along the path is no news: the panel says it all the time.
+            self._watching.tell(f"{status.time_s:.0f} s: {decision.reason}")
+        self._decided = decision
         now_s = stopwatch_s()
         if self._viewer.is_due(now_s):
             self._viewer.show(self._view(status, now_s))
@@ -113,6 +115,7 @@ def mission_section(status: Status, run: Drive) -> Section:
         Fact("target", f"{status.target or '-'}{left}"),
         Fact("reached", f"{status.targets_reached} of {status.targets}"),
         Fact("part", part),
+        Fact("why", decision.reason if decision else "-"),
         Fact("steps", f"{status.steps}, {searches} searches"),
     )
     return Section("Mission", facts)

@@ -8,6 +8,7 @@ import select
 import signal
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from typer.testing import CliRunner
 
 from companion.frames import GeoPoint
 from sitl.cli.commands import app
-from sitl.cli.viewer import ViewError, terminal
+from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.doors import Door
 from sitl.meter import PacketCounter
 from sitl.movers import Mover, timed_track
@@ -271,3 +272,46 @@ def test_a_terminal_that_cannot_move_its_cursor_is_refused(monkeypatch: pytest.M
         monkeypatch.setenv("TERM", "xterm")
         assert terminal().is_terminal
     os.close(ours)
+
+
+class Stopped(io.StringIO):
+    """A terminal that takes nothing more once ``held``, as after Ctrl-S, until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.going, self.reached = threading.Event(), threading.Event()
+        self.going.set()
+
+    def write(self, text: str) -> int:
+        if not self.going.is_set():
+            self.reached.set()
+            self.going.wait(30.0)
+        return super().write(text)
+
+
+def test_a_stopped_terminal_does_not_hold_up_who_shows() -> None:
+    stream = Stopped()
+    one = a_view(scene(ROOM))
+    with Viewer(Console(file=stream, force_terminal=True, width=80, height=24)) as viewer:
+        stream.going.clear()
+        viewer.show(one)
+        assert stream.reached.wait(10.0)
+        for _ in range(100):  # the terminal is stuck in the middle of the first picture all the while
+            viewer.show(a_view(scene(ROOM)))
+        assert not stream.going.is_set()
+        stream.going.set()
+    assert "GUIDED, armed" in stream.getvalue() and LEAVE.decode() in stream.getvalue()
+
+
+def test_pictures_are_due_five_times_a_second() -> None:
+    viewer = Viewer(Console(file=io.StringIO()))
+    assert sum(viewer.is_due(hundredth / 100.0) for hundredth in range(1000)) == pytest.approx(50, abs=2)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_an_error_gives_the_terminal_back(error: type[BaseException]) -> None:
+    stream = io.StringIO()
+    with pytest.raises(error), Viewer(Console(file=stream, force_terminal=True, width=80, height=24)) as viewer:
+        viewer.show(a_view(scene(ROOM)))
+        raise error
+    assert stream.getvalue().rindex(LEAVE.decode()) > stream.getvalue().rindex(ENTER.decode())
