@@ -12,15 +12,14 @@ from typing import Any
 
 from numba import njit
 
+from sitl.autopilot_motors import has_steered_wheels, run_motors
 from sitl.autopilot_speed import (
     GRAVITY_M_S2,
     accel_limited,
     filter_share,
     forward_speed,
-    has_steered_wheels,
     rate_of_lateral,
     rate_to_heading,
-    run_motors,
     run_speed,
     run_steering,
     run_stop,

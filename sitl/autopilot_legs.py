@@ -20,6 +20,7 @@ from sitl.autopilot_guided import (
     follow_shaped,
     steer_waypoint,
 )
+from sitl.autopilot_motors import has_steered_wheels
 from sitl.autopilot_profile import (
     AHEAD_E,
     AHEAD_N,
@@ -33,7 +34,7 @@ from sitl.autopilot_profile import (
     ramp_s,
     top_speed,
 )
-from sitl.autopilot_speed import GRAVITY_M_S2, has_steered_wheels, run_stop
+from sitl.autopilot_speed import GRAVITY_M_S2, run_stop
 from sitl.control import LEG, LOOP_S, NEVER
 
 BEFORE, THIS, NEXT = 0, 1, 2

@@ -9,7 +9,7 @@ from numba import njit
 from sitl.autopilot_circle import run_circle
 from sitl.autopilot_guided import run_control
 from sitl.autopilot_legs import run_leg
-from sitl.autopilot_speed import run_motors
+from sitl.autopilot_motors import run_motors
 from sitl.control import CIRCLE, LEG
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
+from sitl.control import OUTPUTS
+
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
 """MAV_PARAM_TYPE."""
 
@@ -15,15 +17,22 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "ATC_ACCEL_MAX": (1.0, REAL32),
     "ATC_BRAKE": (1, INT8),
     "ATC_DECEL_MAX": (0.0, REAL32),
+    "ATC_SPEED_D": (0.0, REAL32),
+    "ATC_SPEED_FF": (0.0, REAL32),
+    "ATC_SPEED_FLTD": (0.0, REAL32),
     "ATC_SPEED_FLTE": (10.0, REAL32),
+    "ATC_SPEED_FLTT": (0.0, REAL32),
     "ATC_SPEED_I": (0.2, REAL32),
     "ATC_SPEED_IMAX": (1.0, REAL32),
     "ATC_SPEED_P": (0.1, REAL32),
     "ATC_STOP_SPEED": (0.1, REAL32),
     "ATC_STR_ACC_MAX": (120.0, REAL32),
     "ATC_STR_ANG_P": (2.0, REAL32),
+    "ATC_STR_RAT_D": (0.0, REAL32),
     "ATC_STR_RAT_FF": (0.2, REAL32),
+    "ATC_STR_RAT_FLTD": (0.0, REAL32),
     "ATC_STR_RAT_FLTE": (10.0, REAL32),
+    "ATC_STR_RAT_FLTT": (0.0, REAL32),
     "ATC_STR_RAT_I": (0.2, REAL32),
     "ATC_STR_RAT_IMAX": (1.0, REAL32),
     "ATC_STR_RAT_MAX": (120.0, REAL32),
@@ -52,6 +61,7 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "FENCE_TOTAL": (0, INT8),
     "FENCE_TYPE": (6, INT8),
     "FRAME_CLASS": (1, INT8),
+    "FRAME_TYPE": (0, INT8),
     "FS_ACTION": (2, INT8),
     "FS_CRASH_CHECK": (0, INT8),
     "FS_EKF_ACTION": (1, INT8),
@@ -67,6 +77,11 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "MIS_TOTAL": (0, INT16),
     "MOT_SLEWRATE": (100, INT16),
     "MOT_SPD_SCA_BASE": (1.0, REAL32),
+    "MOT_STR_THR_MIX": (0.5, REAL32),
+    "MOT_THR_MAX": (100, INT8),
+    "MOT_THR_MIN": (0, INT8),
+    "MOT_THST_ASYM": (1.0, REAL32),
+    "MOT_THST_EXPO": (0.0, REAL32),
     "OA_TYPE": (0, INT8),
     "PRX1_TYPE": (0, INT8),
     "PSC_POS_P": (0.2, REAL32),
@@ -91,8 +106,8 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "RTL_SPEED": (0.0, REAL32),
     "SCHED_LOOP_RATE": (50, INT16),
     **{f"SERIAL{port}_PROTOCOL": (2, INT8) for port in range(8)},
-    "SERVO1_FUNCTION": (73, INT16),
-    "SERVO3_FUNCTION": (74, INT16),
+    **{f"SERVO{n}_FUNCTION": ({1: 73, 3: 74}.get(n, 0), INT16) for n in range(1, OUTPUTS + 1)},
+    **{f"SERVO{n}_REVERSED": (0, INT8) for n in range(1, OUTPUTS + 1)},
     "SIM_BATT_CAP_AH": (0.0, REAL32),
     "SIM_BATT_VOLTAGE": (12.6, REAL32),
     "SRTL_ACCURACY": (2.0, REAL32),
@@ -114,10 +129,15 @@ LIMITS = {INT8: (-128.0, 127.0), INT16: (-32768.0, 32767.0), INT32: (-(2.0**31),
 class Parameters:
     """The parameter table: read by name or index, set with the firmware's rounding of integers."""
 
-    def __init__(self, changes: Mapping[str, float] | None = None) -> None:
-        """Start from the defaults; KeyError names an unknown parameter of ``changes``."""
-        self._values = {name: float(value) for name, (value, _) in DEFAULTS.items()}
-        self._names = list(DEFAULTS)
+    def __init__(self, changes: Mapping[str, float] | None = None, kept: Mapping[str, int] | None = None) -> None:
+        """Start from the defaults, with ``changes``.
+
+        ``kept``: types of names that are not simulated: they can be read and set, and change nothing. KeyError names a parameter
+        of ``changes`` that is neither.
+        """
+        self._types = {name: kind for name, (_, kind) in DEFAULTS.items()} | dict(kept or {})
+        self._values = {name: float(value) for name, (value, _) in DEFAULTS.items()} | dict.fromkeys(kept or (), 0.0)
+        self._names = list(self._types)
         for name, value in (changes or {}).items():
             if not self.set(name, value):
                 raise KeyError(f"the simulated rover has no parameter {name}")
@@ -144,13 +164,13 @@ class Parameters:
 
     def type_of(self, name: str) -> int:
         """MAV_PARAM_TYPE of a known parameter."""
-        return DEFAULTS[name][1]
+        return self._types[name]
 
     def set(self, name: str, value: float) -> bool:
         """Change a parameter; False if there is none of this name or the value is no number."""
         if name not in self._values or not math.isfinite(value):
             return False
-        limits = LIMITS.get(DEFAULTS[name][1])
+        limits = LIMITS.get(self._types[name])
         if limits is not None:
             value = min(max(float(round(value)), limits[0]), limits[1])
         self._values[name] = float(value)

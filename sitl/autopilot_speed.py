@@ -1,4 +1,4 @@
-"""Compiled speed and turn-rate controllers, from a wish to motor outputs (behaviour of AR_AttitudeControl, AP_MotorsUGV)."""
+"""Compiled speed and turn-rate controllers, from a wish to throttle and steering (behaviour of AR_AttitudeControl, AC_PID)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 from numba import njit
 
-from sitl.control import GROUND_STEERING, LOOP_S
+from sitl.control import LOOP_S
 from sitl.shaping import limited
 
 GRAVITY_M_S2 = 9.80665
@@ -62,6 +62,21 @@ def integrated(integral: float, error: float, gain: float, limit: float, saturat
 
 
 @njit(cache=True, nogil=True)
+def filtered(
+    before: tuple[float, float, float], target: float, actual: float, fresh: int,
+    target_hz: float, error_hz: float, slope_hz: float,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Target, error and the error's slope, each low-passed (AC_PID's FLTT, FLTE and FLTD); ``before``: the same a loop ago."""
+    if fresh:
+        return target, target - actual, 0.0
+    if target_hz > 0.0:
+        target = before[0] + filter_share(target_hz) * (target - before[0])
+    error = before[1] + filter_share(error_hz) * (target - actual - before[1])
+    slope = before[2] + filter_share(slope_hz) * ((error - before[1]) / LOOP_S - before[2])
+    return target, error, slope
+
+
+@njit(cache=True, nogil=True)
 def run_speed(control: Any, tuning: Any, estimate: Any, speed: float) -> None:
     """Set the throttle for a wished speed."""
     actual = forward_speed(estimate)
@@ -74,16 +89,21 @@ def run_speed(control: Any, tuning: Any, estimate: Any, speed: float) -> None:
     base = 0.0
     if tuning.cruise_speed > 0.0 and tuning.cruise_throttle > 0.0:
         base = control.desired_speed * tuning.cruise_throttle * 0.01 / tuning.cruise_speed
-    error = control.desired_speed - actual
-    if control.speed_error_fresh:
-        control.speed_error = error
-        control.speed_error_fresh = 0
-    else:
-        control.speed_error += filter_share(tuning.speed_filter_hz) * (error - control.speed_error)
+    control.speed_target, control.speed_error, control.speed_slope = filtered(
+        (control.speed_target, control.speed_error, control.speed_slope), control.desired_speed, actual,
+        control.speed_error_fresh, tuning.speed_target_hz, tuning.speed_filter_hz, tuning.speed_slope_hz,
+    )  # fmt: skip
+    control.speed_error_fresh = 0
+    saturated = 1 if control.throttle_limited or control.throttle_withheld else 0
     control.speed_integral = integrated(
-        control.speed_integral, control.speed_error, tuning.speed_i, tuning.speed_imax, control.throttle_limited
+        control.speed_integral, control.speed_error, tuning.speed_i, tuning.speed_imax, saturated
     )
-    control.throttle = control.speed_error * tuning.speed_p + control.speed_integral + base
+    throttle = control.speed_error * tuning.speed_p + control.speed_integral + base
+    throttle += control.speed_slope * tuning.speed_d + control.speed_target * tuning.speed_ff
+    # Without ATC_BRAKE the motors never push against the way the rover is to go.
+    against = throttle <= 0.0 if control.desired_speed >= 0.0 else throttle >= 0.0
+    control.throttle_withheld = 1 if tuning.brake == 0.0 and against else 0
+    control.throttle = 0.0 if control.throttle_withheld else throttle
 
 
 @njit(cache=True, nogil=True)
@@ -132,64 +152,14 @@ def run_steering(control: Any, tuning: Any, estimate: Any, rate: float) -> None:
     side = rate_of_lateral(tuning.turn_max_g * GRAVITY_M_S2, abs(forward_speed(estimate)))
     rate = limited(rate, max(side, math.radians(1.0)))
     control.desired_turn_rate = rate
-    error = rate - estimate.yaw_rate_rad_s
-    if control.steer_error_fresh:
-        control.steer_error = error
-        control.steer_error_fresh = 0
-    else:
-        control.steer_error += filter_share(tuning.steer_filter_hz) * (error - control.steer_error)
+    control.steer_target, control.steer_error, control.steer_slope = filtered(
+        (control.steer_target, control.steer_error, control.steer_slope), rate, estimate.yaw_rate_rad_s,
+        control.steer_error_fresh, tuning.steer_target_hz, tuning.steer_filter_hz, tuning.steer_slope_hz,
+    )  # fmt: skip
+    control.steer_error_fresh = 0
     saturated = 1 if control.left_limited or control.right_limited else 0
     control.steer_integral = integrated(
         control.steer_integral, control.steer_error, tuning.steer_i, tuning.steer_imax, saturated
     )
-    control.steering = control.steer_error * tuning.steer_p + control.steer_integral + rate * tuning.steer_ff
-
-
-@njit(cache=True, nogil=True)
-def has_steered_wheels(tuning: Any) -> bool:
-    """Whether the servo outputs are those of a rover with Ackermann steering, which cannot turn on the spot."""
-    return bool(tuning.steering_function == GROUND_STEERING)
-
-
-@njit(cache=True, nogil=True)
-def run_wheels(control: Any, tuning: Any, speed: float, throttle: float, steering: float) -> None:
-    """Outputs for steered wheels: the faster, the less steering; the other way round when rolling backwards.
-
-    Up to MOT_SPD_SCA_BASE steering is not scaled, and counts as limited, so that its integral does not wind up.
-    """
-    fast = tuning.steering_base_m_s > 0.0 and abs(speed) > tuning.steering_base_m_s
-    control.left_limited = 1 if not fast or steering <= -1.0 else 0
-    control.right_limited = 1 if not fast or steering >= 1.0 else 0
-    control.throttle_limited = 1 if abs(throttle) >= 1.0 else 0
-    control.throttle_before = throttle
-    if fast:
-        steering *= tuning.steering_base_m_s / abs(speed)
-    control.servo_1 = -steering if speed < 0.0 else steering
-    control.servo_3 = throttle
-
-
-@njit(cache=True, nogil=True)
-def run_motors(control: Any, tuning: Any, estimate: Any) -> None:
-    """Mix throttle and steering to the two sides; what does not fit is scaled down evenly."""
-    throttle = control.throttle
-    if tuning.slew_rate > 0.0:
-        change = max(tuning.slew_rate * LOOP_S, 1.0) * 0.01
-        throttle = control.throttle_before + limited(throttle - control.throttle_before, change)
-    throttle = limited(throttle, 1.0)
-    steering = limited(control.steering, 1.0)
-    if not control.armed:
-        control.servo_1 = control.servo_3 = control.throttle_before = 0.0
-        control.left_limited = control.right_limited = control.throttle_limited = 1
-        return
-    if has_steered_wheels(tuning):
-        run_wheels(control, tuning, forward_speed(estimate), throttle, steering)
-        return
-    # The firmware lets a rover turn on the spot, but not faster than its throttle leaves room for.
-    total = abs(throttle) + abs(steering)
-    scale = 1.0 / total if total > 1.0 else 1.0
-    control.left_limited = 1 if steering < 0.0 and (scale < 1.0 or steering <= -1.0) else 0
-    control.right_limited = 1 if steering > 0.0 and (scale < 1.0 or steering >= 1.0) else 0
-    control.throttle_limited = 1 if scale < 1.0 or abs(throttle) >= 1.0 else 0
-    control.throttle_before = throttle
-    control.servo_1 = scale * (throttle + steering)
-    control.servo_3 = scale * (throttle - steering)
+    steering = control.steer_error * tuning.steer_p + control.steer_integral + control.steer_target * tuning.steer_ff
+    control.steering = steering + control.steer_slope * tuning.steer_d

@@ -37,12 +37,19 @@ def _ms(vehicle: Vehicle) -> int:
     return vehicle.time_us // 1000
 
 
+GROUND_ROVER, SURFACE_BOAT = 10, 11
+"""MAV_TYPE."""
+BOAT = 2
+"""FRAME_CLASS."""
+
+
 def heartbeat(vehicle: Vehicle) -> list[Any]:
-    """HEARTBEAT: a ground rover, ArduPilot."""
+    """HEARTBEAT: a ground rover, or a boat if FRAME_CLASS says so; ArduPilot."""
     starting = vehicle.time_s < 1.0
     mode = Mode.INITIALISING if starting else vehicle.mode
     status = CALIBRATING if starting else STANDBY if mode == Mode.HOLD else ACTIVE
-    return [mavlink.MAVLink_heartbeat_message(10, 3, base_mode(vehicle), int(mode), status, 3)]
+    kind = SURFACE_BOAT if int(vehicle.parameters["FRAME_CLASS"]) == BOAT else GROUND_ROVER
+    return [mavlink.MAVLink_heartbeat_message(kind, 3, base_mode(vehicle), int(mode), status, 3)]
 
 
 def _attitude(vehicle: Vehicle) -> list[Any]:

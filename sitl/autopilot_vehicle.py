@@ -120,14 +120,15 @@ class Vehicle:
         sensing: RangeSensing,
         parameters: Mapping[str, float],
         storage: Storage | None = None,
+        kept: Mapping[str, int] | None = None,
     ) -> None:
         """``origin``: where it boots, 1e-7 degree; ``origin_m``: the same place in the world frame.
 
-        ``storage``: missions and fences kept over a reboot.
+        ``storage``: missions and fences kept over a reboot; ``kept``: parameters without effect, and their types.
         """
         self.rover = rover
         self.sensing = sensing
-        self.parameters = Parameters(parameters)
+        self.parameters = Parameters(parameters, kept)
         self.estimate: Record = new_estimate()
         self.control: Record = new_control()
         self.tuning: Record = new_tuning(self.parameters.as_dict())

@@ -6,6 +6,7 @@ Each is an array of one record, so that compiled code changes it in place.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,12 @@ GROUND_STEERING, THROTTLE = 26, 70
 """SERVO1_FUNCTION and SERVO3_FUNCTION of a rover with steered wheels."""
 THROTTLE_LEFT, THROTTLE_RIGHT = 73, 74
 """The same of a skid rover."""
+
+THROTTLE_LEFT, THROTTLE_RIGHT = 73, 74
+"""The same of a rover with skid steering."""
+
+OUTPUTS = 16
+"""How many outputs, SERVOn_..., an autopilot has; the plant is wired to 1 and 3."""
 
 NEVER = -1_000_000
 """Tick of something that has not happened."""
@@ -49,7 +56,8 @@ CONTROL = np.dtype(
             "tick", "armed", "task", "reversed", "fresh_target", "reached", "arrived", "timed_out", "have_target",
             "target_tick", "nav_tick", "speed_change_tick", "pivoting", "pivot_done_tick", "place_tick",
             "place_valid", "speed_error_fresh", "steer_error_fresh", "vel_error_fresh", "speed_tick", "stop_tick",
-            "steer_tick", "left_limited", "right_limited", "throttle_limited", "fast", "corner", "halts", "on_circle",
+            "steer_tick", "left_limited", "right_limited", "throttle_limited",
+            "throttle_withheld", "fast", "corner", "halts", "on_circle",
         )
     ]
     + [
@@ -59,8 +67,8 @@ CONTROL = np.dtype(
             "base_speed", "speed_max", "accel_max", "jerk_max",
             "shaped_n", "shaped_e", "shaped_vn", "shaped_ve", "shaped_an", "shaped_ae", "vel_error_n", "vel_error_e",
             "nav_speed", "nav_turn_rate",
-            "desired_speed", "speed_error", "speed_integral",
-            "desired_turn_rate", "steer_error", "steer_integral",
+            "desired_speed", "speed_target", "speed_error", "speed_slope", "speed_integral",
+            "desired_turn_rate", "steer_target", "steer_error", "steer_slope", "steer_integral",
             "throttle", "throttle_before", "steering", "servo_1", "servo_3", "room_m",
             "stick_steering", "stick_throttle", "amps", "used_mah", "used_wh", "rest_v",
             "from_n", "from_e", "pace", "circle_radius", "circle_turned", "circle_angle", "circle_speed",
@@ -93,11 +101,19 @@ TUNING_NAMES = {
     "steer_p": "ATC_STR_RAT_P",
     "steer_i": "ATC_STR_RAT_I",
     "steer_imax": "ATC_STR_RAT_IMAX",
+    "steer_d": "ATC_STR_RAT_D",
+    "steer_target_hz": "ATC_STR_RAT_FLTT",
     "steer_filter_hz": "ATC_STR_RAT_FLTE",
+    "steer_slope_hz": "ATC_STR_RAT_FLTD",
     "speed_p": "ATC_SPEED_P",
     "speed_i": "ATC_SPEED_I",
     "speed_imax": "ATC_SPEED_IMAX",
+    "speed_d": "ATC_SPEED_D",
+    "speed_ff": "ATC_SPEED_FF",
+    "speed_target_hz": "ATC_SPEED_FLTT",
     "speed_filter_hz": "ATC_SPEED_FLTE",
+    "speed_slope_hz": "ATC_SPEED_FLTD",
+    "brake": "ATC_BRAKE",
     "stop_speed": "ATC_STOP_SPEED",
     "pos_p": "PSC_POS_P",
     "vel_p": "PSC_VEL_P",
@@ -109,7 +125,11 @@ TUNING_NAMES = {
     "guided_options": "GUID_OPTIONS",
     "avoid": "AVOID_ENABLE",
     "avoid_margin_m": "AVOID_MARGIN",
-    "steering_function": "SERVO1_FUNCTION",
+    "servo_1": "SERVO1_FUNCTION",
+    "servo_3": "SERVO3_FUNCTION",
+    "thrust_expo": "MOT_THST_EXPO",
+    "asymmetry": "MOT_THST_ASYM",
+    "mix": "MOT_STR_THR_MIX",
     "turn_radius_m": "TURN_RADIUS",
     "steering_base_m_s": "MOT_SPD_SCA_BASE",
 }
@@ -118,7 +138,10 @@ TUNING_NAMES = {
 LEAST = {"turn_max_g": 0.1, "pos_p": 0.001}
 """What the controllers divide by is never less, whatever the parameter says (0.1 g is the firmware's own limit)."""
 
-TUNING = np.dtype([(name, "f8") for name in TUNING_NAMES])
+DERIVED = ("skids", "servo_1_sign", "servo_3_sign", "throttle_min", "throttle_max")
+"""Fields that take more than one parameter, or other units; ``skids`` is 1 with both motors of a skid rover on outputs."""
+
+TUNING = np.dtype([(name, "f8") for name in (*TUNING_NAMES, *DERIVED)])
 
 
 def new_estimate() -> Record:
@@ -143,4 +166,20 @@ def new_tuning(parameters: dict[str, float]) -> Record:
     tuning = np.zeros(1, dtype=TUNING)
     for field, parameter in TUNING_NAMES.items():
         tuning[field] = max(parameters[parameter], LEAST.get(field, -math.inf))
+    tuning["skids"] = 1.0 if is_skid(parameters) else 0.0
+    for number in (1, 3):
+        tuning[f"servo_{number}_sign"] = -1.0 if parameters[f"SERVO{number}_REVERSED"] else 1.0
+    most = min(max(parameters["MOT_THR_MAX"], 5.0), 100.0)
+    tuning["throttle_max"] = most / 100.0
+    tuning["throttle_min"] = min(max(parameters["MOT_THR_MIN"], 0.0), 20.0, most) / 100.0
     return tuning
+
+
+def functions_of(parameters: Mapping[str, float]) -> set[int]:
+    """The SERVOn_FUNCTION that any output has."""
+    return {int(parameters.get(f"SERVO{number}_FUNCTION", 0.0)) for number in range(1, OUTPUTS + 1)}
+
+
+def is_skid(parameters: Mapping[str, float]) -> bool:
+    """Whether these parameters are of a rover with skid steering: both of its motors have an output."""
+    return {THROTTLE_LEFT, THROTTLE_RIGHT} <= functions_of(parameters)

@@ -47,7 +47,7 @@ class LockstepClock:
         self._companion_end.write(self._vehicle_end.take())
         if self._vehicle_end.dropped:
             # The autopilot has rebooted: whoever holds the line opens it again at once.
-            self._vehicle_end = self._simulator.connect()
+            self._vehicle_end = self._simulator.connect(name="companion")
         self._now_s = time_s
 
 
@@ -116,7 +116,7 @@ class Drive:
         self.simulator = self.scenario.simulator(self.seed)
         self.report.compile_time_s = stopwatch_s() - began_s
         near, far = MemoryLink.pair()
-        clock = LockstepClock(self.simulator, self.simulator.connect(), far)
+        clock = LockstepClock(self.simulator, self.simulator.connect(name="companion"), far)
         codec = Codec(self.settings.link)
         autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder)
         self.companion = Companion(

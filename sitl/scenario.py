@@ -10,8 +10,10 @@ from companion.frames import GeoPoint
 from companion.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
+from sitl.autopilot_params import DEFAULTS, REAL32
 from sitl.faults import FaultPlan, SensorFault
 from sitl.motion import NoiseSettings
+from sitl.paramfile import ParameterFile, load_parameters
 from sitl.physics import Physics
 from sitl.sensors import SensorSuite, suite_named
 from sitl.simulator import SimStart, Simulator, steered_wheels
@@ -42,6 +44,10 @@ class Scenario:
     turning_radius_m: float = 0.0
     """0: skid steering; else Ackermann."""
     faults: FaultPlan | None = None
+    kept: dict[str, int] = field(default_factory=dict)
+    """Types of those parameters that are not simulated, only kept."""
+    notes: tuple[str, ...] = ()
+    """What people should know about it, a line each."""
 
     def simulator(self, seed: int, noise: bool | NoiseSettings = True) -> Simulator:
         """A rover that has just been switched on."""
@@ -55,6 +61,7 @@ class Scenario:
             noise,
             turning_radius_m=self.turning_radius_m,
             faults=self.faults,
+            kept=self.kept,
         )
 
     def physics(self, seed: int, *, scans: bool = False) -> Physics:
@@ -94,10 +101,42 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     start = SimStart(*start_m, math.radians(spec.heading_deg), _home(mission, spec))
     parameters = {"WP_SPEED": mission.rover.cruise_speed_m_s, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
     turning_radius_m = _turning_radius_m(mission, spec, name)
-    if turning_radius_m > 0.0:
-        parameters |= steered_wheels(turning_radius_m)
     sensors = spec.sensors if isinstance(spec.sensors, str) else described
-    return Scenario(world, start, sensors, radius_m, parameters, turning_radius_m)
+    scenario = Scenario(world, start, sensors, radius_m, parameters)
+    if spec.parameters is None:
+        return _steered(scenario, turning_radius_m)
+    file = load_parameters(spec.parameters)
+    scenario = _steered(scenario, _fitting_radius_m(turning_radius_m, spec, file))
+    kept = {name: file.types.get(name, REAL32) for name in file.unknown}
+    parameters = {**scenario.parameters, **file.known, **file.unknown}
+    return replace(scenario, parameters=parameters, kept=kept, notes=file.notes(scenario.turning_radius_m > 0.0))
+
+
+def _steered(scenario: Scenario, turning_radius_m: float) -> Scenario:
+    """With steered wheels, or unchanged for radius 0."""
+    if turning_radius_m <= 0.0:
+        return scenario
+    parameters = scenario.parameters | steered_wheels(turning_radius_m)
+    return replace(scenario, parameters=parameters, turning_radius_m=turning_radius_m)
+
+
+def _fitting_radius_m(radius_m: float, spec: SitlSpec, file: ParameterFile) -> float:
+    """The plant's turning radius, where the parameter file says what kind of rover it is for. Raises ScenarioError."""
+    if file.is_skid:
+        if spec.steering == "ackermann":
+            raise ScenarioError(
+                f"{file.path}: SERVOn_FUNCTION are of a rover with skid steering, the mission says steering "
+                "ackermann; take that out, or another file"
+            )
+        return 0.0
+    if file.is_steered and radius_m <= 0.0:
+        if spec.steering == "skid":
+            raise ScenarioError(
+                f"{file.path}: SERVOn_FUNCTION are of a rover with steered wheels, the mission says steering "
+                "skid; take that out, or another file"
+            )
+        return file.values.get("TURN_RADIUS", DEFAULTS["TURN_RADIUS"][0])
+    return radius_m
 
 
 def _turning_radius_m(mission: Mission, spec: SitlSpec, name: str) -> float:
@@ -169,3 +208,8 @@ def with_sensors(mission: Mission, sensors: str) -> Mission:
     except ValueError as error:
         raise ScenarioError(f"--sensors: {error}") from error
     return replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=given))
+
+
+def with_parameter_file(mission: Mission, path: Path) -> Mission:
+    """The same mission with the parameters of a file."""
+    return replace(mission, sitl=replace(mission.sitl or SitlSpec(), parameters=path))

@@ -21,8 +21,12 @@ def serve(
     speedup: float,
     running: Callable[[], bool],
     news: News | None = None,
+    observe: Callable[[], None] = lambda: None,
 ) -> None:
-    """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no; ``news`` tells of it."""
+    """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no.
+
+    ``news`` tells of it; ``observe`` is called in every round, and must not take long.
+    """
     news = news or News()
     began_s = now_s() - simulator.time_s / speedup
     while running():
@@ -34,6 +38,7 @@ def serve(
         simulator.advance_to_s(goal_s)
         _exchange(simulator, endpoints, now_s())
         news.look(simulator)
+        observe()
         wait_s = (simulator.time_s + STEP_S) / speedup + began_s - now_s()
         if wait_s > 0.0:
             select.select([one for endpoint in endpoints for one in endpoint.descriptors()], [], [], wait_s)

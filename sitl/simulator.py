@@ -24,6 +24,7 @@ from sitl.control import GROUND_STEERING, LOOP_HZ, THROTTLE
 from sitl.fault_player import FaultPlayer
 from sitl.faults import FaultPlan
 from sitl.link_faults import Way
+from sitl.meter import PacketCounter
 from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.rover import new_rover
 from sitl.sensors import RangeSensing, SensorSuite, suite_named
@@ -103,26 +104,32 @@ def steered_wheels(turning_radius_m: float) -> dict[str, float]:
 class SimLink:
     """One connection to the vehicle and to the components on its network."""
 
-    def __init__(self, channel: Channel, number: int) -> None:
+    def __init__(self, channel: Channel, number: int, name: str = "") -> None:
         """Use ``Simulator.connect``."""
         self.channel = channel
         self.number = number
+        self.name = name
         self.inbox = bytearray()
         self.dropped = False
         self.ways: tuple[Way, Way] | None = None
         """Where packets are under way to the vehicle and from it, on links with faults."""
+        self.heard = PacketCounter()
+        self.sent = PacketCounter()
         self._arrived = bytearray()
 
     def receive(self, data: bytes) -> None:
         """Bytes on their way to the vehicle; it handles them with its next main loop."""
         self.inbox += data
+        self.heard.feed(data)
 
     def take(self) -> bytes:
         """What was sent to this link since the last call."""
         if self.ways is None:
-            return self.channel.take()
-        data = bytes(self._arrived)
-        self._arrived.clear()
+            data = self.channel.take()
+        else:
+            data = bytes(self._arrived)
+            self._arrived.clear()
+        self.sent.feed(data)
         return data
 
     def pass_in(self, player: FaultPlayer, now_s: float) -> bytes:
@@ -156,8 +163,11 @@ class Simulator:
         lidar_rate_hz: float | None = None,
         turning_radius_m: float = 0.0,
         faults: FaultPlan | None = None,
+        kept: Mapping[str, int] | None = None,
     ) -> None:
         """``sensors`` is a suite or its name; ``parameters`` are ArduRover's, other than the defaults.
+
+        ``kept``: those among them that are not simulated, and their types: they can be read and set.
 
         ``turning_radius_m``: 0 for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
         (``steered_wheels``), as on a real rover.
@@ -174,6 +184,7 @@ class Simulator:
         self.world = world
         self._start = start
         self._parameters = dict(parameters or {})
+        self._kept = dict(kept or {})
         self._storage = Storage()
         self._noise = settings.as_array()
         self._rng = np.random.default_rng(motion_seed)
@@ -198,7 +209,7 @@ class Simulator:
         rover = self._rover[0]
         here = (float(rover["north_m"]), float(rover["east_m"]))
         origin = geodesy.moved(self._geo_start, here[0] - self._start.north_m, here[1] - self._start.east_m)
-        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters, self._storage)
+        self._vehicle = Vehicle(self._rover, origin, here, self._sensing, self._parameters, self._storage, self._kept)
         self._vehicle.control["tick"] = 0
         self._vehicle.estimate["heading_rad"] = rover["heading_rad"]
         self._vehicle.signing.restore(self._signing_key)
@@ -251,13 +262,29 @@ class Simulator:
         room_m = min(stands_m, self.world.mover_gap_m(*here, self.time_s)[0])
         return max(room_m - float(rover["radius_m"]), 0.0)
 
-    def connect(self, port: int = SECURE_PORT) -> SimLink:
+    @property
+    def vehicle(self) -> Vehicle:
+        """The autopilot's own state, to be looked at."""
+        return self._vehicle
+
+    @property
+    def rover_radius_m(self) -> float:
+        """Radius of the rover's circle."""
+        return float(self._rover[0]["radius_m"])
+
+    @property
+    def links(self) -> tuple[SimLink, ...]:
+        """The links that are open."""
+        return tuple(self._links)
+
+    def connect(self, port: int = SECURE_PORT, name: str = "") -> SimLink:
         """A new link to the vehicle, through its serial port ``port`` (SERIALn); several may be open at once.
 
-        It gets the lowest number, from 1, that no other has.
+        It gets the lowest number, from 1, that no other has; ``name`` is for people.
         """
         taken = {one.number for one in self._links}
-        link = SimLink(self._autopilot.open_channel(port), next(n for n in range(1, len(taken) + 2) if n not in taken))
+        number = next(n for n in range(1, len(taken) + 2) if n not in taken)
+        link = SimLink(self._autopilot.open_channel(port), number, name)
         if self._player.touches_links:
             link.ways = (Way(link.number, "to_vehicle"), Way(link.number, "from_vehicle"))
         self._links.append(link)

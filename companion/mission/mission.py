@@ -119,6 +119,7 @@ class SitlSpec:
     ``world``: map file; ``resolution_m``: its field size where it has none of its own (None: the mission's);
     ``start``: the field of the world where the rover stands; heading clockwise from north;
     ``home``: where on earth that is (None: the planned home, else the first target in degrees, else somewhere);
+    ``parameters``: a file with ArduRover's parameters;
     ``steering``: skid or ackermann (None: ackermann if the rover has a turning radius).
     """
 
@@ -130,6 +131,7 @@ class SitlSpec:
     home: GeoPoint | None = None
     movers: tuple[MoverSpec, ...] = ()
     steering: str | None = None
+    parameters: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

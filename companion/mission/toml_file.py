@@ -192,6 +192,7 @@ class SitlTable(Table):
     home: GeoTable | None = None
     movers: Annotated[list[MoverTable], Field(max_length=100, default_factory=list)]
     steering: Literal["skid", "ackermann"] | None = None
+    parameters: FileName | None = None
 
 
 class MissionTable(Table):
@@ -254,6 +255,7 @@ def _sitl(table: SitlTable, path: Path) -> SitlSpec:
         home=None if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
         movers=tuple(_named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)),
         steering=table.steering,
+        parameters=path.parent / table.parameters if table.parameters else None,
     )
 
 

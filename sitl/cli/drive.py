@@ -20,14 +20,21 @@ from companion.mission.mission import Mission, MissionError
 from companion.provenance import made_with
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
+from sitl.cli.drive_view import run_with_view
+from sitl.cli.viewer import ViewError, terminal
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
+from sitl.paramfile import ParameterFileError
 from sitl.picture import save_picture
-from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_sensors
+from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
 from sitl.worldfile import ground_grid
 
 EXIT_BAD_INPUT, EXIT_STOPPED = 2, 130
+BAD_INPUT = (
+    SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
+    ParameterFileError,
+)  # fmt: skip
 LINE_EVERY_S = 60.0
 
 
@@ -56,8 +63,10 @@ def drive(
     prior: Annotated[
         bool, typer.Option("--prior", help="With --world: the companion knows the map from the start.")
     ] = False,
+    params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
     faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
     time_limit_s: Annotated[float, typer.Option(min=1.0, help="Simulated seconds before giving up.")] = 3600.0,
+    view: Annotated[bool, typer.Option("--view", help="Show map, rover and decisions on this terminal.")] = False,
 ) -> None:
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
@@ -68,12 +77,18 @@ def drive(
     recorder: Recorder | NullRecorder = NullRecorder()
     run: Drive | None = None
     try:
+        screen = terminal() if view else None
         settings = usable_settings(settings_file)
         mission = _mission(mission_file, world, start, target, resolution_m, top_left=top_left, prior=prior)
         if sensors is not None:
             mission = with_sensors(mission, sensors)
+        if params is not None:
+            mission = with_parameter_file(mission, params)
         _refuse_blind(mission)
         scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
+        _refuse_untold(mission, scenario)
+        for note in scenario.notes:
+            typer.echo(note, err=True)
         if record is not None:
             recorder = Recorder(record, mission_file, settings, seed)
         picture(image)
@@ -82,8 +97,8 @@ def drive(
         writable(map_stem, ".yaml")
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
-        report = _run_with_progress(run, console)
-    except (SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError) as error:
+        report = _run_with_progress(run, console) if screen is None else run_with_view(run, screen)
+    except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     except KeyboardInterrupt:
@@ -136,6 +151,15 @@ def _refuse_blind(mission: Mission) -> None:
     if mission.sitl is not None and str(mission.sitl.sensors) == "none":
         raise MissionError(
             "sensors none: the companion does not drive without range data; none is for rover-sitl serve"
+        )
+
+
+def _refuse_untold(mission: Mission, scenario: Scenario) -> None:
+    """The companion must know that it cannot turn on the spot."""
+    if scenario.turning_radius_m > 0.0 and mission.rover.turning_radius_m <= 0.0:
+        raise MissionError(
+            f"{mission.source or mission.name}: the parameters are of a rover with steered wheels: give the mission "
+            f"[rover] turning_radius_m = {scenario.turning_radius_m:g}, or the companion would turn it on the spot"
         )
 
 

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import contextlib
 import signal
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from companion.clock import WallClock
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.endpoints import FORMS, Endpoint, ListenError, open_endpoint
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.news import News
-from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_sensors
+from sitl.paramfile import ParameterFileError
+from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
 from sitl.server import serve as run_server
+from sitl.watching import Watching
 
 DEFAULT_LISTEN = ["udpout:127.0.0.1:14550", "tcp:127.0.0.1:5760"]
 BAD_INPUT = 2
@@ -37,34 +42,42 @@ def serve(
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
     sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
+    params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
     faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
+    view: Annotated[bool, typer.Option("--view", help="Show map, rover and rates on this terminal.")] = False,
 ) -> None:
     """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C.
 
     One line tells of each client that comes or goes, and of each collision.
     """
     clock = WallClock()
-    news = News() if quiet else News(say, clock.now_s)
     endpoints: list[Endpoint] = []
     try:
+        console = terminal() if view else None
         mission = load_mission(mission_file)
         mission = mission if sensors is None else with_sensors(mission, sensors)
+        mission = mission if params is None else with_parameter_file(mission, params)
         scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
+        for note in scenario.notes:
+            typer.echo(note, err=True)
         simulator = scenario.simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
         simulator.advance_to_s(0.02)
+        watching = Watching(mission.name, simulator)
+        tell = watching.tell if view else say
+        news = News() if quiet else News(tell, clock.now_s)
         for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
             endpoints.append(open_endpoint(url, simulator, news, serial_port))
-    except (MissionError, MapError, ScenarioError, ListenError, FaultFileError) as error:
+    except (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ParameterFileError, ViewError) as error:
         for endpoint in endpoints:
             endpoint.close()
         typer.echo(str(error), err=True)
         raise typer.Exit(BAD_INPUT) from error
     if not quiet:
         for url in listen or DEFAULT_LISTEN:
-            say(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
+            tell(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
         if not listen:
-            say("a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760")
+            tell("a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760")
     stop: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:
@@ -73,12 +86,29 @@ def serve(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, on_signal)
     try:
-        run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, news)
+        with _viewed(console, watching, clock) as observe:
+            run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, news, observe)
     finally:
         for endpoint in endpoints:
             endpoint.close()
     if not quiet:
-        say(f"stopped after {simulator.time_s:.0f} s of the rover's time")
+        tell(f"stopped after {simulator.time_s:.0f} s of the rover's time")
+
+
+@contextlib.contextmanager
+def _viewed(console: Console | None, watching: Watching, clock: WallClock) -> Iterator[Callable[[], None]]:
+    """What the server calls in each round: nothing, or a new picture when one is due."""
+    if console is None:
+        yield lambda: None
+        return
+    with Viewer(console) as viewer:
+
+        def observe() -> None:
+            now_s = clock.now_s()
+            if viewer.is_due(now_s):
+                viewer.show(watching.view(now_s))
+
+        yield observe
 
 
 def say(line: str) -> None:

@@ -142,7 +142,7 @@ class SerialEndpoint:
         """The line is open."""
         self._line = line
         self._serial_port = serial_port
-        self._link: SimLink = simulator.connect(serial_port)
+        self._link: SimLink = simulator.connect(serial_port, f"serial line {serial_port}")
         self._begun = b""
 
     def descriptors(self) -> list[int]:
@@ -153,7 +153,7 @@ class SerialEndpoint:
     def exchange(self, simulator: Simulator, now_s: float) -> None:
         """Bytes in, whole packets out."""
         if self._link.dropped:
-            self._link = simulator.connect(self._serial_port)
+            self._link = simulator.connect(self._serial_port, f"serial line {self._serial_port}")
         queued = self._link.take()
         try:
             if self._line.descriptor() is None:

@@ -83,8 +83,9 @@ class TcpServer:
                 caller, place = self._socket.accept()
                 caller.setblocking(False)
                 caller.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                link = simulator.connect(self._serial_port)
-                self._clients.append(TcpClient(caller, link, place_text(place)))
+                name = place_text(place)
+                link = simulator.connect(self._serial_port, f"tcp:{name}")
+                self._clients.append(TcpClient(caller, link, name))
                 self._news.came(self._clients[-1].name, self._url)
         for client in self._clients:
             client.exchange()

@@ -44,7 +44,7 @@ class UdpEndpoint:
             else:
                 address = (socket.gethostbyname(host), port)
                 self._socket.bind(("", 0))
-                self._partners[address] = Partner(simulator.connect(serial_port), 0.0)
+                self._partners[address] = Partner(simulator.connect(serial_port, f"udp:{place_text(address)}"), 0.0)
         except OSError:
             self._socket.close()
             raise
@@ -67,7 +67,7 @@ class UdpEndpoint:
         self._forget_silent(simulator, now_s)
         for address, partner in self._partners.items():
             if partner.link.dropped:
-                partner.link = simulator.connect(self._serial_port)
+                partner.link = simulator.connect(self._serial_port, f"udp:{place_text(address)}")
             for piece in datagrams(partner.link.take()):
                 with contextlib.suppress(OSError):
                     self._socket.sendto(piece, address)
@@ -80,7 +80,8 @@ class UdpEndpoint:
         elif sender not in self._partners:
             if len(self._partners) >= MOST_PARTNERS:
                 self._forget(min(self._partners, key=lambda address: self._partners[address].heard_s), simulator)
-            self._partners[sender] = Partner(simulator.connect(self._serial_port), now_s)
+            link = simulator.connect(self._serial_port, f"udp:{place_text(sender)}")
+            self._partners[sender] = Partner(link, now_s)
         self._partners[sender].heard_s = now_s
         return self._partners[sender]
 

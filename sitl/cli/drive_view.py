@@ -1,0 +1,121 @@
+"""What ``drive --view`` shows beyond the vehicle: what the companion has seen, wants, and says."""
+
+from __future__ import annotations
+
+import signal
+from dataclasses import replace
+
+from rich.console import Console
+
+from companion.app import Status
+from companion.clock import stopwatch_s
+from companion.grid import OBSTACLE
+from companion.itinerary import TargetStatus
+from companion.mapping import EvidenceMap, known_fields
+from companion.navigator import Decision, Part
+from sitl.cli.viewer import Viewer
+from sitl.lockstep import Drive, Report
+from sitl.sketch import Kind, Layer, Place, Scene
+from sitl.view import Fact, Section, View
+from sitl.watching import Watching, world_layers
+
+STATES = {
+    TargetStatus.PENDING: "pending",
+    TargetStatus.REACHED: "reached",
+    TargetStatus.UNREACHABLE: "lost",
+    TargetStatus.SKIPPED: "lost",
+}
+PARTS = {"A": "returning", "B": "exploring", "C": "new path"}
+
+
+def run_with_view(run: Drive, console: Console) -> Report:
+    """Drive to the end while a picture of it is shown; the last one stays on the terminal. SIGTERM counts as Ctrl-C."""
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        with Viewer(console) as viewer:
+            shown = DriveView(run, viewer)
+            report = run.run(shown.observe)
+            shown.finish()
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    viewer.print_last()
+    return report
+
+
+class DriveView:
+    """Shows a run in lock-step; real time is read only to know when a picture is due."""
+
+    def __init__(self, run: Drive, viewer: Viewer) -> None:
+        self._run = run
+        self._viewer = viewer
+        self._watching = Watching(run.mission.name, run.simulator)
+        self._decided: Decision | None = None
+
+    def observe(self, status: Status) -> None:
+        """A new moment of the run; drawn if the last picture is old enough."""
+        self._watching.note_track()
+        for text in status.news:
+            self._watching.tell(f"{status.time_s:.0f} s: {text}")
+        decision = status.decision
+        if decision is not None and decision is not self._decided and decision.part is not Part.EXPLORE:
+            # Going on along the path is no news: the panel says it all the time.
+            self._watching.tell(f"{status.time_s:.0f} s: {decision.reason}")
+        self._decided = decision
+        now_s = stopwatch_s()
+        if self._viewer.is_due(now_s):
+            self._viewer.show(self._view(status, now_s))
+
+    def finish(self) -> None:
+        """The last moment, which is always drawn."""
+        self._viewer.show(self._view(self._run.companion.status(), stopwatch_s()))
+
+    def _view(self, status: Status, now_s: float) -> View:
+        watching = self._watching
+        sections = (watching.vehicle_section(now_s), mission_section(status, self._run), watching.links_section())
+        return View(watching.title, self._scene(), sections, tuple(watching.news))
+
+    def _scene(self) -> Scene:
+        """The truth faintly, and over it what the companion knows."""
+        scene, simulator, start = self._watching.scene(), self._run.simulator, self._run.scenario.start
+        evidence, itinerary = self._run.companion.evidence, self._run.companion.itinerary
+        layers = world_layers(simulator.world, simulator.time_s, Kind.HIDDEN)
+        places = [place for place in scene.places if place.state == "start"]
+        if evidence is not None:
+            layers += seen_layers(evidence, start.north_m, start.east_m)
+        if itinerary is not None:
+            for target, state in zip(itinerary.targets, itinerary.statuses, strict=True):
+                north_m, east_m = target.point.north_m + start.north_m, target.point.east_m + start.east_m
+                places.append(Place(target.name, north_m, east_m, STATES[state]))
+        return replace(scene, layers=layers, places=tuple(places))
+
+
+def seen_layers(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[Layer, ...]:
+    """The companion's map, whose frame begins at this place of the world."""
+    base = evidence.base
+    corner = (base.resolution_m, base.south_west.north_m + north_m, base.south_west.east_m + east_m)
+    closed = base.weights >= OBSTACLE
+    occupied = evidence.log_odds >= evidence.settings.occupied_at
+    fine = (evidence.evidence_m, *corner[1:])
+    layers = [Layer(Kind.SEEN, known_fields(evidence), *corner), Layer(Kind.CLOSED, closed, *corner)]
+    return (*layers, Layer(Kind.WALL, occupied, *fine))
+
+
+def mission_section(status: Status, run: Drive) -> Section:
+    """What the companion is doing, where it is going, and why."""
+    companion = run.companion
+    decision = status.decision
+    goal = companion.itinerary.goal if companion.itinerary else None
+    left = ""
+    if goal is not None and status.pose is not None and status.target:
+        left = f", {status.pose.point.distance_m(goal.point):.0f} m"
+    part = f"{decision.part.value}, {PARTS[decision.part.value]}" if decision else "-"
+    searches = len(companion.driver.searcher.seconds) if companion.driver else 0
+    facts = (
+        Fact("doing", status.doing),
+        Fact("target", f"{status.target or '-'}{left}"),
+        Fact("reached", f"{status.targets_reached} of {status.targets}"),
+        Fact("part", part),
+        Fact("why", decision.reason if decision else "-"),
+        Fact("steps", f"{status.steps}, {searches} searches"),
+    )
+    return Section("Mission", facts)

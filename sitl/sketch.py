@@ -1,0 +1,204 @@
+"""A world as a small picture of square dots, north up, for a terminal: what is where, and which part of it is shown.
+
+World frame: metres north and east, as in ``sitl.world``.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+COARSEST_M = 2.5
+"""A dot is never larger: ground for which that is not enough is shown in part, round the rover."""
+FOLLOWING_M = 1.0
+"""Side of a dot when only a part is shown."""
+STEP_M = 10.0
+"""Ground without edges is shown in whole steps, so that the picture does not change its scale all the time."""
+MARGIN_M = 3.0
+
+
+class Kind(IntEnum):
+    """What a dot shows; of several things in one dot the last one of this list wins."""
+
+    NOTHING = 0
+    SEEN = 1
+    ROUGH = 2
+    SLIPPERY = 3
+    OPEN_DOOR = 4
+    TRACK = 5
+    HIDDEN = 6
+    CLOSED = 7
+    WALL = 8
+    BLACK = 9
+    GLASS = 10
+    DOOR = 11
+    MOVER = 12
+
+
+Dots = NDArray[np.uint8]
+"""Kinds, shape (rows, columns), row 0 in the north."""
+
+
+class Layer(NamedTuple):
+    """Fields of one kind: ``where[y, x]``, side of a field, and the outer south-west corner."""
+
+    kind: Kind
+    where: NDArray[np.bool_]
+    resolution_m: float
+    south_m: float
+    west_m: float
+
+
+class Disc(NamedTuple):
+    """Something round."""
+
+    north_m: float
+    east_m: float
+    radius_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A place with a name: a target, the start. ``state``: pending, reached or lost."""
+
+    name: str
+    north_m: float
+    east_m: float
+    state: str = "pending"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Scene:
+    """Everything that is drawn. ``track``: shape (n, 2), where the rover has been; ``bounds_m``: south, west, north, east, or None."""
+
+    layers: tuple[Layer, ...]
+    rover: Disc
+    heading_rad: float
+    track: NDArray[np.float64]
+    movers: tuple[Disc, ...] = ()
+    places: tuple[Place, ...] = ()
+    bounds_m: tuple[float, float, float, float] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """The part of the world that is shown: north-west corner, side of a dot, and how many dots."""
+
+    north_m: float
+    west_m: float
+    dot_m: float
+    rows: int
+    columns: int
+
+    def dot(self, north_m: float, east_m: float) -> tuple[int, int] | None:
+        """Row and column of a place, None outside."""
+        row = math.floor((self.north_m - north_m) / self.dot_m)
+        column = math.floor((east_m - self.west_m) / self.dot_m)
+        return (row, column) if 0 <= row < self.rows and 0 <= column < self.columns else None
+
+
+def frame_for(scene: Scene, rows: int, columns: int) -> Frame:
+    """All of it, if a dot then is no larger than ``COARSEST_M``; otherwise the surroundings of the rover."""
+    south_m, west_m, north_m, east_m = scene.bounds_m or _extent_m(scene)
+    dot_m = max((north_m - south_m) / rows, (east_m - west_m) / columns)
+    if dot_m <= COARSEST_M:
+        spare_n, spare_e = rows * dot_m - (north_m - south_m), columns * dot_m - (east_m - west_m)
+        return Frame(north_m + spare_n / 2.0, west_m - spare_e / 2.0, dot_m, rows, columns)
+    dot_m = FOLLOWING_M
+    middle_n = _kept_inside(scene.rover.north_m, south_m, north_m, rows * dot_m)
+    middle_e = _kept_inside(scene.rover.east_m, west_m, east_m, columns * dot_m)
+    # Whole dots, so that walls do not shimmer while the rover moves.
+    top_m = (math.floor(middle_n / dot_m) + 1 + (rows - 1) // 2) * dot_m
+    return Frame(top_m, (math.floor(middle_e / dot_m) - columns // 2) * dot_m, dot_m, rows, columns)
+
+
+def _kept_inside(middle_m: float, low_m: float, high_m: float, shown_m: float) -> float:
+    """The middle of what is shown, near the rover, but not beyond the world's edges."""
+    if high_m - low_m <= shown_m:
+        return 0.5 * (low_m + high_m)
+    return min(max(middle_m, low_m + shown_m / 2.0), high_m - shown_m / 2.0)
+
+
+def _extent_m(scene: Scene) -> tuple[float, float, float, float]:
+    """South, west, north and east of all that is there, with some room, in whole steps."""
+    discs = [(scene.rover.north_m, scene.rover.east_m), *((m.north_m, m.east_m) for m in scene.movers)]
+    discs += [(place.north_m, place.east_m) for place in scene.places]
+    points = np.concatenate([np.array(discs), scene.track.reshape(-1, 2)])
+    low, high = points.min(axis=0) - MARGIN_M, points.max(axis=0) + MARGIN_M
+    south_m, west_m = np.floor(low / STEP_M) * STEP_M
+    north_m, east_m = np.ceil(high / STEP_M) * STEP_M
+    return float(south_m), float(west_m), float(north_m), float(east_m)
+
+
+def paint(scene: Scene, frame: Frame) -> Dots:
+    """Every dot's kind."""
+    dots: Dots = np.zeros((frame.rows, frame.columns), dtype=np.uint8)
+    for layer in scene.layers:
+        here = _covered(layer, frame)
+        dots[here] = np.maximum(dots[here], layer.kind)
+    _paint_track(scene.track, frame, dots)
+    for mover in scene.movers:
+        _paint_disc(mover, frame, dots)
+    return dots
+
+
+def _covered(layer: Layer, frame: Frame) -> NDArray[np.bool_]:
+    """The dots in which any field of the layer lies; where dots are the smaller ones, those whose middle lies in one."""
+    south_m = frame.north_m - frame.rows * frame.dot_m
+    rows = _runs(south_m - layer.south_m, frame.dot_m, frame.rows, layer.resolution_m, layer.where.shape[0])
+    columns = _runs(frame.west_m - layer.west_m, frame.dot_m, frame.columns, layer.resolution_m, layer.where.shape[1])
+    covered = np.zeros((frame.rows, frame.columns), dtype=np.bool_)
+    if rows is None or columns is None:
+        return covered
+    some_rows = np.logical_or.reduceat(layer.where[: rows.end], rows.begins, axis=0)
+    some = np.logical_or.reduceat(some_rows[:, : columns.end], columns.begins, axis=1)
+    covered[np.ix_(rows.dots, columns.dots)] = some
+    return covered[::-1]
+
+
+class _Runs(NamedTuple):
+    """Along one axis: which dots have fields, the first field of each, and where the last one's fields end."""
+
+    dots: NDArray[np.intp]
+    begins: NDArray[np.intp]
+    end: int
+
+
+def _runs(offset_m: float, dot_m: float, dots: int, field_m: float, fields: int) -> _Runs | None:
+    """The fields of each dot; ``offset_m`` is where the first dot begins, counted from the first field."""
+    if dot_m < field_m:
+        begins = np.floor((offset_m + (np.arange(dots) + 0.5) * dot_m) / field_m).astype(np.intp)
+        inside = np.flatnonzero((begins >= 0) & (begins < fields))
+        # Several dots share a field: ``reduceat`` then takes just the field where a run begins.
+        return _Runs(inside, begins[inside], int(begins[inside][-1]) + 1) if inside.size else None
+    edges = np.ceil((offset_m + np.arange(dots + 1) * dot_m) / field_m - 0.5).astype(np.intp).clip(0, fields)
+    inside = np.flatnonzero(edges[1:] > edges[:-1])
+    return _Runs(inside, edges[inside], int(edges[inside[-1] + 1])) if inside.size else None
+
+
+def _paint_track(track: NDArray[np.float64], frame: Frame, dots: Dots) -> None:
+    """A line through the points, without gaps."""
+    if len(track) == 0:
+        return
+    steps = np.abs(np.diff(track, axis=0)).max(axis=1, initial=0.0) / frame.dot_m
+    along = np.concatenate(([0.0], np.cumsum(np.maximum(steps, 1e-9))))
+    fine = np.linspace(0.0, along[-1], max(len(track), math.ceil(2.0 * along[-1])))
+    rows = np.floor((frame.north_m - np.interp(fine, along, track[:, 0])) / frame.dot_m).astype(np.intp)
+    columns = np.floor((np.interp(fine, along, track[:, 1]) - frame.west_m) / frame.dot_m).astype(np.intp)
+    inside = (rows >= 0) & (rows < frame.rows) & (columns >= 0) & (columns < frame.columns)
+    here = (rows[inside], columns[inside])
+    dots[here] = np.maximum(dots[here], Kind.TRACK)
+
+
+def _paint_disc(disc: Disc, frame: Frame, dots: Dots) -> None:
+    north_m = frame.north_m - (np.arange(frame.rows) + 0.5) * frame.dot_m - disc.north_m
+    east_m = frame.west_m + (np.arange(frame.columns) + 0.5) * frame.dot_m - disc.east_m
+    dots[np.hypot(north_m[:, None], east_m[None, :]) <= disc.radius_m] = Kind.MOVER
+    middle = frame.dot(disc.north_m, disc.east_m)
+    if middle is not None:
+        dots[middle] = Kind.MOVER

@@ -1,0 +1,214 @@
+"""What ``--view`` shows: map, rover and figures, as something that rich can print. A pure function of the state.
+
+Two dots, one above the other, make one character. With colours that is an upper half block on a ground of its own; without them
+every kind has a sign of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import groupby
+from operator import itemgetter
+
+from rich.console import Group, RenderableType
+from rich.layout import Layout
+from rich.panel import Panel
+from rich.table import Table
+from rich.text import Text
+
+from sitl.sketch import Dots, Frame, Kind, Scene, frame_for, paint
+
+PANEL_COLUMNS = (32, 44)
+"""At least and at most; between them a third of the terminal."""
+NAME_COLUMNS = 11
+SMALLEST = (60, 16)
+"""Columns and rows below which there is no room for a picture."""
+
+ARROWS = "↑↗→↘↓↙←↖"
+STATE_SIGNS = {"pending": "◎", "reached": "✓", "lost": "✗", "start": "⌂"}
+STATE_STYLES = {"pending": "bold #ff5f5f", "reached": "bold #5fd75f", "lost": "bold #ffaf00", "start": "bold #5fd75f"}
+ROVER_STYLE = "bold #000000 on #ffd700"
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """How a kind of dot looks: its colour, its sign where there are none, and its name in the legend."""
+
+    colour: str
+    sign: str
+    name: str
+
+
+LOOKS = {
+    Kind.NOTHING: Look("#14161a", " ", ""),
+    Kind.SEEN: Look("#2c4034", "·", "seen free"),
+    Kind.ROUGH: Look("#6b5a2e", ":", "rough"),
+    Kind.SLIPPERY: Look("#2d5f8a", "~", "slippery"),
+    Kind.OPEN_DOOR: Look("#8a5a1e", "'", "door open"),
+    Kind.TRACK: Look("#5fafff", "•", "way"),
+    Kind.HIDDEN: Look("#4a4d55", "░", "not seen yet"),
+    Kind.CLOSED: Look("#8f6d45", "▒", "fence, known"),
+    Kind.BLACK: Look("#800080", "b", "black"),
+    Kind.GLASS: Look("#00afaf", "g", "glass"),
+    Kind.DOOR: Look("#ff8700", "+", "door closed"),
+    Kind.WALL: Look("#d7d7d7", "█", "obstacle"),
+    Kind.MOVER: Look("#d75fd7", "o", "moving"),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One line of the panel; ``alarm``: it should be seen."""
+
+    name: str
+    value: str
+    alarm: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Facts under a heading."""
+
+    title: str
+    facts: tuple[Fact, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class View:
+    """The state that is shown. ``news``: what was told, the newest last."""
+
+    title: str
+    scene: Scene
+    sections: tuple[Section, ...]
+    news: tuple[str, ...] = ()
+
+
+def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableType:
+    """The whole screen of so many characters."""
+    if columns < SMALLEST[0] or rows < SMALLEST[1]:
+        small = f"{columns} x {rows} characters are too few for a picture (at least {SMALLEST[0]} x {SMALLEST[1]})"
+        return Group(Text(small), *(_line(fact, columns) for section in view.sections for fact in section.facts))
+    layout = Layout()
+    beside = min(max(PANEL_COLUMNS[0], columns // 3), PANEL_COLUMNS[1])
+    layout.split_row(Layout(name="map"), Layout(name="panel", size=beside))
+    layout["map"].update(_map_panel(view, columns - beside - 2, rows - 3, colour=colour))
+    layout["panel"].update(Panel(_facts(view, beside - 4, rows - 2), border_style="dim"))
+    return layout
+
+
+def _map_panel(view: View, columns: int, rows: int, *, colour: bool) -> Panel:
+    """The map with its legend below, so many characters inside the border."""
+    frame = frame_for(view.scene, 2 * rows, columns)
+    dots = paint(view.scene, frame)
+    lines = map_lines(view.scene, frame, dots, colour=colour)
+    legend = _legend(dots, colour=colour)
+    legend.truncate(columns, overflow="ellipsis")
+    width_m, height_m = frame.columns * frame.dot_m, frame.rows * frame.dot_m
+    title = Text(f"{view.title}: {width_m:.0f} x {height_m:.0f} m", overflow="ellipsis", no_wrap=True)
+    return Panel(Group(*lines, legend), title=title, title_align="left", border_style="dim", padding=0)
+
+
+def map_lines(scene: Scene, frame: Frame, dots: Dots, *, colour: bool) -> list[Text]:
+    """The map, a text for each row of characters; ``frame.rows`` is even."""
+    marks = _marks(scene, frame)
+    lines = []
+    for row in range(0, frame.rows, 2):
+        pairs = zip(dots[row].tolist(), dots[row + 1].tolist(), strict=True)
+        characters = [_character(Kind(upper), Kind(lower), colour=colour) for upper, lower in pairs]
+        for column, (sign, style) in marks.get(row // 2, {}).items():
+            # A mark lies on the ground that is there, unless it brings its own.
+            ground = "" if " on " in style or not colour else f" on {LOOKS[Kind(int(dots[row, column]))].colour}"
+            characters[column] = (sign, style + ground)
+        line = Text(no_wrap=True, overflow="crop")
+        for style, run in groupby(characters, itemgetter(1)):
+            line.append("".join(sign for sign, _ in run), style)
+        lines.append(line)
+    return lines
+
+
+def _character(upper: Kind, lower: Kind, *, colour: bool) -> tuple[str, str]:
+    """Two dots as one character and its style."""
+    if colour:
+        if upper == lower:
+            return " ", f"on {LOOKS[upper].colour}"
+        return "▀", f"{LOOKS[upper].colour} on {LOOKS[lower].colour}"
+    if Kind.WALL in (upper, lower) and upper != lower and Kind.MOVER not in (upper, lower):
+        return ("▀" if upper == Kind.WALL else "▄"), ""
+    return LOOKS[max(upper, lower)].sign, ""
+
+
+def _marks(scene: Scene, frame: Frame) -> dict[int, dict[int, tuple[str, str]]]:
+    """Signs that take a whole character, and their styles, by row and column of characters; the rover is on top."""
+    marks: dict[int, dict[int, tuple[str, str]]] = {}
+    signs = [(one.north_m, one.east_m, STATE_SIGNS[one.state], STATE_STYLES[one.state]) for one in scene.places]
+    signs.append((scene.rover.north_m, scene.rover.east_m, arrow(scene.heading_rad), ROVER_STYLE))
+    for north_m, east_m, sign, style in signs:
+        where = frame.dot(north_m, east_m)
+        if where is not None:
+            marks.setdefault(where[0] // 2, {})[where[1]] = (sign, style)
+    return marks
+
+
+def arrow(heading_rad: float) -> str:
+    """The arrow that is nearest to a heading, clockwise from north."""
+    return ARROWS[round(heading_rad / (math.pi / 4.0)) % 8]
+
+
+def _legend(dots: Dots, *, colour: bool) -> Text:
+    """What the kinds are that the map shows, the most important first."""
+    legend = Text(no_wrap=True)
+    there = set(dots.ravel().tolist())
+    for kind, look in sorted(LOOKS.items(), reverse=True):
+        if look.name and kind in there:
+            legend.append("■ " if colour else f"{look.sign} ", look.colour if colour else "")
+            legend.append(f"{look.name}  ")
+    return legend
+
+
+def _facts(view: View, columns: int, rows: int) -> Table:
+    """All sections, then as much of the news as there is room for."""
+    table = Table.grid()
+    table.add_column(width=columns, no_wrap=True, overflow="ellipsis")
+    room = rows
+    for section in view.sections:
+        lines = [Text(section.title, "bold"), *(_line(fact, columns) for fact in section.facts)]
+        for line in lines[: max(room, 0)]:
+            table.add_row(line)
+        room -= len(lines)
+    if room > 1 and view.news:
+        table.add_row(Text("News", "bold"))
+        for text in _newest(view.news, columns, room - 1):
+            table.add_row(text)
+    return table
+
+
+def _line(fact: Fact, columns: int) -> Text:
+    line = Text(fact.name.ljust(NAME_COLUMNS), "dim", no_wrap=True)
+    line.append(fact.value, "bold not dim #ff5f5f" if fact.alarm else "not dim")
+    line.truncate(columns, overflow="ellipsis")
+    return line
+
+
+def _newest(news: Iterable[str], columns: int, rows: int) -> list[Text]:
+    """The last lines that fit, broken where they are too long; a text that does not fit whole is left out."""
+    lines: list[Text] = []
+    for text in reversed(tuple(news)):
+        wrapped = _wrapped(text, columns)
+        if len(lines) + len(wrapped) > rows:
+            return lines
+        lines = [*wrapped, *lines]
+    return lines
+
+
+def _wrapped(text: str, columns: int) -> list[Text]:
+    """Lines of a text, the later ones set in by a space; words longer than a line are cut through."""
+    lines = [""]
+    for word in text.split():
+        if lines[-1].strip() and len(lines[-1]) + 1 + len(word) > columns:
+            lines.append(" ")
+        lines[-1] += word if not lines[-1].strip() else f" {word}"
+        while len(lines[-1]) > columns:
+            lines[-1:] = [lines[-1][:columns], " " + lines[-1][columns:]]
+    return [Text(line, no_wrap=True) for line in lines]
