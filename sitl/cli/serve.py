@@ -92,7 +92,7 @@ def serve(
         for endpoint in endpoints:
             endpoint.close()
     if not quiet:
-        tell(f"stopped after {simulator.time_s:.0f} s of the rover's time")
+        say(f"stopped after {simulator.time_s:.0f} s of the rover's time")
 
 
 @contextlib.contextmanager
