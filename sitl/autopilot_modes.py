@@ -10,7 +10,7 @@ from sitl.autopilot_fence import arming_fault
 from sitl.autopilot_plan import GuidedTask, Submode
 from sitl.autopilot_vehicle import ARMABLE_S, AUTOPILOT_MODES, PREARM_S, Mode, Sticks, Vehicle
 from sitl.autopilot_ways import begin_driving, begin_return, begin_way_back, remember_start
-from sitl.control import COAST, STOP
+from sitl.control import COAST, STOP, outputs_fault
 
 NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.INITIALISING}
 FORCE = {2989, 21196}
@@ -107,7 +107,8 @@ def arm(vehicle: Vehicle, force: bool = False) -> bool:
     if vehicle.mode in NOT_ARMABLE and not force:
         reasons = ["Mode not armable"]
     for reason in reasons:
-        vehicle.say(CRITICAL, f"Arm: {reason}")
+        # The check of the outputs always speaks as a check before arming.
+        vehicle.say(CRITICAL, f"PreArm: {reason}" if reason == outputs_fault(vehicle.parameters) else f"Arm: {reason}")
     if reasons:
         return False
     vehicle.armed = True
@@ -123,7 +124,7 @@ def arming_faults(vehicle: Vehicle) -> list[str]:
     if not vehicle.has_home:
         return ["Accels inconsistent", "AHRS: waiting for home"]
     battery = arming_complaint(vehicle.parameters, vehicle.volts(), vehicle.used_mah())
-    faults = [battery] if battery else []
+    faults = [fault for fault in (battery, outputs_fault(vehicle.parameters)) if fault]
     located = vehicle.has_position and vehicle.time_s >= ARMABLE_S + vehicle.gps_late.position_s
     if vehicle.mode in AUTOPILOT_MODES and not located:
         return [*faults, "AHRS: not using configured AHRS type"]

@@ -6,8 +6,7 @@ Each is an array of one record, so that compiled code changes it in place.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,11 +174,31 @@ def new_tuning(parameters: dict[str, float]) -> Record:
     return tuning
 
 
-def functions_of(parameters: Mapping[str, float]) -> set[int]:
+class Table(Protocol):
+    """Parameters by name, all of them or some."""
+
+    def __getitem__(self, name: str) -> float: ...
+    def __contains__(self, name: object) -> bool: ...
+
+
+def functions_of(parameters: Table) -> set[int]:
     """The SERVOn_FUNCTION that any output has."""
-    return {int(parameters.get(f"SERVO{number}_FUNCTION", 0.0)) for number in range(1, OUTPUTS + 1)}
+    names = [f"SERVO{number}_FUNCTION" for number in range(1, OUTPUTS + 1)]
+    return {int(parameters[name]) for name in names if name in parameters}
 
 
-def is_skid(parameters: Mapping[str, float]) -> bool:
+def outputs_fault(parameters: Table) -> str:
+    """What the arming check says of outputs that make no rover; empty if they do (behaviour of AP_MotorsUGV's pre-arm check)."""
+    functions = functions_of(parameters)
+    left, right = THROTTLE_LEFT in functions, THROTTLE_RIGHT in functions
+    throttle, steering = THROTTLE in functions, GROUND_STEERING in functions
+    if not (left or right or throttle or steering):
+        return "no motor, sail or scripting outputs defined"
+    if left != right:
+        return "check skid steering config"
+    return "check steering and throttle config" if throttle != steering else ""
+
+
+def is_skid(parameters: Table) -> bool:
     """Whether these parameters are of a rover with skid steering: both of its motors have an output."""
     return {THROTTLE_LEFT, THROTTLE_RIGHT} <= functions_of(parameters)

@@ -13,7 +13,7 @@ from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.rover import new_rover
 from sitl.simulator import steered_wheels
 from sitl.world import World
-from tests.sitl_client import Client, open_ground
+from tests.sitl_client import READY_S, Client, open_ground
 
 SKID = {"WP_SPEED": 2.0, "WP_RADIUS": 1.0, "AVOID_ENABLE": 0.0}
 WHEELS = {**SKID, **steered_wheels(1.5)}
@@ -210,6 +210,22 @@ def test_without_braking_motors_never_push_against_the_way(ahead: float) -> None
 
     assert least_push({"ATC_BRAKE": 1}) < -0.05
     assert least_push({"ATC_BRAKE": 0}) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "complaint"),
+    [
+        ({"SERVO1_FUNCTION": 0, "SERVO3_FUNCTION": 0}, "no motor, sail or scripting outputs defined"),
+        ({"SERVO3_FUNCTION": 0}, "check skid steering config"),
+        ({"SERVO2_FUNCTION": 26}, "check steering and throttle config"),
+    ],
+)
+def test_outputs_that_make_no_rover_are_not_armed(changes: dict[str, float], complaint: str) -> None:
+    client = Client(open_ground(parameters=changes))
+    client.run_for(READY_S)
+    assert client.arm() == 4
+    assert f"PreArm: {complaint}"[:50] in client.texts()  # longer texts come in pieces
+    assert not client.simulator.vehicle.armed
 
 
 def test_a_boat_says_that_it_is_one() -> None:
