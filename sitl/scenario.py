@@ -13,7 +13,7 @@ from companion.mission.sensor_tables import sensors_from, sensors_given
 from sitl.autopilot_params import DEFAULTS, REAL32
 from sitl.faults import FaultPlan, SensorFault
 from sitl.motion import NoiseSettings
-from sitl.paramfile import ParameterFile, load_parameters
+from sitl.paramfile import ParameterFile, ParameterFileError, load_parameters
 from sitl.physics import Physics
 from sitl.sensors import SensorSuite, suite_named
 from sitl.simulator import SimStart, Simulator, steered_wheels
@@ -105,7 +105,10 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     scenario = Scenario(world, start, sensors, radius_m, parameters)
     if spec.parameters is None:
         return _steered(scenario, turning_radius_m)
-    file = load_parameters(spec.parameters)
+    try:
+        file = load_parameters(spec.parameters)
+    except ParameterFileError as error:
+        raise ScenarioError(str(error)) from error
     scenario = _steered(scenario, _fitting_radius_m(turning_radius_m, spec, file))
     kept = {name: file.types.get(name, REAL32) for name in file.unknown}
     parameters = {**scenario.parameters, **file.known, **file.unknown}

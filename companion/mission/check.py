@@ -98,7 +98,10 @@ def _plane(place: Place, first: Place) -> tuple[float, float]:
 
 def _check_files(mission: Mission) -> None:
     sitl = mission.sitl
-    for what, path in (("prior_map", mission.prior_map), ("sitl.world", sitl.world if sitl else None)):
+    files = [("prior_map", mission.prior_map)]
+    if sitl is not None:
+        files += [("sitl.world", sitl.world), ("sitl.parameters", sitl.parameters)]
+    for what, path in files:
         if path is not None and not path.is_file():
             raise MissionError(f"{what}: no such file: {path}")
     if sitl is not None and sitl.start is not None and sitl.world is None:

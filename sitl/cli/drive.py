@@ -25,7 +25,6 @@ from sitl.cli.viewer import ViewError, terminal
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
-from sitl.paramfile import ParameterFileError
 from sitl.picture import save_picture
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
 from sitl.worldfile import ground_grid
@@ -33,7 +32,6 @@ from sitl.worldfile import ground_grid
 EXIT_BAD_INPUT, EXIT_STOPPED = 2, 130
 BAD_INPUT = (
     SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
-    ParameterFileError,
 )  # fmt: skip
 LINE_EVERY_S = 60.0
 

@@ -20,8 +20,7 @@ from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.endpoints import FORMS, Endpoint, ListenError, open_endpoint
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.news import News
-from sitl.paramfile import ParameterFileError
-from sitl.scenario import ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
+from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
 from sitl.server import serve as run_server
 from sitl.watching import Watching
 
@@ -54,21 +53,16 @@ def serve(
     endpoints: list[Endpoint] = []
     try:
         console = terminal() if view else None
-        mission = load_mission(mission_file)
-        mission = mission if sensors is None else with_sensors(mission, sensors)
-        mission = mission if params is None else with_parameter_file(mission, params)
-        scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
-        for note in scenario.notes:
-            typer.echo(note, err=True)
+        name, scenario = _scenario(mission_file, sensors, params, faults)
         simulator = scenario.simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
         simulator.advance_to_s(0.02)
-        watching = Watching(mission.name, simulator)
+        watching = Watching(name, simulator)
         tell = watching.tell if view else say
         news = News() if quiet else News(tell, clock.now_s)
         for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
             endpoints.append(open_endpoint(url, simulator, news, serial_port))
-    except (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ParameterFileError, ViewError) as error:
+    except (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ViewError) as error:
         for endpoint in endpoints:
             endpoint.close()
         typer.echo(str(error), err=True)
@@ -78,13 +72,7 @@ def serve(
             tell(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
         if not listen:
             tell("a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760")
-    stop: list[int] = []
-
-    def on_signal(number: int, frame: FrameType | None) -> None:
-        stop.append(number)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
+    stop = _stop_signals()
     try:
         with _viewed(console, watching, clock) as observe:
             run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, news, observe)
@@ -93,6 +81,31 @@ def serve(
             endpoint.close()
     if not quiet:
         say(f"stopped after {simulator.time_s:.0f} s of the rover's time")
+
+
+def _scenario(
+    mission_file: Path, sensors: str | None, params: Path | None, faults: Path | None
+) -> tuple[str, Scenario]:
+    """The mission's name, and what it and the options ask for; what people should know of it is said."""
+    mission = load_mission(mission_file)
+    mission = mission if sensors is None else with_sensors(mission, sensors)
+    mission = mission if params is None else with_parameter_file(mission, params)
+    scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
+    for note in scenario.notes:
+        typer.echo(note, err=True)
+    return mission.name, scenario
+
+
+def _stop_signals() -> list[int]:
+    """A list that is empty until the process is asked to end."""
+    stop: list[int] = []
+
+    def on_signal(number: int, frame: FrameType | None) -> None:
+        stop.append(number)
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, on_signal)
+    return stop
 
 
 @contextlib.contextmanager

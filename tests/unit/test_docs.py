@@ -64,6 +64,7 @@ def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path) -> 
         return
     shutil.copytree(ROOT / "missions" / "maps", tmp_path / "maps")
     shutil.copy(ROOT / "missions" / "field.plan", tmp_path)
+    (tmp_path / "rover.param").write_text("WP_SPEED,2\n", encoding="utf-8")
     mission = tmp_path / "example.toml"
     mission.write_text(text, encoding="utf-8")
     result = CliRunner().invoke(APPS["rover-companion"], ["mission", "check", str(mission)])
