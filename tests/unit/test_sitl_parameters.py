@@ -1,6 +1,7 @@
 """ArduRover's parameters change how the simulated rover moves: each by itself, and in the direction its name says."""
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -126,6 +127,15 @@ def test_the_table_holds_every_parameter_of_motion() -> None:
     prefixes = ("ATC_", "MOT_", "CRUISE_", "WP_", "TURN_", "PSC_", "SERVO", "FRAME_")
     motion = {name for name in DEFAULTS if name.startswith(prefixes)}
     assert motion - set(OTHERWISE) - set(ON_WHEELS) - set(TOGETHER) <= ELSEWHERE
+
+
+def test_the_page_says_what_each_of_them_does() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "sitl.md").read_text(encoding="utf-8")
+    table = page[page.index("## Parameters") : page.index("## AUTO")]
+    for name in {*OTHERWISE, *ON_WHEELS, *TOGETHER, "FRAME_CLASS", "FRAME_TYPE"}:
+        ending = name[name.rindex("_") :]
+        short = name.startswith(("ATC_SPEED_", "ATC_STR_RAT_")) and f"`{ending}`" in table
+        assert f"`{name}`" in table or short or name.replace("1", "n").replace("3", "n") in table, name
 
 
 def top_speed(changes: dict[str, float]) -> float:
