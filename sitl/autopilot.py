@@ -23,7 +23,7 @@ from sitl.control import LOOP_HZ
 
 PARAMETERS_PER_LOOP = 5
 TIMESYNC_S = 10.0
-UNCHANGED = 65535
+UNCHANGED, RELEASED = 65535, 32767
 
 TIMETABLE: tuple[tuple[float, tuple[str, ...]], ...] = (
     (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "Barometer 2 calibration complete")),
@@ -172,16 +172,31 @@ def _heartbeat(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def _override(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """RC_CHANNELS_OVERRIDE of the ground station: steering and throttle; 0 lets go, 65535 leaves as it is."""
-    is_station = message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"])
-    if not is_station or vehicle.parameters["RC_OVERRIDE_TIME"] == 0.0:
-        return
     sticks = vehicle.sticks
     steering, throttle = (
-        before if raw_us == UNCHANGED else 0.0 if raw_us == 0 else min(max((raw_us - 1500) / 500.0, -1.0), 1.0)
+        before if raw_us == UNCHANGED else None if raw_us == 0 else (raw_us - 1500) / 500.0
         for raw_us, before in ((message.chan1_raw, sticks.steering), (message.chan3_raw, sticks.throttle))
     )
-    released = message.chan1_raw == 0 and message.chan3_raw == 0
-    vehicle.sticks = Sticks(steering, throttle, None if released else vehicle.time_s)
+    _take_sticks(vehicle, message, steering, throttle)
+
+
+def _manual_control(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MANUAL_CONTROL, a joystick: y steers, z is the throttle, in thousandths; the largest number lets go."""
+    if message.target == vehicle.system:
+        axes = (None if axis == RELEASED else axis / 1000.0 for axis in (message.y, message.z))
+        _take_sticks(vehicle, message, *axes)
+
+
+def _take_sticks(vehicle: Vehicle, message: Any, steering: float | None, throttle: float | None) -> None:
+    """The ground station's sticks, -1 to 1, None where it lets go. They are a sign of life as well."""
+    is_station = message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"])
+    if not is_station:
+        return
+    vehicle.clocks.ground_station_s = vehicle.time_s
+    if vehicle.parameters["RC_OVERRIDE_TIME"] == 0.0:
+        return
+    held, pushed = (0.0 if axis is None else min(max(axis, -1.0), 1.0) for axis in (steering, throttle))
+    vehicle.sticks = Sticks(held, pushed, None if steering is None and throttle is None else vehicle.time_s)
     apply_sticks(vehicle)
 
 
@@ -215,6 +230,7 @@ HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
     "COMMAND_LONG": answer,
     "COMMAND_INT": answer,
     "HEARTBEAT": _heartbeat,
+    "MANUAL_CONTROL": _manual_control,
     "MISSION_SET_CURRENT": set_mission_current,
     "OBSTACLE_DISTANCE": _obstacles,
     "PARAM_REQUEST_LIST": _list_parameters,

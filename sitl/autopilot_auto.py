@@ -96,7 +96,9 @@ class AutoRunner:
             if change_speed(self.vehicle, item.params[1]):
                 self.vehicle.say(INFO, f"speed: {item.params[1]:.1f} m/s")
         elif command == items.SET_HOME:
-            self._set_home(self.vehicle.place() if first == 1.0 else item.place)
+            place = self.vehicle.place() if first == 1.0 else item.place
+            if place != (0, 0):
+                self.vehicle.move_home(place)
         elif command == items.SET_REVERSE:
             self.vehicle.control["reversed"] = 1 if first == 1.0 else 0
         elif command == items.GUIDED_LIMITS:
@@ -106,12 +108,6 @@ class AutoRunner:
         else:
             return command in ELSEWHERE or command in DONE_AT_ONCE
         return True
-
-    def _set_home(self, place: tuple[int, int]) -> None:
-        if place != (0, 0):
-            self.vehicle.home = place
-            for channel in self.vehicle.channels.values():
-                channel.requested.append(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
 
     def _go(self, index: int, item: Item) -> None:
         """Drive to a place; past it without stopping if the next is known and nothing is to be done there."""

@@ -11,13 +11,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl.autopilot_auto import AutoRunner
 from sitl.autopilot_fence import enable_fence
 from sitl.autopilot_link import Channel
-from sitl.autopilot_modes import FORCE, INFO, arm, disarm, set_mode
+from sitl.autopilot_modes import CRITICAL, FORCE, INFO, arm, arming_faults, disarm, set_mode
 from sitl.autopilot_streams import DEFAULT_INTERVAL_US, MESSAGES, set_interval, streamable
 from sitl.autopilot_targets import GLOBAL_FRAMES, change_speed, go_to, valid_place
 from sitl.autopilot_vehicle import Mode, Vehicle
 from sitl.control import LOOP_HZ
 
-ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
+ACCEPTED, TRY_LATER, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 LONGEST_US = 60_000_000
 
 Handler = Callable[[Vehicle, Channel, Any], int]
@@ -149,6 +149,48 @@ def _return(vehicle: Vehicle, channel: Channel, message: Any) -> int:
     return ACCEPTED if set_mode(vehicle, Mode.RTL) else FAILED
 
 
+def _place_of(message: Any) -> tuple[int, tuple[int, int]]:
+    """Frame, latitude and longitude in 1e-7 degree; COMMAND_LONG has degrees, in the frame GLOBAL."""
+    if message.get_type() == "COMMAND_INT":
+        return message.frame, (message.x, message.y)
+    degrees = (0.0 if math.isnan(value) else value for value in (message.param5, message.param6))
+    lat, lon = (round(value * 1e7) for value in degrees)
+    return mavlink.MAV_FRAME_GLOBAL, (lat, lon)
+
+
+def _set_home(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    """DO_SET_HOME: here (param1 is 1, or no place given), or at a place."""
+    if math.isnan(message.param1):
+        return DENIED
+    frame, place = _place_of(message)
+    if message.param1 == 1.0 or place == (0, 0):
+        if not vehicle.has_position:
+            return FAILED
+        place = vehicle.place()
+    elif message.param1 != 0.0 or not valid_place(*place):
+        return FAILED
+    elif frame not in GLOBAL_FRAMES:
+        return DENIED
+    vehicle.move_home(place)
+    return ACCEPTED
+
+
+def _get_home(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    if not vehicle.has_home:
+        return FAILED
+    channel.requested += [mavlink.MAVLINK_MSG_ID_HOME_POSITION, mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN]
+    return ACCEPTED
+
+
+def _check_arming(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    """RUN_PREARM_CHECKS: accepted whatever comes out; the complaints follow as texts."""
+    if vehicle.armed:
+        return TRY_LATER
+    for reason in arming_faults(vehicle):
+        vehicle.say(CRITICAL, f"PreArm: {reason}")
+    return ACCEPTED
+
+
 def _reboot(vehicle: Vehicle, channel: Channel, message: Any) -> int:
     if message.param1 not in (1.0, 3.0):
         return UNSUPPORTED
@@ -165,6 +207,9 @@ HANDLERS: dict[int, Handler] = {
     mavlink.MAV_CMD_GET_MESSAGE_INTERVAL: _get_interval,
     mavlink.MAV_CMD_REQUEST_MESSAGE: _request_message,
     mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES: _request_version,
+    mavlink.MAV_CMD_DO_SET_HOME: _set_home,
+    mavlink.MAV_CMD_GET_HOME_POSITION: _get_home,
+    mavlink.MAV_CMD_RUN_PREARM_CHECKS: _check_arming,
     mavlink.MAV_CMD_DO_CHANGE_SPEED: _change_speed,
     mavlink.MAV_CMD_DO_SET_REVERSE: _set_reverse,
     mavlink.MAV_CMD_MISSION_START: _mission_start,

@@ -12,7 +12,8 @@ MAGIC_1, MAGIC_2 = 0xFE, 0xFD
 SIGNED = 0x01
 HEADER_1, HEADER_2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 
-_BEGINNING = re.compile(b"[\xfd\xfe]")
+BEGINNING = re.compile(b"[\xfd\xfe]")
+"""A byte that a packet may begin with."""
 
 
 def packet_size(data: bytes | bytearray, at: int) -> int | None:
@@ -36,7 +37,7 @@ class Framer:
         buffer = self._rest + data
         packets: list[bytes] = []
         at = 0
-        while (found := _BEGINNING.search(buffer, at)) is not None:
+        while (found := BEGINNING.search(buffer, at)) is not None:
             at = found.start()
             size = packet_size(buffer, at)
             if size is None:

@@ -284,6 +284,12 @@ class Vehicle:
                     channel.send(message)
         self.texts.clear()
 
+    def move_home(self, place: tuple[int, int]) -> None:
+        """Home is elsewhere from now on, 1e-7 degree; every channel is told."""
+        self.home = place
+        for channel in self.channels.values():
+            channel.requested.append(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+
     def tell_parameter(self, name: str) -> None:
         """Tell every channel a parameter's value."""
         for channel in self.channels.values():

@@ -92,6 +92,9 @@ class FaultPlayer:
         """A fresh autopilot: it meets what goes on."""
         self._was_started = False
         self._mode_before.clear()
+        for number, fault in self._present():
+            if isinstance(fault, PilotTakesOver):  # the switch and the sticks are where they were
+                self._take_over(number, fault, vehicle)
         self._apply(vehicle, rover, sensing)
 
     def _begin_and_end(self, now_s: float, vehicle: Vehicle) -> None:
@@ -112,16 +115,19 @@ class FaultPlayer:
             case Reboot():
                 self.reboot_until_s = end_s
             case PilotTakesOver():
-                self._mode_before[number] = vehicle.mode
-                vehicle.sticks = Sticks(fault.steering, fault.throttle)
-                set_mode(vehicle, Mode[fault.mode])
-                apply_sticks(vehicle)
+                self._take_over(number, fault, vehicle)
             case GpsGlitch():
                 drawn_rad = float(rng.uniform(0.0, 2.0 * math.pi))
                 given = fault.bearing_deg
                 self._glitch_rad[number] = drawn_rad if given is None else math.radians(given)
             case _:
                 pass
+
+    def _take_over(self, number: int, fault: PilotTakesOver, vehicle: Vehicle) -> None:
+        self._mode_before[number] = vehicle.mode
+        vehicle.sticks = Sticks(fault.steering, fault.throttle)
+        set_mode(vehicle, Mode[fault.mode])
+        apply_sticks(vehicle)
 
     def _end(self, number: int, fault: Fault, vehicle: Vehicle) -> None:
         if isinstance(fault, PilotTakesOver):

@@ -12,10 +12,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from sitl.autopilot_framing import BEGINNING, packet_size
 from sitl.faults import Direction, LinkFault
 
-MAVLINK_1, MAVLINK_2, SIGNED = 0xFE, 0xFD, 1
-SIGNATURE_BYTES = 13
 WORST_BYTES = 3
 """A damaged packet has one to so many wrong bytes."""
 
@@ -33,28 +32,18 @@ class Packets:
         """The whole packets, and what stands between them, in order."""
         data, at, pieces = self._rest + data, 0, []
         while at < len(data):
-            if data[at] not in (MAVLINK_1, MAVLINK_2):
-                begin = at
-                while at < len(data) and data[at] not in (MAVLINK_1, MAVLINK_2):
-                    at += 1
-                pieces.append(data[begin:at])
-                continue
-            size = _packet_bytes(data, at)
+            found = BEGINNING.search(data, at)
+            begin = found.start() if found else len(data)
+            if begin > at:
+                pieces.append(data[at:begin])
+            at = begin
+            size = packet_size(data, at) if found else None
             if size is None or at + size > len(data):
                 break
             pieces.append(data[at : at + size])
             at += size
         self._rest = data[at:]
         return pieces
-
-
-def _packet_bytes(data: bytes, at: int) -> int | None:
-    """How long the packet that begins here is; None when too little of it is there to know."""
-    if at + 3 > len(data):
-        return None
-    if data[at] == MAVLINK_1:
-        return data[at + 1] + 8
-    return data[at + 1] + 12 + (SIGNATURE_BYTES if data[at + 2] & SIGNED else 0)
 
 
 @dataclass

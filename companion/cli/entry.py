@@ -10,6 +10,10 @@ from typing import cast
 EXIT_USAGE, EXIT_STOPPED = 2, 130
 
 
+class StoppedError(Exception):
+    """Ctrl-C has ended a command that has more to say about it; the text is one line."""
+
+
 def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
     """Load the commands and run one; the exit code.
 
@@ -29,8 +33,11 @@ def _run(name: str, commands: Callable[..., object]) -> int:
     usage_error = cast(type[typer.BadParameter], typer.BadParameter.__base__)
     try:
         code = commands(prog_name=name, standalone_mode=False)
-    except typer.Abort:  # what typer makes of an interrupt
+    except typer.Abort:  # what older typers make of an interrupt
         raise KeyboardInterrupt from None
+    except StoppedError as stopped:
+        print(stopped, file=sys.stderr)
+        return EXIT_STOPPED
     except usage_error as error:
         where = error.ctx.command_path if error.ctx is not None else name
         print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)
@@ -39,4 +46,6 @@ def _run(name: str, commands: Callable[..., object]) -> int:
         # The reader has what it wanted (`... | head`). Python would complain once more when it flushes at the end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
+    if code == EXIT_STOPPED:  # what newer ones make of it, without a word
+        raise KeyboardInterrupt
     return code if isinstance(code, int) else 0

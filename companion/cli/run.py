@@ -63,7 +63,7 @@ def run(
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     if stop.asked:
-        raise typer.Exit(EXIT_STOPPED)
+        raise SystemExit(EXIT_STOPPED)  # it has said so itself
     raise typer.Exit(EXIT_MISSED if missed else EXIT_REACHED)
 
 

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
 from companion.app import Status
+from companion.cli.entry import StoppedError
 from companion.cli.inputs import OutputError, picture, usable_settings, writable
 from companion.itinerary import TargetStatus
 from companion.mapfiles import MapError
@@ -29,7 +30,7 @@ from sitl.picture import save_picture
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
 from sitl.worldfile import ground_grid
 
-EXIT_BAD_INPUT, EXIT_STOPPED = 2, 130
+EXIT_BAD_INPUT = 2
 BAD_INPUT = (
     SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
 )  # fmt: skip
@@ -101,8 +102,7 @@ def drive(
         raise typer.Exit(EXIT_BAD_INPUT) from error
     except KeyboardInterrupt:
         recorder.close()
-        typer.echo(_stopped(run, recorder), err=True)
-        raise typer.Exit(EXIT_STOPPED) from None
+        raise StoppedError(_stopped(run, recorder)) from None
     recorder.close()
     _print_summary(report, console)
     _put_out(run, recorder, console, image, map_stem, json_file)

@@ -15,7 +15,7 @@ FORMS = "tcp:HOST:PORT, udpout:HOST:PORT, udpin:HOST:PORT, serial:PATH[:BAUD] or
 TAKEN, ELSEWHERE = "choose another port", "is that an address of this computer?"
 REMEDIES = {
     "serial": "see that the device is there and that you may use it",
-    "pty": "name a link that can be made, in a folder that is there",
+    "pty": "name a link that is not there yet, in a folder that is",
 }
 
 

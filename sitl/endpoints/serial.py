@@ -91,15 +91,16 @@ class PseudoTerminal:
     """Both ends of a line: ours, and one that other programs open under the name of a link in the file system."""
 
     def __init__(self, path: str) -> None:
-        """Raises OSError when there is something else of this name."""
+        """Raises OSError when there is something else of this name, or somebody's terminal that is still there."""
         self._path = Path(path)
         self._ours, self._theirs = os.openpty()
         tty.setraw(self._theirs)
         os.set_blocking(self._ours, False)
         try:
-            if self._path.is_symlink() and os.readlink(self._path).startswith(TERMINALS):
-                self._path.unlink()  # left over from a simulator that was killed
-            self._path.symlink_to(os.ttyname(self._theirs))
+            name = os.ttyname(self._theirs)
+            if _is_left_over(self._path, name):
+                self._path.unlink()
+            self._path.symlink_to(name)
         except OSError:
             os.close(self._ours)
             os.close(self._theirs)
@@ -133,6 +134,14 @@ class PseudoTerminal:
             self._path.unlink()
         os.close(self._ours)
         os.close(self._theirs)
+
+
+def _is_left_over(path: Path, own: str) -> bool:
+    """Whether a name is that of a simulator that was killed: its terminal has gone, or has just become ours (``own``)."""
+    if not path.is_symlink():
+        return False
+    target = os.readlink(path)
+    return target == own or (target.startswith(TERMINALS) and not path.exists())
 
 
 class SerialEndpoint:

@@ -4,11 +4,14 @@ import signal
 import subprocess
 import sys
 import time
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
+import typer
 
+from companion.cli.entry import StoppedError, start
 from tests.served import finished, process
 
 SCRIPTS = {"rover-companion": "companion", "rover-sitl": "sitl"}
@@ -47,6 +50,24 @@ def test_an_interrupt_while_it_loads_is_no_traceback(name: str) -> None:
         # Before our first line runs, the interpreter itself may still be starting: that is not ours.
         quiet += "cli/" not in errors and process.returncode in (0, 130)
     assert quiet >= 1
+
+
+def test_an_interrupt_of_a_command_that_says_nothing_itself_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    """typer ends a command with the code of an interrupt and no word."""
+    app = typer.Typer()
+
+    @app.command()
+    def interrupted() -> None:
+        raise KeyboardInterrupt
+
+    @app.command()
+    def talkative() -> None:
+        raise StoppedError("stopped: half of it is done")
+
+    code = start("script", lambda: partial(app, ["interrupted"]))
+    assert (code, capsys.readouterr().err) == (130, "script: stopped by Ctrl-C\n")
+    code = start("script", lambda: partial(app, ["talkative"]))
+    assert (code, capsys.readouterr().err) == (130, "stopped: half of it is done\n")
 
 
 @pytest.mark.parametrize("name", SCRIPTS)

@@ -172,6 +172,15 @@ def test_a_left_over_name_is_taken_and_a_file_is_not(bench: Bench, tmp_path: Pat
         bench.open(f"pty:{tmp_path}/none/ttyV0")
 
 
+def test_the_name_of_a_terminal_in_use_is_left_alone(bench: Bench, tmp_path: Path) -> None:
+    name = tmp_path / "ttyV0"
+    bench.open(f"pty:{name}")
+    terminal = os.readlink(name)
+    with pytest.raises(ListenError, match=r"ttyV0: cannot be opened: File exists; name a link that is not there yet"):
+        bench.open(f"pty:{name}")
+    assert os.readlink(name) == terminal
+
+
 def test_a_serial_device_may_be_pulled_out_and_put_in_again(bench: Bench, tmp_path: Path) -> None:
     device = tmp_path / "ttyUSB0"
     ours, theirs = os.openpty()

@@ -309,6 +309,22 @@ def test_a_pack_with_a_capacity_runs_down() -> None:
 # Pilot ---------------------------------------------------------------------------------------------------------------
 
 
+def test_the_switch_is_where_it_was_after_a_power_failure() -> None:
+    """The autopilot reads it when it boots; its pilot lets go of it long after that."""
+    simulator = faulty(Reboot(50.0, 53.0), PilotTakesOver(48.0, 70.0, mode="HOLD"))
+    ready(simulator).run_to(54.0)
+    client = Client(simulator)
+    client.run_to(69.0)
+    assert heartbeat_mode(client) == HOLD
+    client.run_to(72.0)
+    assert heartbeat_mode(client) == MANUAL
+
+
+def heartbeat_mode(client: Client) -> int:
+    beats = [m for m in client.received if m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 1]
+    return int(beats[-1].custom_mode)
+
+
 def test_the_pilot_takes_over_and_gives_back() -> None:
     client, seen = driven(PilotTakesOver(50.0, 55.0, mode="HOLD"), until_s=60.0)
     modes = [(round(t), m.custom_mode) for t, m in of(seen, "HEARTBEAT")]
