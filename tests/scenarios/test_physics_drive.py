@@ -1,0 +1,71 @@
+"""The whole chain over the JSON interface, with our simulated autopilot in the firmware's place."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from companion.app import Companion
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.codec import Codec
+from companion.mavlink.transport import MemoryLink
+from companion.mission.load import load_mission
+from companion.recorder import NullRecorder
+from companion.settings import Settings
+from companion.stepping import InlineRunner
+from companion.warmup import warm_up
+from sitl.lockstep import LockstepClock
+from sitl.physics import Physics
+from sitl.scenario import scenario_from_mission
+from sitl.sensors import SUITES
+from sitl.simulator import SimStart, Simulator, steered_wheels
+from sitl.world import World
+from tests.sitl_client import HOME, open_ground, ready
+from tests.split_vehicle import SplitVehicle
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize("turning_radius_m", [0.0, 2.0], ids=["skid", "ackermann"])
+@pytest.mark.parametrize("target_m", [(20.0, 0.0), (8.0, -12.0)])
+def test_the_same_autopilot_drives_over_the_interface_as_in_the_simulator(
+    turning_radius_m: float, target_m: tuple[float, float]
+) -> None:
+    parameters = steered_wheels(turning_radius_m) if turning_radius_m else {}
+    whole = open_ground(turning_radius_m=turning_radius_m, parameters=parameters)
+    start = SimStart(0.0, 0.0, 0.0, HOME)
+    behind = Physics(World.open(), start, SUITES["none"], turning_radius_m=turning_radius_m)
+    split = SplitVehicle(behind, parameters)
+    clients = [ready(whole), ready(cast(Simulator, split))]
+    for client in clients:
+        client.drive_to(*target_m)
+    farthest_m = 0.0
+    for _ in range(120):
+        for client in clients:
+            client.run_for(0.1)
+        truth, motion = whole.truth, behind.motion
+        farthest_m = max(farthest_m, math.hypot(truth.north_m - motion.north_m, truth.east_m - motion.east_m))
+    assert math.dist((truth.north_m, truth.east_m), target_m) < 3.5
+    # The one difference: outputs are rounded to whole microseconds, a five-hundredth of the throttle.
+    assert farthest_m < 0.05
+
+
+def test_the_companion_drives_a_mission_over_the_interface_by_the_published_lidar() -> None:
+    mission = load_mission(ROOT / "missions" / "one-obstacle.toml")
+    scenario = scenario_from_mission(mission)
+    behind = scenario.physics(0, scans=True)
+    split = cast(Any, SplitVehicle(behind, scenario.parameters))
+    settings = Settings()
+    warm_up(settings, mission.rover.turning_radius_m)
+    near, far = MemoryLink.pair()
+    companion = Companion(
+        AutopilotLink(near, Codec(settings.link), settings.link, NullRecorder()),
+        LockstepClock(split, split.connect(), far), mission, settings, InlineRunner(), NullRecorder(), seed=0, arm=True,
+    )  # fmt: skip
+    while not companion.done and split.time_s < 400.0:
+        companion.tick()
+    assert companion.outcome.complete
+    assert behind.collisions == ()
