@@ -50,7 +50,7 @@ def test_the_same_autopilot_drives_over_the_interface_as_in_the_simulator(
         farthest_m = max(farthest_m, math.hypot(truth.north_m - motion.north_m, truth.east_m - motion.east_m))
     assert math.dist((truth.north_m, truth.east_m), target_m) < 3.5
     # The one difference: outputs are rounded to whole microseconds, a five-hundredth of the throttle.
-    assert farthest_m < 0.05
+    assert farthest_m < 0.005
 
 
 def test_the_companion_drives_a_mission_over_the_interface_by_the_published_lidar() -> None:
