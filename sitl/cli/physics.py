@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import signal
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
@@ -15,14 +13,15 @@ from companion.clock import WallClock
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
-from sitl.cli.serve import BAD_INPUT, say
+from sitl.cli.serve import BAD_INPUT, say, stop_signals
 from sitl.endpoints import ListenError
 from sitl.endpoints.client import FORMS, ClientLink, open_link
 from sitl.firmware_parameters import firmware_parameters, parameter_file
+from sitl.paramfile import ParameterFileError
 from sitl.physics import Physics
 from sitl.physics_news import PhysicsNews, summary
 from sitl.physics_server import open_port, run
-from sitl.scenario import ScenarioError, scenario_from_mission, with_sensors
+from sitl.scenario import ScenarioError, scenario_from_mission, with_parameter_file, with_sensors
 
 
 def physics(
@@ -32,7 +31,8 @@ def physics(
     mavlink: Annotated[
         str | None, typer.Option(metavar="URL", help=f"Where the lidar publishes its scans: {FORMS}.")
     ] = None,
-    parameters: Annotated[
+    params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
+    write_params: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the parameters that the firmware needs for this rover.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
@@ -45,31 +45,27 @@ def physics(
     try:
         mission = load_mission(mission_file)
         mission = mission if sensors is None else with_sensors(mission, sensors)
+        mission = mission if params is None else with_parameter_file(mission, params)
         scenario = scenario_from_mission(mission)
         behind = scenario.physics(seed, scans=mavlink is not None)
-        writable(parameters)
-        if parameters is not None:
-            text = parameter_file(firmware_parameters(scenario.parameters, behind.suite))
-            parameters.write_text(text, encoding="ascii")
+        writable(write_params)
+        if write_params is not None:
+            steered = scenario.turning_radius_m > 0.0
+            text = parameter_file(firmware_parameters(scenario.parameters, behind.suite, steered=steered))
+            write_params.write_text(text, encoding="ascii")
         link = open_link(mavlink) if mavlink else None
         # Compiles what is not compiled yet before the firmware waits for answers.
         behind.rehearse()
         listening = open_port(host, port)
-    except (MissionError, MapError, ScenarioError, ListenError, OutputError) as error:
+    except (MissionError, MapError, ScenarioError, ListenError, OutputError, ParameterFileError) as error:
         if link is not None:
             link.close()
         typer.echo(str(error), err=True)
         raise typer.Exit(BAD_INPUT) from error
     tell = (lambda line: None) if quiet else say
-    for line in _greeting(behind, host, port, mavlink, parameters):
+    for line in _greeting(behind, host, port, mavlink, write_params):
         tell(line)
-    stop: list[int] = []
-
-    def on_signal(number: int, frame: FrameType | None) -> None:
-        stop.append(number)
-
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, on_signal)
+    stop = stop_signals()
     try:
         run(behind, listening, link, clock.now_s, lambda: not stop, PhysicsNews(behind, tell, clock.now_s).look)
     finally:

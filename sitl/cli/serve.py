@@ -76,7 +76,7 @@ def serve(
             tell(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
         if not listen:
             tell("a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760")
-    stop = _stop_signals()
+    stop = stop_signals()
     try:
         with _viewed(console, watching, clock) as observe:
             run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, news, observe)
@@ -100,7 +100,7 @@ def _scenario(
     return mission.name, scenario
 
 
-def _stop_signals() -> list[int]:
+def stop_signals() -> list[int]:
     """A list that is empty until the process is asked to end."""
     stop: list[int] = []
 

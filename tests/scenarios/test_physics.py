@@ -64,7 +64,7 @@ def stopped(child: subprocess.Popen[str], number: signal.Signals) -> list[str]:
 
 def test_a_firmware_drives_and_starts_again_and_the_physics_ends_cleanly(tmp_path: Path) -> None:
     file = tmp_path / "rover.parm"
-    with physics("--sensors", "beams", "--parameters", file) as (child, port):
+    with physics("--sensors", "beams", "--write-params", file) as (child, port):
         with asking(port) as exchange:
             one = Firmware(exchange, rate_hz=200)
             one.drive(1.0, 1750, 1750)
@@ -181,10 +181,11 @@ def test_bad_input_gets_one_line(tmp_path: Path) -> None:
     assert "no such file" in refused(tmp_path / "none.toml")
     assert "not an address; write" in refused(MISSION, "--mavlink", "tcp:localhost")
     assert "--sensors: unknown sensors 'radar'" in refused(MISSION, "--sensors", "radar")
+    assert "cannot be read" in refused(MISSION, "--params", tmp_path / "none.parm")
     many = tmp_path / "many.toml"
     many.write_text("[[beam]]\norientation = 0\nmin_m = 0.2\nmax_m = 6.0\n" * 7, encoding="utf-8")
     assert "7 rangefinders: the firmware takes 6 at most; describe fewer beams" in refused(MISSION, "--sensors", many)
-    assert "cannot be written" in refused(MISSION, "--parameters", tmp_path)
+    assert "cannot be written" in refused(MISSION, "--write-params", tmp_path)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))
         port = other.getsockname()[1]

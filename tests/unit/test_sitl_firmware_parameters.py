@@ -15,7 +15,7 @@ MISSION = {"WP_SPEED": 2.0, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.
 
 @pytest.mark.parametrize("suite", ["none", "beams", "lidar-360"])
 def test_a_skid_rover_is_tuned_as_the_simulated_autopilot(suite: str) -> None:
-    told = firmware_parameters(MISSION, SUITES[suite])
+    told = firmware_parameters(MISSION, SUITES[suite], steered=False)
     ours = {name: value for name, (value, _) in DEFAULTS.items()} | MISSION
     shared = {name for name in told if name in ours and not name.startswith("RNGFND")}
     assert {name: told[name] for name in shared} == {name: ours[name] for name in shared}
@@ -29,20 +29,33 @@ def test_a_skid_rover_is_tuned_as_the_simulated_autopilot(suite: str) -> None:
     }
 
 
-def test_steered_wheels_win_over_motors() -> None:
-    told = firmware_parameters(MISSION | steered_wheels(2.5), SUITES["none"])
+def test_steered_wheels_have_steering_and_one_throttle() -> None:
+    told = firmware_parameters(MISSION | steered_wheels(2.5), SUITES["none"], steered=True)
     assert (told["SERVO1_FUNCTION"], told["SERVO3_FUNCTION"], told["TURN_RADIUS"]) == (26.0, 70.0, 2.5)
+
+
+def test_a_users_own_parameters_count_but_where_the_plant_is_wired() -> None:
+    own = {
+        "SERVO1_FUNCTION": 74.0,
+        "SERVO3_FUNCTION": 73.0,
+        "SERVO1_REVERSED": 1.0,
+        "CRUISE_SPEED": 1.5,
+        "RNGFND1_TYPE": 10.0,
+    }
+    told = firmware_parameters(own, SUITES["beams"], steered=False)
+    wired = ("SERVO1_FUNCTION", "SERVO3_FUNCTION", "SERVO1_REVERSED", "CRUISE_SPEED", "RNGFND1_TYPE")
+    assert [told[name] for name in wired] == [73.0, 74.0, 0.0, 1.5, 100.0]
 
 
 @pytest.mark.parametrize("servo", [1, 3])
 def test_pulses_span_what_the_plant_takes(servo: int) -> None:
-    told = firmware_parameters({}, SUITES["none"])
+    told = firmware_parameters({}, SUITES["none"], steered=False)
     pulses = [int(told[f"SERVO{servo}_{end}"]) for end in ("MIN", "TRIM", "MAX")]
     assert [servo_output(pulse) for pulse in pulses] == [-1.0, 0.0, 1.0]
 
 
 def test_every_rangefinder_is_switched_on_where_it_looks() -> None:
-    told = firmware_parameters({}, SUITES["beams"])
+    told = firmware_parameters({}, SUITES["beams"], steered=False)
     for number, beam in enumerate(SUITES["beams"].beams, 1):
         values = [told[f"RNGFND{number}_{what}"] for what in ("TYPE", "ORIENT", "MIN", "MAX")]
         assert values == [100.0, beam.orientation, beam.min_m, beam.max_m]
