@@ -60,9 +60,9 @@ def serve(
         scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
         for note in scenario.notes:
             typer.echo(note, err=True)
-        simulator = scenario.simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
-        simulator.advance_to_s(0.02)
+        scenario.simulator(seed).rehearse()
+        simulator = scenario.simulator(seed)
         watching = Watching(mission.name, simulator)
         tell = watching.tell if view else say
         news = News() if quiet else News(tell, clock.now_s)
