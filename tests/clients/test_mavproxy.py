@@ -13,6 +13,7 @@ from pymavlink import mavwp
 from tests.clients.program import Program, installed, program
 from tests.clients.scene import HOME_DEG, PLACES, Scene, metres_from_home, scene
 from tests.rig import GUIDED, HOLD
+from tests.scenarios.test_mavwp import send
 
 AROUND = ((-1e-3, -1e-3), (1e-3, -1e-3), (1e-3, 1e-3), (-1e-3, 1e-3))
 CORNERS = [(HOME_DEG[0] + north, HOME_DEG[1] + east) for north, east in AROUND]
@@ -62,6 +63,12 @@ def lists_up_and_down(ground: Program, here: Scene, folder: Path) -> None:
     assert [(one.x, one.y) for one in found[1:]] == units(PLACES)
     assert [one.param1 for one in found[1:]] == [1, 2]
     ground.told("wp set 2", "DO_SET_MISSION_CURRENT: ACCEPTED")
+
+    # A tool of pymavlink's mavutil and mavwp puts another mission there meanwhile; MAVProxy fetches that one.
+    loader.add_latlonalt(*PLACES[0], 0.0)
+    loader.target_system = loader.target_component = 1
+    assert send(here.witness.link, loader, 0) == 0
+    ground.told("wp list", "Saved 4 waypoints")
 
     ground.told(f"rally load {rally}", "AP: Rally points received")
     ground.told("rally list", "Saved 2 rally items")
