@@ -205,7 +205,11 @@ def _gps_origin(vehicle: Vehicle) -> list[Any]:
 
 
 def _version(vehicle: Vehicle) -> list[Any]:
-    return [mavlink.MAVLink_autopilot_version_message(CAPABILITIES, 67567616, 0, 0, 0, b"rover-co", [0] * 8, [0] * 8, 0, 0, 0)]
+    return [
+        mavlink.MAVLink_autopilot_version_message(
+            CAPABILITIES, 67567616, 0, 0, 0, b"rover-co", [0] * 8, [0] * 8, 0, 0, 0
+        )
+    ]
 
 
 def _raw_imu(vehicle: Vehicle) -> list[Any]:

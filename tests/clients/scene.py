@@ -63,8 +63,7 @@ class Witness:
             self.told[message.param_id] = message.param_value
 
     def wait(self, fits: Callable[[Any], bool], limit_s: float = PATIENCE_S) -> Any:
-        """The first message from now on that fits."""
-        self.look()
+        """The first message that fits, of all that has not been looked at yet."""
         stop_s = time.monotonic() + limit_s
         while time.monotonic() < stop_s:
             message = self.link.recv_match(blocking=True, timeout=1.0)
@@ -81,7 +80,6 @@ class Witness:
 
     def until(self, done: Callable[[], bool], limit_s: float = PATIENCE_S) -> None:
         """Until something is so for the witness."""
-        self.look()
         if not done():
             self.wait(lambda _: done(), limit_s)
 
@@ -115,6 +113,7 @@ class Scene:
     def may_be_armed(self) -> None:
         """The companion asks for a person to arm, and the autopilot's checks are passed."""
         self.companion.says("a person to arm")
+        self.witness.look()
         self.witness.wait(lambda m: m.get_type() == "SYS_STATUS" and bool(m.onboard_control_sensors_health & PREARM))
 
     def driving(self) -> None:
