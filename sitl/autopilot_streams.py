@@ -30,7 +30,7 @@ DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
 CAPABILITIES = 61935 & ~mavlink.MAV_PROTOCOL_CAPABILITY_FTP
-"""The firmware's, but for files: there are none here, and a ground station that is told so does not wait for an answer."""
+"""The firmware's, but for files: there are none here."""
 
 Builder = Callable[[Vehicle], list[Any]]
 
