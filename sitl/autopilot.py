@@ -8,6 +8,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_commands import answer
+from sitl.autopilot_files import answer_file_request
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import INFO, WARNING, apply_sticks, run_failsafes, set_mode
 from sitl.autopilot_network import close_channel, open_channel, pass_on, set_up_signing
@@ -229,6 +230,7 @@ def _attitude(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
     "COMMAND_LONG": answer,
     "COMMAND_INT": answer,
+    "FILE_TRANSFER_PROTOCOL": answer_file_request,
     "HEARTBEAT": _heartbeat,
     "MANUAL_CONTROL": _manual_control,
     "MISSION_SET_CURRENT": set_mission_current,

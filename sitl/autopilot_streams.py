@@ -29,6 +29,8 @@ from sitl.sensors import Reading
 DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
+CAPABILITIES = 61935 & ~mavlink.MAV_PROTOCOL_CAPABILITY_FTP
+"""The firmware's, but for files: there are none here."""
 
 Builder = Callable[[Vehicle], list[Any]]
 
@@ -203,7 +205,11 @@ def _gps_origin(vehicle: Vehicle) -> list[Any]:
 
 
 def _version(vehicle: Vehicle) -> list[Any]:
-    return [mavlink.MAVLink_autopilot_version_message(61935, 67567616, 0, 0, 0, b"rover-co", [0] * 8, [0] * 8, 0, 0, 0)]
+    return [
+        mavlink.MAVLink_autopilot_version_message(
+            CAPABILITIES, 67567616, 0, 0, 0, b"rover-co", [0] * 8, [0] * 8, 0, 0, 0
+        )
+    ]
 
 
 def _raw_imu(vehicle: Vehicle) -> list[Any]:

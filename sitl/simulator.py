@@ -20,6 +20,7 @@ from sitl.autopilot_plan import Storage
 from sitl.autopilot_signing import SECURE_PORT, StoredKey
 from sitl.autopilot_traffic import Traffic
 from sitl.autopilot_vehicle import Vehicle
+from sitl.autopilot_warmup import begin_every_drive
 from sitl.control import GROUND_STEERING, LOOP_HZ, THROTTLE
 from sitl.fault_player import FaultPlayer
 from sitl.faults import FaultPlan
@@ -31,6 +32,8 @@ from sitl.sensors import RangeSensing, SensorSuite, suite_named
 from sitl.world import World
 
 NOISE_ROWS = 500
+REHEARSAL_S = 4.0
+"""By then every range sensor has measured."""
 
 
 class GeoPlace(Protocol):
@@ -276,6 +279,15 @@ class Simulator:
     def links(self) -> tuple[SimLink, ...]:
         """The links that are open."""
         return tuple(self._links)
+
+    def rehearse(self) -> None:
+        """Run four seconds and begin every kind of drive, so that all is compiled that may be called later.
+
+        For a simulator that is thrown away afterwards: its time has passed and its noise is drawn.
+        """
+        self.connect()  # some sensors measure only for somebody
+        self.advance_to_s(REHEARSAL_S)
+        begin_every_drive(self._vehicle)
 
     def connect(self, port: int = SECURE_PORT, name: str = "") -> SimLink:
         """A new link to the vehicle, through its serial port ``port`` (SERIALn); several may be open at once.

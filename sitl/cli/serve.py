@@ -54,9 +54,9 @@ def serve(
     try:
         console = terminal() if view else None
         name, scenario = _scenario(mission_file, sensors, params, faults)
-        simulator = scenario.simulator(seed)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
-        simulator.advance_to_s(0.02)
+        scenario.simulator(seed).rehearse()
+        simulator = scenario.simulator(seed)
         watching = Watching(name, simulator)
         tell = watching.tell if view else say
         news = News() if quiet else News(tell, clock.now_s)

@@ -52,3 +52,67 @@ def test_a_drive_compiles_nothing(mission: str, planner: str) -> None:
     found = json.loads(done.stdout)
     assert found["outcome"] == "reached" and found["kernels"] >= 5
     assert found["new"] == []
+
+
+# Every kind of drive, by way of a link: guided places, speeds and headings, then a mission with legs, a circle and the way home.
+SERVED = """
+import json, sys
+from pathlib import Path
+from numba.core.dispatcher import Dispatcher
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from companion.mission.load import load_mission
+from sitl.scenario import scenario_from_mission, with_sensors
+
+def compiled():
+    modules = [module for name, module in list(sys.modules.items()) if name.startswith("sitl.")]
+    things = {id(thing): thing for module in modules for thing in vars(module).values() if isinstance(thing, Dispatcher)}
+    return {f"{thing.__module__}.{thing.__name__}": len(thing.signatures) for thing in things.values()}
+
+scenario = scenario_from_mission(with_sensors(load_mission(Path(sys.argv[1])), sys.argv[2]))
+scenario.simulator(0).rehearse()
+before = compiled()
+simulator = scenario.simulator(0)
+link, packer = simulator.connect(), mavlink.MAVLink(None, 255, 190)
+
+def say(message, seconds):
+    link.receive(message.pack(packer))
+    simulator.advance_to_s(simulator.time_s + seconds)
+
+def order(command, *parameters, seconds=0.2):
+    say(mavlink.MAVLink_command_long_message(1, 1, command, 0, *parameters, *[0] * (7 - len(parameters))), seconds)
+
+def target(mask, *fields):
+    say(mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, mask, *fields), 1.0)
+
+simulator.advance_to_s(45.0)
+order(176, 1, 15)
+order(400, 1)
+target(3580, 2, 2, 0, 0, 0, 0, 0, 0, 0, 0, 0)
+order(178, 1, 0.3)
+target(3559, 0, 0, 0, 0.5, 0, 0, 0, 0, 0, 0, 0)
+target(2559, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 0)
+lat, lon = (round(degrees * 1e7) for degrees in (scenario.start.home.lat_deg, scenario.start.home.lon_deg))
+places = ((16, 0, 0, 0), (16, 100, 100, 0), (16, 200, 100, 0), (16, 200, 300, 1), (18, 200, 300, 1), (20, 0, 0, 0))
+say(mavlink.MAVLink_mission_count_message(1, 1, len(places), 0), 0.1)
+for seq, (command, north, east, first) in enumerate(places):
+    say(mavlink.MAVLink_mission_item_int_message(1, 1, seq, 3, command, 0, 1, first, 0, 1, 0, lat + north, lon + east, 0, 0), 0.1)
+order(176, 1, 10, seconds=90.0)
+order(176, 1, 12, seconds=2.0)
+after = compiled()
+said = [m.text for m in mavlink.MAVLink(None).parse_buffer(link.take()) if m.get_type() == "STATUSTEXT"]
+print(json.dumps({"said": said, "kernels": sum(before.values()), "new": [n for n in after if after[n] > before.get(n, 0)]}))
+"""
+
+
+@pytest.mark.parametrize(
+    ("mission", "sensors"), [("open.toml", "beams"), ("ackermann.toml", "lidar-360"), ("crossing.toml", "none")]
+)
+def test_a_vehicle_that_is_served_compiles_nothing(mission: str, sensors: str) -> None:
+    """A client that starts the first mission would wait for a compiler, and the vehicle's heart would not beat meanwhile."""
+    command = [sys.executable, "-c", SERVED, str(MISSIONS / mission), sensors]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert any("Mission: 4" in text for text in found["said"]), "the circle was begun"
+    assert found["kernels"] >= 5
+    assert found["new"] == []

@@ -1,0 +1,121 @@
+"""MAVProxy as the ground station beside a companion that drives: it types what a person types."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+from pymavlink import mavwp
+
+from tests.clients.program import Program, installed, program
+from tests.clients.scene import HOME_DEG, PLACES, Scene, metres_from_home, scene
+from tests.rig import GUIDED, HOLD
+from tests.scenarios.test_mavwp import send
+
+AROUND = ((-1e-3, -1e-3), (1e-3, -1e-3), (1e-3, 1e-3), (-1e-3, 1e-3))
+CORNERS = [(HOME_DEG[0] + north, HOME_DEG[1] + east) for north, east in AROUND]
+GEOFENCE = 1 << 20
+
+
+@contextmanager
+def mavproxy(folder: Path, port: int) -> Iterator[Program]:
+    """MAVProxy with its own modules, without windows, all its files in the folder."""
+    installed("MAVProxy", "MAVProxy")
+    place = folder / "mavproxy"
+    place.mkdir()
+    arguments = ["--master", f"tcp:127.0.0.1:{port}", "--logfile", place / "mav.tlog", "--state-basedir", place]
+    with program(place, "-m", "MAVProxy.mavproxy", *arguments) as running:
+        running.says("online system 1")
+        yield running
+
+
+def write_files(folder: Path) -> tuple[Path, Path, Path]:
+    """A mission, rally points and a fence, each in the form that MAVProxy's help tells of."""
+    mission, rally, fence = folder / "way.txt", folder / "rally.txt", folder / "fence.txt"
+    home, *rows = (f"{lat:.7f}\t{lon:.7f}\t0" for lat, lon in (HOME_DEG, *PLACES))
+    lines = [f"0\t1\t0\t16\t0\t0\t0\t0\t{home}\t1"]
+    lines += [f"{seq}\t0\t3\t16\t{seq}\t0\t0\t0\t{row}\t1" for seq, row in enumerate(rows, 1)]
+    mission.write_text("\n".join(["QGC WPL 110", *lines, ""]))
+    rally.write_text("".join(f"RALLY {lat:.7f} {lon:.7f} 0 0 0 0\n" for lat, lon in PLACES))
+    ring = [HOME_DEG, *CORNERS, CORNERS[0]]  # where to go first, then the corners, the first one again at the end
+    fence.write_text("".join(f"{lat:.7f}\t{lon:.7f}\n" for lat, lon in ring))
+    return mission, rally, fence
+
+
+def units(places: tuple[tuple[float, float], ...] | list[tuple[float, float]]) -> list[tuple[int, int]]:
+    return [(round(lat * 1e7), round(lon * 1e7)) for lat, lon in places]
+
+
+def lists_up_and_down(ground: Program, here: Scene, folder: Path) -> None:
+    """Mission, rally points and fence: sent, read back by MAVProxy, and looked at by somebody else."""
+    mission, rally, fence = write_files(folder)
+    ground.told(f"wp load {mission}", "AP: Flight plan received")
+    back = folder / "back.txt"
+    ground.told("wp list", "Saved 3 waypoints")
+    ground.told(f"wp save {back}", "Saved 3 waypoints")
+    loader = mavwp.MAVWPLoader()
+    assert loader.load(str(back)) == 3
+    assert [(loader.wp(seq).x, loader.wp(seq).y) for seq in (1, 2)] == [pytest.approx(place) for place in PLACES]
+    found = here.witness.items(0)
+    assert [(one.x, one.y) for one in found[1:]] == units(PLACES)
+    assert [one.param1 for one in found[1:]] == [1, 2]
+    ground.told("wp set 2", "DO_SET_MISSION_CURRENT: ACCEPTED")
+
+    # A tool of pymavlink's mavutil and mavwp puts another mission there meanwhile; MAVProxy fetches that one.
+    loader.add_latlonalt(*PLACES[0], 0.0)
+    loader.target_system = loader.target_component = 1
+    assert send(here.witness.link, loader, 0) == 0
+    ground.told("wp list", "Saved 4 waypoints")
+
+    ground.told(f"rally load {rally}", "AP: Rally points received")
+    ground.told("rally list", "Saved 2 rally items")
+    assert [(one.x, one.y) for one in here.witness.items(2)] == units(PLACES)
+
+    ground.told(f"fence load {fence}", "TYPE_FENCE: ACCEPTED")
+    ground.told("fence list", "Saved 5 fence items")
+    assert [(one.x, one.y) for one in here.witness.items(1) if one.command == 5001] == units(CORNERS)
+    for order, enabled in (("enable", True), ("disable", False)):
+        ground.told(f"fence {order}", "DO_FENCE_ENABLE: ACCEPTED")
+        here.witness.wait(
+            lambda m, enabled=enabled: (
+                m.get_type() == "SYS_STATUS" and bool(m.onboard_control_sensors_enabled & GEOFENCE) == enabled
+            )
+        )
+
+
+@pytest.mark.slow
+def test_mavproxy_beside_the_companion(tmp_path: Path) -> None:
+    with scene(tmp_path, companion_on="udp") as here, mavproxy(tmp_path, here.tcp) as ground:
+        ground.says(r"Received \d+ parameters")
+        here.may_be_armed()
+        ground.told("mode guided", "DO_SET_MODE: ACCEPTED")
+        ground.told("arm throttle", "AP: Throttle armed")
+        here.driving()
+
+        assert float(ground.told("param show WP_SPEED", r"WP_SPEED +([\d.]+)")[1]) == pytest.approx(0.4)
+        ground.tell("param set RTL_SPEED 0.25")  # it does not answer
+        here.witness.until(lambda: here.witness.told.get("RTL_SPEED") == 0.25)
+        ground.told("param fetch RTL_SPEED", r"RTL_SPEED = 0\.25")
+        lists_up_and_down(ground, here, tmp_path)
+        here.driving()
+
+        # The person takes over, and gives the rover back: the companion goes on where it was.
+        ground.told("mode hold", "Mode HOLD")
+        here.witness.until(lambda: here.witness.mode == HOLD and here.witness.speed_m_s < 0.05)
+        here.companion.says("mode is not GUIDED")
+        ground.told("mode guided", "Mode GUIDED")
+        here.driving()
+        here.arrived()
+
+        # Nobody else drives any more: MAVProxy does.
+        place = PLACES[0]
+        ground.told("mode guided", "DO_SET_MODE: ACCEPTED")
+        ground.told("arm throttle", "COMPONENT_ARM_DISARM: ACCEPTED")
+        ground.told(f"guided {place[0]} {place[1]} 0", "DO_REPOSITION: ACCEPTED")
+        here.witness.until(lambda: math.dist(metres_from_home(*here.witness.truth_deg), metres_from_home(*place)) < 1.5)
+        assert here.witness.mode == GUIDED
+        here.untouched()
+        assert "Traceback" not in ground.output
