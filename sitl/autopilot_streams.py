@@ -29,8 +29,8 @@ from sitl.sensors import Reading
 DEFAULT_INTERVAL_US = 1_000_000
 NAN = float("nan")
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
-CAPABILITIES = 61935 & ~mavlink.MAV_PROTOCOL_CAPABILITY_FTP
-"""The firmware's, but for files: there are none here."""
+CAPABILITIES = 61935
+"""The firmware's (measured). That of files is among them; what is asked about files is answered (`autopilot_files`)."""
 
 Builder = Callable[[Vehicle], list[Any]]
 

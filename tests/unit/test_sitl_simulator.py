@@ -230,18 +230,6 @@ def test_any_message_with_any_content_leaves_the_link_up(seed: int) -> None:
     assert math.isfinite(client.simulator.truth.north_m)
 
 
-def test_what_it_can_is_announced_and_files_are_not() -> None:
-    """A ground station that reads of a file service first waits for a file of parameters, which never comes."""
-    client = ready(open_ground())
-    client.command(512, 148)
-    client.run_for(0.1)
-    can = client.of("AUTOPILOT_VERSION")[-1].capabilities
-    lists = mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_RALLY
-    assert can & lists == lists
-    assert can & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT and can & mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    assert not can & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
-
-
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.binary(min_size=1, max_size=300), max_size=5))
 def test_noise_on_the_line_leaves_the_link_up(chunks: list[bytes]) -> None:
