@@ -130,11 +130,19 @@ class FaultPlayer:
         apply_sticks(vehicle)
 
     def _end(self, number: int, fault: Fault, vehicle: Vehicle) -> None:
-        if isinstance(fault, PilotTakesOver):
+        if not isinstance(fault, PilotTakesOver):
+            return
+        before = self._mode_before.pop(number, None)
+        others = [(other, one) for other, one in self._present() if isinstance(one, PilotTakesOver)]
+        if others:  # one pilot, one switch: it stays where another fault has it
+            self._take_over(*others[-1], vehicle)
+        else:
             vehicle.sticks = Sticks()
             apply_sticks(vehicle)
-            if number in self._mode_before:
-                set_mode(vehicle, self._mode_before.pop(number))
+        if before is not None and others:
+            self._mode_before[others[-1][0]] = before
+        elif before is not None:
+            set_mode(vehicle, before)
 
     # Effects ---------------------------------------------------------------------------------------------------------
 

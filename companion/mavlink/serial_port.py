@@ -21,7 +21,7 @@ class SerialLink:
         self._port: serial.Serial | None = None
         try:
             self._port = self._open()
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, OverflowError) as error:
             raise LinkError(f"{self._name}: cannot be opened: {_reason(error)}") from error
 
     @property
@@ -98,6 +98,6 @@ def _reason(error: Exception) -> str:
         return "no permission; add yourself to the group 'dialout'"
     if "lock" in text or "busy" in text.lower():
         return "another program uses it; stop that one"
-    if isinstance(error, ValueError):
+    if isinstance(error, ValueError | OverflowError):
         return f"the port does not take this baud rate ({text})"
     return text

@@ -41,12 +41,12 @@ def read_table(path: Path, kind: type[M], error: type[Exception]) -> M:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
-            raise error(f"{path}: larger than {MAX_BYTES} bytes")
+            raise error(f"{path}: larger than {MAX_BYTES} bytes; a short TOML file is expected")
         return kind.model_validate(tomllib.loads(data.decode("utf-8")))
     except OSError as fault:
-        raise error(f"{path}: cannot be read: {fault.strerror}") from fault
+        raise error(f"{path}: cannot be read: {fault.strerror}; check the path") from fault
     except UnicodeDecodeError as fault:
-        raise error(f"{path}: not UTF-8 text (byte {fault.start})") from fault
+        raise error(f"{path}: not UTF-8 text (byte {fault.start}); save it as UTF-8") from fault
     except tomllib.TOMLDecodeError as fault:
         raise error(f"{path}: not valid TOML: {fault}") from fault
     except RecursionError as fault:

@@ -67,10 +67,6 @@ def serve(
             endpoint.close()
         typer.echo(str(error), err=True)
         raise typer.Exit(BAD_INPUT) from error
-    except KeyboardInterrupt:
-        for endpoint in endpoints:
-            endpoint.close()
-        raise
     if not quiet:
         for url in listen or DEFAULT_LISTEN:
             tell(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")

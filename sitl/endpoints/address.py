@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 
 from sitl.endpoints.endpoint import Endpoint, ListenError, network_address
-from sitl.endpoints.serial import DEFAULT_BAUD, Device, PseudoTerminal, SerialEndpoint
+from sitl.endpoints.serial import DEFAULT_BAUD, HIGHEST_BAUD, Device, PseudoTerminal, SerialEndpoint
 from sitl.endpoints.tcp import TcpServer
 from sitl.endpoints.udp import UdpEndpoint
 from sitl.news import News
@@ -45,5 +45,7 @@ def _line(kind: str, place: str) -> Device | PseudoTerminal:
         return PseudoTerminal(place)
     path, _, baud = place.rpartition(":")
     if path and baud.isascii() and baud.isdigit():
+        if not 0 < int(baud) <= HIGHEST_BAUD:
+            raise ListenError(f"serial:{place}: {baud:.20} baud is no speed of a line; choose one up to {HIGHEST_BAUD}")
         return Device(path, int(baud))
     return Device(place, DEFAULT_BAUD)

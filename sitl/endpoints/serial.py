@@ -13,7 +13,7 @@ import serial
 from sitl.endpoints.endpoint import READ_BYTES, packets
 from sitl.simulator import SimLink, Simulator
 
-DEFAULT_BAUD = 115200
+DEFAULT_BAUD, HIGHEST_BAUD = 115200, 4_000_000
 RETRY_S = 1.0
 TERMINALS = "/dev/pts/"
 

@@ -1,6 +1,7 @@
 """Drives a mission in lock-step and prints one hash of all bytes in both directions, all decisions and the rover's truth.
 
-``python -m tests.conformance.hashed_run MISSION SEED..``: a line for each seed.
+``python -m tests.conformance.hashed_run MISSION SEED..``: a line for each seed. ``MISSION+SENSORS+FAULTS..`` adds a file of sensors and
+plans of faults.
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ from companion.mission.load import load_mission
 from companion.navigator import Decision
 from companion.recorder import NullRecorder
 from companion.settings import Settings
+from sitl.fault_file import load_faults
+from sitl.faults import FaultPlan
 from sitl.lockstep import Drive
-from sitl.scenario import scenario_from_mission
+from sitl.scenario import scenario_from_mission, with_faults, with_sensors
 
 TIME_LIMIT_S = 100.0
 
@@ -36,10 +39,15 @@ class HashingRecorder(NullRecorder):
         self.digest.update(repr((time_s, target, decision.reason, decision.path)).encode())
 
 
-def hashed(mission_file: Path, seed: int) -> str:
+def hashed(what: str, seed: int) -> str:
     """Hash, packets and metres of one run."""
-    mission, recorder = load_mission(mission_file), HashingRecorder()
-    drive = Drive(mission, scenario_from_mission(mission), Settings(), seed, recorder, TIME_LIMIT_S)
+    mission_file, *more = what.split("+")
+    mission, recorder = load_mission(Path(mission_file)), HashingRecorder()
+    mission = with_sensors(mission, more[0]) if more else mission
+    plans = [load_faults(Path(plan)) for plan in more[1:]]
+    faults = FaultPlan(tuple(fault for plan in plans for fault in plan.faults))
+    scenario = with_faults(scenario_from_mission(mission), faults if plans else None)
+    drive = Drive(mission, scenario, Settings(), seed, recorder, TIME_LIMIT_S)
     report = drive.run()
     recorder.digest.update(repr(drive.simulator.truth).encode())
     return f"{recorder.digest.hexdigest()} {recorder.packets} {report.distance_m:.3f}"
@@ -47,4 +55,4 @@ def hashed(mission_file: Path, seed: int) -> str:
 
 if __name__ == "__main__":
     for number in sys.argv[2:]:
-        print(hashed(Path(sys.argv[1]), int(number)))
+        print(hashed(sys.argv[1], int(number)))

@@ -15,12 +15,22 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def started(mission: str, hash_seed: str, *seeds: str) -> subprocess.Popen[str]:
-    command = [sys.executable, "-m", "tests.conformance.hashed_run", str(ROOT / "missions" / mission), *seeds]
+    command = [sys.executable, "-m", "tests.conformance.hashed_run", mission, *seeds]
     environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
     return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
 
 
-@pytest.mark.parametrize("mission", ["crossing.toml"])
+EVERYTHING = "+".join(
+    (
+        "missions/depot.toml",
+        "missions/sensors/weathered.toml",
+        *(f"missions/faults/{plan}.toml" for plan in ("radio", "gps", "vehicle")),
+    )
+)
+"""Doors, ice, a mover; sensors with every flaw; every kind of fault but those that end the drive."""
+
+
+@pytest.mark.parametrize("mission", ["missions/crossing.toml", EVERYTHING], ids=["crossing", "everything"])
 def test_the_same_seed_gives_the_same_bytes(mission: str) -> None:
     runs = [started(mission, "1", "5", "6", "5"), started(mission, "2", "5")]
     first, second = (run.communicate(timeout=300)[0].split("\n")[:-1] for run in runs)

@@ -172,6 +172,15 @@ def test_a_left_over_name_is_taken_and_a_file_is_not(bench: Bench, tmp_path: Pat
         bench.open(f"pty:{tmp_path}/none/ttyV0")
 
 
+@pytest.mark.parametrize("baud", ["0", "99999999999", "4000001"])
+def test_a_speed_that_no_line_has(bench: Bench, tmp_path: Path, baud: str) -> None:
+    """Zero would hang up, and what does not fit into the system's field is no speed."""
+    name = tmp_path / "ttyV0"
+    bench.open(f"pty:{name}")
+    with pytest.raises(ListenError, match=f"ttyV0:{baud}: {baud} baud is no speed of a line; choose one up to 4000000"):
+        bench.open(f"serial:{name}:{baud}")
+
+
 def test_the_name_of_a_terminal_in_use_is_left_alone(bench: Bench, tmp_path: Path) -> None:
     name = tmp_path / "ttyV0"
     bench.open(f"pty:{name}")

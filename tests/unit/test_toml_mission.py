@@ -199,7 +199,7 @@ def test_bad_files_get_one_line(tmp_path: Path, text: str, reason: str) -> None:
 def test_a_file_that_is_no_text(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_bytes(b"name = '\xff'")
-    with pytest.raises(MissionError, match=r"m\.toml: not UTF-8 text \(byte 8\)"):
+    with pytest.raises(MissionError, match=r"m\.toml: not UTF-8 text \(byte 8\); save it as UTF-8"):
         load_mission(path)
     path.write_bytes(b"a = " + b"[" * 100_000)
     with pytest.raises(MissionError, match="not valid TOML"):

@@ -351,6 +351,13 @@ class TestUrls:
         os.close(rover)
         os.close(device)
 
+    def test_a_baud_rate_beyond_all_numbers(self) -> None:
+        rover, device = os.openpty()
+        with pytest.raises(LinkError, match="the port does not take this baud rate"):
+            open_link(f"serial:{os.ttyname(device)}:99999999999")
+        os.close(rover)
+        os.close(device)
+
     @pytest.mark.parametrize(("suffix", "baud"), [("", 115200), (",57600", 57600)])
     def test_bare_device(self, suffix: str, baud: int) -> None:
         rover, device = os.openpty()

@@ -320,6 +320,16 @@ def test_the_switch_is_where_it_was_after_a_power_failure() -> None:
     assert heartbeat_mode(client) == MANUAL
 
 
+@pytest.mark.parametrize("later_first", [False, True])
+def test_of_two_spans_of_the_pilot_that_overlap_the_one_that_is_left_holds_the_switch(later_first: bool) -> None:
+    faults = [PilotTakesOver(50.0, 55.0, mode="MANUAL", throttle=0.5), PilotTakesOver(52.0, 60.0, mode="HOLD")]
+    client = ready(faulty(*(reversed(faults) if later_first else faults)))
+    for time_s, mode in ((51.5, MANUAL), (54.0, HOLD), (59.0, HOLD), (62.0, GUIDED)):
+        client.run_to(time_s)
+        assert heartbeat_mode(client) == mode, time_s
+    assert client.simulator.truth.speed_m_s == pytest.approx(0.0, abs=0.01)
+
+
 def heartbeat_mode(client: Client) -> int:
     beats = [m for m in client.received if m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 1]
     return int(beats[-1].custom_mode)
