@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from sitl.control import OUTPUTS
+from sitl.control import GROUND_STEERING, OUTPUTS, THROTTLE
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
 """MAV_PARAM_TYPE."""
@@ -179,3 +179,16 @@ class Parameters:
     def as_dict(self) -> dict[str, float]:
         """A copy of all values by name."""
         return dict(self._values)
+
+
+def steered_wheels(turning_radius_m: float) -> dict[str, float]:
+    """ArduRover's parameters for a rover with steered wheels: outputs, TURN_RADIUS, and steering tuned to it.
+
+    At MOT_SPD_SCA_BASE, 1 m/s, a turn rate of 1 rad/s is a turn of 1 m radius, so the feed-forward is the radius at full lock.
+    """
+    return {
+        "SERVO1_FUNCTION": float(GROUND_STEERING),
+        "SERVO3_FUNCTION": float(THROTTLE),
+        "TURN_RADIUS": turning_radius_m,
+        "ATC_STR_RAT_FF": turning_radius_m,
+    }

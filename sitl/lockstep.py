@@ -20,7 +20,8 @@ from companion.settings import Settings
 from companion.stepping import InlineRunner
 from companion.warmup import warm_up
 from sitl.scenario import Scenario
-from sitl.simulator import SimLink, Simulator
+from sitl.sim_link import SimLink
+from sitl.simulator import Simulator
 
 TRACK_PERIOD_S = 0.5
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from sitl.simulator import Collision, SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import Collision, SimStart
 
 SILENT_S = 5.0
 """A UDP partner that has said nothing for so long has gone: there is no other way to know."""

@@ -19,7 +19,7 @@ from sitl.motion import NoiseSettings
 from sitl.movers import Floats, Ints
 from sitl.rover import GRAVITY_M_S2, drive, meet_movers, new_rover
 from sitl.sensors import RangeSensing, SensorSuite
-from sitl.simulator import Collision, SimStart
+from sitl.truth import Collision, SimStart
 from sitl.world import Ground, Obstacles, World
 
 PLANT_STEP_S = 0.005

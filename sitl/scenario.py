@@ -10,14 +10,15 @@ from companion.frames import GeoPoint
 from companion.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
-from sitl.autopilot_params import DEFAULTS, REAL32
+from sitl.autopilot_params import DEFAULTS, REAL32, steered_wheels
 from sitl.faults import FaultPlan, SensorFault
 from sitl.motion import NoiseSettings
 from sitl.paramfile import ParameterFile, ParameterFileError, load_parameters
 from sitl.physics import Physics
 from sitl.sensors import SensorSuite, suite_named
-from sitl.simulator import SimStart, Simulator, steered_wheels
+from sitl.simulator import Simulator
 from sitl.suites import suite_of
+from sitl.truth import SimStart
 from sitl.world import World
 from sitl.worldfile import load_world, movers_of
 

@@ -7,148 +7,32 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from typing import Protocol
+from dataclasses import replace
 
 import numpy as np
 
 from sitl import geodesy
 from sitl.autopilot import Autopilot
 from sitl.autopilot_lidar import LidarComponent
-from sitl.autopilot_link import Channel
 from sitl.autopilot_plan import Storage
 from sitl.autopilot_signing import SECURE_PORT, StoredKey
 from sitl.autopilot_traffic import Traffic
 from sitl.autopilot_vehicle import Vehicle
 from sitl.autopilot_warmup import begin_every_drive
-from sitl.control import GROUND_STEERING, LOOP_HZ, THROTTLE
+from sitl.control import LOOP_HZ
 from sitl.fault_player import FaultPlayer
 from sitl.faults import FaultPlan
 from sitl.link_faults import Way
-from sitl.meter import PacketCounter
 from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.rover import new_rover
 from sitl.sensors import RangeSensing, SensorSuite, suite_named
+from sitl.sim_link import SimLink
+from sitl.truth import Collision, SimStart, Truth
 from sitl.world import World
 
 NOISE_ROWS = 500
 REHEARSAL_S = 4.0
 """By then every range sensor has measured."""
-
-
-class GeoPlace(Protocol):
-    """Anything with latitude and longitude in degrees."""
-
-    @property
-    def lat_deg(self) -> float:
-        """Latitude, WGS-84."""
-        ...
-
-    @property
-    def lon_deg(self) -> float:
-        """Longitude, WGS-84."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class SimStart:
-    """Where the rover stands when it is switched on, in the world frame, and where on earth that is.
-
-    The EKF origin and home are set here, so LOCAL_POSITION_NED begins at 0, 0.
-    """
-
-    north_m: float
-    east_m: float
-    heading_rad: float
-    home: GeoPlace
-
-
-@dataclass(frozen=True, slots=True)
-class Truth:
-    """Where the rover really is, world frame."""
-
-    time_s: float
-    north_m: float
-    east_m: float
-    heading_rad: float
-    speed_m_s: float
-    yaw_rate_rad_s: float
-    slide_m_s: float = 0.0
-    """Speed sideways, to the right; only on slippery ground."""
-
-
-@dataclass(frozen=True, slots=True)
-class Collision:
-    """The rover touched an obstacle: when, and where its centre was (world frame).
-
-    ``mover`` is the name of what touched it if that moves, ``speed_m_s`` the rover's own speed then.
-    """
-
-    time_s: float
-    north_m: float
-    east_m: float
-    mover: str | None = None
-    speed_m_s: float = math.nan
-
-
-def steered_wheels(turning_radius_m: float) -> dict[str, float]:
-    """ArduRover's parameters for a rover with steered wheels: outputs, TURN_RADIUS, and steering tuned to it.
-
-    At MOT_SPD_SCA_BASE, 1 m/s, a turn rate of 1 rad/s is a turn of 1 m radius, so the feed-forward is the radius at full lock.
-    """
-    return {
-        "SERVO1_FUNCTION": float(GROUND_STEERING),
-        "SERVO3_FUNCTION": float(THROTTLE),
-        "TURN_RADIUS": turning_radius_m,
-        "ATC_STR_RAT_FF": turning_radius_m,
-    }
-
-
-class SimLink:
-    """One connection to the vehicle and to the components on its network."""
-
-    def __init__(self, channel: Channel, number: int, name: str = "") -> None:
-        """Use ``Simulator.connect``."""
-        self.channel = channel
-        self.number = number
-        self.name = name
-        self.inbox = bytearray()
-        self.dropped = False
-        self.ways: tuple[Way, Way] | None = None
-        """Where packets are under way to the vehicle and from it, on links with faults."""
-        self.heard = PacketCounter()
-        self.sent = PacketCounter()
-        self._arrived = bytearray()
-
-    def receive(self, data: bytes) -> None:
-        """Bytes on their way to the vehicle; it handles them with its next main loop."""
-        self.inbox += data
-        self.heard.feed(data)
-
-    def take(self) -> bytes:
-        """What was sent to this link since the last call."""
-        if self.ways is None:
-            data = self.channel.take()
-        else:
-            data = bytes(self._arrived)
-            self._arrived.clear()
-        self.sent.feed(data)
-        return data
-
-    def pass_in(self, player: FaultPlayer, now_s: float) -> bytes:
-        """What reaches the vehicle now."""
-        data = bytes(self.inbox)
-        self.inbox.clear()
-        if self.ways is None:
-            return data
-        player.pass_on(self.ways[0], data, now_s)
-        return self.ways[0].arrived(now_s)
-
-    def pass_out(self, player: FaultPlayer, now_s: float) -> None:
-        """What the vehicle has sent goes on its way, what was under way arrives."""
-        if self.ways is not None:
-            player.pass_on(self.ways[1], self.channel.take(), now_s)
-            self._arrived += self.ways[1].arrived(now_s)
 
 
 class Simulator:
@@ -173,7 +57,7 @@ class Simulator:
         ``kept``: those among them that are not simulated, and their types: they can be read and set.
 
         ``turning_radius_m``: 0 for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
-        (``steered_wheels``), as on a real rover.
+        (``autopilot_params.steered_wheels``), as on a real rover.
 
         ``faults``: what goes wrong, and when.
 

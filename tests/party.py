@@ -6,7 +6,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.simulator import SimLink, Simulator
+from sitl.sim_link import SimLink
+from sitl.simulator import Simulator
 from tests.sitl_client import open_ground
 
 KEY = bytes(range(32))

@@ -5,7 +5,9 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.frames import GeoPoint
-from sitl.simulator import SimLink, SimStart, Simulator
+from sitl.sim_link import SimLink
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 
 HOME = GeoPoint(-35.3632613, 149.1652299)

@@ -19,7 +19,7 @@ from sitl.geodesy import to_units
 from sitl.physics import Physics
 from sitl.rover import new_rover
 from sitl.sensors import SUITES, RangeSensing
-from sitl.simulator import SimLink
+from sitl.sim_link import SimLink
 from sitl.world import World
 from tests.firmware import Firmware
 

@@ -11,7 +11,8 @@ from typing import Protocol
 import serial
 
 from sitl.endpoints.endpoint import READ_BYTES, packets
-from sitl.simulator import SimLink, Simulator
+from sitl.sim_link import SimLink
+from sitl.simulator import Simulator
 
 DEFAULT_BAUD, HIGHEST_BAUD = 115200, 4_000_000
 RETRY_S = 1.0

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 
 from sitl.endpoints.endpoint import BACKLOG_BYTES, READ_BYTES, place_text
 from sitl.news import News
-from sitl.simulator import SimLink, Simulator
+from sitl.sim_link import SimLink
+from sitl.simulator import Simulator
 
 MOST_CLIENTS = 32
 MOST_READS = 16

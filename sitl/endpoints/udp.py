@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 from sitl.endpoints.endpoint import READ_BYTES, datagrams, place_text
 from sitl.news import News
-from sitl.simulator import SimLink, Simulator
+from sitl.sim_link import SimLink
+from sitl.simulator import Simulator
 
 Address = tuple[str, int]
 MOST_PARTNERS = 8

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.sitl_client import HOME, Client, ready
 

@@ -13,7 +13,8 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.sensors import Beam, SensorSuite
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.shared_data import SHARED
 from tests.sitl_client import HOME, Client

@@ -24,7 +24,8 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.sitl_client import HOME, Client
 

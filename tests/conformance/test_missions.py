@@ -9,7 +9,8 @@ import pytest
 
 from companion.frames import GeoPoint
 from sitl import geodesy
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.conformance.recordings import RECORDINGS
 from tests.conformance.recordings import replay as replayed

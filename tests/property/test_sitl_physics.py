@@ -17,7 +17,7 @@ from sitl.json_frames import decode
 from sitl.physics import Physics, frame_step_s
 from sitl.rover import SPEED_LAG_S
 from sitl.sensors import SUITES
-from sitl.simulator import SimStart
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.firmware import Firmware, frame
 

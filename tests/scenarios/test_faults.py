@@ -30,7 +30,7 @@ from sitl.faults import (
 )
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
-from sitl.simulator import SimLink
+from sitl.sim_link import SimLink
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 HOLD, ARMED = 4, 128

@@ -17,11 +17,13 @@ from companion.recorder import NullRecorder
 from companion.settings import Settings
 from companion.stepping import InlineRunner
 from companion.warmup import warm_up
+from sitl.autopilot_params import steered_wheels
 from sitl.lockstep import LockstepClock
 from sitl.physics import Physics
 from sitl.scenario import scenario_from_mission
 from sitl.sensors import SUITES
-from sitl.simulator import SimStart, Simulator, steered_wheels
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.sitl_client import HOME, open_ground, ready
 from tests.split_vehicle import SplitVehicle

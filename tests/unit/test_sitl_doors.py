@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sitl.doors import FOR_EVER_MS, Door, next_change_s
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.sitl_client import HOME, Client, ready
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from sitl.autopilot_params import DEFAULTS
+from sitl.autopilot_params import DEFAULTS, steered_wheels
 from sitl.firmware_parameters import firmware_parameters, parameter_file
 from sitl.physics import servo_output
 from sitl.sensors import SUITES
-from sitl.simulator import steered_wheels
 
 MISSION = {"WP_SPEED": 2.0, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
 

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sitl.rover import GRAVITY_M_S2, TOP_SPEED_M_S, drive, new_rover
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import Ground, World
 from tests.sitl_client import HOME, ready
 

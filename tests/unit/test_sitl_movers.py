@@ -13,7 +13,8 @@ from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from sitl.movers import Mover, timed_track
 from sitl.scenario import ScenarioError, scenario_from_mission
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.sitl_client import READY_S, Client
 

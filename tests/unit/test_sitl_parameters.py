@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from sitl.autopilot_guided import begin_guided, begin_target
-from sitl.autopilot_params import DEFAULTS, Parameters
+from sitl.autopilot_params import DEFAULTS, Parameters, steered_wheels
 from sitl.control import COAST, LOOP_HZ, TURN_RATE, new_control, new_estimate, new_tuning
 from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.rover import new_rover
-from sitl.simulator import steered_wheels
 from sitl.world import World
 from tests.sitl_client import READY_S, Client, open_ground
 

@@ -19,7 +19,7 @@ from sitl.physics_news import PhysicsNews, summary
 from sitl.range_flaws import Flaws
 from sitl.rover import SPEED_LAG_S, TOP_SPEED_M_S, TURN_RATE_RAD_S, WHEEL_MOST_RAD, WHEEL_RATE_RAD_S
 from sitl.sensors import SUITES, Beam, SensorSuite
-from sitl.simulator import SimStart
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.firmware import NEW, OLD, Firmware, frame
 

@@ -17,8 +17,9 @@ from sitl.doors import Door
 from sitl.range_flaws import Flaws, Sun, spoiled
 from sitl.scenario import scenario_from_mission, with_sensors
 from sitl.sensors import UNKNOWN, RangeSensing, SensorSuite
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
 from sitl.suites import suite_of
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.sitl_client import HOME, Client
 

@@ -15,7 +15,8 @@ from sitl.endpoints import Endpoint, ListenError, open_endpoint
 from sitl.endpoints.endpoint import datagrams
 from sitl.news import News
 from sitl.server import serve
-from sitl.simulator import Collision, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import Collision
 from tests.sitl_client import open_ground
 
 

@@ -10,7 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_params import DEFAULTS
 from sitl.motion import NoiseSettings
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.sitl_client import HOME, Client, open_ground, ready
 

@@ -25,8 +25,9 @@ from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.doors import Door
 from sitl.meter import PacketCounter
 from sitl.movers import Mover, timed_track
-from sitl.simulator import SimStart, Simulator
+from sitl.simulator import Simulator
 from sitl.sketch import COARSEST_M, Disc, Kind, Layer, Place, Scene, frame_for, paint
+from sitl.truth import SimStart
 from sitl.view import Fact, Section, View, arrow, render
 from sitl.watching import Rates, Watching
 from sitl.world import World

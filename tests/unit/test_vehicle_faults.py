@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.autopilot_params import steered_wheels
 from sitl.faults import (
     BatteryLow,
     Fault,
@@ -21,7 +22,8 @@ from sitl.faults import (
     SensorFault,
     WheelSlip,
 )
-from sitl.simulator import SimStart, Simulator, steered_wheels
+from sitl.simulator import Simulator
+from sitl.truth import SimStart
 from sitl.world import World
 from tests.shared_data import SHARED, needs_shared
 from tests.sitl_client import HOME, Client, open_ground, ready

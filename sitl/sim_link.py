@@ -1,0 +1,55 @@
+"""One connection to the simulated vehicle: bytes in, bytes out, and what a fault plan does to them on the way."""
+
+from __future__ import annotations
+
+from sitl.autopilot_link import Channel
+from sitl.fault_player import FaultPlayer
+from sitl.link_faults import Way
+from sitl.meter import PacketCounter
+
+
+class SimLink:
+    """One connection to the vehicle and to the components on its network."""
+
+    def __init__(self, channel: Channel, number: int, name: str = "") -> None:
+        """Use ``Simulator.connect``."""
+        self.channel = channel
+        self.number = number
+        self.name = name
+        self.inbox = bytearray()
+        self.dropped = False
+        self.ways: tuple[Way, Way] | None = None
+        """Where packets are under way to the vehicle and from it, on links with faults."""
+        self.heard = PacketCounter()
+        self.sent = PacketCounter()
+        self._arrived = bytearray()
+
+    def receive(self, data: bytes) -> None:
+        """Bytes on their way to the vehicle; it handles them with its next main loop."""
+        self.inbox += data
+        self.heard.feed(data)
+
+    def take(self) -> bytes:
+        """What was sent to this link since the last call."""
+        if self.ways is None:
+            data = self.channel.take()
+        else:
+            data = bytes(self._arrived)
+            self._arrived.clear()
+        self.sent.feed(data)
+        return data
+
+    def pass_in(self, player: FaultPlayer, now_s: float) -> bytes:
+        """What reaches the vehicle now."""
+        data = bytes(self.inbox)
+        self.inbox.clear()
+        if self.ways is None:
+            return data
+        player.pass_on(self.ways[0], data, now_s)
+        return self.ways[0].arrived(now_s)
+
+    def pass_out(self, player: FaultPlayer, now_s: float) -> None:
+        """What the vehicle has sent goes on its way, what was under way arrives."""
+        if self.ways is not None:
+            player.pass_on(self.ways[1], self.channel.take(), now_s)
+            self._arrived += self.ways[1].arrived(now_s)

@@ -1,0 +1,62 @@
+"""Where the rover begins, where it really is, and what it touched: world frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+
+class GeoPlace(Protocol):
+    """Anything with latitude and longitude in degrees."""
+
+    @property
+    def lat_deg(self) -> float:
+        """Latitude, WGS-84."""
+        ...
+
+    @property
+    def lon_deg(self) -> float:
+        """Longitude, WGS-84."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class SimStart:
+    """Where the rover stands when it is switched on, in the world frame, and where on earth that is.
+
+    The EKF origin and home are set here, so LOCAL_POSITION_NED begins at 0, 0.
+    """
+
+    north_m: float
+    east_m: float
+    heading_rad: float
+    home: GeoPlace
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """Where the rover really is, world frame."""
+
+    time_s: float
+    north_m: float
+    east_m: float
+    heading_rad: float
+    speed_m_s: float
+    yaw_rate_rad_s: float
+    slide_m_s: float = 0.0
+    """Speed sideways, to the right; only on slippery ground."""
+
+
+@dataclass(frozen=True, slots=True)
+class Collision:
+    """The rover touched an obstacle: when, and where its centre was (world frame).
+
+    ``mover`` is the name of what touched it if that moves, ``speed_m_s`` the rover's own speed then.
+    """
+
+    time_s: float
+    north_m: float
+    east_m: float
+    mover: str | None = None
+    speed_m_s: float = math.nan
