@@ -1,7 +1,7 @@
 """Drives a mission in lock-step and prints one hash of all bytes in both directions, all decisions and the rover's truth.
 
 ``python -m tests.conformance.hashed_run MISSION SEED..``: a line for each seed. ``MISSION+SENSORS+FAULTS..`` adds a file of sensors and
-plans of faults.
+plans of faults. ``auto:`` before it: the autopilot drives a mission of its own instead, and a ground station listens.
 """
 
 from __future__ import annotations
@@ -10,16 +10,21 @@ import hashlib
 import sys
 from pathlib import Path
 
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
 from companion.mission.load import load_mission
+from companion.mission.mission import Mission
 from companion.navigator import Decision
 from companion.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.fault_file import load_faults
 from sitl.faults import FaultPlan
 from sitl.lockstep import Drive
-from sitl.scenario import scenario_from_mission, with_faults, with_sensors
+from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
+from tests.mission_client import at, do, in_auto
 
 TIME_LIMIT_S = 100.0
+WAYPOINT, RETURN = 16, 20
 
 
 class HashingRecorder(NullRecorder):
@@ -39,20 +44,37 @@ class HashingRecorder(NullRecorder):
         self.digest.update(repr((time_s, target, decision.reason, decision.path)).encode())
 
 
-def hashed(what: str, seed: int) -> str:
-    """Hash, packets and metres of one run."""
+def laid_out(what: str) -> tuple[Mission, Scenario]:
+    """The mission and all that goes with it."""
     mission_file, *more = what.split("+")
-    mission, recorder = load_mission(Path(mission_file)), HashingRecorder()
+    mission = load_mission(Path(mission_file))
     mission = with_sensors(mission, more[0]) if more else mission
     plans = [load_faults(Path(plan)) for plan in more[1:]]
     faults = FaultPlan(tuple(fault for plan in plans for fault in plan.faults))
-    scenario = with_faults(scenario_from_mission(mission), faults if plans else None)
+    return mission, with_faults(scenario_from_mission(mission), faults if plans else None)
+
+
+def hashed(what: str, seed: int) -> str:
+    """Hash, packets and metres of one run."""
+    mission, scenario = laid_out(what)
+    recorder = HashingRecorder()
     drive = Drive(mission, scenario, Settings(), seed, recorder, TIME_LIMIT_S)
     report = drive.run()
     recorder.digest.update(repr(drive.simulator.truth).encode())
     return f"{recorder.digest.hexdigest()} {recorder.packets} {report.distance_m:.3f}"
 
 
+def hashed_auto(what: str, seed: int) -> str:
+    """The same of a mission that the autopilot drives by itself: two places, and home."""
+    simulator = laid_out(what)[1].simulator(seed)
+    client = in_auto(simulator, [at(WAYPOINT, 0.0, 12.0), at(WAYPOINT, 4.0, 14.0), do(RETURN)])
+    simulator.advance_to_s(TIME_LIMIT_S)
+    data = client.link.take()
+    digest = hashlib.sha256(repr(simulator.truth).encode() + data)
+    return f"{digest.hexdigest()} {len(mavlink.MAVLink(None).parse_buffer(data))} {simulator.driven_m:.3f}"
+
+
 if __name__ == "__main__":
     for number in sys.argv[2:]:
-        print(hashed(sys.argv[1], int(number)))
+        auto = sys.argv[1].startswith("auto:")
+        print(hashed_auto(sys.argv[1][5:], int(number)) if auto else hashed(sys.argv[1], int(number)))

@@ -30,7 +30,12 @@ EVERYTHING = "+".join(
 """Doors, ice, a mover; sensors with every flaw; every kind of fault but those that end the drive."""
 
 
-@pytest.mark.parametrize("mission", ["missions/crossing.toml", EVERYTHING], ids=["crossing", "everything"])
+AUTO = "auto:missions/depot.toml+missions/sensors/weathered.toml+missions/faults/gps.toml"
+
+
+@pytest.mark.parametrize(
+    "mission", ["missions/crossing.toml", EVERYTHING, AUTO], ids=["crossing", "everything", "auto"]
+)
 def test_the_same_seed_gives_the_same_bytes(mission: str) -> None:
     runs = [started(mission, "1", "5", "6", "5"), started(mission, "2", "5")]
     first, second = (run.communicate(timeout=300)[0].split("\n")[:-1] for run in runs)
@@ -39,5 +44,5 @@ def test_the_same_seed_gives_the_same_bytes(mission: str) -> None:
     assert first[0] == first[2] == second[0], "the same seed, three times, in two processes"
     assert first[0] != first[1], "another seed"
     _, packets, driven_m = first[0].split()
-    assert int(packets) > 3000
+    assert int(packets) > 2000
     assert float(driven_m) > 10.0
