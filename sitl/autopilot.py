@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl.autopilot_commands import answer
 from sitl.autopilot_files import answer_file_request
 from sitl.autopilot_link import Channel
-from sitl.autopilot_modes import INFO, WARNING, apply_sticks, run_failsafes, set_mode
+from sitl.autopilot_modes import apply_sticks, run_failsafes, set_mode
 from sitl.autopilot_network import close_channel, open_channel, pass_on, set_up_signing
 from sitl.autopilot_params import REAL32
 from sitl.autopilot_progress import plan_due_us, run_plan, set_mission_current
@@ -19,7 +19,17 @@ from sitl.autopilot_signing import SECURE_PORT
 from sitl.autopilot_streams import heartbeat, send_due, set_group
 from sitl.autopilot_targets import attitude_target, global_target, local_target
 from sitl.autopilot_transfer import TRANSFERS, keep_home
-from sitl.autopilot_vehicle import ALTITUDE_M, HOME_S, ORIGIN_S, POSITION_S, Sticks, Vehicle, parameter_message
+from sitl.autopilot_vehicle import (
+    ALTITUDE_M,
+    HOME_S,
+    INFO,
+    ORIGIN_S,
+    POSITION_S,
+    WARNING,
+    Sticks,
+    Vehicle,
+    parameter_message,
+)
 from sitl.control import LOOP_HZ
 
 PARAMETERS_PER_LOOP = 5

@@ -15,7 +15,7 @@ from sitl.autopilot_items import NAMES, Item
 from sitl.autopilot_modes import set_mode
 from sitl.autopilot_plan import GuidedTask, Submode
 from sitl.autopilot_targets import change_speed
-from sitl.autopilot_vehicle import ALTITUDE_M, Mode, Vehicle
+from sitl.autopilot_vehicle import ALTITUDE_M, INFO, NOTICE, WARNING, Mode, Vehicle
 from sitl.autopilot_ways import (
     arrived,
     begin_driving,
@@ -25,7 +25,6 @@ from sitl.autopilot_ways import (
 )
 from sitl.control import HEADING
 
-CRITICAL, WARNING, NOTICE, INFO = 2, 4, 5, 6
 SMALLEST_CIRCLE_M = 0.5
 STAY, LOITER, ACRO, MANUAL = 0, 1, 2, 3
 """MIS_DONE_BEHAVE."""

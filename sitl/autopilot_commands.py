@@ -11,10 +11,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl.autopilot_auto import AutoRunner
 from sitl.autopilot_fence import enable_fence
 from sitl.autopilot_link import Channel
-from sitl.autopilot_modes import CRITICAL, FORCE, INFO, arm, arming_faults, disarm, set_mode
+from sitl.autopilot_modes import FORCE, arm, arming_faults, disarm, set_mode
 from sitl.autopilot_streams import DEFAULT_INTERVAL_US, MESSAGES, set_interval, streamable
 from sitl.autopilot_targets import GLOBAL_FRAMES, change_speed, go_to, valid_place
-from sitl.autopilot_vehicle import Mode, Vehicle
+from sitl.autopilot_vehicle import CRITICAL, INFO, Mode, Vehicle
 from sitl.control import LOOP_HZ
 
 ACCEPTED, TRY_LATER, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4

@@ -9,11 +9,10 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl.autopilot_items import WAYPOINT, Item, Result
 from sitl.autopilot_link import Channel
 from sitl.autopilot_plan import FENCE, MISSION, RALLY
-from sitl.autopilot_vehicle import ALTITUDE_M, Vehicle
+from sitl.autopilot_vehicle import ALTITUDE_M, WARNING, Vehicle
 
 MOST = {MISSION: 724, FENCE: 84, RALLY: 50}
 """How many items fit into the storage of a usual flight controller (16 kB)."""
-WARNING = 4
 
 
 def type_of(message: Any) -> int:

@@ -8,10 +8,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_area import distance_m, outside, shapes
 from sitl.autopilot_items import FENCE_CIRCLE_IN
-from sitl.autopilot_vehicle import Mode, Vehicle
+from sitl.autopilot_vehicle import NOTICE, Mode, Vehicle
 from sitl.autopilot_ways import CIRCLE_FENCE, POLYGON_FENCE
 
-NOTICE = 5
 NAMES = {CIRCLE_FENCE: "Circle", POLYGON_FENCE: "Polygon"}
 ON, OFF, FLOOR_OFF = 1, 0, 2
 REPORT, RETURN, HOLD, SMART_RETURN, SMART_RETURN_OR_HOLD, DISARM = 0, 1, 2, 3, 4, 5

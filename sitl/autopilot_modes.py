@@ -8,7 +8,18 @@ from sitl.autopilot_battery import LOW, NAMES, OK, arming_complaint
 from sitl.autopilot_ekf import Change
 from sitl.autopilot_fence import arming_fault
 from sitl.autopilot_plan import GuidedTask, Submode
-from sitl.autopilot_vehicle import ARMABLE_S, AUTOPILOT_MODES, PREARM_S, Mode, Sticks, Vehicle
+from sitl.autopilot_vehicle import (
+    ARMABLE_S,
+    AUTOPILOT_MODES,
+    CRITICAL,
+    INFO,
+    NOTICE,
+    PREARM_S,
+    WARNING,
+    Mode,
+    Sticks,
+    Vehicle,
+)
 from sitl.autopilot_ways import begin_driving, begin_return, begin_way_back, remember_start
 from sitl.control import COAST, STOP, outputs_fault
 
@@ -16,7 +27,6 @@ NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.INITIALISING}
 FORCE = {2989, 21196}
 """Magic numbers that arm or disarm against the checks."""
 
-CRITICAL, WARNING, NOTICE, INFO = 2, 4, 5, 6
 GCS_SILENCE_S = 5.7
 PREARM_TEXT_EVERY_S = 30.0
 VARIANCE_TEXT_EVERY_S = 30.0

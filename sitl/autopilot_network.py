@@ -10,10 +10,9 @@ from sitl.autopilot_link import Channel, new_channel
 from sitl.autopilot_routing import AUTOPILOT
 from sitl.autopilot_signing import ACCEPTED_UNSIGNED, SECURE_PORT, StoredKey
 from sitl.autopilot_streams import start_streams
-from sitl.autopilot_vehicle import Vehicle, text_messages
+from sitl.autopilot_vehicle import ERROR, Vehicle, text_messages
 
 MAVLINK_1 = 1
-ERROR = 3
 """Severity of a text."""
 
 

@@ -7,14 +7,14 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot_auto import CRITICAL, AutoRunner
+from sitl.autopilot_auto import AutoRunner
 from sitl.autopilot_fence import run_fence
 from sitl.autopilot_link import Channel
 from sitl.autopilot_modes import disarm, set_mode
 from sitl.autopilot_plan import Submode
 from sitl.autopilot_streams import mission_current
 from sitl.autopilot_transfer import run_uploads
-from sitl.autopilot_vehicle import Mode, Vehicle
+from sitl.autopilot_vehicle import CRITICAL, Mode, Vehicle
 from sitl.autopilot_ways import SAVE_EVERY_US, remember_path, run_return, run_way_back, stand
 
 TICK_US = 100_000

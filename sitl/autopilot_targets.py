@@ -7,9 +7,8 @@ from typing import Any
 
 from sitl import geodesy
 from sitl.autopilot_guided import begin_target
-from sitl.autopilot_modes import INFO
 from sitl.autopilot_plan import Submode
-from sitl.autopilot_vehicle import DRIVEN_MODES, Mode, Vehicle
+from sitl.autopilot_vehicle import DRIVEN_MODES, INFO, Mode, Vehicle
 from sitl.control import CIRCLE, HEADING, LEG, TURN_RATE, WAYPOINT
 
 LOCAL_NED, LOCAL_OFFSET, BODY, BODY_OFFSET = 1, 7, 8, 9

@@ -13,7 +13,6 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot_download import (
     MOST,
-    WARNING,
     acknowledge,
     request,
     request_int,
@@ -36,10 +35,9 @@ from sitl.autopilot_items import (
 from sitl.autopilot_link import Channel
 from sitl.autopilot_plan import FENCE, MISSION, RALLY, Upload
 from sitl.autopilot_targets import go_to
-from sitl.autopilot_vehicle import Mode, Vehicle, text_messages
+from sitl.autopilot_vehicle import INFO, WARNING, Mode, Vehicle, text_messages
 
 ASK_AGAIN_US, GIVE_UP_US = 1_000_000, 8_000_000
-INFO = 6
 DONE_TEXTS = {MISSION: "Flight plan received", RALLY: "Rally points received"}
 TIMEOUT_TEXTS = {MISSION: "Mission upload timeout", FENCE: "Fence upload timeout", RALLY: "Rally upload timeout"}
 TOTALS = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}

@@ -43,6 +43,10 @@ EKF_UNINITIALISED, EKF_CONSTANT_POSITION = 1024, 167
 """EKF_STATUS_REPORT flags of the start-up: nothing yet; attitude and velocity but a constant position."""
 
 
+CRITICAL, ERROR, WARNING, NOTICE, INFO = 2, 3, 4, 5, 6
+"""MAV_SEVERITY of what is said."""
+
+
 class Mode(IntEnum):
     """ArduRover's flight modes."""
 

@@ -9,7 +9,7 @@ from sitl.autopilot_area import Place, distance_m, nearest, outside
 from sitl.autopilot_guided import begin_guided
 from sitl.autopilot_legs import begin_leg
 from sitl.autopilot_plan import WayBack
-from sitl.autopilot_vehicle import Mode, Vehicle
+from sitl.autopilot_vehicle import INFO, Mode, Vehicle
 from sitl.control import LEG, STOP
 
 CIRCLE_FENCE, POLYGON_FENCE = 2, 4
@@ -18,7 +18,6 @@ SAVE_EVERY_US = 300_000
 SIMPLIFY_AT = 50
 """New points on the path after which it is simplified."""
 SLOWEST_M_S = 0.05
-INFO = 6
 
 
 def begin_driving(vehicle: Vehicle, speed_m_s: float = 0.0) -> None:
