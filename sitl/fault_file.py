@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from abc import ABC, abstractmethod
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -44,7 +45,7 @@ class FaultFileError(Exception):
     """A plan that cannot be used; the text is one line with file, place, reason and remedy."""
 
 
-class FaultTable(BaseModel):
+class FaultTable(BaseModel, ABC):
     """``[[fault]]``: what all kinds have in common."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
@@ -69,9 +70,9 @@ class FaultTable(BaseModel):
         repeat_s = math.inf if self.repeat_s is None else self.repeat_s
         return {"start_s": self.start_s, "end_s": end_s, "since": self.since, "repeat_s": repeat_s}
 
+    @abstractmethod
     def fault(self) -> Fault:
         """The fault as a value. Raises ValueError when what was said contradicts itself."""
-        raise NotImplementedError
 
 
 class OnLink(FaultTable):

@@ -73,6 +73,8 @@ def test_action_disarm() -> None:
     client = fenced(BOX, FENCE_ACTION=5)
     client.drive_to(25.0, 0.0)
     run_until(client, "Throttle disarmed", 20.0)
+    client.run_for(1.0)
+    assert not client.of("HEARTBEAT")[-1].base_mode & 128
 
 
 def test_the_circle_round_home_and_its_backup() -> None:
