@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from companion.bench.cases import PAPER_MAPS
 from companion.bench.contestants import Contestant
 from companion.bench.measure import Entry
 
@@ -24,7 +23,7 @@ def peer_ratios(entries: list[Entry], contestants: list[Contestant]) -> list[tup
     """Map, size, the fastest complete peer and how many times as long as ``astar`` it takes."""
     found = []
     for entry in entries:
-        if entry.contestant == "astar" and entry.case in PAPER_MAPS:
+        if entry.contestant == "astar":
             peer = fastest_peer(entries, contestants, entry.case, entry.scale)
             if peer is not None:
                 found.append((entry.case, entry.scale, peer.contestant, peer.median_ms / entry.median_ms))
@@ -37,7 +36,7 @@ def genetic_ratios(entries: list[Entry]) -> list[tuple[str, int, float, float]]:
     found = []
     for entry in entries:
         graph = times.get(("astar", entry.case, entry.scale))
-        if entry.contestant == "bspline-ga" and entry.case in PAPER_MAPS and graph is not None:
+        if entry.contestant == "bspline-ga" and graph is not None:
             found.append((entry.case, entry.scale, graph.median_ms / entry.median_ms, entry.found / entry.runs))
     return found
 

@@ -74,7 +74,8 @@ def bench(
     if json_file is not None:
         json_file.write_text(json.dumps(as_json(entries, cases, limits, settings), indent=2) + "\n", encoding="utf-8")
     if docs is not None:
-        command = f"rover-companion bench --sizes {sizes} --seeds {seeds} --seed {seed} --cell-s {cell_s:g} --docs docs"
+        names = "".join(f"{file.name} " for file in map_files or [])
+        command = f"rover-companion bench {names}--sizes {sizes} --seeds {seeds} --seed {seed} --cell-s {cell_s:g} --docs docs"
         for file in write_page(docs, command, entries, contestants, cases, limits):
             console.print(f"written: {file}")
 
