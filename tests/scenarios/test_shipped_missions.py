@@ -21,6 +21,8 @@ SOLVABLE = [
     "field.plan", "field.waypoints",
 ]  # fmt: skip
 SUITES = ["lidar-90", "lidar-360", "beams"]
+LIDARS_ELSEWHERE = ["ackermann.toml", "crossing.toml", "depot.toml"]
+"""Tests of their own drive these with both lidars."""
 
 
 def driven(name: str, suite: str | None = None, seed: int = 0, settings: Settings | None = None) -> Report:
@@ -38,6 +40,18 @@ def test_mission_is_solved(name: str, suite: str) -> None:
     assert report.collisions == 0
     assert [status for _, status in report.targets] == ["reached"] * len(report.targets)
     assert report.exit_code == 0
+
+
+@pytest.mark.parametrize("name", LIDARS_ELSEWHERE)
+def test_mission_is_solved_with_single_beams_too(name: str) -> None:
+    report = driven(name, "beams")
+    assert report.collisions == 0
+    assert report.exit_code == 0
+
+
+def test_no_shipped_mission_is_left_out() -> None:
+    files = {file.name for kind in ("*.toml", "*.plan", "*.waypoints") for file in MISSIONS.glob(kind)}
+    assert files == {*SOLVABLE, *LIDARS_ELSEWHERE, "sealed.toml"}
 
 
 @pytest.mark.parametrize("suite", SUITES)
