@@ -10,10 +10,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sitl.autopilot_ekf import STEP_S
-from sitl.autopilot_modes import apply_sticks, set_mode, tell_of_ekf
-from sitl.autopilot_vehicle import HOME_S, ORIGIN_S, POSITION_S, Mode, Sticks, Vehicle
-from sitl.control import Record
+from sitl.autopilot.control import Record
+from sitl.autopilot.ekf import STEP_S
+from sitl.autopilot.modes import apply_sticks, set_mode, tell_of_ekf
+from sitl.autopilot.vehicle import HOME_S, ORIGIN_S, POSITION_S, Mode, Sticks, Vehicle
 from sitl.faults import (
     BatteryLow,
     Fault,

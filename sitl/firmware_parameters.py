@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sitl.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
+from sitl.autopilot.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
 from sitl.physics import MIDDLE_US, SPAN_US
 from sitl.sensors import SensorSuite
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from sitl.autopilot_framing import BEGINNING, packet_size
+from sitl.autopilot.framing import BEGINNING, packet_size
 from sitl.faults import Direction, LinkFault
 
 WORST_BYTES = 3

@@ -10,9 +10,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sitl.autopilot_battery import FULL_A, RESISTANCE_OHM
-from sitl.autopilot_loop import run_tasks
-from sitl.control import LOOP_S
+from sitl.autopilot.battery import FULL_A, RESISTANCE_OHM
+from sitl.autopilot.control import LOOP_S
+from sitl.autopilot.loop import run_tasks
 from sitl.movers import Floats, Ints
 from sitl.rover import drive, meet_movers
 from sitl.world import Ground, Obstacles

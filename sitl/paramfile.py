@@ -10,8 +10,8 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from sitl.autopilot_params import DEFAULTS, INT8, INT16, INT32, REAL32
-from sitl.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT, functions_of, is_skid
+from sitl.autopilot.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT, functions_of, is_skid
+from sitl.autopilot.params import DEFAULTS, INT8, INT16, INT32, REAL32
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 AUTOPILOT = 1

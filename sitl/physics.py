@@ -13,7 +13,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numba import njit
 
-from sitl.autopilot_scanner import Scanner, ScannerPort
+from sitl.autopilot.scanner import Scanner, ScannerPort
 from sitl.json_frames import COUNTS, RANGES_MOST, BodyState, ServoFrame, decode, encode
 from sitl.motion import NoiseSettings
 from sitl.movers import Floats, Ints

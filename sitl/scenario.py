@@ -10,7 +10,7 @@ from companion.frames import GeoPoint
 from companion.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
-from sitl.autopilot_params import DEFAULTS, REAL32, steered_wheels
+from sitl.autopilot.params import DEFAULTS, REAL32, steered_wheels
 from sitl.faults import FaultPlan, SensorFault
 from sitl.motion import NoiseSettings
 from sitl.paramfile import ParameterFile, ParameterFileError, load_parameters

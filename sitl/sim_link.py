@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sitl.autopilot_link import Channel
+from sitl.autopilot.link import Channel
 from sitl.fault_player import FaultPlayer
 from sitl.link_faults import Way
 from sitl.meter import PacketCounter

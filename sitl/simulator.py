@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 
 from sitl import geodesy
-from sitl.autopilot import Autopilot
-from sitl.autopilot_lidar import LidarComponent
-from sitl.autopilot_plan import Storage
-from sitl.autopilot_signing import SECURE_PORT, StoredKey
-from sitl.autopilot_traffic import Traffic
-from sitl.autopilot_vehicle import Vehicle
-from sitl.autopilot_warmup import begin_every_drive
-from sitl.control import LOOP_HZ
+from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.control import LOOP_HZ
+from sitl.autopilot.lidar import LidarComponent
+from sitl.autopilot.plan import Storage
+from sitl.autopilot.signing import SECURE_PORT, StoredKey
+from sitl.autopilot.traffic import Traffic
+from sitl.autopilot.vehicle import Vehicle
+from sitl.autopilot.warmup import begin_every_drive
 from sitl.fault_player import FaultPlayer
 from sitl.faults import FaultPlan
 from sitl.link_faults import Way
@@ -57,7 +57,7 @@ class Simulator:
         ``kept``: those among them that are not simulated, and their types: they can be read and set.
 
         ``turning_radius_m``: 0 for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
-        (``autopilot_params.steered_wheels``), as on a real rover.
+        (``autopilot.params.steered_wheels``), as on a real rover.
 
         ``faults``: what goes wrong, and when.
 

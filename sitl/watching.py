@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.control import LEG, WAYPOINT
+from sitl.autopilot.control import LEG, WAYPOINT
 from sitl.simulator import Simulator
 from sitl.sketch import Disc, Kind, Layer, Place, Scene
 from sitl.view import Fact, Section, View

@@ -11,10 +11,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from sitl.autopilot import Autopilot
-from sitl.autopilot_loop import run_tasks
-from sitl.autopilot_vehicle import Vehicle
-from sitl.control import LOOP_HZ
+from sitl.autopilot.autopilot import Autopilot
+from sitl.autopilot.control import LOOP_HZ
+from sitl.autopilot.loop import run_tasks
+from sitl.autopilot.vehicle import Vehicle
 from sitl.geodesy import to_units
 from sitl.physics import Physics
 from sitl.rover import new_rover

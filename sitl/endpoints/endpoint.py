@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from sitl.autopilot_framing import packet_size
+from sitl.autopilot.framing import packet_size
 from sitl.simulator import Simulator
 
 READ_BYTES = 65536

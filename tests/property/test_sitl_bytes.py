@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot import HANDLERS
-from sitl.autopilot_commands import HANDLERS as COMMANDS
-from sitl.autopilot_framing import Framer, packet_size
+from sitl.autopilot.autopilot import HANDLERS
+from sitl.autopilot.commands import HANDLERS as COMMANDS
+from sitl.autopilot.framing import Framer, packet_size
 from sitl.simulator import Simulator
 from tests.party import Party
 from tests.sitl_client import open_ground

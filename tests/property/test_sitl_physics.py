@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.frames import GeoPoint
-from sitl.autopilot_scanner import ScannerPort
+from sitl.autopilot.scanner import ScannerPort
 from sitl.json_frames import decode
 from sitl.physics import Physics, frame_step_s
 from sitl.rover import SPEED_LAG_S

@@ -17,7 +17,7 @@ from companion.recorder import NullRecorder
 from companion.settings import Settings
 from companion.stepping import InlineRunner
 from companion.warmup import warm_up
-from sitl.autopilot_params import steered_wheels
+from sitl.autopilot.params import steered_wheels
 from sitl.lockstep import LockstepClock
 from sitl.physics import Physics
 from sitl.scenario import scenario_from_mission

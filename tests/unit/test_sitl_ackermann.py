@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from companion.grid import Grid
 from companion.mission.mission import HomePoint, Mission, RoverSpec, SitlSpec, Target
-from sitl.autopilot_params import steered_wheels
+from sitl.autopilot.params import steered_wheels
 from sitl.rover import WHEEL_MOST_RAD, drive, new_rover
 from sitl.scenario import ScenarioError, scenario_from_mission
 from sitl.simulator import Simulator

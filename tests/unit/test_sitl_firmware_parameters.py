@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sitl.autopilot_params import DEFAULTS, steered_wheels
+from sitl.autopilot.params import DEFAULTS, steered_wheels
 from sitl.firmware_parameters import firmware_parameters, parameter_file
 from sitl.physics import servo_output
 from sitl.sensors import SUITES

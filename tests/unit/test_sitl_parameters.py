@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sitl.autopilot_guided import begin_guided, begin_target
-from sitl.autopilot_params import DEFAULTS, Parameters, steered_wheels
-from sitl.control import COAST, LOOP_HZ, TURN_RATE, new_control, new_estimate, new_tuning
+from sitl.autopilot.control import COAST, LOOP_HZ, TURN_RATE, new_control, new_estimate, new_tuning
+from sitl.autopilot.guided import begin_guided, begin_target
+from sitl.autopilot.params import DEFAULTS, Parameters, steered_wheels
 from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.rover import new_rover
 from sitl.world import World

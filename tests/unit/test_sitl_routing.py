@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot_routing import MOST_ROUTES, Router
+from sitl.autopilot.routing import MOST_ROUTES, Router
 from sitl.simulator import Simulator
 from tests.party import AUTOPILOT_VERSION, HOLD, REQUEST_MESSAGE, SET_MODE, Party, booted
 

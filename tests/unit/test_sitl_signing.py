@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot_signing import MINUTE
+from sitl.autopilot.signing import MINUTE
 from sitl.simulator import Simulator
 from tests.party import ARM, HOLD, KEY, REBOOT, SET_MODE, TIME, Party, booted, split
 from tests.sitl_client import open_ground

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot_params import DEFAULTS
+from sitl.autopilot.params import DEFAULTS
 from sitl.motion import NoiseSettings
 from sitl.simulator import Simulator
 from sitl.truth import SimStart

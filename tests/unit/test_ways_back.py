@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.autopilot_ways import simplified, without_loops
+from sitl.autopilot.ways import simplified, without_loops
 from tests.mission_client import FENCE, RALLY, at, place_m, run_until, upload
 from tests.sitl_client import Client, open_ground, ready
 

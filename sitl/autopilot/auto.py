@@ -1,0 +1,234 @@
+"""AUTO: what each mission command does on a rover, and when it is done (behaviour of ModeAuto)."""
+
+from __future__ import annotations
+
+import math
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl import geodesy
+from sitl.autopilot import items
+from sitl.autopilot.area import distance_m
+from sitl.autopilot.circle import begin_circle
+from sitl.autopilot.control import HEADING
+from sitl.autopilot.fence import enable_fence
+from sitl.autopilot.items import NAMES, Item
+from sitl.autopilot.modes import set_mode
+from sitl.autopilot.plan import GuidedTask, Submode
+from sitl.autopilot.targets import change_speed
+from sitl.autopilot.vehicle import ALTITUDE_M, INFO, NOTICE, WARNING, Mode, Vehicle
+from sitl.autopilot.ways import (
+    arrived,
+    begin_driving,
+    begin_return,
+    drive_to,
+    stand,
+)
+
+SMALLEST_CIRCLE_M = 0.5
+STAY, LOITER, ACRO, MANUAL = 0, 1, 2, 3
+"""MIS_DONE_BEHAVE."""
+
+ELSEWHERE = {181, 182, 183, 184, 202, 203, 205, 206, 208, 211, 215, 216, 218}
+"""Servos, relays, cameras, grippers: begun without effect, done at once, as without the part."""
+DONE_AT_ONCE = {
+    items.CHANGE_SPEED, items.SET_HOME, items.SET_REVERSE, items.FENCE_ENABLE, items.GUIDED_LIMITS, items.JUMP_TAG,
+    195, 197, 201,
+}  # fmt: skip
+
+
+class AutoRunner:
+    """Begins and checks the commands of the mission for one vehicle."""
+
+    def __init__(self, vehicle: Vehicle) -> None:
+        """Made anew whenever it is needed; all state is the vehicle's."""
+        self.vehicle = vehicle
+        self.auto = vehicle.plan.auto
+
+    def completed(self) -> None:
+        """The end of the mission: stay, unless MIS_DONE_BEHAVE says otherwise."""
+        self.vehicle.say(NOTICE, "Mission Complete")
+        behaviour = int(self.vehicle.parameters["MIS_DONE_BEHAVE"])
+        self._stop()
+        if behaviour == ACRO:
+            set_mode(self.vehicle, Mode.ACRO)
+        elif behaviour == MANUAL:
+            set_mode(self.vehicle, Mode.MANUAL)
+
+    def jumped(self, index: int, times: int, of: int) -> None:
+        """Tell of a jump."""
+        self.vehicle.say(INFO, f"Mission: {index} Jump {times}/{of}")
+
+    def _stop(self) -> None:
+        self.auto.submode = Submode.STOP
+        stand(self.vehicle)
+
+    # Beginning ------------------------------------------------------------------------------------------------------
+
+    def start(self, index: int, item: Item) -> bool:
+        """Begin a command."""
+        self.vehicle.say(INFO, f"Mission: {index} {NAMES.get(item.command, '?')}")
+        command, first = item.command, item.params[0]
+        if command in (items.WAYPOINT, items.LOITER_UNLIMITED, items.LOITER_TIME):
+            self._go(index, item)
+        elif command == items.RETURN:
+            self.auto.submode = Submode.RETURN
+            begin_return(self.vehicle)
+        elif command == items.LOITER_TURNS:
+            self._circle(item)
+        elif command == items.GUIDED_ENABLE:
+            self._hand_over(item)
+        elif command == items.SET_YAW_SPEED:
+            self._turn(item)
+        elif command == items.DELAY:
+            self._wait(item)
+        elif command in (items.CONDITION_DELAY, items.CONDITION_DISTANCE):
+            self.auto.condition_since_s, self.auto.condition = self.vehicle.time_s, first
+        else:
+            return self._do(item)
+        return True
+
+    def _do(self, item: Item) -> bool:
+        """Begin a command that is done at once; False if a rover has none such."""
+        command, first = item.command, item.params[0]
+        if command == items.CHANGE_SPEED:
+            if change_speed(self.vehicle, item.params[1]):
+                self.vehicle.say(INFO, f"speed: {item.params[1]:.1f} m/s")
+        elif command == items.SET_HOME:
+            place = self.vehicle.place() if first == 1.0 else item.place
+            if place != (0, 0):
+                self.vehicle.move_home(place)
+        elif command == items.SET_REVERSE:
+            self.vehicle.control["reversed"] = 1 if first == 1.0 else 0
+        elif command == items.GUIDED_LIMITS:
+            self.auto.guided.limit_s, self.auto.guided.limit_m = first, item.params[3]
+        elif command == items.FENCE_ENABLE:
+            return enable_fence(self.vehicle, int(first), spoken=True)
+        else:
+            return command in ELSEWHERE or command in DONE_AT_ONCE
+        return True
+
+    def _go(self, index: int, item: Item) -> None:
+        """Drive to a place; past it without stopping if the next is known and nothing is to be done there."""
+        hold_s = item.params[0] if item.command != items.LOITER_UNLIMITED else 0.0
+        self.auto.loiter_s = 0.0 if hold_s >= 32768.0 else hold_s
+        self.auto.reached = False
+        following = None
+        if item.command == items.WAYPOINT and self.auto.loiter_s == 0.0:
+            after = self.vehicle.plan.mission.next_nav(index + 1)
+            if after is not None:
+                following = self.vehicle.plan.mission.items[after].place
+        self.auto.submode = Submode.WAYPOINT
+        drive_to(self.vehicle, self._sane(item.place), following if following != (0, 0) else None)
+
+    def _sane(self, place: tuple[int, int]) -> tuple[int, int]:
+        """A place of zeros is where the rover is."""
+        return self.vehicle.place() if place == (0, 0) else place
+
+    def _circle(self, item: Item) -> None:
+        begin_driving(self.vehicle)
+        self.vehicle.destination = centre = self._sane(item.place)
+        centre_m = geodesy.offset_m(self.vehicle.origin, centre)
+        radius_m = math.copysign(max(abs(item.params[2]), SMALLEST_CIRCLE_M), item.params[2])
+        begin_circle(self.vehicle.control[0], self.vehicle.estimate[0], *centre_m, radius_m)
+        self.auto.submode = Submode.CIRCLE
+
+    def _hand_over(self, item: Item) -> None:
+        """Guided within AUTO; with 0 nothing begins."""
+        if not item.params[0] > 0.0:
+            return
+        old = self.auto.guided
+        self.auto.submode = Submode.GUIDED
+        begin_driving(self.vehicle)
+        stand(self.vehicle)
+        place = item.place if item.place != (0, 0) else None
+        height_m = item.z if item.frame != items.ABSOLUTE else item.z - ALTITUDE_M
+        self.auto.guided = GuidedTask(
+            place, height_m, self.vehicle.time_s, self.vehicle.place(), None, old.limit_s, old.limit_m
+        )
+
+    def _turn(self, item: Item) -> None:
+        heading_deg, speed_m_s, relative, _ = item.params
+        heading_rad = math.radians(heading_deg) + (self.vehicle.heading_rad() if relative > 0.0 else 0.0)
+        limit_m_s = self.vehicle.parameters["WP_SPEED"]
+        self.auto.submode, self.auto.turned, self.auto.heading_rad = Submode.HEADING, False, heading_rad
+        control = self.vehicle.control
+        control["task"], control["target_heading"] = HEADING, heading_rad
+        control["target_speed"] = min(max(speed_m_s, -limit_m_s), limit_m_s)
+        control["target_turn_rate"] = 0.0
+        control["have_target"] = 1
+        control["target_tick"] = control["tick"]
+
+    def _wait(self, item: Item) -> None:
+        """NAV_DELAY; the vehicle has no clock, so a time of day is now."""
+        self._stop()
+        self.auto.delay_since_s = self.vehicle.time_s
+        self.auto.delay_s = max(item.params[0], 0.0)
+        self.vehicle.say(INFO, f"Delaying {int(self.auto.delay_s)} sec")
+
+    # Checking -------------------------------------------------------------------------------------------------------
+
+    def verify(self, index: int, item: Item) -> bool:
+        """Whether a command is done; every end is told with MISSION_ITEM_REACHED."""
+        if item.command in ELSEWHERE:
+            return True
+        done = self._done(index, item)
+        if done:
+            for channel in self.vehicle.channels.values():
+                channel.send(mavlink.MAVLink_mission_item_reached_message(index))
+        return done
+
+    def _done(self, index: int, item: Item) -> bool:
+        now_s, auto, command = self.vehicle.time_s, self.auto, item.command
+        if command in (items.WAYPOINT, items.LOITER_UNLIMITED):
+            return self._there(index) and command == items.WAYPOINT
+        if command == items.LOITER_TIME:
+            done = self._there(index)
+            if done:
+                self.vehicle.say(WARNING, "Finished active loiter")
+            return done
+        if command == items.RETURN:
+            return arrived(self.vehicle)
+        if command == items.LOITER_TURNS:
+            return float(self.vehicle.control[0]["circle_turned"]) / (2.0 * math.pi) >= item.params[0]
+        if command == items.GUIDED_ENABLE:
+            return item.params[0] == 0.0 or self._handed_back()
+        if command == items.SET_YAW_SPEED:
+            return auto.submode != Submode.HEADING or auto.turned
+        if command == items.DELAY:
+            return now_s - auto.delay_since_s > auto.delay_s
+        if command == items.CONDITION_DELAY:
+            return now_s - auto.condition_since_s > auto.condition
+        if command == items.CONDITION_DISTANCE:
+            return self._left_m() < auto.condition
+        if command not in DONE_AT_ONCE:
+            self.vehicle.say(WARNING, f"Skipping invalid cmd #{command}")
+        return True
+
+    def _there(self, index: int) -> bool:
+        """A waypoint is done when it was reached and stayed at for as long as wanted."""
+        if not arrived(self.vehicle):
+            return False
+        auto = self.auto
+        if not auto.reached:
+            auto.reached, auto.loitering_since_s = True, self.vehicle.time_s
+            stay = f". Loiter for {int(auto.loiter_s)} seconds" if auto.loiter_s > 0.0 else ""
+            self.vehicle.say(INFO, f"Reached waypoint #{index}{stay}")
+        return self.vehicle.time_s - auto.loitering_since_s >= auto.loiter_s
+
+    def _handed_back(self) -> bool:
+        """Near the given place, or a limit of time or distance is passed."""
+        task, here = self.auto.guided, self.vehicle.place()
+        if self.auto.submode != Submode.GUIDED:
+            return True
+        if task.place is not None and distance_m(here, task.place) <= self.vehicle.parameters["WP_RADIUS"]:
+            return True
+        if 0.0 < task.limit_s <= self.vehicle.time_s - task.began_s:
+            return True
+        return 0.0 < task.limit_m < distance_m(here, task.began_at)
+
+    def _left_m(self) -> float:
+        """Metres to the place that is driven to; 0 where there is none."""
+        if self.auto.submode in (Submode.STOP, Submode.HEADING):
+            return 0.0
+        return distance_m(self.vehicle.place(), self.vehicle.destination)

@@ -1,0 +1,171 @@
+"""The fence: what was uploaded, and the circle round home; breaches and what follows (behaviour of AC_Fence)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl.autopilot.area import distance_m, outside, shapes
+from sitl.autopilot.items import FENCE_CIRCLE_IN
+from sitl.autopilot.vehicle import NOTICE, Mode, Vehicle
+from sitl.autopilot.ways import CIRCLE_FENCE, POLYGON_FENCE
+
+NAMES = {CIRCLE_FENCE: "Circle", POLYGON_FENCE: "Polygon"}
+ON, OFF, FLOOR_OFF = 1, 0, 2
+REPORT, RETURN, HOLD, SMART_RETURN, SMART_RETURN_OR_HOLD, DISARM = 0, 1, 2, 3, 4, 5
+"""FENCE_ACTION."""
+GIVE_UP_M = 100.0
+BACKUP_M = 20.0
+RECOVERY_S = 10.0
+FENCE_STATUS = 162
+
+
+def fence_names(kinds: int) -> str:
+    """The firmware's words for some kinds of fence."""
+    found = [name for bit, name in NAMES.items() if kinds & bit]
+    return " and ".join(found) + (" fences" if len(found) > 1 else " fence")
+
+
+def configured(vehicle: Vehicle) -> int:
+    """The kinds of fence that FENCE_TYPE chooses."""
+    return int(vehicle.parameters["FENCE_TYPE"]) & (CIRCLE_FENCE | POLYGON_FENCE)
+
+
+def enable_fence(vehicle: Vehicle, action: int, spoken: bool = False) -> bool:
+    """DO_FENCE_ENABLE, as a command or in a mission (then it says so); False if it cannot be done."""
+    kinds = configured(vehicle)
+    if action not in (ON, OFF, FLOOR_OFF):
+        return False
+    if action == FLOOR_OFF:
+        return True
+    if action == ON and not present(vehicle) and not spoken:
+        return False
+    vehicle.plan.fence.enabled = kinds if action == ON else 0
+    if action == OFF:
+        vehicle.plan.fence.breached = 0
+    if spoken and kinds:
+        vehicle.say(NOTICE, f"{fence_names(kinds)} {'enabled' if action == ON else 'disabled'}")
+    return True
+
+
+def present(vehicle: Vehicle) -> bool:
+    """Whether any fence could be breached: the circle always, polygons once there are some."""
+    kinds = configured(vehicle)
+    return bool(kinds & CIRCLE_FENCE) or (bool(kinds & POLYGON_FENCE) and bool(vehicle.plan.storage.fence))
+
+
+def arming_fault(vehicle: Vehicle) -> str | None:
+    """Why the fence forbids arming, in the firmware's words."""
+    on = vehicle.parameters["FENCE_ENABLE"] > 0.0
+    if on and not present(vehicle):
+        return "Fences enabled, but none selected"
+    if not on or not configured(vehicle):
+        return None
+    if not vehicle.has_position:
+        return "Fence requires position"
+    radius_m, margin_m = vehicle.parameters["FENCE_RADIUS"], vehicle.parameters["FENCE_MARGIN"]
+    circles = [size for command, _, size in shapes(vehicle.plan.storage.fence) if command == FENCE_CIRCLE_IN]
+    if configured(vehicle) & POLYGON_FENCE and any(size < margin_m for size in circles):
+        return "Polygon fence margin is greater than inclusion circle radius"
+    if radius_m < 0.0:
+        return "Invalid Circle FENCE_RADIUS value"
+    if radius_m < margin_m:
+        return "Circle FENCE_MARGIN is greater than FENCE_RADIUS"
+    if vehicle.plan.fence.breached:
+        return f"Vehicle breaching {fence_names(vehicle.plan.fence.breached)}"
+    return "Invalid FENCE_MARGIN value" if margin_m < 0.0 else None
+
+
+def run_fence(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool], disarm: Callable[[Vehicle], None]) -> None:
+    """Look for breaches; a new one while armed is told and acted on."""
+    fence, setting = vehicle.plan.fence, vehicle.parameters["FENCE_ENABLE"]
+    if setting != fence.seen_setting:
+        fence.seen_setting = setting
+        fence.enabled = configured(vehicle) if setting > 0.0 else 0
+    if not setting > 0.0 and not fence.enabled:
+        fence.breached = 0
+        return
+    fresh, beyond_m = _look(vehicle)
+    if fence.recovering_since_s is not None:
+        if vehicle.time_s - fence.recovering_since_s < RECOVERY_S:
+            return
+        fence.recovering_since_s = None
+    if fresh and vehicle.armed:
+        vehicle.say(NOTICE, f"{fence_names(fresh)} breached")
+        _act(vehicle, beyond_m, set_mode, disarm)
+
+
+def _look(vehicle: Vehicle) -> tuple[int, float]:
+    """Freshly breached kinds, and how far beyond the circle the rover is."""
+    fence, here, fresh, beyond_m = vehicle.plan.fence, vehicle.place(), 0, 0.0
+    if not vehicle.has_position:
+        return 0, 0.0
+    if fence.enabled & CIRCLE_FENCE:
+        home_m = distance_m(vehicle.home, here)
+        beyond_m = home_m - vehicle.parameters["FENCE_RADIUS"]
+        if beyond_m < 0.0:
+            fence.breached &= ~CIRCLE_FENCE
+            fence.backup_m = 0.0
+        elif not fence.breached & CIRCLE_FENCE or 0.0 < fence.backup_m <= home_m:
+            fresh |= CIRCLE_FENCE
+            fence.backup_m = home_m + BACKUP_M
+    if fence.enabled & POLYGON_FENCE:
+        options = int(vehicle.parameters["FENCE_OPTIONS"])
+        if not outside(vehicle.plan.storage.fence, here, options):
+            fence.breached &= ~POLYGON_FENCE
+        elif not fence.breached & POLYGON_FENCE:
+            fresh |= POLYGON_FENCE
+    fence.breached &= fence.enabled
+    if fresh:
+        _record(vehicle, fresh)
+    return fresh, beyond_m
+
+
+def _record(vehicle: Vehicle, fresh: int) -> None:
+    fence = vehicle.plan.fence
+    fence.count = min(fence.count + bin(fresh).count("1"), 65500)
+    first = not fence.breached
+    fence.breached |= fresh
+    if first:
+        fence.breach_s = vehicle.time_s
+        if vehicle.time_s - fence.told_s > 1.0:
+            fence.told_s = vehicle.time_s
+            for channel in vehicle.channels.values():
+                channel.requested.append(FENCE_STATUS)
+
+
+def _act(
+    vehicle: Vehicle, beyond_m: float, set_mode: Callable[[Vehicle, int], bool], disarm: Callable[[Vehicle], None]
+) -> None:
+    """FENCE_ACTION; far outside the circle there is only HOLD."""
+    action = int(vehicle.parameters["FENCE_ACTION"])
+    if action == DISARM and beyond_m <= GIVE_UP_M:
+        disarm(vehicle)
+        return
+    wishes: dict[int, tuple[Mode, ...]] = {
+        REPORT: (),
+        RETURN: (Mode.RTL, Mode.HOLD),
+        HOLD: (Mode.HOLD,),
+        SMART_RETURN: (Mode.SMART_RTL, Mode.RTL, Mode.HOLD),
+        SMART_RETURN_OR_HOLD: (Mode.SMART_RTL, Mode.HOLD),
+    }
+    modes = wishes.get(action, ())
+    if modes and beyond_m > GIVE_UP_M:
+        modes = (Mode.HOLD,)
+    for mode in modes:
+        if set_mode(vehicle, mode):
+            return
+
+
+def fence_status(vehicle: Vehicle) -> list[mavlink.MAVLink_fence_status_message]:
+    """FENCE_STATUS; only sent while a fence is enabled."""
+    fence = vehicle.plan.fence
+    if not fence.enabled:
+        return []
+    kind = mavlink.FENCE_BREACH_BOUNDARY if fence.breached else mavlink.FENCE_BREACH_NONE
+    return [
+        mavlink.MAVLink_fence_status_message(
+            int(fence.breached != 0), fence.count, kind, round(fence.breach_s * 1000.0), mavlink.FENCE_MITIGATE_NONE
+        )
+    ]

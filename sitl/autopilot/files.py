@@ -1,0 +1,46 @@
+"""MAVLink's file service of a vehicle without files: every request is answered, none finds anything.
+
+A ground station that asks for a file of parameters or missions first (`@PARAM/param.pck`) then goes on to the list at once,
+instead of asking again for ten seconds.
+"""
+
+from __future__ import annotations
+
+import struct
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl.autopilot.link import Channel
+from sitl.autopilot.vehicle import Vehicle
+
+HEADER = struct.Struct("<HBBBBBxI")
+"""Number, session, operation, size, operation that is answered, end of a burst, (padding), offset."""
+PAYLOAD_BYTES = 251
+TERMINATE, RESET, READ, WRITE, BURST = 1, 2, 5, 7, 15
+OF_A_SESSION, OPERATIONS = {READ, WRITE, BURST}, range(1, 16)
+ACK, NAK = 128, 129
+INVALID_SESSION, UNKNOWN_COMMAND, FILE_NOT_FOUND = 4, 7, 10
+
+
+def answer_file_request(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """FILE_TRANSFER_PROTOCOL: sessions may be ended, files are not found."""
+    number, session, operation, *_ = HEADER.unpack_from(bytes(message.payload))
+    if operation in (ACK, NAK):
+        return
+    if operation in (TERMINATE, RESET):
+        result, data = ACK, b""
+    else:
+        result, data = NAK, bytes([_error(operation)])
+    header = HEADER.pack((number + 1) & 0xFFFF, session, result, len(data), operation, 0, 0)
+    payload = (header + data).ljust(PAYLOAD_BYTES, b"\0")
+    channel.send(
+        mavlink.MAVLink_file_transfer_protocol_message(0, message.get_srcSystem(), message.get_srcComponent(), payload)
+    )
+
+
+def _error(operation: int) -> int:
+    """Why it cannot be done: no session is ever open, no file is ever there."""
+    if operation not in OPERATIONS:
+        return UNKNOWN_COMMAND
+    return INVALID_SESSION if operation in OF_A_SESSION else FILE_NOT_FOUND

@@ -1,0 +1,111 @@
+"""Moving obstacles that tell of themselves, as a rover hears them on its autopilot's links.
+
+A ``vehicle`` is a MAVLink system of its own on the same network: HEARTBEAT and GLOBAL_POSITION_INT. What ``adsb`` and ``ais``
+send on the air reaches the autopilot's receivers, and the autopilot passes it on as ADSB_VEHICLE and AIS_VESSEL.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl import geodesy
+from sitl.autopilot.link import Channel, new_codec, packed
+from sitl.autopilot.routing import AUTOPILOT
+from sitl.autopilot.vehicle import ALTITUDE_M
+from sitl.world import World
+
+FIRST_SYSTEM = 101
+"""System id of the first mover that announces itself as a vehicle; the others count on."""
+INTERVALS_S = {"vehicle": 0.25, "adsb": 1.0, "ais": 1.0}
+HEARTBEAT_S = 1.0
+GENERIC, GROUND_ROVER, ACTIVE = 0, 10, 4
+SURFACE_SERVICE = 18
+ADSB_FLAGS = (
+    mavlink.ADSB_FLAGS_VALID_COORDS
+    | mavlink.ADSB_FLAGS_VALID_ALTITUDE
+    | mavlink.ADSB_FLAGS_VALID_HEADING
+    | mavlink.ADSB_FLAGS_VALID_VELOCITY
+)
+AIS_FLAGS = mavlink.AIS_FLAGS_VALID_COG | mavlink.AIS_FLAGS_VALID_VELOCITY | mavlink.AIS_FLAGS_VALID_DIMENSIONS
+
+
+class Traffic:
+    """Sends what every announced mover tells; vehicles have sequence numbers of their own."""
+
+    def __init__(self, world: World, origin: tuple[int, int], origin_m: tuple[float, float]) -> None:
+        """``origin``: a place on earth, 1e-7 degree; ``origin_m``: the same place in the world frame."""
+        self._world = world
+        self._origin = origin
+        self._origin_m = origin_m
+        self._talkers = [number for number, mover in enumerate(world.movers) if mover.announce]
+        vehicles = [number for number in self._talkers if world.movers[number].announce == "vehicle"]
+        self._codecs = {n: new_codec(AUTOPILOT, min(FIRST_SYSTEM + i, 250)) for i, n in enumerate(vehicles)}
+        self._due_s = {number: 0.05 * i for i, number in enumerate(self._talkers)}
+        self._heartbeat_s = dict.fromkeys(vehicles, 0.0)
+
+    @property
+    def talks(self) -> bool:
+        """Whether anything announces itself."""
+        return bool(self._talkers)
+
+    def next_due_s(self) -> float:
+        """Time of the next packet; inf when nobody talks."""
+        return min(self._due_s.values(), default=math.inf)
+
+    def send_due(self, time_s: float, channels: Iterable[Channel]) -> None:
+        """Send what is due at this moment on the autopilot's channels."""
+        channels = tuple(channels)
+        for number in self._talkers:
+            if time_s < self._due_s[number] - 1e-9:
+                continue
+            self._due_s[number] += INTERVALS_S[self._world.movers[number].announce]
+            for message in self._messages(number, time_s):
+                data = packed(message, self._codecs[number]) if number in self._codecs else b""
+                for channel in channels:
+                    if data:
+                        channel.outbox += data
+                    else:
+                        channel.send(message)
+
+    def _messages(self, number: int, time_s: float) -> list[Any]:
+        mover = self._world.movers[number]
+        north_m, east_m, north_m_s, east_m_s = self._world.mover_at(number, time_s)
+        place = geodesy.moved(self._origin, north_m - self._origin_m[0], east_m - self._origin_m[1])
+        course_cdeg = round(math.degrees(math.atan2(east_m_s, north_m_s)) * 100.0) % 36000
+        speed_cm_s = round(100.0 * math.hypot(north_m_s, east_m_s))
+        if mover.announce == "adsb":
+            return [_adsb(number, place, course_cdeg, speed_cm_s, mover.name)]
+        if mover.announce == "ais":
+            return [_ais(number, place, course_cdeg, speed_cm_s, mover.radius_m, mover.name)]
+        messages: list[Any] = []
+        if time_s >= self._heartbeat_s[number] - 1e-9:
+            self._heartbeat_s[number] = time_s + HEARTBEAT_S
+            messages.append(mavlink.MAVLink_heartbeat_message(GROUND_ROVER, GENERIC, 0, 0, ACTIVE, 3))
+        velocity = (round(100.0 * north_m_s), round(100.0 * east_m_s), 0)
+        altitude_mm = round(ALTITUDE_M * 1000)
+        messages.append(
+            mavlink.MAVLink_global_position_int_message(
+                round(time_s * 1000), *place, altitude_mm, 0, *velocity, course_cdeg
+            )
+        )
+        return messages
+
+
+def _adsb(number: int, place: tuple[int, int], course_cdeg: int, speed_cm_s: int, name: str) -> Any:
+    return mavlink.MAVLink_adsb_vehicle_message(
+        0xA00000 + number, *place, 0, round(ALTITUDE_M * 1000), course_cdeg, speed_cm_s, 0,
+        name.encode("ascii", "replace")[:8], SURFACE_SERVICE, 0, ADSB_FLAGS, 0,
+    )  # fmt: skip
+
+
+def _ais(number: int, place: tuple[int, int], course_cdeg: int, speed_cm_s: int, radius_m: float, name: str) -> Any:
+    side_m = math.ceil(radius_m)
+    callsign, text = f"R{number}".encode(), name.encode("ascii", "replace")[:20]
+    return mavlink.MAVLink_ais_vessel_message(
+        999000000 + number, *place, course_cdeg, course_cdeg, speed_cm_s, 0, 0, 0,
+        side_m, side_m, side_m, side_m, callsign, text, 0, AIS_FLAGS,
+    )  # fmt: skip

@@ -1,0 +1,277 @@
+"""Uploads of mission, fence and rally points (behaviour of MissionItemProtocol): one uploader at a time.
+
+Mission and rally points are written as they arrive, the fence only when it is whole. A cancelling MISSION_ACK is not
+listened to: an upload that nobody goes on with ends after eight seconds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl.autopilot.download import (
+    MOST,
+    acknowledge,
+    request,
+    request_int,
+    request_list,
+    stored,
+    type_of,
+    warn_once,
+)
+from sitl.autopilot.items import (
+    JUMP,
+    WAYPOINT,
+    Item,
+    RefusedError,
+    Result,
+    fence_fault,
+    fence_item,
+    mission_item,
+    rally_item,
+)
+from sitl.autopilot.link import Channel
+from sitl.autopilot.plan import FENCE, MISSION, RALLY, Upload
+from sitl.autopilot.targets import go_to
+from sitl.autopilot.vehicle import INFO, WARNING, Mode, Vehicle, text_messages
+
+ASK_AGAIN_US, GIVE_UP_US = 1_000_000, 8_000_000
+DONE_TEXTS = {MISSION: "Flight plan received", RALLY: "Rally points received"}
+TIMEOUT_TEXTS = {MISSION: "Mission upload timeout", FENCE: "Fence upload timeout", RALLY: "Rally upload timeout"}
+TOTALS = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}
+
+Handler = Callable[[Vehicle, Channel, Any], None]
+
+
+def _say(channel: Channel, severity: int, text: str) -> None:
+    """A text for this connection alone."""
+    for piece in text_messages(channel, severity, text):
+        channel.send(piece)
+
+
+def keep_home(vehicle: Vehicle) -> None:
+    """Home is known: it becomes item 0 of an empty mission."""
+    if not vehicle.plan.mission.items:
+        vehicle.plan.mission.write(0, Item(WAYPOINT))
+        _save_total(vehicle, MISSION)
+
+
+def _save_total(vehicle: Vehicle, kind: int) -> None:
+    """MIS_TOTAL and its kin follow the storage; whoever listens is told."""
+    total = len(stored(vehicle, kind))
+    if kind == FENCE:
+        corners = sum(item.command != mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT for item in stored(vehicle, kind))
+        total = corners + 2 if corners >= 3 else 0
+    vehicle.parameters.set(TOTALS[kind], total)
+    vehicle.tell_parameter(TOTALS[kind])
+
+
+def count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_COUNT: somebody wants to upload."""
+    kind, uploads = type_of(message), vehicle.plan.uploads
+    if kind not in MOST:
+        acknowledge(channel, message, Result.UNSUPPORTED)
+        return
+    upload = uploads.get(kind)
+    sender = (message.get_srcSystem(), message.get_srcComponent())
+    if upload is not None and (upload.system, upload.component) != sender:
+        acknowledge(channel, message, Result.DENIED)
+        return
+    if message.count > MOST[kind]:
+        acknowledge(channel, message, Result.NO_SPACE)
+        vehicle.say(WARNING, f"Only {MOST[kind]} items are supported")
+        return
+    items = stored(vehicle, kind)
+    if kind != FENCE and len(items) > message.count:
+        del items[message.count :]
+        vehicle.plan.mission.changes += 1
+        _save_total(vehicle, kind)
+    if message.count == 0:
+        uploads.pop(kind, None)
+        _finish(vehicle, channel, message, kind, [])
+        return
+    fence: list[Item | None] = [None] * message.count if kind == FENCE else []
+    _begin(vehicle, channel, message, 0, message.count - 1, fence)
+
+
+def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_WRITE_PARTIAL_LIST: somebody wants to upload a few items."""
+    kind = type_of(message)
+    if kind not in MOST:
+        acknowledge(channel, message, Result.UNSUPPORTED)
+        return
+    if kind in vehicle.plan.uploads:
+        acknowledge(channel, message, Result.DENIED)
+        return
+    items, first, last = stored(vehicle, kind), message.start_index, message.end_index
+    # A negative index is a very large one to the firmware.
+    if not 0 <= first <= last <= len(items):
+        acknowledge(channel, message, Result.ERROR)
+        vehicle.say(WARNING, "Flight plan update rejected")
+        return
+    _begin(vehicle, channel, message, first, last, list(items) if kind == FENCE else [])
+
+
+def _begin(vehicle: Vehicle, channel: Channel, message: Any, first: int, last: int, fence: list[Item | None]) -> None:
+    now_us = vehicle.time_us
+    vehicle.plan.uploads[type_of(message)] = Upload(
+        channel.number, message.get_srcSystem(), message.get_srcComponent(), first, last, now_us, now_us, fence
+    )
+    _ask(vehicle, type_of(message))
+
+
+def _ask(vehicle: Vehicle, kind: int) -> None:
+    """MISSION_REQUEST for the next item; the answer may be MISSION_ITEM_INT all the same."""
+    upload = vehicle.plan.uploads[kind]
+    upload.asked_us = vehicle.time_us
+    channel = vehicle.channels.get(upload.channel)
+    if channel is not None:
+        channel.send(mavlink.MAVLink_mission_request_message(upload.system, upload.component, upload.next, kind))
+
+
+def run_uploads(vehicle: Vehicle) -> None:
+    """Ask again for what did not come, give up on who has gone silent."""
+    for kind, upload in list(vehicle.plan.uploads.items()):
+        if vehicle.time_us - upload.heard_us > GIVE_UP_US:
+            del vehicle.plan.uploads[kind]
+            channel = vehicle.channels.get(upload.channel)
+            if channel is not None:
+                _say(channel, WARNING, TIMEOUT_TEXTS[kind])
+                channel.send(
+                    mavlink.MAVLink_mission_ack_message(upload.system, upload.component, int(Result.CANCELLED), kind)
+                )
+        elif vehicle.time_us - upload.asked_us > ASK_AGAIN_US:
+            _ask(vehicle, kind)
+
+
+def item(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_ITEM and MISSION_ITEM_INT: one of an upload, or (current = 2) a guided target."""
+    kind = type_of(message)
+    try:
+        if kind == MISSION and message.current in (2, 3):
+            result = _guided(vehicle, message)
+        elif kind not in MOST:
+            result = Result.UNSUPPORTED
+        else:
+            if message.get_type() == "MISSION_ITEM":
+                warn_once(vehicle, kind, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT")
+            if kind in vehicle.plan.uploads:
+                _take(vehicle, channel, message, kind)
+                return
+            result = Result.ERROR
+    except RefusedError as refusal:
+        result = refusal.result
+    acknowledge(channel, message, result)
+
+
+def _guided(vehicle: Vehicle, message: Any) -> Result:
+    target = mission_item(message)
+    if message.current == 3:  # a height, which a rover has not
+        return Result.ACCEPTED
+    if vehicle.mode != Mode.GUIDED or not vehicle.has_origin:
+        return Result.ERROR
+    go_to(vehicle, target.place)
+    return Result.ACCEPTED
+
+
+def _take(vehicle: Vehicle, channel: Channel, message: Any, kind: int) -> None:
+    """One item of an upload: in its turn, and from who began it."""
+    upload = vehicle.plan.uploads[kind]
+    reply = vehicle.channels.get(upload.channel, channel)
+    if message.seq != upload.next:
+        acknowledge(reply, message, Result.INVALID_SEQUENCE)
+        return
+    if (message.get_srcSystem(), message.get_srcComponent()) != (upload.system, upload.component):
+        acknowledge(reply, message, Result.DENIED)
+        return
+    try:
+        _write(vehicle, message, kind, upload)
+    except RefusedError as refusal:
+        del vehicle.plan.uploads[kind]
+        acknowledge(reply, message, refusal.result)
+        return
+    upload.heard_us = vehicle.time_us
+    upload.next += 1
+    if upload.next <= upload.last:
+        _ask(vehicle, kind)
+        return
+    del vehicle.plan.uploads[kind]
+    _finish(vehicle, reply, message, kind, upload.fence)
+
+
+def _write(vehicle: Vehicle, message: Any, kind: int, upload: Upload) -> None:
+    if kind == FENCE:
+        if message.seq >= len(upload.fence):
+            raise RefusedError(Result.INVALID_SEQUENCE)
+        upload.fence[message.seq] = fence_item(message)
+        return
+    items = stored(vehicle, kind)
+    new = mission_item(message) if kind == MISSION else rally_item(message)
+    total = len(items)
+    if kind == MISSION and new.command == JUMP:
+        target = int(new.params[0])
+        if target == 0 or (target >= total and target > upload.last):
+            raise RefusedError(Result.ERROR)
+    if message.seq > total or message.seq >= MOST[kind]:
+        raise RefusedError(Result.ERROR)
+    if kind == MISSION:
+        vehicle.plan.mission.write(message.seq, new)
+    elif message.seq < total:
+        items[message.seq] = new
+    else:
+        items.append(new)
+    if len(items) > total:
+        _save_total(vehicle, kind)
+
+
+def _finish(vehicle: Vehicle, channel: Channel, message: Any, kind: int, fence: list[Item | None]) -> None:
+    """The transfer is complete; only now is a fence looked at as a whole."""
+    result = Result.ACCEPTED
+    if kind == FENCE and not _keep_fence(vehicle, [part for part in fence if part is not None]):
+        result = Result.ERROR
+    acknowledge(channel, message, result)
+    if kind in DONE_TEXTS:
+        _say(channel, INFO, DONE_TEXTS[kind])
+
+
+def _keep_fence(vehicle: Vehicle, items: list[Item]) -> bool:
+    fault = fence_fault(items)
+    if fault is not None:
+        vehicle.say(WARNING, fault)
+        vehicle.say(WARNING, "Fence validation failed")
+        return False
+    vehicle.plan.storage.fence[:] = items
+    _save_total(vehicle, FENCE)
+    return True
+
+
+def clear(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_CLEAR_ALL; refused during an upload, and for a mission that is running."""
+    kind = type_of(message)
+    if kind not in MOST:
+        acknowledge(channel, message, Result.UNSUPPORTED)
+        return
+    cleared = kind not in vehicle.plan.uploads
+    if cleared and kind == MISSION:
+        cleared = vehicle.plan.mission.clear()
+    elif cleared:
+        stored(vehicle, kind).clear()
+    if cleared:
+        _save_total(vehicle, kind)
+    acknowledge(channel, message, Result.ACCEPTED if cleared else Result.ERROR)
+
+
+TRANSFERS: dict[str, Handler] = {
+    "MISSION_CLEAR_ALL": clear,
+    "MISSION_COUNT": count,
+    "MISSION_ITEM": item,
+    "MISSION_ITEM_INT": item,
+    "MISSION_REQUEST": request,
+    "MISSION_REQUEST_INT": request_int,
+    "MISSION_REQUEST_LIST": request_list,
+    "MISSION_WRITE_PARTIAL_LIST": write_partial,
+}
+
+__all__ = ["TRANSFERS", "keep_home", "run_uploads", "stored"]

@@ -1,0 +1,323 @@
+"""The vehicle's state that all parts of the autopilot share: records of the compiled loop, mode, position, who listens."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl import geodesy
+from sitl.autopilot.battery import Battery, rest_volts
+from sitl.autopilot.control import CIRCLE, LEG, LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
+from sitl.autopilot.ekf import Ekf
+from sitl.autopilot.link import Channel
+from sitl.autopilot.params import Parameters
+from sitl.autopilot.plan import Plan, Storage, Submode, new_plan
+from sitl.autopilot.routing import Router
+from sitl.autopilot.signing import Signing
+from sitl.sensors import RangeSensing
+
+ALTITUDE_M = 120.0
+"""Height of the ground everywhere, above sea level."""
+
+STREAMS_S = 3.0
+EKF_SEEN_S = 4.0
+ATTITUDE_S = 7.0
+HOME_S = 10.0
+LOCAL_POSITION_S = 11.0
+ORIGIN_S = 19.0
+PREARM_S = 24.0
+POSITION_S = 42.0
+ARMABLE_S = 43.0
+"""The firmware's start-up, seconds since boot (measured)."""
+
+MOST_TEXTS = 30
+"""Texts that wait to be sent; more push the oldest ones out, as in the firmware's queue."""
+
+EKF_UNINITIALISED, EKF_CONSTANT_POSITION = 1024, 167
+"""EKF_STATUS_REPORT flags of the start-up: nothing yet; attitude and velocity but a constant position."""
+
+
+CRITICAL, ERROR, WARNING, NOTICE, INFO = 2, 3, 4, 5, 6
+"""MAV_SEVERITY of what is said."""
+
+
+class Mode(IntEnum):
+    """ArduRover's flight modes."""
+
+    MANUAL = 0
+    ACRO = 1
+    STEERING = 3
+    HOLD = 4
+    LOITER = 5
+    FOLLOW = 6
+    SIMPLE = 7
+    DOCK = 8
+    CIRCLE = 9
+    AUTO = 10
+    RTL = 11
+    SMART_RTL = 12
+    GUIDED = 15
+    INITIALISING = 16
+
+
+AUTOPILOT_MODES = {Mode.LOITER, Mode.CIRCLE, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED}
+"""Modes that drive by themselves and need a position."""
+
+DRIVEN_MODES = {Mode.GUIDED, Mode.AUTO, Mode.RTL, Mode.SMART_RTL}
+"""Modes that may have a place to drive to."""
+
+
+@dataclass
+class Clocks:
+    """Times the autopilot remembers, seconds since boot."""
+
+    ground_station_s: float | None = None
+    prearm_text_s: float = 0.0
+    armed_s: float | None = None
+    variance_text_s: float = 0.0
+    logging_s: float = -math.inf
+    """When arming was last tried or ended; the log is written for a while after that."""
+
+
+@dataclass
+class Proximity:
+    """Obstacle distances the autopilot has taken in: nearest of each eighth of a turn, clockwise from ahead."""
+
+    octants_cm: list[int] = field(default_factory=list)
+    limits_cm: tuple[int, int] = (0, 0)
+    heard_s: float = -1.0
+
+
+@dataclass
+class Sticks:
+    """What the pilot gives, -1 to 1, by the transmitter or by a ground station's RC_CHANNELS_OVERRIDE."""
+
+    steering: float = 0.0
+    throttle: float = 0.0
+    overridden_s: float | None = None
+    """When an override was heard last; the sticks fall back to the middle when none comes any more."""
+
+
+@dataclass
+class GpsLate:
+    """How much later than without faults the parts of the start-up come that need GPS, seconds."""
+
+    home_s: float = 0.0
+    origin_s: float = 0.0
+    position_s: float = 0.0
+
+
+class Vehicle:
+    """State of the simulated ArduRover since it was booted."""
+
+    def __init__(
+        self,
+        rover: Record,
+        origin: tuple[int, int],
+        origin_m: tuple[float, float],
+        sensing: RangeSensing,
+        parameters: Mapping[str, float],
+        storage: Storage | None = None,
+        kept: Mapping[str, int] | None = None,
+    ) -> None:
+        """``origin``: where it boots, 1e-7 degree; ``origin_m``: the same place in the world frame.
+
+        ``storage``: missions and fences kept over a reboot; ``kept``: parameters without effect, and their types.
+        """
+        self.rover = rover
+        self.sensing = sensing
+        self.parameters = Parameters(parameters, kept)
+        self.estimate: Record = new_estimate()
+        self.control: Record = new_control()
+        self.tuning: Record = new_tuning(self.parameters.as_dict())
+        self.origin = origin
+        self.origin_m = np.array(origin_m)
+        self.home = origin
+        self.mode = Mode.MANUAL
+        self.armed = False
+        self.system = min(max(int(self.parameters["MAV_SYSID"]), 1), 255)
+        self.channels: dict[int, Channel] = {}
+        self.router = Router()
+        self.signing = Signing()
+        self.clocks = Clocks()
+        self.texts: list[tuple[int, str]] = []
+        self.rebooting = False
+        self.destination: tuple[int, int] = origin
+        self.proximity = Proximity()
+        self.ekf = Ekf()
+        self.battery = Battery()
+        self.sticks = Sticks()
+        self.gps_late = GpsLate()
+        self.stale_m: tuple[float, float] | None = None
+        """The last position that was known, while none is; it is told again and again."""
+        self.control["rest_v"] = self.parameters["SIM_BATT_VOLTAGE"]
+        self.plan: Plan = new_plan(storage or Storage())
+
+    @property
+    def time_us(self) -> int:
+        """Microseconds since boot."""
+        return max(int(self.control[0]["tick"]), 0) * (1_000_000 // LOOP_HZ)
+
+    @property
+    def time_s(self) -> float:
+        """Seconds since boot."""
+        return self.time_us * 1e-6
+
+    @property
+    def has_home(self) -> bool:
+        """GPS fix and home are there."""
+        return self.time_s >= HOME_S + self.gps_late.home_s
+
+    @property
+    def has_origin(self) -> bool:
+        """The EKF has an origin."""
+        return self.time_s >= ORIGIN_S + self.gps_late.origin_s
+
+    @property
+    def is_started(self) -> bool:
+        """The start-up is over: the EKF has had an absolute position."""
+        return self.time_s >= POSITION_S + self.gps_late.position_s
+
+    @property
+    def has_position(self) -> bool:
+        """The EKF has an absolute position."""
+        return self.is_started and self.ekf.has_position
+
+    @property
+    def ekf_flags(self) -> int:
+        """EKF_STATUS_REPORT's flags at this moment."""
+        if self.is_started:
+            return self.ekf.flags
+        if self.time_s >= ATTITUDE_S:
+            return EKF_CONSTANT_POSITION
+        return 0 if self.time_s >= ATTITUDE_S - 1.0 else EKF_UNINITIALISED
+
+    @property
+    def in_guided(self) -> bool:
+        """Guided targets are obeyed: in GUIDED, and in AUTO while a mission item hands over."""
+        return self.mode == Mode.GUIDED or (self.mode == Mode.AUTO and self.plan.auto.submode == Submode.GUIDED)
+
+    @property
+    def has_target(self) -> bool:
+        """A place is being driven to, or was reached."""
+        if self.mode in (Mode.RTL, Mode.SMART_RTL, Mode.LOITER):
+            return True
+        return self.mode in DRIVEN_MODES and int(self.control[0]["task"]) in (WAYPOINT, CIRCLE, LEG)
+
+    def position_m(self) -> tuple[float, float]:
+        """Estimated metres north and east of the EKF origin; zeros before there is a position, later the last one known."""
+        if not self.is_started:
+            return 0.0, 0.0
+        if self.stale_m is not None:
+            return self.stale_m
+        believed = self.estimate[0]
+        return float(believed["north_m"]), float(believed["east_m"])
+
+    def velocity_m_s(self) -> tuple[float, float]:
+        """Estimated speed north and east; zeros without a position."""
+        if not self.is_started or self.stale_m is not None:
+            return 0.0, 0.0
+        believed = self.estimate[0]
+        return float(believed["vel_n"]), float(believed["vel_e"])
+
+    def place(self) -> tuple[int, int]:
+        """Estimated latitude and longitude, 1e-7 degree; zeros without a fix."""
+        if not self.has_home:
+            return 0, 0
+        return geodesy.moved(self.origin, *self.position_m())
+
+    def gps_place(self) -> tuple[int, int]:
+        """Latitude and longitude as the GPS receiver has it, 1e-7 degree; zeros without a fix."""
+        error_n, error_e = self.ekf.gps.error_m
+        believed = self.estimate[0]
+        believed_n, believed_e = float(believed["offset_n"]), float(believed["offset_e"])
+        if (error_n, error_e) == (believed_n, believed_e) and self.stale_m is None:
+            return self.place()
+        if not self.has_home:
+            return 0, 0
+        north_m, east_m = (float(believed[name]) if self.is_started else 0.0 for name in ("north_m", "east_m"))
+        return geodesy.moved(self.origin, north_m + error_n - believed_n, east_m + error_e - believed_e)
+
+    def amps(self) -> float:
+        """What the motors take from the battery."""
+        return float(self.control[0]["amps"])
+
+    def volts(self) -> float:
+        """The battery's voltage."""
+        return self.battery.volts(self.parameters, float(self.rover[0]["drawn_ah"]), self.amps())
+
+    def used_mah(self) -> float:
+        """What the battery monitor has counted since boot."""
+        return float(self.control[0]["used_mah"])
+
+    def battery_percent(self) -> int:
+        """What the battery monitor believes is left, by the capacity it was told."""
+        capacity_mah = self.parameters["BATT_CAPACITY"]
+        if capacity_mah <= 10.0:
+            return 0
+        return min(max(int(100.0 * (capacity_mah - self.used_mah()) / capacity_mah), 0), 100)
+
+    def drain(self) -> None:
+        """Keep the voltage at rest that the compiled loop counts energy with."""
+        self.control["rest_v"] = rest_volts(self.parameters, float(self.rover[0]["drawn_ah"]))
+
+    def heading_rad(self) -> float:
+        """Estimated heading, -pi to pi."""
+        return float(self.estimate[0]["heading_rad"])
+
+    def heading_cdeg(self) -> int:
+        """Estimated heading in hundredths of a degree, 0 to 35999."""
+        return round(math.degrees(self.heading_rad()) * 100.0) % 36000
+
+    def say(self, severity: int, text: str) -> None:
+        """Queue a STATUSTEXT for every channel; it goes out after the answers of this moment."""
+        self.texts.append((severity, text))
+        del self.texts[:-MOST_TEXTS]
+
+    def flush_texts(self) -> None:
+        """Send the queued texts, longer ones in chunks of 50 characters."""
+        for severity, text in self.texts:
+            for channel in self.channels.values():
+                for message in text_messages(channel, severity, text):
+                    channel.send(message)
+        self.texts.clear()
+
+    def move_home(self, place: tuple[int, int]) -> None:
+        """Home is elsewhere from now on, 1e-7 degree; every channel is told."""
+        self.home = place
+        for channel in self.channels.values():
+            channel.requested.append(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
+
+    def tell_parameter(self, name: str) -> None:
+        """Tell every channel a parameter's value."""
+        for channel in self.channels.values():
+            channel.send(parameter_message(self.parameters, name))
+
+    def retune(self) -> None:
+        """Take changed parameters over into the compiled controllers."""
+        fresh = new_tuning(self.parameters.as_dict())
+        self.tuning[:] = fresh
+
+
+def parameter_message(table: Parameters, name: str, in_list: bool = False) -> Any:
+    """PARAM_VALUE of a known parameter; the index is only told in a list."""
+    index = table.index_of(name) if in_list else 65535
+    return mavlink.MAVLink_param_value_message(name.encode(), table[name], table.type_of(name), len(table), index)
+
+
+def text_messages(channel: Channel, severity: int, text: str) -> list[Any]:
+    """A text as STATUSTEXT messages."""
+    if len(text) <= 50:
+        return [mavlink.MAVLink_statustext_message(severity, text.encode(), 0, 0)]
+    channel.text_id = channel.text_id % 65535 + 1
+    pieces = [text[start : start + 50] for start in range(0, len(text), 50)]
+    return [
+        mavlink.MAVLink_statustext_message(severity, piece.encode(), channel.text_id, number)
+        for number, piece in enumerate(pieces)
+    ]
