@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +11,7 @@ from companion.clock import Clock, stopwatch_s
 from companion.commands import Arm, Command, Say, SetMode
 from companion.driver import Driver
 from companion.guidance import STANDSTILL, Guide
+from companion.handover import HandOver
 from companion.itinerary import Itinerary, TargetStatus
 from companion.laying import from_home
 from companion.mapfiles import save_ros_map
@@ -23,7 +22,7 @@ from companion.mission.mission import Mission
 from companion.outbox import Outbox
 from companion.pursuit import Pursuit
 from companion.recorder import DecisionLog
-from companion.reporting import Reporter, Status
+from companion.reporting import Outcome, Reporter, Status
 from companion.safety import Control, Reaction, Watch, awaited, check, latched
 from companion.settings import Settings
 from companion.startup import StartUp
@@ -35,25 +34,8 @@ from companion.whereabouts import Whereabouts
 __all__ = ["Companion", "Outcome", "Status"]
 
 INFO, WARNING = 6, 4
-STEPS_KEPT = 100_000
-HAND_OVER_S = 1.5
-"""So long the companion stays, after its last command, to see that the rover is in HOLD."""
 NOT_FOLLOWED_S = 5.0
 """People are told when the autopilot's read-back has shown another target for so long."""
-
-
-@dataclass
-class Outcome:
-    """What the run came to. ``step_seconds``: how long the newest ticks took."""
-
-    targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
-    step_seconds: deque[float] = field(default_factory=lambda: deque(maxlen=STEPS_KEPT))
-    said: list[str] = field(default_factory=list)
-
-    @property
-    def complete(self) -> bool:
-        """Whether every target has been reached."""
-        return bool(self.targets) and all(status is TargetStatus.REACHED for _, status in self.targets)
 
 
 class Companion:
@@ -93,7 +75,7 @@ class Companion:
         self._followed_s = clock.now_s()
         self._stopped = False
         self._stop_asked = False
-        self._leave_at_s: float | None = None
+        self._handover = HandOver(autopilot, self._send)
         self._done = False
 
     @property
@@ -147,11 +129,11 @@ class Companion:
         for event in self._autopilot.poll(now_s):
             self.vehicle = fold(self.vehicle, event)
             self._take_in(event)
-        if self._stop_asked and self._leave_at_s is None:
+        if self._stop_asked and not self._handover.begun:
             self._hand_over(now_s, "stopped by the user")
-        if self._leave_at_s is None:
+        if not self._handover.begun:
             self._act(now_s)
-        elif self._is_handed_over(now_s):
+        elif self._handover.is_over(self.vehicle, now_s):
             self._done = True
         self._tell_of_faults(now_s)
         self._autopilot.service(now_s)
@@ -163,11 +145,11 @@ class Companion:
 
     def close(self) -> None:
         """The way out after an error: a rover that is ours is stopped and put into HOLD before this returns."""
-        if self._done or self._leave_at_s is not None:
+        if self._done or self._handover.begun:
             return
         now_s = self._clock.now_s()
         self._hand_over(now_s, "error")
-        while not self._is_handed_over(now_s):
+        while not self._handover.is_over(self.vehicle, now_s):
             now_s += 1.0 / self._settings.link.tick_hz
             self._clock.sleep_until_s(now_s)
             for event in self._autopilot.poll(now_s):
@@ -305,27 +287,10 @@ class Companion:
             self._autopilot.send(STANDSTILL.setpoint, now_s)
 
     def _hand_over(self, now_s: float, why: str) -> None:
-        """Stop a rover that is ours and put it into HOLD; then there are a few moments to see that it has been taken."""
-        self._leave_at_s = now_s
+        """The run ends."""
         self._reporter.doing = why
-        heartbeat = self.vehicle.heartbeat
-        if heartbeat is None or heartbeat.mode != RoverMode.GUIDED or self.watch.control is not Control.COMPANION:
-            return
-        self._leave_at_s = now_s + HAND_OVER_S
-        if heartbeat.armed:
-            self._send(STANDSTILL.setpoint, now_s)
-        self._send(SetMode(RoverMode.HOLD), now_s)
-        if why != "done":
+        if self._handover.begin(self.vehicle, self.watch.control, now_s) and why != "done":
             self._tell(f"Companion: {why}, HOLD", WARNING)
-
-    def _is_handed_over(self, now_s: float) -> bool:
-        """Whether the rover has left GUIDED, or has said that it will, or time is up."""
-        assert self._leave_at_s is not None
-        ack = self._autopilot.last_ack(SetMode(RoverMode.HOLD))
-        answered = ack is not None and ack.result == 0 and ack.time_s > self._leave_at_s - HAND_OVER_S
-        heartbeat = self.vehicle.heartbeat
-        left = heartbeat is not None and heartbeat.mode != RoverMode.GUIDED
-        return answered or left or now_s >= self._leave_at_s
 
     def _tell_of_faults(self, now_s: float) -> None:
         """What a person should know though it stops nothing, once each."""

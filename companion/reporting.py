@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 
 from companion.frames import Pose
+from companion.itinerary import TargetStatus
 from companion.mavlink.rates import RateFault
 from companion.navigator import Decision
 
 FAULT_AFTER_S = 5.0
 """A message rate that is too low for a moment is not worth a word."""
+STEPS_KEPT = 100_000
+"""The times of so many of the newest rounds are kept."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +29,20 @@ class Status:
     targets: int
     steps: int
     news: tuple[str, ...] = ()
+
+
+@dataclass
+class Outcome:
+    """What the run came to. ``step_seconds``: how long the newest ticks took."""
+
+    targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
+    step_seconds: deque[float] = field(default_factory=lambda: deque(maxlen=STEPS_KEPT))
+    said: list[str] = field(default_factory=list)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every target has been reached."""
+        return bool(self.targets) and all(status is TargetStatus.REACHED for _, status in self.targets)
 
 
 @dataclass

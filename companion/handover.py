@@ -1,0 +1,48 @@
+"""The end of a run: a rover that is ours is stopped and put into HOLD, and there is time to see that it has been."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from companion.commands import Command, SetMode
+from companion.guidance import STANDSTILL
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.safety import Control
+from companion.vehicle import RoverMode, VehicleState
+
+HAND_OVER_S = 1.5
+"""So long the companion stays, after its last command, to see that the rover is in HOLD."""
+
+
+class HandOver:
+    """Begun once, by whatever ends the run. ``send`` gives the autopilot a command at a time."""
+
+    def __init__(self, autopilot: AutopilotLink, send: Callable[[Command, float], None]) -> None:
+        self._autopilot = autopilot
+        self._send = send
+        self._leave_at_s: float | None = None
+
+    @property
+    def begun(self) -> bool:
+        """Whether the run is ending."""
+        return self._leave_at_s is not None
+
+    def begin(self, vehicle: VehicleState, control: Control, now_s: float) -> bool:
+        """Stop the rover and ask for HOLD; False, and nothing is sent, if the rover is not ours."""
+        self._leave_at_s = now_s
+        heartbeat = vehicle.heartbeat
+        if heartbeat is None or heartbeat.mode != RoverMode.GUIDED or control is not Control.COMPANION:
+            return False
+        self._leave_at_s = now_s + HAND_OVER_S
+        if heartbeat.armed:
+            self._send(STANDSTILL.setpoint, now_s)
+        self._send(SetMode(RoverMode.HOLD), now_s)
+        return True
+
+    def is_over(self, vehicle: VehicleState, now_s: float) -> bool:
+        """Whether the rover has left GUIDED, or has said that it will, or time is up."""
+        assert self._leave_at_s is not None
+        ack = self._autopilot.last_ack(SetMode(RoverMode.HOLD))
+        answered = ack is not None and ack.result == 0 and ack.time_s > self._leave_at_s - HAND_OVER_S
+        left = vehicle.heartbeat is not None and vehicle.heartbeat.mode != RoverMode.GUIDED
+        return answered or left or now_s >= self._leave_at_s
