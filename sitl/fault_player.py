@@ -125,9 +125,8 @@ class FaultPlayer:
 
     def _take_over(self, number: int, fault: PilotTakesOver, vehicle: Vehicle) -> None:
         self._mode_before[number] = vehicle.mode
-        vehicle.sticks = Sticks(fault.steering, fault.throttle)
+        _hold_sticks(vehicle, Sticks(fault.steering, fault.throttle))
         set_mode(vehicle, Mode[fault.mode])
-        apply_sticks(vehicle)
 
     def _end(self, number: int, fault: Fault, vehicle: Vehicle) -> None:
         if not isinstance(fault, PilotTakesOver):
@@ -137,8 +136,7 @@ class FaultPlayer:
         if others:  # one pilot, one switch: it stays where another fault has it
             self._take_over(*others[-1], vehicle)
         else:
-            vehicle.sticks = Sticks()
-            apply_sticks(vehicle)
+            _hold_sticks(vehicle, Sticks())
         if before is not None and others:
             self._mode_before[others[-1][0]] = before
         elif before is not None:
@@ -239,3 +237,11 @@ class FaultPlayer:
     def pass_on(self, way: Way, data: bytes, now_s: float) -> None:
         """Put bytes on their way through a link with its faults."""
         way.pass_on(data, now_s, lambda fault: self.is_active(fault, now_s), self._links)
+
+
+def _hold_sticks(vehicle: Vehicle, sticks: Sticks) -> None:
+    """The transmitter's sticks; a ground station's override goes before them while it lasts."""
+    vehicle.transmitter = sticks
+    if vehicle.sticks.overridden_s is None:
+        vehicle.sticks = sticks
+    apply_sticks(vehicle)

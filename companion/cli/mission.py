@@ -16,6 +16,7 @@ from companion.mapfiles import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, Mission, MissionError, MoverSpec, Place
 from companion.mission.resolve import resolve
+from companion.mission.tables import read_toml
 
 EXIT_BAD_INPUT = 2
 
@@ -98,7 +99,8 @@ def _maps(mission: Mission) -> list[str]:
     if mission.prior_map is not None:
         lines.append(f"known map: {mission.prior_map}: {_map_text(load_map(mission.prior_map, resolution_m))}")
     if sitl is not None and sitl.world is not None and sitl.world.suffix.lower() == ".toml":
-        lines.append(f"simulator's world: {sitl.world}: a world file, which only rover-sitl reads")
+        read_toml(sitl.world, MissionError)
+        lines.append(f"simulator's world: {sitl.world}: a world file; what it describes only rover-sitl checks")
     elif sitl is not None and sitl.world is not None:
         world = load_map(sitl.world, sitl.resolution_m or resolution_m)
         lines.append(f"simulator's world: {sitl.world}: {_map_text(world)}")

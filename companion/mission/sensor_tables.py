@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from companion.mission.tables import Positive, Table, read_table
 from companion.settings import describe_first
@@ -60,10 +60,17 @@ class LidarTable(SensorTable):
         return self
 
 
+def _number(value: object) -> object:
+    """Python takes true for 1. Raises ValueError."""
+    if isinstance(value, bool):
+        raise ValueError("a number is needed, not true or false")
+    return value
+
+
 class BeamTable(SensorTable):
     """``[[beam]]``: a rangefinder; ``orientation`` 0 to 7 in eighths of a turn clockwise from ahead, 24 up, 25 down."""
 
-    orientation: Literal[0, 1, 2, 3, 4, 5, 6, 7, 24, 25]
+    orientation: Annotated[Literal[0, 1, 2, 3, 4, 5, 6, 7, 24, 25], BeforeValidator(_number)]
     width_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 2.0
     height_m: Positive = 0.3
 
@@ -110,5 +117,10 @@ def sensors_given(value: object) -> Sensors:
 def sensors_from(value: Sensors, folder: Path, error: type[Exception]) -> Sensors:
     """The same with a file read. Raises ``error`` for a bad one."""
     if isinstance(value, str) and value.endswith(".toml"):
-        return read_table(folder / value, SensorsTable, error)
+        sensors = read_table(folder / value, SensorsTable, error)
+        if str(sensors) == "none":
+            raise error(
+                f"{folder / value}: describes no sensor; give a [lidar], [[beam]] or [proximity], or write sensors = 'none'"
+            )
+        return sensors
     return value

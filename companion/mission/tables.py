@@ -38,11 +38,19 @@ class Table(BaseModel):
 def read_table(path: Path, kind: type[M], error: type[Exception]) -> M:
     """A whole TOML file as one table. Raises ``error``: one line with file, place and reason."""
     try:
+        return kind.model_validate(read_toml(path, error))
+    except ValidationError as fault:
+        raise error(f"{path}: {_counted(describe_first(fault, kind))}") from fault
+
+
+def read_toml(path: Path, error: type[Exception]) -> dict[str, object]:
+    """What a TOML file says, whatever it is about. Raises ``error``: one line with file, place and reason."""
+    try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise error(f"{path}: larger than {MAX_BYTES} bytes; a short TOML file is expected")
-        return kind.model_validate(tomllib.loads(data.decode("utf-8")))
+        return tomllib.loads(data.decode("utf-8"))
     except OSError as fault:
         raise error(f"{path}: cannot be read: {fault.strerror}; check the path") from fault
     except UnicodeDecodeError as fault:
@@ -51,8 +59,6 @@ def read_table(path: Path, kind: type[M], error: type[Exception]) -> M:
         raise error(f"{path}: not valid TOML: {fault}") from fault
     except RecursionError as fault:
         raise error(f"{path}: not valid TOML: nested too deeply") from fault
-    except ValidationError as fault:
-        raise error(f"{path}: {_counted(describe_first(fault, kind))}") from fault
 
 
 def named(path: Path, kind: str, number: int, make: Callable[[], T], error: type[Exception]) -> T:

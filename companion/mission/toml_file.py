@@ -187,7 +187,7 @@ class SitlTable(Table):
     world: FileName | None = None
     resolution_m: Positive | None = None
     start: Field2 | None = None
-    heading_deg: float = SitlSpec().heading_deg
+    heading_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = SitlSpec().heading_deg
     sensors: Annotated[SensorsTable | FileName, BeforeValidator(sensors_given)] = "lidar-90"
     home: GeoTable | None = None
     movers: Annotated[list[MoverTable], Field(max_length=100, default_factory=list)]

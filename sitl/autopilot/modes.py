@@ -18,7 +18,6 @@ from sitl.autopilot.vehicle import (
     PREARM_S,
     WARNING,
     Mode,
-    Sticks,
     Vehicle,
 )
 from sitl.autopilot.ways import begin_driving, begin_return, begin_way_back, remember_start
@@ -199,7 +198,7 @@ def _forget_override(vehicle: Vehicle) -> None:
     heard_s = vehicle.sticks.overridden_s
     patience_s = vehicle.parameters["RC_OVERRIDE_TIME"]
     if heard_s is not None and 0.0 <= patience_s < vehicle.time_s - heard_s:
-        vehicle.sticks = Sticks()
+        vehicle.sticks = vehicle.transmitter
         apply_sticks(vehicle)
 
 

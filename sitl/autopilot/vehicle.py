@@ -101,7 +101,7 @@ class Sticks:
     steering: float = 0.0
     throttle: float = 0.0
     overridden_s: float | None = None
-    """When an override was heard last; the sticks fall back to the middle when none comes any more."""
+    """When an override was heard last; when none comes any more, the transmitter counts again."""
 
 
 @dataclass
@@ -152,7 +152,8 @@ class Vehicle:
         self.proximity = Proximity()
         self.ekf = Ekf()
         self.battery = Battery()
-        self.sticks = Sticks()
+        self.transmitter = Sticks()
+        self.sticks = self.transmitter
         self.gps_late = GpsLate()
         self.stale_m: tuple[float, float] | None = None
         """The last position that was known, while none is; it is told again and again."""

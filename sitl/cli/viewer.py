@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
+import signal
 import threading
-from types import TracebackType
+from types import FrameType, TracebackType
 
 from rich.console import Console, RenderableType
 from rich.live import Live
@@ -62,12 +64,14 @@ class Viewer:
         """Take the terminal over."""
         self._live.start(refresh=False)
         self._thread.start()
+        self._tstp_before = signal.signal(signal.SIGTSTP, self._suspend)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         """Give the terminal back."""
+        signal.signal(signal.SIGTSTP, self._tstp_before)
         with self._wake:
             self._ended = True
             self._wake.notify()
@@ -75,6 +79,20 @@ class Viewer:
         if not self._thread.is_alive():
             with contextlib.suppress(OSError):
                 self._live.stop()
+
+    def _suspend(self, number: int, frame: FrameType | None) -> None:
+        """Ctrl-Z: the terminal is the shell's until this process is continued."""
+        self._console.set_alt_screen(False)
+        self._console.show_cursor(True)
+        signal.signal(signal.SIGTSTP, signal.SIG_DFL)
+        os.kill(os.getpid(), signal.SIGTSTP)
+        # Continued.
+        signal.signal(signal.SIGTSTP, self._suspend)
+        self._console.set_alt_screen(True)
+        self._console.show_cursor(False)
+        with self._wake:
+            self._drawn = None
+            self._wake.notify()
 
     def print_last(self) -> None:
         """The last state, once more, where it stays."""

@@ -185,6 +185,8 @@ def test_the_least_that_is_a_mission(tmp_path: Path) -> None:
         ("prior_map = 'gone.yaml'\n" + GRID + TARGET, "prior_map: no such file"),
         ("fence = 'gone.plan'\n" + GRID + TARGET, "gone.plan: cannot be read"),
         (GRID + TARGET + "[sitl]\nworld = 'gone.png'\n", "sitl.world: no such file"),
+        (GRID + TARGET + "[sitl]\nheading_deg = 1e300\n", "sitl.heading_deg"),
+        (GRID + TARGET + "[sitl.sensors]\nbeam = [{ orientation = true, min_m = 0.1, max_m = 5 }]\n", "not true or false"),
         (GRID + TARGET + "[sitl]\nstart = [0, 50]\n", "sitl.start: field 0, 50 is outside"),
     ],
 )  # fmt: skip
@@ -194,6 +196,12 @@ def test_bad_files_get_one_line(tmp_path: Path, text: str, reason: str) -> None:
             load_mission(written(tmp_path, text))
     else:
         assert reason in refusal(tmp_path, text)
+
+
+def test_a_sensor_file_that_describes_none(tmp_path: Path) -> None:
+    (tmp_path / "empty.toml").write_text("")
+    with pytest.raises(MissionError, match=r"empty\.toml: describes no sensor"):
+        load_mission(written(tmp_path, GRID + TARGET + "[sitl]\nsensors = 'empty.toml'\n"))
 
 
 def test_a_file_that_is_no_text(tmp_path: Path) -> None:

@@ -388,6 +388,16 @@ def test_an_override_that_is_not_repeated_is_forgotten() -> None:
     assert client.simulator.truth.speed_m_s < 0.1
 
 
+def test_when_the_override_ends_the_transmitter_counts_again() -> None:
+    client = ready(faulty(PilotTakesOver(50.0, 62.0, mode="MANUAL", throttle=0.5)), system=255, component=190)
+    client.run_to(52.0)
+    override(client, 1500, 1500)
+    client.run_to(54.0)
+    assert client.simulator.truth.speed_m_s == pytest.approx(0.0, abs=0.05), "the override goes before"
+    client.run_to(60.0)
+    assert client.simulator.truth.speed_m_s == pytest.approx(2.0, abs=0.1)
+
+
 def test_only_the_ground_station_may_override_and_only_in_manual() -> None:
     companion = ready(open_ground())
     override(companion, 1500, 1750)
