@@ -1,10 +1,11 @@
-"""The same seed gives the same bytes: in one process, in two, whatever order Python's sets happen to have.
+"""The same seed gives the same bytes: in one process, in two, whatever order Python's sets happen to have, and as on another machine.
 
-There is no stored hash: additions and products are the same everywhere, but sine, exponential and their like come from the machine's C
-library, whose last digit depends on library and processor.
+Another machine is made of this one: the C library told to do without fused multiply-add (its sine and exponential then differ in the
+last digit), numpy without vector units, kernels compiled for the plainest processor of the kind.
 """
 
 import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -14,9 +15,9 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def started(mission: str, hash_seed: str, *seeds: str) -> subprocess.Popen[str]:
+def started(mission: str, hash_seed: str, *seeds: str, **more: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "tests.conformance.hashed_run", mission, *seeds]
-    environment = {**os.environ, "PYTHONHASHSEED": hash_seed}
+    environment = {**os.environ, "PYTHONHASHSEED": hash_seed, **more}
     return subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True)
 
 
@@ -46,3 +47,47 @@ def test_the_same_seed_gives_the_same_bytes(mission: str) -> None:
     _, packets, driven_m = first[0].split()
     assert int(packets) > 2000
     assert float(driven_m) > 10.0
+
+
+NO_FMA = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"}
+
+
+def another_machine(cache: Path) -> dict[str, str]:
+    """The environment that makes this machine another one, as far as arithmetic goes."""
+    units = "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR"
+    kernels = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": "", "NUMBA_CACHE_DIR": str(cache)}
+    return {**NO_FMA, "NPY_DISABLE_CPU_FEATURES": units, **kernels}
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the switches are those of x86-64 processors")
+def test_another_machine_gives_the_same_bytes(tmp_path: Path) -> None:
+    runs = [
+        started("missions/crossing.toml", "1", "5"),
+        started("missions/crossing.toml", "1", "5", **another_machine(tmp_path)),
+    ]
+    here, there = (run.communicate(timeout=400)[0] for run in runs)
+    assert [run.returncode for run in runs] == [0, 0]
+    assert here == there
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the switches are those of x86-64 processors")
+@pytest.mark.parametrize("mission", [EVERYTHING, AUTO], ids=["everything", "auto"])
+def test_another_c_library_gives_the_same_bytes(mission: str) -> None:
+    runs = [started(mission, "1", "5"), started(mission, "1", "5", **NO_FMA)]
+    here, there = (run.communicate(timeout=300)[0] for run in runs)
+    assert [run.returncode for run in runs] == [0, 0]
+    assert here == there
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the switches are those of x86-64 processors")
+def test_without_fused_multiply_add_the_last_digits_do_differ() -> None:
+    """Else the tests above would compare a machine with itself."""
+    sines = "import math; print([math.sin(0.001 * n) for n in range(100_000)])"
+    run = [
+        subprocess.run(
+            [sys.executable, "-c", sines], env={**os.environ, **more}, capture_output=True, check=True
+        ).stdout
+        for more in ({}, NO_FMA)
+    ]
+    if "fma" in Path("/proc/cpuinfo").read_text() and platform.libc_ver()[0] == "glibc":
+        assert run[0] != run[1]
