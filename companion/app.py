@@ -29,6 +29,7 @@ from companion.startup import StartUp
 from companion.stepping import StepRunner
 from companion.traffic import announced
 from companion.vehicle import Event, RangeSeen, RoverMode, TextSeen, VehicleState, fold
+from companion.watchdogs import Watchdogs
 from companion.whereabouts import Whereabouts
 
 __all__ = ["Companion", "Outcome", "Status"]
@@ -71,6 +72,7 @@ class Companion:
         self._outbox = Outbox(settings.guidance)
         self._reporter = Reporter(self.outcome.said)
         self._next_tick_s = clock.now_s()
+        self._watchdogs = Watchdogs()
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
         self._followed_s = clock.now_s()
         self._stopped = False
@@ -189,7 +191,7 @@ class Companion:
         if self._whereabouts.must_ask(now_s):
             self._autopilot.ask_places()
         before = self.watch.control
-        doubt = self._whereabouts.reason(now_s)
+        doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason(now_s)
         self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, doubt)
         if verdict.reaction is Reaction.DRIVE:
             if self._stopped or before is not Control.COMPANION:
@@ -242,9 +244,10 @@ class Companion:
         """Scans go into the map; a position that jumps, or an origin that moves, makes the map worthless."""
         if isinstance(event, TextSeen) and event.severity <= WARNING:
             self._reporter.note(f"autopilot: {event.text}")
+        self._watchdogs.take_in(event, self.vehicle)
         if self._pursuit is None:
             return
-        if isinstance(event, RangeSeen) and not self._whereabouts.position_doubted:
+        if isinstance(event, RangeSeen) and self._watchdogs.scan_fits and not self._whereabouts.position_doubted:
             pose, attitude = self.vehicle.pose_at(event.time_s), self.vehicle.attitude
             if pose is not None and attitude is not None:
                 self._pursuit.map_scan(pose, attitude.yaw_rate_rad_s, event.scan)

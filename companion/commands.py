@@ -72,6 +72,13 @@ class RequestMessage:
 
 
 @dataclass(frozen=True, slots=True)
+class AskTime:
+    """TIMESYNC: the answer brings ``asked_ns`` back, nanoseconds of our own clock."""
+
+    asked_ns: int
+
+
+@dataclass(frozen=True, slots=True)
 class ReadParameter:
     """Read one parameter by name."""
 
@@ -97,12 +104,14 @@ Command = (
     | ChangeSpeed
     | RequestRate
     | RequestMessage
+    | AskTime
     | ReadParameter
     | Say
 )
 
 __all__ = [
     "Arm",
+    "AskTime",
     "ChangeSpeed",
     "Command",
     "GuidedHeading",

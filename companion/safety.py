@@ -120,6 +120,12 @@ def unsafe_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings)
             return f"{name} silent for over {limit_s:g} s"
     if not vehicle.ekf_ok:
         return "EKF has no position"
+    if vehicle.restarted:
+        return "the autopilot's clock has run back"
+    if now_s - vehicle.latency.jumped_s < settings.settle_s:
+        return "the autopilot's clock has jumped"
+    if vehicle.latency.lasting_s > settings.latency_s:
+        return f"link later than {settings.latency_s:g} s"
     if vehicle.frozen:
         return "position stands still while the velocity says otherwise"
     return ""

@@ -10,16 +10,13 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 from companion.frames import GeoPoint, Pose
+from companion.latency import BACK_S, Latency, TimeAnswered, answered, reported
+from companion.reckoning import Reckoned, jump_m, reckoned
 from companion.scan import RangeScan
 
 EKF_POSITION = 8 | 16
 """POS_HORIZ_REL or POS_HORIZ_ABS: one of them must be set to drive."""
 EKF_CONST_POSITION = 128
-RECKONED_M = 1.5
-FROZEN_SHARE = 0.2
-"""Where the velocity says that the rover has gone so far, its position must have moved by more than this share of it."""
-RECKONED_S = 10.0
-"""Slower than this nothing is concluded: the position wanders."""
 OTHERS_KEPT = 64
 OTHERS_FORGOTTEN_S = 30.0
 """Other vehicles are remembered for so long after they were last heard, and no more than so many of them."""
@@ -186,16 +183,8 @@ Event = (
     | TextSeen
     | ParameterSeen
     | PrearmSeen
+    | TimeAnswered
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Reckoned:
-    """Where the velocity has led from a position report on, in metres."""
-
-    since: LocalPositionSeen
-    north_m: float = 0.0
-    east_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -220,6 +209,10 @@ class VehicleState:
     """The velocity says that the rover moves and the position does not: kept until a person sets GUIDED again."""
     reckoned: Reckoned | None = None
     """The check for that, under way."""
+    restarted: bool = False
+    """The autopilot's boot time has run back: kept until a person sets GUIDED again."""
+    latency: Latency = field(default_factory=Latency)
+    """How late the link is."""
     parameters: dict[str, float] = field(default_factory=dict)
     others: dict[str, OtherSeen] = field(default_factory=dict)
     """Who else is about, by name."""
@@ -241,6 +234,11 @@ class VehicleState:
     def speed_m_s(self) -> float:
         """Ground speed; 0 until a position is known."""
         return 0.0 if self.position is None else math.hypot(self.position.north_m_s, self.position.east_m_s)
+
+    @property
+    def latency_s(self) -> float:
+        """From something seen to a command that arrives, as far as the link is to blame; measured, 0 until then."""
+        return self.latency.longest_s
 
     @property
     def ekf_ok(self) -> bool:
@@ -266,6 +264,8 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
             return replace(state, scan=event, scan_ahead=event if event.scan.looks_ahead else state.scan_ahead)
         case TargetSeen():
             return replace(state, target=event)
+        case TimeAnswered():
+            return replace(state, latency=answered(state.latency, event))
         case _:
             return _fold_seldom(state, event)
 
@@ -296,30 +296,19 @@ def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, Oth
 def _with_heartbeat(state: VehicleState, event: HeartbeatSeen) -> VehicleState:
     """Mode and arming; whoever sets GUIDED anew has looked after the position."""
     set_anew = state.heartbeat is not None and state.heartbeat.mode != RoverMode.GUIDED == event.mode
-    return replace(state, heartbeat=event, frozen=state.frozen and not set_anew)
+    restarted = state.restarted and not set_anew
+    return replace(state, heartbeat=event, frozen=state.frozen and not set_anew, restarted=restarted)
 
 
 def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:
-    """The position, compared with the last one and, over a longer way, with where the velocity has led."""
-    before, reckoned = state.position, state.reckoned
-    state = replace(state, position=now, jump_m=_jump_m(before, now))
-    if before is None or reckoned is None or not 0.0 <= now.boot_s - reckoned.since.boot_s <= RECKONED_S:
-        return replace(state, reckoned=Reckoned(now))
-    elapsed_s = now.boot_s - before.boot_s
-    north_m = reckoned.north_m + (before.north_m_s + now.north_m_s) / 2.0 * elapsed_s
-    east_m = reckoned.east_m + (before.east_m_s + now.east_m_s) / 2.0 * elapsed_s
-    led_m = math.hypot(north_m, east_m)
-    if led_m < RECKONED_M:
-        return replace(state, reckoned=Reckoned(reckoned.since, north_m, east_m))
-    moved_m = math.hypot(now.north_m - reckoned.since.north_m, now.east_m - reckoned.since.east_m)
-    frozen = state.frozen or moved_m < FROZEN_SHARE * led_m
-    return replace(state, reckoned=Reckoned(now), frozen=frozen)
-
-
-def _jump_m(before: LocalPositionSeen | None, now: LocalPositionSeen) -> float:
-    if before is None:
-        return 0.0
-    elapsed_s = now.boot_s - before.boot_s
-    north_m = before.north_m + (before.north_m_s + now.north_m_s) / 2.0 * elapsed_s
-    east_m = before.east_m + (before.east_m_s + now.east_m_s) / 2.0 * elapsed_s
-    return math.hypot(now.north_m - north_m, now.east_m - east_m)
+    """The position, compared with where the velocity has led, and its time with our clock."""
+    before = state.position
+    if before is not None and now.boot_s < before.boot_s - BACK_S:
+        off_m = jump_m(before, now, clock_jumped=True)
+        return replace(state, position=now, jump_m=off_m, restarted=True, latency=Latency(), reckoned=None)
+    latency = reported(state.latency, now.time_s, now.boot_s)
+    clock_jumped = latency.jumped_s == now.time_s
+    so_far, frozen = reckoned(None if clock_jumped else state.reckoned, before, now)
+    off_m = jump_m(before, now, clock_jumped=clock_jumped)
+    frozen = state.frozen or frozen
+    return replace(state, position=now, jump_m=off_m, reckoned=so_far, frozen=frozen, latency=latency)

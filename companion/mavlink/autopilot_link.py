@@ -8,7 +8,8 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.commands import Command, Heartbeat, RequestMessage
+from companion.commands import AskTime, Command, Heartbeat, RequestMessage
+from companion.latency import TimeAnswered
 from companion.mavlink.acks import AckKeeper
 from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec
@@ -22,6 +23,8 @@ PLACES_S = 2.0
 """Origin and home are asked for this often until known,"""
 PLACES_AGAIN_S = 30.0
 """and then this often, for the autopilot says only once when it has moved them."""
+TIME_S = 0.5
+"""The autopilot's time is asked for this often: how long the answer takes is how late the link is."""
 TWIN_S = 3.5
 """Another companion's heartbeat counts for so long."""
 
@@ -53,6 +56,8 @@ class AutopilotLink:
         self._places_s = -math.inf
         self._home_known = False
         self._own: deque[bytes] = deque(maxlen=8)
+        self._time_s = -math.inf
+        self._asked_ns: deque[int] = deque(maxlen=64)
         self._twin_s = -math.inf
 
     @property
@@ -98,6 +103,8 @@ class AutopilotLink:
             if self._codec.is_own_heartbeat(packet) and packet.raw not in self._own:  # some networks send all back
                 self._twin_s = now_s
             for event in self._codec.decode_packet(packet, now_s):
+                if isinstance(event, TimeAnswered) and not self._is_ours(event):
+                    continue
                 self._note(event)
                 events.append(event)
         return events
@@ -125,6 +132,7 @@ class AutopilotLink:
         for request in self._rates.due(now_s, self._codec.message_counts):
             self._write(request, now_s)
         self._ask_places(now_s)
+        self._ask_time(now_s)
         for command, repetition in self._acks.due(now_s):
             self._write(command, now_s, repetition)
 
@@ -143,6 +151,19 @@ class AutopilotLink:
         self._places_s = now_s
         for message_id in (mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN, mavlink.MAVLINK_MSG_ID_HOME_POSITION):
             self._write(RequestMessage(message_id), now_s)
+
+    def _ask_time(self, now_s: float) -> None:
+        if now_s - self._time_s >= TIME_S - 1e-6:
+            self._time_s = now_s
+            self._asked_ns.append(round(now_s * 1e9))
+            self._write(AskTime(self._asked_ns[-1]), now_s)
+
+    def _is_ours(self, answer: TimeAnswered) -> bool:
+        """Whether it answers our own question, for the first time: others ask as well, and answers are sent to everybody."""
+        if answer.asked_ns not in self._asked_ns:
+            return False
+        self._asked_ns.remove(answer.asked_ns)
+        return True
 
     def _note(self, event: Event) -> None:
         match event:

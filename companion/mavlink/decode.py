@@ -9,6 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.frames import GeoPoint
+from companion.latency import TimeAnswered
 from companion.mavlink import others, ranges
 from companion.mavlink.framing import Packet
 from companion.mavlink.places import point_of
@@ -77,6 +78,7 @@ class Decoder:
             mavlink.MAVLINK_MSG_ID_RANGEFINDER: self._rangefinder,
             mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: _home,
+            mavlink.MAVLINK_MSG_ID_TIMESYNC: _time_answered,
         }
 
     def decode(self, packet: Packet, time_s: float) -> list[Event]:
@@ -243,6 +245,11 @@ def _target(message: Any, time_s: float) -> Event | None:
 
 def _ekf(message: Any, time_s: float) -> Event:
     return EkfStatusSeen(time_s, message.flags)
+
+
+def _time_answered(message: Any, time_s: float) -> Event | None:
+    """An answer bears the autopilot's time; without it, it is a question."""
+    return TimeAnswered(time_s, message.ts1) if message.tc1 > 0 else None
 
 
 def _parameter(message: Any, time_s: float) -> Event:

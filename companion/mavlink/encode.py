@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import (
     Arm,
+    AskTime,
     ChangeSpeed,
     Command,
     GuidedHeading,
@@ -79,6 +80,8 @@ class Encoder:
                 return [self._heading(command)]
             case ReadParameter():
                 return [self._read(command)]
+            case AskTime():
+                return [mavlink.MAVLink_timesync_message(0, command.asked_ns)]
             case Say():
                 return self._say(command)
             case _:

@@ -210,6 +210,17 @@ def test_modules_and_tests_that_pages_name_exist() -> None:
             assert f"def {name}(" in tests, f"{page.name}: {name}"
 
 
+def test_every_table_of_hazards_has_its_five_columns_and_names_a_test() -> None:
+    text = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
+    heads = [row for row in rows if row[0] == "hazard"]
+    assert heads and all(row == ["hazard", "detection", "reaction", "time to reaction", "test"] for row in heads)
+    hazards = [row for row in rows if row not in heads and set(row[0]) != {"-"}]
+    for row in hazards:
+        assert len(row) == 5 and all(row[i] for i in (0, 2, 3)), row[0]
+        assert re.search(r"`(test_|tests/)", row[4]), f"{row[0]}: no test"
+
+
 def test_the_picture_is_small() -> None:
     assert 10_000 < (ROOT / "docs" / "images" / "rooms.png").stat().st_size < 200_000
 

@@ -1,0 +1,28 @@
+"""What is watched besides the age of data: each doubt why the rover must not move, in one place."""
+
+from __future__ import annotations
+
+from companion.scan_watch import ScanWatch
+from companion.vehicle import Event, RangeSeen, VehicleState
+
+
+class Watchdogs:
+    """Takes events already folded into the vehicle's state, and says what is in doubt."""
+
+    def __init__(self) -> None:
+        self._scans = ScanWatch()
+        self._fits = True
+
+    @property
+    def scan_fits(self) -> bool:
+        """Whether the newest scan belongs where the rover is now, so that it may go on the map."""
+        return self._fits
+
+    def take_in(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event."""
+        if isinstance(event, RangeSeen):
+            self._fits = self._scans.take(event.scan, vehicle)
+
+    def reason(self, now_s: float) -> str:
+        """Why the rover must not move now; empty when it may."""
+        return self._scans.reason

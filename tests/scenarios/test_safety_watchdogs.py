@@ -1,0 +1,152 @@
+"""Faults that leave the data fresh, in lock-step: readings that repeat, a link that is late, clocks that jump, work that takes too long."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.rig import HOLD, SET_MODE, Rig, yard
+
+TICK_S = 0.05
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Rig:
+    """A rover at full speed, with a wall ahead."""
+    rig = Rig(yard(tmp_path))
+    rig.until_driven(3.0)
+    return rig
+
+
+def first_stop_s(rig: Rig, since_s: float) -> float:
+    """When the first velocity of zero went out; a tick later all that was said has been taken note of."""
+    rig.companion.tick()
+    return next(one.time_s for one in rig.sent_since(since_s) if one.is_standstill)
+
+
+def modes_asked_for(rig: Rig, since_s: float) -> list[float]:
+    return [one.message.param2 for one in rig.sent_since(since_s) if one.command == SET_MODE]
+
+
+class Repeated:
+    """The lidar says again and again what it said when this began; its clock and its checksum are right."""
+
+    def __init__(self) -> None:
+        self._cells: Any = None
+
+    def __call__(self, message: Any) -> Any:
+        if message.get_type() == "OBSTACLE_DISTANCE":
+            self._cells = self._cells or list(message.distances)
+            message.distances = self._cells
+        return message
+
+
+# --- range data that repeats itself ---------------------------------------------------------------------------------
+
+
+def test_a_lidar_that_repeats_itself_stops_the_rover_and_lets_it_go_on_when_it_sees_again(rig: Rig) -> None:
+    rig.change, since_s = Repeated(), rig.now_s()
+    rig.run_for(1.8)
+    assert first_stop_s(rig, since_s) - since_s <= 0.8
+    assert "Stopping: obstacle distance repeats itself" in rig.texts()
+    rig.change = None
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+    assert modes_asked_for(rig, since_s) == [HOLD], "only the one at the end"
+
+
+def test_a_lidar_that_repeats_itself_for_ever_ends_in_hold_however_often_a_person_tries(rig: Rig) -> None:
+    rig.change, since_s = Repeated(), rig.now_s()
+    for _ in range(3):
+        rig.until(lambda: rig.mode == HOLD, 5.0)
+        rig.pilot_mode(15)
+        rig.until(lambda: rig.mode == 15, 2.0)
+    assert rig.simulator.collisions == ()
+    assert rig.simulator.driven_m < 7.0
+    assert modes_asked_for(rig, since_s) == [HOLD] * 3
+
+
+# --- a late link ----------------------------------------------------------------------------------------------------
+
+
+class Late:
+    """Everything that the vehicle says comes so much later, in order."""
+
+    def __init__(self, rig: Rig, late_s: float) -> None:
+        self._rig, self.late_s = rig, late_s
+        self._waiting: deque[tuple[float, bytes]] = deque()
+
+    def __call__(self, data: bytes) -> bytes:
+        now_s = self._rig.now_s()
+        self._waiting.append((now_s + self.late_s, data))
+        come = []
+        while self._waiting and self._waiting[0][0] <= now_s + 1e-6:
+            come.append(self._waiting.popleft()[1])
+        return b"".join(come)
+
+
+def test_a_good_link_is_a_tick_or_two_late(rig: Rig) -> None:
+    rig.run_for(2.0)
+    assert 0.0 < rig.companion.vehicle.latency_s <= 2 * TICK_S
+
+
+@pytest.mark.parametrize("late_s", [0.3, 0.8])
+def test_a_link_that_is_late_within_the_limit_is_measured_and_driven_on(rig: Rig, late_s: float) -> None:
+    rig.garble, since_s = Late(rig, late_s), rig.now_s()
+    rig.until(lambda: rig.companion.vehicle.latency_s >= late_s, 2 * late_s + 1.0)
+    rig.run_for(2.0)
+    assert late_s <= rig.companion.vehicle.latency_s <= late_s + 2 * TICK_S
+    assert rig.now_s() - since_s > 2.0 and not any("later than" in text for text in rig.texts())
+
+
+def test_a_link_later_than_the_limit_stops_the_rover_and_holds_it_until_it_is_better_and_a_person_says_so(
+    rig: Rig,
+) -> None:
+    late = Late(rig, 1.2)
+    rig.garble, since_s = late, rig.now_s()
+    rig.until(lambda: "HOLD: link later than 1 s" in rig.texts(), 6.0)
+    assert first_stop_s(rig, since_s) - since_s <= 1.2 + 0.3, "nothing at all for 1 s, or three late reports"
+    assert rig.now_s() - since_s <= 4.0
+    late.late_s = 0.0
+    rig.run_for(5.0)
+    assert rig.mode == HOLD and rig.speed_m_s < 0.05
+    rig.pilot_mode(15)
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+# --- clocks that jump -----------------------------------------------------------------------------------------------
+
+
+def clock_off_by(milliseconds: int) -> Callable[[Any], Any]:
+    def change(message: Any) -> Any:
+        if message.get_srcComponent() == 1 and "time_boot_ms" in message.get_fieldnames():
+            message.time_boot_ms = max(0, message.time_boot_ms + milliseconds)
+        return message
+
+    return change
+
+
+def test_an_autopilots_clock_that_jumps_ahead_stops_the_rover_for_a_moment(rig: Rig) -> None:
+    rig.change, since_s = clock_off_by(60_000), rig.now_s()
+    rig.until(lambda: "Stopping: the autopilot's clock has jumped" in rig.texts(), 1.0)
+    assert first_stop_s(rig, since_s) - since_s <= 0.15 + TICK_S
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+    assert modes_asked_for(rig, since_s) == [HOLD]
+
+
+def test_an_autopilots_clock_that_runs_back_though_it_is_armed_and_in_guided_waits_for_a_person(rig: Rig) -> None:
+    rig.change, since_s = clock_off_by(-40_000), rig.now_s()
+    rig.until(lambda: rig.mode == HOLD, 4.0)
+    assert first_stop_s(rig, since_s) - since_s <= 0.15 + TICK_S
+    assert "HOLD: the autopilot's clock has run back" in rig.texts()
+    rig.run_for(5.0)
+    assert modes_asked_for(rig, since_s) == [HOLD] and rig.speed_m_s < 0.05
+    rig.pilot_mode(15)
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
