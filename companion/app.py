@@ -20,6 +20,7 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import EncodeError
 from companion.mission.mission import Mission
 from companion.outbox import Outbox
+from companion.output_check import OutputCheck
 from companion.pursuit import Pursuit
 from companion.recorder import DecisionLog
 from companion.reporting import Outcome, Reporter, Status
@@ -70,6 +71,7 @@ class Companion:
         self._rng = np.random.default_rng(seed)
         self._start_up = StartUp(mission, settings, arm=arm)
         self._outbox = Outbox(settings.guidance)
+        self.output_check = OutputCheck(self._tell)
         self._reporter = Reporter(self.outcome.said)
         self._next_tick_s = clock.now_s()
         self._watchdogs = Watchdogs()
@@ -263,7 +265,7 @@ class Companion:
         guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s, others)
         self._reporter.doing = pursuit.doing
         if guide is not None:
-            self._command(guide, now_s)
+            self._command(self.output_check.passed(guide, pose, self.vehicle.speed_m_s, pursuit.surroundings), now_s)
             return
         self.outcome.targets = pursuit.statuses()
         self._tell(f"Mission ended: {pursuit.reached} of {len(self.outcome.targets)} targets reached", INFO)

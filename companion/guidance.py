@@ -252,6 +252,11 @@ def stopping_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
     return speed_m_s * settings.latency_s + speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
 
 
+def farthest_m(speed_m_s: float, settings: GuidanceSettings) -> float:
+    """How far away a guided target may lie, straight."""
+    return settings.horizon_m + stopping_distance_m(speed_m_s, settings)
+
+
 def fastest_within_m(distance_m: float, settings: GuidanceSettings) -> float:
     """The speed from which the rover can stop within a distance: the inverse of ``stopping_distance_m``."""
     a, t = settings.deceleration_m_s2, settings.latency_s
@@ -293,7 +298,7 @@ def _farthest_with(
     for index in range(last, route.progress, -2):
         point = route.point(index)
         distance_m = pose.point.distance_m(point)
-        if distance_m < 0.05:
+        if not 0.05 <= distance_m <= farthest_m(speed_m_s, settings):
             continue
         line = look_along(evidence, pose.point, point, rover.radius_m + extra_m)
         if line.clear_m < distance_m - 0.05 or line.seen_m + beyond_m < distance_m - 0.05:

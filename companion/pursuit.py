@@ -14,6 +14,7 @@ from companion.laying import Laid, apart_m, lay_again
 from companion.mapping import EvidenceMap, forget, integrate
 from companion.mission.mission import Mission
 from companion.navigator import Action, Decision
+from companion.output_check import Surroundings
 from companion.planning.registry import make_planner
 from companion.recorder import DecisionLog
 from companion.scan import RangeScan
@@ -74,6 +75,11 @@ class Pursuit:
     def evidence(self) -> EvidenceMap:
         """The map."""
         return self.laid.evidence
+
+    @property
+    def surroundings(self) -> Surroundings:
+        """What is known of the ground, and the rover on it."""
+        return Surroundings(self.evidence, self._limits, self._settings)
 
     @property
     def reached(self) -> int:

@@ -75,6 +75,8 @@ class Report:
     stuck: int = 0
     distance_m: float = 0.0
     collisions: int = 0
+    refused: int = 0
+    """Setpoints that the companion's own last look before sending turned down."""
     sim_time_s: float = 0.0
     driving_time_s: float = 0.0
     wall_time_s: float = 0.0
@@ -150,6 +152,7 @@ class Drive:
         report.said = companion.outcome.said
         report.targets = [(name, str(status)) for name, status in companion.statuses()]
         report.collisions = len(self.simulator.collisions)
+        report.refused = companion.output_check.refused.total()
         report.distance_m = self.simulator.driven_m
         report.sim_time_s = self.simulator.time_s
         if companion.driver is not None:

@@ -30,7 +30,9 @@ def driven(name: str, suite: str | None = None, seed: int = 0, settings: Setting
     if suite is not None:
         mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=suite))
     run = Drive(mission, scenario_from_mission(mission), settings or Settings(), seed, NullRecorder())
-    return run.run()
+    report = run.run()
+    assert report.refused == 0, run.companion.output_check.refused
+    return report
 
 
 @pytest.mark.parametrize("suite", SUITES)

@@ -1,0 +1,190 @@
+"""The last look at a setpoint, against a slow reading of the same map; and that it really stands before the line."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import settings as runs
+from hypothesis import strategies as st
+
+from companion.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
+from companion.frames import NedPoint, Pose
+from companion.grid import empty_grid
+from companion.guidance import STOP, Guide, Motion, RoverLimits, farthest_m
+from companion.mapping import EvidenceMap, new_map
+from companion.output_check import Output, OutputCheck, Surroundings, fault_of
+from companion.settings import Settings
+from tests.rig import Rig, yard
+
+SETTINGS = Settings()
+RADIUS_M = 0.35
+SIDE = 16
+MIDDLE = 0.5 * SIDE
+
+
+def open_ground() -> EvidenceMap:
+    """All of it seen free."""
+    evidence = new_map(empty_grid(SIDE, SIDE), RADIUS_M, SETTINGS.mapping)
+    evidence.log_odds.fill(-1.0)
+    return evidence
+
+
+def surroundings(evidence: EvidenceMap) -> Surroundings:
+    return Surroundings(evidence, RoverLimits(RADIUS_M, 2.0, 8.0), SETTINGS)
+
+
+def patched(evidence: EvidenceMap, north_m: float, east_m: float, size_m: float, value: float) -> None:
+    y, x = (round(v / evidence.evidence_m) for v in (north_m, east_m))
+    size = max(1, round(size_m / evidence.evidence_m))
+    evidence.log_odds[max(0, y) : y + size, max(0, x) : x + size] = value
+
+
+@st.composite
+def grounds(draw) -> EvidenceMap:
+    """Patches that nobody has seen, and some things that stand there."""
+    evidence, place = open_ground(), st.floats(0.0, SIDE - 1.0)
+    for value, most, size in ((0.0, 4, st.floats(0.3, 3.0)), (2.0, 6, st.floats(0.1, 0.8))):
+        for _ in range(draw(st.integers(0, most))):
+            patched(evidence, draw(place), draw(place), draw(size), value)
+    return evidence
+
+
+def outputs(setpoint: st.SearchStrategy[Setpoint]) -> st.SearchStrategy[Output]:
+    near = st.floats(MIDDLE - 2.0, MIDDLE + 2.0)
+    poses = st.builds(Pose, near, near, st.floats(-math.pi, math.pi), st.just(0.0))
+    return st.builds(Output, setpoint, poses, st.floats(0.0, 2.0))
+
+
+ANYWHERE = st.floats(-3.0, SIDE + 3.0)
+POSITIONS = outputs(st.builds(GuidedPosition, st.builds(NedPoint, ANYWHERE, ANYWHERE)))
+VELOCITIES = outputs(st.builds(GuidedVelocity, st.floats(-2.0, 2.0), st.floats(-0.8, 0.8)))
+
+
+def places_of(evidence: EvidenceMap, occupied: bool) -> np.ndarray:
+    """Middles of the cells where something stands, or which nobody has seen; columns north, east."""
+    at = evidence.log_odds >= evidence.settings.occupied_at if occupied else evidence.log_odds == 0.0
+    return (np.argwhere(at) + 0.5) * evidence.evidence_m
+
+
+def gap_m(places: np.ndarray, north_m: float, east_m: float) -> float:
+    return float(np.hypot(places[:, 0] - north_m, places[:, 1] - east_m).min()) if len(places) else math.inf
+
+
+@runs(max_examples=400, deadline=None)
+@given(grounds(), POSITIONS)
+def test_a_position_that_passes_is_near_and_the_way_there_clear_and_seen(evidence: EvidenceMap, output: Output) -> None:
+    assert isinstance(output.setpoint, GuidedPosition)
+    pose, there = output.pose, output.setpoint.point
+    standing, unseen = places_of(evidence, True), places_of(evidence, False)
+    if gap_m(standing, pose.north_m, pose.east_m) < RADIUS_M + 0.2 or fault_of(output, surroundings(evidence)):
+        return
+    distance_m = pose.point.distance_m(there)
+    assert distance_m <= farthest_m(output.speed_m_s, SETTINGS.guidance) + 0.1
+    braking_m = max(output.speed_m_s, 0.5) * 0.25 + max(output.speed_m_s, 0.5) ** 2 / 1.6
+    for along_m in np.arange(0.0, distance_m - 0.1, 0.05):
+        share = along_m / distance_m
+        north_m = pose.north_m + share * (there.north_m - pose.north_m)
+        east_m = pose.east_m + share * (there.east_m - pose.east_m)
+        assert (0.0 <= north_m <= SIDE and 0.0 <= east_m <= SIDE) or along_m >= distance_m - braking_m - 0.15
+        assert gap_m(standing, north_m, east_m) > RADIUS_M - 1e-6
+        if along_m < distance_m - braking_m - 0.15:
+            assert gap_m(unseen, north_m, east_m) > 0.5 * evidence.evidence_m - 0.06
+
+
+@runs(max_examples=400, deadline=None)
+@given(grounds(), VELOCITIES)
+def test_a_velocity_that_passes_can_be_stopped_on_its_arc(evidence: EvidenceMap, output: Output) -> None:
+    assert isinstance(output.setpoint, GuidedVelocity)
+    pose, speed_m_s = output.pose, output.setpoint.forward_m_s
+    standing = places_of(evidence, True)
+    if gap_m(standing, pose.north_m, pose.east_m) < RADIUS_M + 0.3 or fault_of(output, surroundings(evidence)):
+        return
+    north_m, east_m = pose.north_m, pose.east_m
+    course_rad = pose.heading_rad + (math.pi if speed_m_s < 0.0 else 0.0)
+    curvature_m = output.setpoint.yaw_rate_rad_s / max(output.speed_m_s, 1.0)
+    braking_m = abs(speed_m_s) * 0.25 + speed_m_s**2 / 1.6
+    for _ in np.arange(0.0, braking_m - 0.1 - evidence.evidence_m, 0.02):
+        north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
+        course_rad += 0.02 * curvature_m
+        assert gap_m(standing, north_m, east_m) > RADIUS_M - 0.05 - evidence.evidence_m
+
+
+@runs(max_examples=200, deadline=None)
+@given(POSITIONS)
+def test_on_open_ground_that_was_seen_only_distance_and_the_edge_of_the_map_count(output: Output) -> None:
+    assert isinstance(output.setpoint, GuidedPosition)
+    there = output.setpoint.point
+    distance_m = output.pose.point.distance_m(there)
+    inside = 0.0 < there.north_m < SIDE and 0.0 < there.east_m < SIDE
+    fault = fault_of(output, surroundings(open_ground()))
+    if inside:
+        assert bool(fault) == (distance_m > farthest_m(output.speed_m_s, SETTINGS.guidance) + 0.1)
+
+
+@pytest.mark.parametrize("setpoint", [STOP, GuidedVelocity(0.0, 0.5), GuidedHeading(1.0)])
+def test_standing_and_turning_on_the_spot_always_pass(setpoint: Setpoint) -> None:
+    evidence = open_ground()
+    patched(evidence, MIDDLE - 1.0, MIDDLE - 1.0, 2.0, 2.0)
+    assert fault_of(Output(setpoint, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), surroundings(evidence)) == ""
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_not_a_number_does_not_pass(value: float) -> None:
+    known, pose = surroundings(open_ground()), Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    for setpoint in (
+        GuidedPosition(NedPoint(value, 1.0)),
+        GuidedVelocity(value, 0.0),
+        GuidedVelocity(1.0, value),
+    ):
+        assert fault_of(Output(setpoint, pose, 0.0), known)
+
+
+def test_the_faults_have_names() -> None:
+    pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    ahead = Output(GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), pose, 0.0)
+    evidence = open_ground()
+    patched(evidence, MIDDLE + 2.0, MIDDLE - 1.0, 2.0, 0.0)
+    assert fault_of(ahead, surroundings(evidence)) == "target on ground not seen"
+    patched(evidence, MIDDLE + 2.0, MIDDLE - 1.0, 2.0, 2.0)
+    assert fault_of(ahead, surroundings(evidence)) == "target behind something"
+    fast = Output(GuidedVelocity(2.0, 0.0), pose, 2.0)
+    assert fault_of(fast, surroundings(evidence)) == "velocity leads into something"
+
+
+def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
+    said: list[str] = []
+    check, known = OutputCheck(lambda text, severity: said.append(text)), surroundings(open_ground())
+    pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    good = Guide(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), 1.0)
+    assert check.passed(good, pose, 0.0, known) is good and not said and not check.refused
+    far = Guide(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
+    assert check.passed(far, pose, 0.0, known).setpoint == STOP
+    assert said == ["Stopping: target farther away than the horizon"] and check.refused.total() == 1
+
+
+def test_a_rule_more_is_asked_like_the_others() -> None:
+    check = OutputCheck(lambda text, severity: None, (lambda output, known: "not on Sundays",))
+    drive = Guide(Motion.LOOK, GuidedHeading(0.0), 0.5)
+    assert check.passed(drive, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0, surroundings(open_ground())).setpoint == STOP
+    assert check.refused == {"not on Sundays": 1}
+
+
+def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None:
+    """From some moment on the driver wants straight through the wall: the rover stops, and says why."""
+    rig = Rig(yard(tmp_path))
+    rig.until_driven(2.0)
+    driver = rig.companion.driver
+    assert driver is not None
+    through = Guide(Motion.DRIVE, GuidedPosition(NedPoint(0.0, 7.0)), 2.0)
+    driver.update = lambda *_: (through, None)  # type: ignore[method-assign]
+    since_s = rig.now_s()
+    rig.run_for(10.0)
+    setpoints = [one for one in rig.sent_since(since_s) if one.is_setpoint]
+    assert setpoints and all(one.is_standstill for one in setpoints[1:])
+    assert rig.speed_m_s < 0.05 and rig.simulator.collisions == ()
+    assert rig.companion.output_check.refused.total() > 100
+    assert "Stopping: target behind something" in rig.texts()
