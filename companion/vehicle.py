@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
+from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.frames import GeoPoint, Pose
 from companion.scan import RangeScan
 
@@ -129,11 +130,12 @@ class RangeSeen:
 
 @dataclass(frozen=True, slots=True)
 class AckSeen:
-    """COMMAND_ACK (``command`` is the MAV_CMD) or MISSION_ACK (``command`` is -1)."""
+    """COMMAND_ACK (``command`` is the MAV_CMD) or MISSION_ACK (``command`` is -1, ``kind`` its MAV_MISSION_TYPE)."""
 
     time_s: float
     command: int
     result: int
+    kind: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +188,9 @@ Event = (
     | TextSeen
     | ParameterSeen
     | PrearmSeen
+    | PlanCountSeen
+    | PlanItemSeen
+    | PlanChangedSeen
 )
 
 
