@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from companion.events_plan import PlanKind
 from companion.frames import NedPoint
 
 
@@ -86,6 +87,29 @@ class ReadParameter:
 
 
 @dataclass(frozen=True, slots=True)
+class RequestList:
+    """Tell how many items a stored list has."""
+
+    kind: PlanKind
+
+
+@dataclass(frozen=True, slots=True)
+class RequestItem:
+    """Tell one item of a stored list."""
+
+    kind: PlanKind
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class EndTransfer:
+    """The transfer of a stored list is over: all has arrived, or (``cancelled``) no more is wanted."""
+
+    kind: PlanKind
+    cancelled: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Say:
     """Text for the people at the ground station; severity as in MAVLink (6 info, 4 warning, 2 critical)."""
 
@@ -106,6 +130,9 @@ Command = (
     | RequestMessage
     | AskTime
     | ReadParameter
+    | RequestList
+    | RequestItem
+    | EndTransfer
     | Say
 )
 
@@ -114,11 +141,14 @@ __all__ = [
     "AskTime",
     "ChangeSpeed",
     "Command",
+    "EndTransfer",
     "GuidedHeading",
     "GuidedPosition",
     "GuidedVelocity",
     "Heartbeat",
     "ReadParameter",
+    "RequestItem",
+    "RequestList",
     "RequestMessage",
     "RequestRate",
     "Say",

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 from companion.frames import GeoPoint, LocalFrame, NedPoint, Pose
-from companion.grid import Grid, inflated
+from companion.grid import OBSTACLE, Grid, inflated
 from companion.itinerary import Itinerary, plan_itinerary, relaid
-from companion.mapping import EvidenceMap, new_map
+from companion.mapping import EvidenceMap, new_map, rebase
+from companion.mission.bounds import Bounds
+from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, OnBlocked
-from companion.mission.resolve import ResolvedTarget, resolve
+from companion.mission.resolve import ResolvedMission, ResolvedTarget, resolve
 from companion.settings import MappingSettings
 
 
@@ -21,24 +24,45 @@ class Laid:
     home: GeoPoint
     evidence: EvidenceMap
     itinerary: Itinerary
+    fence: AutopilotFence
+    bounds: Bounds
+    refused: Mapping[int, str]
+    """What is wrong with targets behind the autopilot's fence, by their number from 0."""
 
 
-def lay(mission: Mission, settings: MappingSettings, origin: GeoPoint, home: GeoPoint, pose: Pose) -> Laid:
+def lay(
+    mission: Mission,
+    settings: MappingSettings,
+    origin: GeoPoint,
+    home: GeoPoint,
+    pose: Pose,
+    fence: AutopilotFence = NO_FENCE,
+) -> Laid:
     """Lay the mission out; the rover returns to ``pose`` when it has to. Raises MissionError."""
     frame = LocalFrame(origin)
-    resolved = resolve(mission, frame, frame.to_ned(home))
-    start = _start(pose.point, resolved.grid)
-    evidence = _fresh_map(mission, settings, resolved.grid)
-    return Laid(origin, home, evidence, plan_itinerary(resolved.targets, start))
+    resolved = resolve(mission, frame, frame.to_ned(home), fence)
+    start = _start(pose.point, resolved.ground)
+    evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
+    itinerary = plan_itinerary(resolved.targets, start)
+    return Laid(origin, home, evidence, itinerary, fence, resolved.bounds, resolved.refused)
 
 
 def lay_again(laid: Laid, itinerary: Itinerary, mission: Mission, settings: MappingSettings, origin: GeoPoint) -> Laid:
     """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
     frame = LocalFrame(origin)
-    resolved = resolve(mission, frame, frame.to_ned(laid.home))
+    resolved = resolve(mission, frame, frame.to_ned(laid.home), laid.fence)
     start = frame.to_ned(LocalFrame(laid.origin).to_geo(itinerary.home.point))
-    evidence = _fresh_map(mission, settings, resolved.grid)
-    return Laid(origin, laid.home, evidence, relaid(itinerary, resolved.targets, _start(start, resolved.grid)))
+    evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
+    itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.ground))
+    return Laid(origin, laid.home, evidence, itinerary, laid.fence, resolved.bounds, resolved.refused)
+
+
+def fenced_again(laid: Laid, itinerary: Itinerary, mission: Mission, fence: AutopilotFence) -> Laid:
+    """The same ground and all that has been seen of it, with another fence of the autopilot. Raises MissionError."""
+    frame = LocalFrame(laid.origin)
+    resolved = resolve(mission, frame, frame.to_ned(laid.home), fence)
+    rebase(laid.evidence, _base(mission, resolved))
+    return replace(laid, itinerary=itinerary, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
 
 
 def from_home(laid: Laid) -> Grid:
@@ -57,7 +81,9 @@ def _start(point: NedPoint, grid: Grid) -> ResolvedTarget:
     return ResolvedTarget("start", point, grid.cell_at(point), 0.0, OnBlocked.HOLD, None)
 
 
-def _fresh_map(mission: Mission, settings: MappingSettings, grid: Grid) -> EvidenceMap:
-    """Fences and known ground grow by the rover's radius; what is seen is measured against the radius itself."""
-    radius_m = mission.rover.radius_m
-    return new_map(grid.with_weights(inflated(grid.weights, radius_m / grid.resolution_m)), radius_m, settings)
+def _base(mission: Mission, resolved: ResolvedMission) -> Grid:
+    """Known ground and fences in fields grow by the rover's radius, which the other fences have in them already."""
+    ground = resolved.ground
+    weights = inflated(ground.weights, mission.rover.radius_m / ground.resolution_m)
+    weights[resolved.closed] = OBSTACLE
+    return ground.with_weights(weights)

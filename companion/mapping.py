@@ -114,6 +114,12 @@ def forget(evidence: EvidenceMap) -> None:
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
 
 
+def rebase(evidence: EvidenceMap, base: Grid) -> None:
+    """Other weights of the mission's own (of a grid that lies as before); what was seen stays."""
+    evidence.base.weights[:] = base.weights
+    _refresh(evidence, 0, 0, base.width, base.height)
+
+
 def doubt(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
     """Forget, before giving up, what may be an error of sensor or position, so that it is looked at again.
 

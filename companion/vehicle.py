@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
+from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.frames import GeoPoint, Pose
 from companion.latency import BACK_S, Latency, TimeAnswered, answered, reported
 from companion.reckoning import Reckoned, jump_m, reckoned
@@ -126,11 +127,12 @@ class RangeSeen:
 
 @dataclass(frozen=True, slots=True)
 class AckSeen:
-    """COMMAND_ACK (``command`` is the MAV_CMD) or MISSION_ACK (``command`` is -1)."""
+    """COMMAND_ACK (``command`` is the MAV_CMD) or MISSION_ACK (``command`` is -1, ``kind`` its MAV_MISSION_TYPE)."""
 
     time_s: float
     command: int
     result: int
+    kind: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,6 +186,9 @@ Event = (
     | ParameterSeen
     | PrearmSeen
     | TimeAnswered
+    | PlanCountSeen
+    | PlanItemSeen
+    | PlanChangedSeen
 )
 
 

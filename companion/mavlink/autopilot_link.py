@@ -13,6 +13,7 @@ from companion.latency import TimeAnswered
 from companion.mavlink.acks import AckKeeper
 from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec
+from companion.mavlink.download import Downloads
 from companion.mavlink.rates import RateFault, RateKeeper, wanted_rates
 from companion.mavlink.readback import ReadBack
 from companion.settings import LinkSettings
@@ -52,6 +53,8 @@ class AutopilotLink:
         self._rates = RateKeeper(wanted_rates(settings))
         self._acks = AckKeeper()
         self._read_back = ReadBack()
+        self.downloads = Downloads()
+        """The lists that the autopilot has stored: mission, fence, rally points."""
         self._heartbeat_s = -math.inf
         self._places_s = -math.inf
         self._home_known = False
@@ -129,7 +132,7 @@ class AutopilotLink:
         self._read_back.check(now_s)
         if not self._codec.vehicle_known:
             return
-        for request in self._rates.due(now_s, self._codec.message_counts):
+        for request in (*self._rates.due(now_s, self._codec.message_counts), *self.downloads.due(now_s)):
             self._write(request, now_s)
         self._ask_places(now_s)
         self._ask_time(now_s)
@@ -175,6 +178,7 @@ class AutopilotLink:
                 self._home_known = True
             case _:
                 pass
+        self.downloads.heard(event)
 
     def _write(self, command: Command, now_s: float, repetition: int = 0) -> None:
         for raw in self._codec.encode_packets(command, repetition):

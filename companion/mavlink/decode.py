@@ -8,6 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.frames import GeoPoint
 from companion.latency import TimeAnswered
 from companion.mavlink import others, ranges
@@ -72,6 +73,8 @@ class Decoder:
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
             mavlink.MAVLINK_MSG_ID_MISSION_ACK: self._mission_ack,
+            mavlink.MAVLINK_MSG_ID_MISSION_COUNT: self._plan_count,
+            mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: self._plan_item,
             mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN: self._gps_origin,
             mavlink.MAVLINK_MSG_ID_COMMAND_ACK: self._command_ack,
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _target,
@@ -225,8 +228,24 @@ class Decoder:
         return AckSeen(time_s, message.command, message.result) if ours else None
 
     def _mission_ack(self, message: Any, time_s: float) -> Event | None:
-        ours = self._is_for_us(message)
-        return AckSeen(time_s, MISSION_ACK_COMMAND, message.type) if ours else None
+        if self._is_for_us(message):
+            return AckSeen(time_s, MISSION_ACK_COMMAND, message.type, message.mission_type)
+        accepted = message.type == mavlink.MAV_MISSION_ACCEPTED
+        return PlanChangedSeen(time_s, message.mission_type) if accepted else None
+
+    def _plan_count(self, message: Any, time_s: float) -> Event | None:
+        if not self._is_for_us(message):
+            return None
+        return PlanCountSeen(time_s, message.mission_type, message.count)
+
+    def _plan_item(self, message: Any, time_s: float) -> Event | None:
+        """One item of a download; values that are no numbers stay so: who reads the list decides."""
+        if not self._is_for_us(message):
+            return None
+        params = (message.param1, message.param2, message.param3, message.param4)
+        place = (message.x / 1e7, message.y / 1e7)
+        head = (message.mission_type, message.seq, message.command, message.frame)
+        return PlanItemSeen(time_s, *head, params, *place, bool(message.autocontinue))
 
     def _is_for_us(self, message: Any) -> bool:
         """Answers to a ground station come by as well; 0 is everybody (and what a MAVLink 1 answer says)."""

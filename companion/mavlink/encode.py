@@ -12,11 +12,14 @@ from companion.commands import (
     AskTime,
     ChangeSpeed,
     Command,
+    EndTransfer,
     GuidedHeading,
     GuidedPosition,
     GuidedVelocity,
     Heartbeat,
     ReadParameter,
+    RequestItem,
+    RequestList,
     RequestMessage,
     RequestRate,
     Say,
@@ -84,6 +87,8 @@ class Encoder:
                 return [mavlink.MAVLink_timesync_message(0, command.asked_ns)]
             case Say():
                 return self._say(command)
+            case RequestList() | RequestItem() | EndTransfer():
+                return [self._transfer(command)]
             case _:
                 return [self._command_long(command, confirmation)]
 
@@ -146,6 +151,17 @@ class Encoder:
 
     def _read(self, command: ReadParameter) -> Any:
         return mavlink.MAVLink_param_request_read_message(self._system_id, 1, command.name.encode("ascii"), -1)
+
+    def _transfer(self, command: RequestList | RequestItem | EndTransfer) -> Any:
+        to = (self._system_id, 1)
+        match command:
+            case RequestList():
+                return mavlink.MAVLink_mission_request_list_message(*to, int(command.kind))
+            case RequestItem():
+                return mavlink.MAVLink_mission_request_int_message(*to, command.index, int(command.kind))
+            case _:
+                result = mavlink.MAV_MISSION_OPERATION_CANCELLED if command.cancelled else mavlink.MAV_MISSION_ACCEPTED
+                return mavlink.MAVLink_mission_ack_message(*to, result, int(command.kind))
 
     def _say(self, command: Say) -> list[Any]:
         pieces = chunks_of(command.text)

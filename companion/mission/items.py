@@ -85,6 +85,28 @@ def understand(items: Sequence[Item], path: Path, name: str, planned_home: GeoPo
     )
 
 
+@dataclass(frozen=True, slots=True)
+class FenceAreas:
+    """What a list of fence items encloses: ground is open inside of ``keep_in`` and outside each of ``keep_out``."""
+
+    keep_in: tuple[Area, ...] = ()
+    keep_out: tuple[Area, ...] = ()
+
+
+def fence_areas(items: Sequence[Item]) -> FenceAreas:
+    """The areas of a fence alone. Raises ItemError with the item's index and its command."""
+    fences = _fences(items)
+    return FenceAreas(tuple(fences.keep_in), tuple(fences.keep_out))
+
+
+def rally_points(items: Sequence[Item]) -> tuple[GeoPoint, ...]:
+    """The places of rally items, in their order. Raises ItemError."""
+    for item in items:
+        if item.command != mav.RALLY_POINT:
+            raise ItemError(f"{item.label}: is no rally point")
+    return tuple(geo_point(item.lat_deg, item.lon_deg, item.label) for item in items)
+
+
 def geo_point(lat_deg: float, lon_deg: float, what: str) -> GeoPoint:
     """A checked place on the earth. Raises ItemError."""
     if not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):

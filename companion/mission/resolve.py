@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from shapely.geometry.base import BaseGeometry
 
 from companion.frames import LocalFrame, NedPoint
 from companion.grid import OBSTACLE, Cell, Grid, empty_grid
 from companion.mapfiles import MapError, load_map
-from companion.mission.areas import Mask, Places, covered, middles_in, shape_of, touched
+from companion.mission.areas import Mask, Places, shape_of, touched
+from companion.mission.bounds import OURS, Bound, Bounds, autopilot_bounds, mission_bounds
 from companion.mission.check import MAX_GRID_FIELDS
-from companion.mission.mission import Area, Mission, MissionError, OnBlocked, Target
+from companion.mission.fence import NO_FENCE, AutopilotFence
+from companion.mission.mission import Mission, MissionError, OnBlocked
 from companion.mission.prior import stamp_prior
 
 MIN_MARGIN_M = 25.0
@@ -33,29 +35,53 @@ class ResolvedTarget:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ResolvedMission:
-    """The ground as known before the rover moves, and the targets in order. ``home_cell`` is where home lies."""
+    """The ground as known before the rover moves, and the targets in order. ``home_cell`` is where home lies.
 
-    grid: Grid
+    ``ground``: weights, known obstacles as large as they are, and fences that were drawn in fields. ``closed``: the fields that the
+    rover's middle must not enter, its radius and the autopilot's margin counted. ``refused``: what is wrong with targets behind
+    the autopilot's fence, by their number from 0.
+    """
+
+    ground: Grid
+    closed: Mask
+    bounds: Bounds
     targets: tuple[ResolvedTarget, ...]
     home_cell: Cell
+    refused: Mapping[int, str]
+
+    @property
+    def grid(self) -> Grid:
+        """The ground with all fences."""
+        weights = self.ground.weights.copy()
+        weights[self.closed] = OBSTACLE
+        return self.ground.with_weights(weights)
 
 
-def resolve(mission: Mission, frame: LocalFrame, home: NedPoint) -> ResolvedMission:
+@dataclass(frozen=True, eq=False, slots=True)
+class _Shut:
+    """A border and the fields that it closes."""
+
+    bound: Bound
+    fields: Mask
+
+
+def resolve(mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence = NO_FENCE) -> ResolvedMission:
     """Lay the mission out. ``home`` is the place, in the autopilot's local frame, that its local metres count from.
 
     A grid with a size lies so that the middle of the field ``grid.home`` is home; otherwise it is laid round home,
     targets, fences and known map, with home in the middle of a field. Weights: base, known map, weighted areas,
-    obstacles of the known map, fences. A field is closed when a keep-out area touches it or when it is not wholly inside
-    every keep-in area; of a keep-in area given in fields, the fields whose middle it holds are inside.
-    Raises MissionError: file, place, reason.
+    obstacles of the known map, fences. A field is closed when part of it is nearer to a keep-out area than the rover's radius, or
+    nearer than that to the edge of a keep-in area or beyond it; of areas given in fields, the fields that they touch, or whose
+    middle they hold, are closed or open. The autopilot's fence closes fields in the same way, with its margin. Targets that
+    it closes are listed in ``refused``: it may have changed on the way. Raises MissionError: file, place, reason.
     """
     try:
-        return _resolved(mission, frame, home)
+        return _resolved(mission, frame, home, fence)
     except (MissionError, MapError) as error:
         raise MissionError(f"{mission.source or mission.name}: {error}") from error
 
 
-def _resolved(mission: Mission, frame: LocalFrame, home: NedPoint) -> ResolvedMission:
+def _resolved(mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence) -> ResolvedMission:
     if not mission.targets:
         raise MissionError("target: there is none to go to")
     prior = _prior_map(mission, home)
@@ -71,26 +97,28 @@ def _resolved(mission: Mission, frame: LocalFrame, home: NedPoint) -> ResolvedMi
     for weighted in mission.weighted:
         mask = touched(grid, shape_of(weighted.area, places))
         weights[mask & (weights < OBSTACLE)] = weighted.weight
-    closed = _closed(mission, grid, places)
-    targets = []
-    for number, (target, point) in enumerate(zip(mission.targets, points, strict=True), start=1):
+    bounds = [*mission_bounds(mission, places), *autopilot_bounds(fence, frame, mission.rover.radius_m)]
+    shut = [_Shut(bound, bound.closed(grid)) for bound in bounds]
+    targets, refused = [], {}
+    for i, (target, point) in enumerate(zip(mission.targets, points, strict=True)):
         cell = grid.cell_at(point)
-        what = f"target {number} '{target.name}'"
+        what = f"target {i + 1} '{target.name}'"
         if fixed and not grid.contains(cell):
             raise MissionError(
                 f"{what}: {_away(home, point)} is outside the grid of {grid.width} x {grid.height} fields"
             )
-        _refuse_closed(what, cell, closed)
-        targets.append(_target(target, point, cell))
+        if reason := _refusal(what, cell, shut):
+            refused[i] = reason
+        targets.append(ResolvedTarget(target.name, point, cell, target.hold_s, target.on_blocked, target.speed_m_s))
     home_cell = grid.cell_at(home)
-    _refuse_closed("home (where the rover begins)", home_cell, closed)
-    for _, mask in closed:
-        weights[mask] = OBSTACLE
-    return ResolvedMission(grid.with_weights(weights), tuple(targets), home_cell)
-
-
-def _target(target: Target, point: NedPoint, cell: Cell) -> ResolvedTarget:
-    return ResolvedTarget(target.name, point, cell, target.hold_s, target.on_blocked, target.speed_m_s)
+    _refusal("home (where the rover begins)", home_cell, shut)
+    closed = np.zeros(weights.shape, np.bool_)
+    for one in shut:
+        if one.bound.in_fields:
+            weights[one.fields] = OBSTACLE
+        else:
+            closed |= one.fields
+    return ResolvedMission(grid.with_weights(weights), closed, Bounds(bounds, grid), tuple(targets), home_cell, refused)
 
 
 def _no_fields(cell: Cell) -> NedPoint:
@@ -179,28 +207,15 @@ def _prior_map(mission: Mission, home: NedPoint) -> Grid | None:
 # --- fences ----------------------------------------------------------------------------------------------------------
 
 
-def _closed(mission: Mission, grid: Grid, places: Places) -> list[tuple[str, Mask]]:
-    """What each fence closes, by its name."""
-    closed = []
-    for number, area in enumerate(mission.keep_out, start=1):
-        closed.append((f"keep_out {number}", touched(grid, shape_of(area, places))))
-    for number, area in enumerate(mission.keep_in, start=1):
-        closed.append((f"keep_in {number}", ~_inside(area, grid, shape_of(area, places))))
-    return closed
-
-
-def _inside(area: Area, grid: Grid, shape: BaseGeometry) -> Mask:
-    # A polygon through the middles of its corner fields is meant to hold those fields.
-    in_fields = area.radius_m is None and all(isinstance(place, Cell) for place in area.places)
-    return middles_in(grid, shape) if in_fields else covered(grid, shape)
-
-
-def _refuse_closed(what: str, cell: Cell, closed: list[tuple[str, Mask]]) -> None:
-    for fence, mask in closed:
-        if mask[cell.y, cell.x]:
-            where = (
-                "in (or within a field of)"
-                if fence.startswith("keep_out")
-                else "outside (or within a field of the edge of)"
-            )
-            raise MissionError(f"{what}: lies {where} {fence}")
+def _refusal(what: str, cell: Cell, shut: list[_Shut]) -> str:
+    """What is wrong with a place behind the autopilot's fence; empty when it is open. Raises MissionError for the mission's own."""
+    for one in shut:
+        if one.fields[cell.y, cell.x]:
+            bound = one.bound
+            where = "outside (or within a field of the edge of)" if bound.keeps_in else "in (or within a field of)"
+            margin = f", {bound.keep_m:g} m kept to it" if bound.keep_m > 0.0 else ""
+            text = f"{what}: lies {where} {bound.name}{margin}"
+            if not bound.name.startswith(OURS):
+                raise MissionError(text)
+            return text
+    return ""

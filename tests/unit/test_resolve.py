@@ -18,6 +18,7 @@ from companion.mission.mission import (
     Mission,
     MissionError,
     Place,
+    RoverSpec,
     Target,
     WeightedArea,
 )
@@ -27,6 +28,7 @@ from companion.mission.resolve import ResolvedMission, resolve
 FRAME = LocalFrame(GeoPoint(53.1325, 23.1688))
 HOME = NedPoint(3.0, -4.0)
 FIXED = GridSpec(1.0, (100, 50), Cell(0, 24))
+POINT = RoverSpec(radius_m=0.0)
 
 
 def mission(*places: Place, **fields: object) -> Mission:
@@ -98,12 +100,13 @@ def test_keep_out_in_fields_closes_its_corner_fields_and_all_between() -> None:
 
 def test_keep_out_along_field_edges_does_not_close_the_neighbours() -> None:
     corners = tuple(HomePoint(north, east) for north, east in ((0.5, 9.5), (2.5, 9.5), (2.5, 11.5), (0.5, 11.5)))
-    result = laid(mission(Cell(98, 24), grid=FIXED, keep_out=(Area(corners),)))
+    result = laid(mission(Cell(98, 24), grid=FIXED, rover=POINT, keep_out=(Area(corners),)))
     assert obstacles(result) == {(10, 25), (10, 26), (11, 25), (11, 26)}
 
 
 def test_keep_out_closes_a_field_it_only_touches() -> None:
-    result = laid(mission(Cell(98, 24), grid=FIXED, keep_out=(Area((HomePoint(0.0, 10.0),), radius_m=0.6),)))
+    area = Area((HomePoint(0.0, 10.0),), radius_m=0.6)
+    result = laid(mission(Cell(98, 24), grid=FIXED, rover=POINT, keep_out=(area,)))
     assert obstacles(result) == {(10, 24), (9, 24), (11, 24), (10, 23), (10, 25)}
 
 
@@ -114,7 +117,7 @@ def test_keep_in_closes_what_is_not_wholly_inside_all_areas() -> None:
         )
 
     areas = (box(-3.2, -0.5, 3.2, 20.0), box(-0.9, -5.0, 9.0, 9.9))
-    result = laid(mission(Cell(5, 24), grid=FIXED, keep_in=areas))
+    result = laid(mission(Cell(5, 24), grid=FIXED, rover=POINT, keep_in=areas))
     free = {(x, y) for x in range(100) for y in range(50)} - obstacles(result)
     assert free == {(x, y) for x in range(0, 10) for y in (24, 25, 26)}
 

@@ -1,0 +1,166 @@
+"""Borders that the rover must not cross, laid on the ground: fences of the mission, and the autopilot's own.
+
+Which fields they close is for the planner; whether a line crosses one is asked again, with the shapes themselves, before anything is sent.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import shapely
+from shapely.geometry.base import BaseGeometry
+
+from companion.frames import LocalFrame, NedPoint
+from companion.grid import Cell, Grid
+from companion.mission.areas import CIRCLE_QUARTER, Mask, Places, covered, middles_in, shape_of, touched
+from companion.mission.fence import AutopilotFence
+from companion.mission.mission import Area, Mission
+
+SLACK_M = 0.05
+"""A rover that stands nearer to a border than it should may not come nearer still by more than this: positions wander."""
+ROUND = 1.0 / math.cos(math.pi / (4 * CIRCLE_QUARTER))
+"""A circle drawn with corners on it lies inside of it; one that keeps out is drawn so much larger."""
+OURS = "the autopilot's fence"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Bound:
+    """One border. ``shape``: x metres east, y metres north in the local frame.
+
+    ``keep_m``: how far from it the rover's middle stays by plan, ``body_m``: and how far it must stay in any case.
+    ``in_fields``: it was drawn in fields, and keeps whole fields.
+    """
+
+    name: str
+    shape: BaseGeometry
+    keeps_in: bool
+    keep_m: float
+    body_m: float
+    in_fields: bool = False
+
+    def closed(self, grid: Grid) -> Mask:
+        """The fields that the rover's middle must not enter; shape (height, width)."""
+        if self.keeps_in:
+            return ~(middles_in(grid, self.shape) if self.in_fields else covered(grid, self.shape.buffer(-self.keep_m)))
+        return touched(grid, self.shape if self.in_fields else self.shape.buffer(self.keep_m))
+
+    def depth_m(self, place: BaseGeometry) -> float:
+        """How far inside the open ground a place or line stays, at the least; 0 or less when it touches the border or is beyond it."""
+        edge_m = float(shapely.distance(self.shape.boundary, place))
+        inside = shapely.covers(self.shape, place) if self.keeps_in else not shapely.intersects(self.shape, place)
+        return edge_m if inside else -edge_m
+
+
+class Bounds:
+    """All borders together. ``fault`` and ``outside`` are asked often: what is well inside costs a few microseconds a border."""
+
+    def __init__(self, bounds: Sequence[Bound], grid: Grid) -> None:
+        """``grid`` widens what was drawn in fields to whole fields."""
+        self._bounds = tuple(_widened(bound, grid.resolution_m) for bound in bounds)
+        self._roomy = tuple(_roomy(bound) for bound in self._bounds)
+
+    def __len__(self) -> int:
+        """How many borders there are."""
+        return len(self._bounds)
+
+    def outside(self, point: NedPoint) -> str:
+        """The border that the rover's middle is beyond; empty when there is none."""
+        place = shapely.Point(point.east_m, point.north_m)
+        return next((bound.name for bound in self._near(place) if bound.depth_m(place) <= 0.0), "")
+
+    def too_near(self, point: NedPoint) -> str:
+        """The border from which a rover that is to begin here stands too near, with what it needs; empty when there is none."""
+        place = shapely.Point(point.east_m, point.north_m)
+        for bound in self._bounds:
+            if bound.depth_m(place) < bound.keep_m - SLACK_M:
+                side = "inside" if bound.keeps_in else "away from"
+                return f"{bound.keep_m:g} m or more {side} {bound.name}"
+        return ""
+
+    def fault(self, points: Sequence[NedPoint]) -> str:
+        """The border that the rover's body would cross on the way through the points; empty when there is none.
+
+        A rover that is too near already may move as long as it comes no nearer, and its middle stays on this side.
+        """
+        way = shapely.LineString([(point.east_m, point.north_m) for point in points])
+        here = shapely.Point(points[0].east_m, points[0].north_m)
+        for bound in self._near(way):
+            depth_m = bound.depth_m(way)
+            if depth_m <= 0.0 or depth_m < min(bound.body_m, bound.depth_m(here)) - SLACK_M:
+                return bound.name
+        return ""
+
+    def _near(self, shape: BaseGeometry) -> Iterator[Bound]:
+        """The borders that need a closer look."""
+        for bound, roomy in zip(self._bounds, self._roomy, strict=True):
+            free = roomy.covers(shape) if bound.keeps_in else not roomy.intersects(shape)
+            if not free:
+                yield bound
+
+
+def mission_bounds(mission: Mission, places: Places) -> list[Bound]:
+    """The fences of the mission file, in its order."""
+    body_m = mission.rover.radius_m
+    bounds = []
+    for keeps_in, areas in ((False, mission.keep_out), (True, mission.keep_in)):
+        for number, area in enumerate(areas, start=1):
+            in_fields = _in_fields(area)
+            room_m = 0.0 if in_fields else body_m
+            name = f"{'keep_in' if keeps_in else 'keep_out'} {number}"
+            bounds.append(Bound(name, _sound(shape_of(area, places)), keeps_in, room_m, room_m, in_fields))
+    return bounds
+
+
+def autopilot_bounds(fence: AutopilotFence, frame: LocalFrame, body_m: float) -> list[Bound]:
+    """The autopilot's fence: its margin and the rover's radius both count."""
+    places = Places(frame, NedPoint(0.0, 0.0), _no_fields)
+    keep_m = max(fence.margin_m, body_m)
+    bounds = []
+    for number, area in enumerate(fence.keep_out, start=1):
+        grown = Area(area.places, None if area.radius_m is None else area.radius_m * ROUND)
+        shape = _sound(shape_of(grown, places))
+        bounds.append(Bound(f"{OURS} (exclusion area {number})", shape, False, keep_m, body_m))
+    inside = [_sound(shape_of(area, places)) for area in fence.keep_in]
+    if fence.any_of and len(inside) > 1:
+        bounds.append(Bound(f"{OURS} (inclusion areas)", shapely.union_all(inside), True, keep_m, body_m))
+    else:
+        names = (f"{OURS} (inclusion area {number})" for number in range(1, len(inside) + 1))
+        bounds += [Bound(name, shape, True, keep_m, body_m) for name, shape in zip(names, inside, strict=True)]
+    if fence.circle_m is not None and fence.home is not None:
+        circle = shape_of(Area((fence.home,), fence.circle_m), places)
+        bounds.append(Bound(f"{OURS} (circle of {fence.circle_m:g} m round home)", circle, True, keep_m, body_m))
+    return bounds
+
+
+def _in_fields(area: Area) -> bool:
+    """A polygon through the middles of its corner fields is meant to hold those fields."""
+    return area.radius_m is None and area.width_m is None and all(isinstance(place, Cell) for place in area.places)
+
+
+def _no_fields(cell: Cell) -> NedPoint:
+    raise AssertionError(f"the autopilot knows no fields ({cell})")
+
+
+def _sound(shape: BaseGeometry) -> BaseGeometry:
+    """The ground that a polygon encloses, even if its sides cross."""
+    if shape.is_valid:
+        return shape
+    parts = shapely.get_parts(shapely.make_valid(shape))
+    return shapely.union_all([part for part in parts if part.geom_type in ("Polygon", "MultiPolygon")])
+
+
+def _widened(bound: Bound, resolution_m: float) -> Bound:
+    """What keeps whole fields reaches half a field beyond the middles of its corner fields."""
+    if not bound.in_fields or not bound.keeps_in:
+        return bound
+    shape = bound.shape.buffer(resolution_m / 2.0, join_style="mitre")
+    return Bound(bound.name, shape, bound.keeps_in, bound.keep_m, bound.body_m, bound.in_fields)
+
+
+def _roomy(bound: Bound) -> BaseGeometry:
+    """Where nothing needs a closer look: wholly inside of this (or, of what keeps out, clear of it)."""
+    shape = bound.shape.buffer(-bound.keep_m if bound.keeps_in else bound.keep_m)
+    shapely.prepare(shape)
+    return shape
