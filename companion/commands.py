@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from companion.events_targets import Asker, TargetAnswer, TargetForm
 from companion.frames import NedPoint
 
 
@@ -86,6 +87,15 @@ class Say:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class AnswerTarget:
+    """What becomes of a guided target that somebody asked of the companion; to him alone."""
+
+    asker: Asker
+    form: TargetForm
+    answer: TargetAnswer
+
+
 Setpoint = GuidedPosition | GuidedVelocity | GuidedHeading
 Command = (
     Heartbeat
@@ -99,9 +109,11 @@ Command = (
     | RequestMessage
     | ReadParameter
     | Say
+    | AnswerTarget
 )
 
 __all__ = [
+    "AnswerTarget",
     "Arm",
     "ChangeSpeed",
     "Command",

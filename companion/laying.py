@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.grid import Grid, inflated
@@ -36,9 +36,15 @@ def lay_again(laid: Laid, itinerary: Itinerary, mission: Mission, settings: Mapp
     """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
     frame = LocalFrame(origin)
     resolved = resolve(mission, frame, frame.to_ned(laid.home))
-    start = frame.to_ned(LocalFrame(laid.origin).to_geo(itinerary.home.point))
+    before = LocalFrame(laid.origin)
+    start = frame.to_ned(before.to_geo(itinerary.home.point))
+    errand = itinerary.errand
+    if errand is not None:
+        point = frame.to_ned(before.to_geo(errand.point))
+        errand = replace(errand, point=point, cell=resolved.grid.cell_at(point))
     evidence = _fresh_map(mission, settings, resolved.grid)
-    return Laid(origin, laid.home, evidence, relaid(itinerary, resolved.targets, _start(start, resolved.grid)))
+    relaid_itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.grid), errand)
+    return Laid(origin, laid.home, evidence, relaid_itinerary)
 
 
 def from_home(laid: Laid) -> Grid:

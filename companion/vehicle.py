@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
+from companion.events_targets import TargetAsked
 from companion.frames import GeoPoint, Pose
 from companion.scan import RangeScan
 
@@ -186,6 +187,7 @@ Event = (
     | TextSeen
     | ParameterSeen
     | PrearmSeen
+    | TargetAsked
 )
 
 

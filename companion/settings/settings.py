@@ -193,6 +193,9 @@ class SafetySettings(Section):
     hold_after_s: float = Field(2.0, ge=0.0, description="from stop to HOLD when nothing gets better")
     heartbeat_s: float = Field(3.0, gt=0.0, description="autopilot silent for so long: stop")
     jump_m: float = Field(2.0, gt=0.0, description="a position jump larger than this is noticed")
+    errand_reach_m: float = Field(
+        300.0, gt=0.0, description="a place asked for on the way that lies farther away than this is refused"
+    )
 
 
 class TrafficSettings(Section):
