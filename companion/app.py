@@ -246,7 +246,7 @@ class Companion:
         if isinstance(event, TextSeen) and event.severity <= WARNING:
             self._reporter.note(f"autopilot: {event.text}")
         if isinstance(event, TargetAsked):
-            idle = self._pursuit is None or self._stopped or self._leave_at_s is not None
+            idle = self._pursuit is None or self._stopped or self._handover.begun
             self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
         if self._pursuit is None:
             return
