@@ -10,6 +10,8 @@ import numpy as np
 from companion.clock import Clock, stopwatch_s
 from companion.commands import Arm, Command, Say, SetMode
 from companion.driver import Driver
+from companion.errands import Errands
+from companion.events_targets import TargetAsked
 from companion.guidance import STANDSTILL, Guide
 from companion.handover import HandOver
 from companion.itinerary import Itinerary, TargetStatus
@@ -76,6 +78,7 @@ class Companion:
         self._next_tick_s = clock.now_s()
         self._watchdogs = Watchdogs()
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
+        self._errands = Errands(mission, settings.safety, self._send, self._tell)
         self._followed_s = clock.now_s()
         self._stopped = False
         self._stop_asked = False
@@ -246,7 +249,13 @@ class Companion:
         """Scans go into the map; a position that jumps, or an origin that moves, makes the map worthless."""
         if isinstance(event, TextSeen) and event.severity <= WARNING:
             self._reporter.note(f"autopilot: {event.text}")
+<<<<<<< HEAD
         self._watchdogs.take_in(event, self.vehicle)
+=======
+        if isinstance(event, TargetAsked):
+            idle = self._pursuit is None or self._stopped or self._handover.begun
+            self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
+>>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
         if self._pursuit is None:
             return
         if isinstance(event, RangeSeen) and self._watchdogs.scan_fits and not self._whereabouts.position_doubted:

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+<<<<<<< HEAD
 from companion.events_plan import PlanKind
+=======
+from companion.events_targets import Asker, TargetAnswer, TargetForm
+>>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
 from companion.frames import NedPoint
 
 
@@ -117,6 +121,15 @@ class Say:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class AnswerTarget:
+    """What becomes of a guided target that somebody asked of the companion; to him alone."""
+
+    asker: Asker
+    form: TargetForm
+    answer: TargetAnswer
+
+
 Setpoint = GuidedPosition | GuidedVelocity | GuidedHeading
 Command = (
     Heartbeat
@@ -134,9 +147,11 @@ Command = (
     | RequestItem
     | EndTransfer
     | Say
+    | AnswerTarget
 )
 
 __all__ = [
+    "AnswerTarget",
     "Arm",
     "AskTime",
     "ChangeSpeed",

@@ -9,10 +9,11 @@ import numpy as np
 from companion.driver import Driver
 from companion.frames import GeoPoint, Pose
 from companion.guidance import Guide, RoverLimits
-from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable
+from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable, with_errand
 from companion.laying import Laid, apart_m, lay_again
 from companion.mapping import EvidenceMap, forget, integrate
 from companion.mission.mission import Mission
+from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Action, Decision
 from companion.output_check import Surroundings
 from companion.planning.registry import make_planner
@@ -111,6 +112,11 @@ class Pursuit:
         self.driver.tally = before.tally
         self._tracker = Tracker(self.evidence, self._settings.traffic)
         return True
+
+    def run_errand(self, errand: ResolvedTarget) -> None:
+        """Drive there first; then the mission goes on."""
+        self.itinerary = with_errand(self.itinerary, errand)
+        self.driver.leave()
 
     def forget_map(self) -> None:
         """What has been seen lies elsewhere now."""

@@ -8,6 +8,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import (
+    AnswerTarget,
     Arm,
     AskTime,
     ChangeSpeed,
@@ -26,6 +27,7 @@ from companion.commands import (
     SetMode,
 )
 from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.mavlink.answers import answer_message
 from companion.mavlink.texts import chunks_of
 
 POSITION_ONLY = 0x0DFC
@@ -87,8 +89,13 @@ class Encoder:
                 return [mavlink.MAVLink_timesync_message(0, command.asked_ns)]
             case Say():
                 return self._say(command)
+<<<<<<< HEAD
             case RequestList() | RequestItem() | EndTransfer():
                 return [self._transfer(command)]
+=======
+            case AnswerTarget():
+                return [answer_message(command)]
+>>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
             case _:
                 return [self._command_long(command, confirmation)]
 

@@ -130,7 +130,7 @@ def test_a_target_behind_the_autopilots_fence_is_named_and_one_behind_the_missio
     refused = laid(fence, HomePoint(0.0, 5.0), HomePoint(0.0, 19.0)).refused
     assert list(refused) == [1]
     assert "target 2 't1': lies outside (or within a field of the edge of) the autopilot's fence" in refused[1]
-    with pytest.raises(MissionError, match="target 2 't1': lies outside .* keep_in 1"):
+    with pytest.raises(MissionError, match=r"target 2 't1': lies outside .* keep_in 1"):
         area = Area(tuple(HomePoint(*corner) for corner in SQUARE))
         laid(NO_FENCE, HomePoint(0.0, 5.0), HomePoint(0.0, 25.0), keep_in=(area,))
 
