@@ -50,6 +50,8 @@ class Pursuit:
         self.laid = laid
         self.itinerary: Itinerary = laid.itinerary
         self.doing = "driving"
+        self.maps_begun = 0
+        """Grows whenever what had been mapped is worth nothing any more."""
         self._mission = mission
         self._settings = settings
         self._runner = runner
@@ -105,6 +107,7 @@ class Pursuit:
         if moved_m <= ORIGIN_MOVED_M:
             return False
         self._tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", WARNING)
+        self.maps_begun += 1
         self.laid = lay_again(self.laid, self.itinerary, self._mission, self._settings.mapping, origin)
         self.itinerary = self.laid.itinerary
         before = self.driver
@@ -121,6 +124,7 @@ class Pursuit:
     def forget_map(self) -> None:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
+        self.maps_begun += 1
         self._tracker = Tracker(self.evidence, self._settings.traffic)
         self.driver.leave()
 
