@@ -20,6 +20,7 @@ from companion.mapfiles import save_ros_map
 from companion.mapping import EvidenceMap, known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import EncodeError
+from companion.memory import Memory
 from companion.mission.mission import Mission
 from companion.outbox import Outbox
 from companion.output_check import OutputCheck
@@ -59,6 +60,7 @@ class Companion:
         *,
         seed: int,
         arm: bool,
+        memory: Memory | None = None,
     ) -> None:
         self.vehicle = VehicleState()
         self.outcome = Outcome()
@@ -71,7 +73,8 @@ class Companion:
         self._runner = runner
         self._log = log
         self._rng = np.random.default_rng(seed)
-        self._start_up = StartUp(mission, settings, arm=arm)
+        self._memory = memory
+        self._start_up = StartUp(mission, settings, arm=arm, kept=memory.kept if memory else None)
         self._outbox = Outbox(settings.guidance)
         self.output_check = OutputCheck(self._tell)
         self._reporter = Reporter(self.outcome.said)
@@ -142,6 +145,7 @@ class Companion:
             self._act(now_s)
         elif self._handover.is_over(self.vehicle, now_s):
             self._done = True
+        self._remember(now_s)
         self._tell_of_faults(now_s)
         self._autopilot.service(now_s)
         self.outcome.step_seconds.append(stopwatch_s() - began_s)
@@ -163,6 +167,7 @@ class Companion:
                 self.vehicle = fold(self.vehicle, event)
             self._autopilot.service(now_s)
         self._done = True
+        self._remember(now_s)
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
@@ -241,7 +246,16 @@ class Companion:
         self._tell(f"Companion: {self._mission.name}, {len(laid.itinerary.targets)} targets", INFO)
         assert self.vehicle.scan is not None
         scan = (self.vehicle.scan_ahead or self.vehicle.scan).scan
-        return Pursuit(self._mission, self._settings, laid, scan, self._runner, self._log, self._tell, self._rng)
+        pursuit = Pursuit(self._mission, self._settings, laid, scan, self._runner, self._log, self._tell, self._rng)
+        if self._memory is not None and self._memory.take_up(pursuit, self.vehicle.pose_at(now_s)):
+            self._tell(f"Resumed {self._start_up.found}, {pursuit.reached} targets reached before", INFO)
+        return pursuit
+
+    def _remember(self, now_s: float) -> None:
+        """What this run would need to go on after a crash."""
+        if self._memory is not None and self._pursuit is not None:
+            left, doubted = self._handover.ours, self._whereabouts.position_doubted
+            self._memory.note(now_s, self.vehicle, self.watch.control, self._pursuit, doubted, left, self._done)
 
     # Listening ---------------------------------------------------------------------------------------------------
 
@@ -315,7 +329,8 @@ class Companion:
                 self._followed_s = now_s
             elif now_s - self._followed_s > NOT_FOLLOWED_S:
                 self._tell_once("The autopilot follows another target than the one sent")
-            for text in self._reporter.faults(self._autopilot.rate_faults, self._log.problem, now_s):
+            lost = self._memory.problem if self._memory else ""
+            for text in self._reporter.faults(self._autopilot.rate_faults, self._log.problem or lost, now_s):
                 self._tell_once(text)
 
     def _tell(self, text: str, severity: int) -> None:

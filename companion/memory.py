@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from companion.driver import Tally
@@ -46,43 +46,42 @@ class Memory:
         self._complete = False
         self._saved_s = -math.inf
         self._saved_at = NedPoint(math.inf, math.inf)
-        self._draws: dict[str, Any] | None = None
+        self._draws: Mapping[str, Any] | None = None
 
     @property
     def problem(self) -> str:
         """Why the state cannot be saved; empty while it can."""
         return self._writer.problem
 
-    def take_up(self, pursuit: Pursuit, pose: Pose) -> None:
-        """Go on in the middle of the leg: once, with a pursuit on the ground of ``lay_resumed``."""
+    def take_up(self, pursuit: Pursuit, pose: Pose | None) -> bool:
+        """Go on in the middle of the leg: once, with a pursuit on the ground of ``lay_resumed``. False: there is nothing to take up."""
         if self.kept is None:
-            return
+            return False
         state = self.kept.state
         tally = Tally(state.tally.steps, state.tally.return_steps, state.tally.stuck)
         pursuit.driver.go_on(tally, state.tally.epoch)
         if state.draws is not None:
             pursuit.driver.searcher.rng.bit_generator.state = _generator(state.draws)
         itinerary, leg = pursuit.itinerary, state.leg
-        if leg is None or itinerary.leg not in (Leg.TRAVEL, Leg.HOME):
-            return
-        past = nav_state(leg, shift_of(state, pursuit.laid))
-        if pursuit.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
-            pursuit.driver.take_up(itinerary.goal, past, leg.doubts_left, pose)
+        if leg is not None and pose is not None and itinerary.leg in (Leg.TRAVEL, Leg.HOME):
+            past = nav_state(leg, shift_of(state, pursuit.laid))
+            if pursuit.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
+                pursuit.driver.take_up(itinerary.goal, past, leg.doubts_left, pose)
+        return True
 
     def note(
         self,
         now_s: float,
         vehicle: VehicleState,
         control: Control,
-        pursuit: Pursuit | None,
-        *,
-        doubted: bool = False,
-        released: bool = False,
-        done: bool = False,
+        pursuit: Pursuit,
+        doubted: bool,
+        released: bool,
+        done: bool,
     ) -> None:
         """One tick is over. ``doubted``: the position is; ``released``: we have put the rover into HOLD; ``done``: the run ends."""
         position, heartbeat = vehicle.position, vehicle.heartbeat
-        if pursuit is None or position is None or heartbeat is None:
+        if position is None or heartbeat is None:
             return
         if not pursuit.driver.planning:
             self._draws = pursuit.driver.searcher.rng.bit_generator.state

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.frames import GeoPoint, NedPoint
 from companion.grid import Cell, empty_grid
 from companion.itinerary import Itinerary
 from companion.laying import Laid, apart_m, from_home, lay_again
@@ -67,9 +67,8 @@ def ownership(state: SavedState, vehicle: VehicleState) -> Ownership | None:
         return Ownership(Control.PERSON, may_arm=False)
     if state.released:
         return Ownership(Control.NOBODY, may_arm=True)
-    restarted = position.boot_s < state.boot_s and not same_boot(state, position)
-    disarmed = not heartbeat.armed
-    if heartbeat.mode != RoverMode.GUIDED and not (restarted and disarmed):
+    restarted = position.boot_s < state.boot_s
+    if heartbeat.mode != RoverMode.GUIDED and (heartbeat.armed or not restarted):
         return Ownership(Control.PERSON, may_arm=False)
     return Ownership(Control.NOBODY, may_arm=restarted)
 
@@ -125,9 +124,7 @@ def nav_state(leg: SavedLeg, shift: Cell) -> NavState:
 def _itinerary(state: SavedState, now_s: float) -> Itinerary:
     """The progress; its places are put where they are by ``lay_again``."""
     progress, start = state.progress, state.progress.start
-    place = ResolvedTarget(
-        "start", NedPoint(start.north_m, start.east_m), Cell(0, 0), 0.0, OnBlocked.HOLD, None
-    )
+    place = ResolvedTarget("start", NedPoint(start.north_m, start.east_m), Cell(0, 0), 0.0, OnBlocked.HOLD, None)
     give_up_s = None if progress.give_up_left_s is None else now_s + progress.give_up_left_s
     return Itinerary((), place, progress.statuses, progress.index, progress.leg, now_s + progress.left_s, give_up_s)
 

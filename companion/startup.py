@@ -92,7 +92,11 @@ class StartUp:
         if step.missing:
             return None, self._due(step.command, now_s)
         laid, pose = self._lay(vehicle, now_s), vehicle.pose_at(now_s)
-        if laid is not None and pose is not None and laid.evidence.base.contains(laid.evidence.base.cell_at(pose.point)):
+        if (
+            laid is not None
+            and pose is not None
+            and laid.evidence.base.contains(laid.evidence.base.cell_at(pose.point))
+        ):
             return laid, None
         self.missing = "the rover to stand on the mission's grid"
         self._look_again_s = now_s + LOOK_AGAIN_S
@@ -106,12 +110,10 @@ class StartUp:
 
     def _whose(self, vehicle: VehicleState, control: Control) -> Control:
         """Who drives, where an earlier run had the rover: looked at once, then by the mode as ever."""
-        if self._kept is None or control is not Control.NOBODY:
-            return control
-        if self._owner is None:
+        if self._owner is None and self._kept is not None:
             self._owner = ownership(self._kept.state, vehicle)
             self._arm = self._arm and (self._owner is None or self._owner.may_arm)
-        return control if self._owner is None else self._owner.control
+        return self._owner.control if self._owner is not None and control is Control.NOBODY else control
 
     def _lay(self, vehicle: VehicleState, now_s: float) -> Laid | None:
         pose = vehicle.pose_at(now_s)

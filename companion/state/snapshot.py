@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -42,7 +43,7 @@ class Snapshot:
     base: Grid
     subdivisions: int
     tally: SavedTally
-    draws: dict[str, Any] | None
+    draws: Mapping[str, Any] | None
 
 
 def saved_state(now: Snapshot) -> SavedState:
@@ -98,5 +99,5 @@ def _leg(state: NavState, doubts_left: int) -> SavedLeg:
     )
 
 
-def _draws(state: dict[str, Any]) -> SavedDraws:
+def _draws(state: Mapping[str, Any]) -> SavedDraws:
     return SavedDraws(**state["state"], has_uint32=state["has_uint32"], uinteger=state["uinteger"])
