@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from companion.commands import Arm, Command, SetMode
+from companion.guidance import STANDSTILL
 from companion.laying import Laid, lay
 from companion.mission.mission import Mission
 from companion.resuming import Kept, Ownership, lay_resumed, ownership, same_boot
@@ -90,7 +91,7 @@ class StartUp:
         step = start_step(vehicle, now_s, self._settings.safety, arm=self._arm, control=control)
         self.missing = step.missing
         if step.missing:
-            return None, self._due(step.command, now_s)
+            return None, self._due(step.command or self._standstill(vehicle), now_s)
         laid, pose = self._lay(vehicle, now_s), vehicle.pose_at(now_s)
         if (
             laid is not None
@@ -100,7 +101,15 @@ class StartUp:
             return laid, None
         self.missing = "the rover to stand on the mission's grid"
         self._look_again_s = now_s + LOOK_AGAIN_S
-        return None, None
+        return None, self._standstill(vehicle)
+
+    def _standstill(self, vehicle: VehicleState) -> Command | None:
+        """A rover that an earlier run had set going stops until it is known what it drives on."""
+        ours = self._kept is not None and self._kept.state.control is Control.COMPANION
+        heartbeat = vehicle.heartbeat
+        if not ours or heartbeat is None or heartbeat.mode != RoverMode.GUIDED or not heartbeat.armed:
+            return None
+        return STANDSTILL.setpoint
 
     def _due(self, command: Command | None, now_s: float) -> Command | None:
         if command is None or now_s - self._asked_s <= ASK_AGAIN_S:

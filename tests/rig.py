@@ -141,6 +141,7 @@ class Rig:
         self._up, self._down = mavlink.MAVLink(None), mavlink.MAVLink(None)
         self.recorder = NullRecorder()
         self._arm, self._seed, self._state = arm, seed, state
+        self.state_file = None if state is None else state / "mission.state"
         self.restart_companion(mission)
 
     def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
