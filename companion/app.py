@@ -263,13 +263,10 @@ class Companion:
         """Scans go into the map; a position that jumps, or an origin that moves, makes the map worthless."""
         if isinstance(event, TextSeen) and event.severity <= WARNING:
             self._reporter.note(f"autopilot: {event.text}")
-<<<<<<< HEAD
         self._watchdogs.take_in(event, self.vehicle)
-=======
         if isinstance(event, TargetAsked):
             idle = self._pursuit is None or self._stopped or self._handover.begun
             self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
->>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
         if self._pursuit is None:
             return
         if isinstance(event, RangeSeen) and self._watchdogs.scan_fits and not self._whereabouts.position_doubted:

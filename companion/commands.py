@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-<<<<<<< HEAD
 from companion.events_plan import PlanKind
-=======
 from companion.events_targets import Asker, TargetAnswer, TargetForm
->>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
 from companion.frames import NedPoint
 
 

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-<<<<<<< HEAD
 from collections.abc import Mapping
-=======
->>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
 from dataclasses import dataclass, replace
 
 from companion.frames import GeoPoint, LocalFrame, NedPoint, Pose
@@ -53,11 +50,15 @@ def lay(
 def lay_again(laid: Laid, itinerary: Itinerary, mission: Mission, settings: MappingSettings, origin: GeoPoint) -> Laid:
     """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
     frame = LocalFrame(origin)
-<<<<<<< HEAD
     resolved = resolve(mission, frame, frame.to_ned(laid.home), laid.fence)
-    start = frame.to_ned(LocalFrame(laid.origin).to_geo(itinerary.home.point))
+    before = LocalFrame(laid.origin)
+    start = frame.to_ned(before.to_geo(itinerary.home.point))
+    errand = itinerary.errand
+    if errand is not None:
+        point = frame.to_ned(before.to_geo(errand.point))
+        errand = replace(errand, point=point, cell=resolved.ground.cell_at(point))
     evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
-    itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.ground))
+    itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.ground), errand)
     return Laid(origin, laid.home, evidence, itinerary, laid.fence, resolved.bounds, resolved.refused)
 
 
@@ -67,18 +68,6 @@ def fenced_again(laid: Laid, itinerary: Itinerary, mission: Mission, fence: Auto
     resolved = resolve(mission, frame, frame.to_ned(laid.home), fence)
     rebase(laid.evidence, _base(mission, resolved))
     return replace(laid, itinerary=itinerary, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
-=======
-    resolved = resolve(mission, frame, frame.to_ned(laid.home))
-    before = LocalFrame(laid.origin)
-    start = frame.to_ned(before.to_geo(itinerary.home.point))
-    errand = itinerary.errand
-    if errand is not None:
-        point = frame.to_ned(before.to_geo(errand.point))
-        errand = replace(errand, point=point, cell=resolved.grid.cell_at(point))
-    evidence = _fresh_map(mission, settings, resolved.grid)
-    relaid_itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.grid), errand)
-    return Laid(origin, laid.home, evidence, relaid_itinerary)
->>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
 
 
 def from_home(laid: Laid) -> Grid:

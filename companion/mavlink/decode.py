@@ -10,12 +10,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.frames import GeoPoint
-<<<<<<< HEAD
 from companion.latency import TimeAnswered
-from companion.mavlink import others, ranges
-=======
 from companion.mavlink import others, ranges, requests
->>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
 from companion.mavlink.framing import Packet
 from companion.mavlink.places import point_of
 from companion.mavlink.texts import TextAssembler

@@ -89,13 +89,10 @@ class Encoder:
                 return [mavlink.MAVLink_timesync_message(0, command.asked_ns)]
             case Say():
                 return self._say(command)
-<<<<<<< HEAD
             case RequestList() | RequestItem() | EndTransfer():
                 return [self._transfer(command)]
-=======
             case AnswerTarget():
                 return [answer_message(command)]
->>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
             case _:
                 return [self._command_long(command, confirmation)]
 

@@ -193,14 +193,11 @@ class SafetySettings(Section):
     hold_after_s: float = Field(2.0, ge=0.0, description="from stop to HOLD when nothing gets better")
     heartbeat_s: float = Field(3.0, gt=0.0, description="autopilot silent for so long: stop")
     jump_m: float = Field(2.0, gt=0.0, description="a position jump larger than this is noticed")
-<<<<<<< HEAD
     latency_s: float = Field(1.0, gt=0.0, description="from the autopilot and back in more than this: stop")
     settle_s: float = Field(0.5, ge=0.0, description="after the autopilot's clock has jumped the rover stands so long")
-=======
     errand_reach_m: float = Field(
         300.0, gt=0.0, description="a place asked for on the way that lies farther away than this is refused"
     )
->>>>>>> ce64489e391f4d77e2802a93f5179c2e93ebfa95
 
 
 class TrafficSettings(Section):
