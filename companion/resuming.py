@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.frames import GeoPoint, NedPoint
-from companion.grid import Cell, empty_grid
+from companion.frames import GeoPoint, LocalFrame, NedPoint, Pose
+from companion.grid import Cell
 from companion.itinerary import Itinerary
-from companion.laying import Laid, apart_m, from_home, lay_again
-from companion.mapping import new_map, restore
+from companion.laying import Laid, apart_m, from_home, lay
+from companion.mapping import restore
+from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import NavState
 from companion.safety import Control
 from companion.settings import MappingSettings
-from companion.state.model import SavedLeg, SavedState
+from companion.state.model import SavedLeg, SavedPlace, SavedState
 from companion.vehicle import LocalPositionSeen, RoverMode, VehicleState
 
 SAME_CLOCKS_S = 1.0
@@ -74,21 +75,29 @@ def ownership(state: SavedState, vehicle: VehicleState) -> Ownership | None:
 
 
 def lay_resumed(
-    kept: Kept, mission: Mission, settings: MappingSettings, origin: GeoPoint, now_s: float, *, same: bool
+    kept: Kept,
+    mission: Mission,
+    settings: MappingSettings,
+    origin: GeoPoint,
+    now_s: float,
+    *,
+    same: bool,
+    fence: AutopilotFence = NO_FENCE,
 ) -> tuple[Laid, str]:
     """The mission where it lies now, with the progress and the map of then; and what is to be said of the map.
 
     ``same``: the autopilot has been on since, so that its frame is the one of then unless its origin has moved. Otherwise a new estimate may put
     everything some metres elsewhere: no ground counts as seen free, and obstacles as such that have hardly been seen. Raises MissionError.
     """
-    state = kept.state
-    nowhere = new_map(empty_grid(1, 1), 0.0, settings)
-    then = Laid(GeoPoint(*state.origin), GeoPoint(*state.home), nowhere, _itinerary(state, now_s))
-    laid = lay_again(then, then.itinerary, mission, settings, origin)
+    state, then = kept.state, GeoPoint(*kept.state.origin)
+    start = _now_at(state.progress.start, then, origin)
+    began_at = Pose(start.north_m, start.east_m, 0.0, now_s)
+    laid = lay(mission, settings, origin, GeoPoint(*state.home), began_at, fence)
+    laid = replace(laid, itinerary=_progress(laid, state, then, now_s))
     evidence, shift = laid.evidence, shift_of(state, laid)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:
         return laid, "without its map (the settings of the map have changed)"
-    same = same and apart_m(origin, then.origin) <= SAME_ORIGIN_M
+    same = same and apart_m(origin, then) <= SAME_ORIGIN_M
     fine = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
     log_odds = _moved(kept.rasters["log_odds"], evidence.log_odds.shape, fine)
     penalty = _moved(kept.rasters["penalty"], evidence.penalty.shape, shift)
@@ -121,12 +130,27 @@ def nav_state(leg: SavedLeg, shift: Cell) -> NavState:
     )
 
 
-def _itinerary(state: SavedState, now_s: float) -> Itinerary:
-    """The progress; its places are put where they are by ``lay_again``."""
-    progress, start = state.progress, state.progress.start
-    place = ResolvedTarget("start", NedPoint(start.north_m, start.east_m), Cell(0, 0), 0.0, OnBlocked.HOLD, None)
-    give_up_s = None if progress.give_up_left_s is None else now_s + progress.give_up_left_s
-    return Itinerary((), place, progress.statuses, progress.index, progress.leg, now_s + progress.left_s, give_up_s)
+def _progress(laid: Laid, state: SavedState, then: GeoPoint, now_s: float) -> Itinerary:
+    """How far the mission had come, on the targets where they lie now."""
+    progress, errand = state.progress, None
+    if progress.errand is not None:
+        point = _now_at(progress.errand, then, laid.origin)
+        cell = laid.evidence.base.cell_at(point)
+        errand = ResolvedTarget(progress.errand.name, point, cell, 0.0, OnBlocked.SKIP, progress.errand.speed_m_s)
+    return replace(
+        laid.itinerary,
+        statuses=progress.statuses,
+        index=progress.index,
+        leg=progress.leg,
+        until_s=now_s + progress.left_s,
+        give_up_s=None if progress.give_up_left_s is None else now_s + progress.give_up_left_s,
+        errand=errand,
+    )
+
+
+def _now_at(place: SavedPlace, then: GeoPoint, origin: GeoPoint) -> NedPoint:
+    """A place of the frame of then, in the frame of now."""
+    return LocalFrame(origin).to_ned(LocalFrame(then).to_geo(NedPoint(place.north_m, place.east_m)))
 
 
 def _moved(raster: Raster, shape: tuple[int, ...], shift: Cell) -> Raster:

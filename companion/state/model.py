@@ -36,6 +36,13 @@ class SavedPlace(Part):
     east_m: Metres
 
 
+class SavedErrand(SavedPlace):
+    """A place that somebody asked for on the way."""
+
+    name: str
+    speed_m_s: Annotated[float, Field(gt=0.0, le=1000.0)] | None
+
+
 class SavedProgress(Part):
     """The itinerary: where the mission began, what has become of each target. Times are what was left of them."""
 
@@ -45,6 +52,7 @@ class SavedProgress(Part):
     leg: Leg
     left_s: Seconds
     give_up_left_s: Seconds | None
+    errand: SavedErrand | None = None
 
     @model_validator(mode="after")
     def _agree(self) -> SavedProgress:

@@ -9,10 +9,12 @@ from typing import Any
 from companion.frames import GeoPoint, LocalFrame
 from companion.grid import Grid
 from companion.itinerary import Itinerary
+from companion.mission.resolve import ResolvedTarget
 from companion.navigator import NavState
 from companion.safety import Control
 from companion.state.model import (
     SavedDraws,
+    SavedErrand,
     SavedGround,
     SavedLeg,
     SavedPlace,
@@ -85,7 +87,13 @@ def _progress(itinerary: Itinerary, now_s: float) -> SavedProgress:
         leg=itinerary.leg,
         left_s=max(0.0, itinerary.until_s - now_s),
         give_up_left_s=None if give_up_s is None else max(0.0, give_up_s - now_s),
+        errand=None if itinerary.errand is None else _errand(itinerary.errand),
     )
+
+
+def _errand(errand: ResolvedTarget) -> SavedErrand:
+    point = errand.point
+    return SavedErrand(name=errand.name, north_m=point.north_m, east_m=point.east_m, speed_m_s=errand.speed_m_s)
 
 
 def _leg(state: NavState, doubts_left: int) -> SavedLeg:

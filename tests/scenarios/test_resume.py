@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from companion.grid import Cell
-from companion.mission.mission import Mission
+from companion.mission.mission import Mission, OnBlocked
+from companion.mission.resolve import ResolvedTarget
 from companion.resuming import Kept
 from companion.safety import Control
 from companion.state.format import decoded
@@ -108,6 +109,25 @@ def test_map_and_past_path_are_there_again(tmp_path: Path, metres: float) -> Non
     assert state is not None and state.past[0] == Cell(2, 7), "the way back to the start"
     assert rig.companion.itinerary is not None and rig.companion.itinerary.home.cell == Cell(2, 7)
     assert any(text.startswith("Resumed with its map, 0 targets reached") for text in rig.texts())
+
+
+def test_an_errand_is_run_to_its_end_and_then_the_mission(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(3.0)
+    pursuit = rig.companion._pursuit
+    assert pursuit is not None
+    centre = pursuit.evidence.base.centre_of(Cell(5, 12))
+    pursuit.run_errand(ResolvedTarget("errand 1", centre, Cell(5, 12), 0.0, OnBlocked.SKIP, 1.5))
+    rig.run_for(0.5)
+    kill_and_resume(rig, mission)
+    goes_on_after_s(rig, rig.now_s())
+    itinerary = rig.companion.itinerary
+    assert itinerary is not None and itinerary.errand is not None and itinerary.errand.cell == Cell(5, 12)
+    rig.until(lambda: rig.companion.itinerary is not None and rig.companion.itinerary.errand is None)
+    truth = rig.simulator.truth
+    assert math.hypot(truth.north_m - 12.5, truth.east_m - 5.5) < 1.5
+    rig.finish()
+    assert rig.companion.outcome.complete
 
 
 def test_a_rover_on_its_way_back_goes_on_back(tmp_path: Path) -> None:
