@@ -10,6 +10,8 @@ import numpy as np
 from companion.clock import Clock, stopwatch_s
 from companion.commands import Arm, Command, Say, SetMode
 from companion.driver import Driver
+from companion.errands import Errands
+from companion.events_targets import TargetAsked
 from companion.guidance import STANDSTILL, Guide
 from companion.handover import HandOver
 from companion.itinerary import Itinerary, TargetStatus
@@ -18,6 +20,7 @@ from companion.mapfiles import save_ros_map
 from companion.mapping import EvidenceMap, known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import EncodeError
+from companion.memory import Memory
 from companion.mission.mission import Mission
 from companion.outbox import Outbox
 from companion.output_check import OutputCheck
@@ -57,6 +60,7 @@ class Companion:
         *,
         seed: int,
         arm: bool,
+        memory: Memory | None = None,
     ) -> None:
         self.vehicle = VehicleState()
         self.outcome = Outcome()
@@ -69,13 +73,15 @@ class Companion:
         self._runner = runner
         self._log = log
         self._rng = np.random.default_rng(seed)
-        self._start_up = StartUp(mission, settings, arm=arm)
+        self._memory = memory
+        self._start_up = StartUp(mission, settings, arm=arm, kept=memory.kept if memory else None)
         self._outbox = Outbox(settings.guidance)
         self.output_check = OutputCheck(self._tell)
         self._reporter = Reporter(self.outcome.said)
         self._next_tick_s = clock.now_s()
         self._watchdogs = Watchdogs()
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
+        self._errands = Errands(mission, settings.safety, self._send, self._tell)
         self._followed_s = clock.now_s()
         self._stopped = False
         self._stop_asked = False
@@ -139,6 +145,7 @@ class Companion:
             self._act(now_s)
         elif self._handover.is_over(self.vehicle, now_s):
             self._done = True
+        self._remember(now_s)
         self._tell_of_faults(now_s)
         self._autopilot.service(now_s)
         self.outcome.step_seconds.append(stopwatch_s() - began_s)
@@ -160,6 +167,7 @@ class Companion:
                 self.vehicle = fold(self.vehicle, event)
             self._autopilot.service(now_s)
         self._done = True
+        self._remember(now_s)
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
@@ -238,7 +246,16 @@ class Companion:
         self._tell(f"Companion: {self._mission.name}, {len(laid.itinerary.targets)} targets", INFO)
         assert self.vehicle.scan is not None
         scan = (self.vehicle.scan_ahead or self.vehicle.scan).scan
-        return Pursuit(self._mission, self._settings, laid, scan, self._runner, self._log, self._tell, self._rng)
+        pursuit = Pursuit(self._mission, self._settings, laid, scan, self._runner, self._log, self._tell, self._rng)
+        if self._memory is not None and self._memory.take_up(pursuit, self.vehicle.pose_at(now_s)):
+            self._tell(f"Resumed {self._start_up.found}, {pursuit.reached} targets reached before", INFO)
+        return pursuit
+
+    def _remember(self, now_s: float) -> None:
+        """What this run would need to go on after a crash."""
+        if self._memory is not None and self._pursuit is not None:
+            left, doubted = self._handover.ours, self._whereabouts.position_doubted
+            self._memory.note(now_s, self.vehicle, self.watch.control, self._pursuit, doubted, left, self._done)
 
     # Listening ---------------------------------------------------------------------------------------------------
 
@@ -247,6 +264,9 @@ class Companion:
         if isinstance(event, TextSeen) and event.severity <= WARNING:
             self._reporter.note(f"autopilot: {event.text}")
         self._watchdogs.take_in(event, self.vehicle)
+        if isinstance(event, TargetAsked):
+            idle = self._pursuit is None or self._stopped or self._handover.begun
+            self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
         if self._pursuit is None:
             return
         if isinstance(event, RangeSeen) and self._watchdogs.scan_fits and not self._whereabouts.position_doubted:
@@ -306,7 +326,8 @@ class Companion:
                 self._followed_s = now_s
             elif now_s - self._followed_s > NOT_FOLLOWED_S:
                 self._tell_once("The autopilot follows another target than the one sent")
-            for text in self._reporter.faults(self._autopilot.rate_faults, self._log.problem, now_s):
+            lost = self._memory.problem if self._memory else ""
+            for text in self._reporter.faults(self._autopilot.rate_faults, self._log.problem or lost, now_s):
                 self._tell_once(text)
 
     def _tell(self, text: str, severity: int) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from companion.events_plan import PlanKind
+from companion.events_targets import Asker, TargetAnswer, TargetForm
 from companion.frames import NedPoint
 
 
@@ -117,6 +118,15 @@ class Say:
     text: str
 
 
+@dataclass(frozen=True, slots=True)
+class AnswerTarget:
+    """What becomes of a guided target that somebody asked of the companion; to him alone."""
+
+    asker: Asker
+    form: TargetForm
+    answer: TargetAnswer
+
+
 Setpoint = GuidedPosition | GuidedVelocity | GuidedHeading
 Command = (
     Heartbeat
@@ -134,9 +144,11 @@ Command = (
     | RequestItem
     | EndTransfer
     | Say
+    | AnswerTarget
 )
 
 __all__ = [
+    "AnswerTarget",
     "Arm",
     "AskTime",
     "ChangeSpeed",

@@ -89,6 +89,26 @@ class Driver:
         self._doubts_left = self._settings.navigator.doubts
         self._recovery.begin(pose)
 
+    def take_up(self, goal: ResolvedTarget, state: NavState, doubts_left: int, pose: Pose) -> None:
+        """Go on with a leg that an earlier run had begun: its way back is remembered, its path is planned anew."""
+        self.head_for(goal, pose)
+        self._state = replace(state, target=goal.cell, better_every=self._settings.navigator.better_every_fields)
+        self._doubts_left = min(doubts_left, self._doubts_left)
+
+    def go_on(self, tally: Tally, epoch: int) -> None:
+        """Count on from where an earlier run had come to."""
+        self.tally, self._epoch = tally, epoch
+
+    @property
+    def leg(self) -> tuple[NavState | None, int, int]:
+        """For those who keep it: the navigator's memory, how often the map may still be doubted, how many legs there have been."""
+        return self._state, self._doubts_left, self._epoch
+
+    @property
+    def planning(self) -> bool:
+        """Whether a step is under way, so that the generator of random numbers is between two states."""
+        return self._runner.busy
+
     @property
     def goal(self) -> ResolvedTarget | None:
         """Where this leg leads."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from companion.commands import Command, SetMode
@@ -10,8 +11,10 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety import Control
 from companion.vehicle import RoverMode, VehicleState
 
-HAND_OVER_S = 1.5
-"""So long the companion stays, after its last command, to see that the rover is in HOLD."""
+HAND_OVER_S = 0.7
+"""So long the companion stays, after its last command, to see that the rover is in HOLD: with all else it does, it is gone within a second."""
+AGAIN_S = 0.2
+"""HOLD is asked for this often until then."""
 
 
 class HandOver:
@@ -21,6 +24,9 @@ class HandOver:
         self._autopilot = autopilot
         self._send = send
         self._leave_at_s: float | None = None
+        self._again_s = math.inf
+        self.ours = False
+        """Whether it is a rover of ours that has been stopped."""
 
     @property
     def begun(self) -> bool:
@@ -37,6 +43,8 @@ class HandOver:
         if heartbeat.armed:
             self._send(STANDSTILL.setpoint, now_s)
         self._send(SetMode(RoverMode.HOLD), now_s)
+        self._again_s = now_s + AGAIN_S
+        self.ours = True
         return True
 
     def is_over(self, vehicle: VehicleState, now_s: float) -> bool:
@@ -45,4 +53,8 @@ class HandOver:
         ack = self._autopilot.last_ack(SetMode(RoverMode.HOLD))
         answered = ack is not None and ack.result == 0 and ack.time_s > self._leave_at_s - HAND_OVER_S
         left = vehicle.heartbeat is not None and vehicle.heartbeat.mode != RoverMode.GUIDED
-        return answered or left or now_s >= self._leave_at_s
+        over = answered or left or now_s >= self._leave_at_s
+        if not over and now_s >= self._again_s:
+            self._again_s = now_s + AGAIN_S
+            self._send(SetMode(RoverMode.HOLD), now_s)
+        return over

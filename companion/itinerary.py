@@ -31,7 +31,10 @@ class Leg(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Itinerary:
-    """Progress through the targets. ``until_s`` ends a stay or a wait; ``home`` is where the mission began."""
+    """Progress through the targets. ``until_s`` ends a stay or a wait; ``home`` is where the mission began.
+
+    ``errand``: a place that somebody asked for on the way; it comes first, then the mission goes on where it was.
+    """
 
     targets: tuple[ResolvedTarget, ...]
     home: ResolvedTarget
@@ -40,15 +43,18 @@ class Itinerary:
     leg: Leg = Leg.TRAVEL
     until_s: float = 0.0
     give_up_s: float | None = None
+    errand: ResolvedTarget | None = None
 
     @property
     def ended(self) -> bool:
         """Whether there is nowhere left to go."""
-        return self.leg in (Leg.DONE, Leg.HOLD)
+        return self.errand is None and self.leg in (Leg.DONE, Leg.HOLD)
 
     @property
     def goal(self) -> ResolvedTarget:
         """Where the rover is heading now."""
+        if self.errand is not None:
+            return self.errand
         return self.home if self.leg is Leg.HOME or self.index >= len(self.targets) else self.targets[self.index]
 
 
@@ -57,13 +63,29 @@ def plan_itinerary(targets: tuple[ResolvedTarget, ...], home: ResolvedTarget) ->
     return Itinerary(targets, home, (TargetStatus.PENDING,) * len(targets))
 
 
-def relaid(itinerary: Itinerary, targets: tuple[ResolvedTarget, ...], home: ResolvedTarget) -> Itinerary:
+def with_errand(itinerary: Itinerary, errand: ResolvedTarget) -> Itinerary:
+    """The errand first, instead of one under way. A stay that it interrupts is over, a wait becomes another try after it."""
+    if itinerary.errand is None and itinerary.leg is Leg.STAY:
+        itinerary = _next(itinerary)
+    elif itinerary.leg is Leg.WAIT:
+        itinerary = replace(itinerary, leg=Leg.TRAVEL)
+    return replace(itinerary, errand=errand)
+
+
+def relaid(
+    itinerary: Itinerary,
+    targets: tuple[ResolvedTarget, ...],
+    home: ResolvedTarget,
+    errand: ResolvedTarget | None = None,
+) -> Itinerary:
     """The same progress with every place where it lies now: the local frame has moved."""
-    return replace(itinerary, targets=targets, home=home)
+    return replace(itinerary, targets=targets, home=home, errand=errand)
 
 
 def on_reached(itinerary: Itinerary, now_s: float) -> Itinerary:
     """The goal has been reached: stay as long as the target asks, or be done."""
+    if itinerary.errand is not None:
+        return replace(itinerary, errand=None)
     if itinerary.leg is Leg.HOME:
         return replace(itinerary, leg=Leg.DONE)
     itinerary = _marked(itinerary, TargetStatus.REACHED)
@@ -71,7 +93,9 @@ def on_reached(itinerary: Itinerary, now_s: float) -> Itinerary:
 
 
 def on_unreachable(itinerary: Itinerary, now_s: float, retry_s: float, wait_limit_s: float) -> Itinerary:
-    """The goal cannot be reached, and the rover is back where the leg began: ``on_blocked`` decides."""
+    """The goal cannot be reached, and the rover is back where the leg began: ``on_blocked`` decides. An errand is dropped."""
+    if itinerary.errand is not None:
+        return replace(itinerary, errand=None)
     if itinerary.leg is Leg.HOME:
         return replace(itinerary, leg=Leg.HOLD)
     itinerary = _marked(itinerary, TargetStatus.UNREACHABLE)

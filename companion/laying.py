@@ -51,9 +51,14 @@ def lay_again(laid: Laid, itinerary: Itinerary, mission: Mission, settings: Mapp
     """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
     frame = LocalFrame(origin)
     resolved = resolve(mission, frame, frame.to_ned(laid.home), laid.fence)
-    start = frame.to_ned(LocalFrame(laid.origin).to_geo(itinerary.home.point))
+    before = LocalFrame(laid.origin)
+    start = frame.to_ned(before.to_geo(itinerary.home.point))
+    errand = itinerary.errand
+    if errand is not None:
+        point = frame.to_ned(before.to_geo(errand.point))
+        errand = replace(errand, point=point, cell=resolved.ground.cell_at(point))
     evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
-    itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.ground))
+    itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.ground), errand)
     return Laid(origin, laid.home, evidence, itinerary, laid.fence, resolved.bounds, resolved.refused)
 
 

@@ -120,6 +120,14 @@ def rebase(evidence: EvidenceMap, base: Grid) -> None:
     _refresh(evidence, 0, 0, base.width, base.height)
 
 
+def restore(evidence: EvidenceMap, log_odds: NDArray[np.float32], penalty: NDArray[np.float32]) -> None:
+    """Take over what an earlier run had seen, and what experience had added; shapes as in the map."""
+    settings = evidence.settings
+    np.clip(log_odds, -settings.free_limit, settings.limit, out=evidence.log_odds)
+    np.maximum(penalty, 0.0, out=evidence.penalty)
+    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+
+
 def doubt(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
     """Forget, before giving up, what may be an error of sensor or position, so that it is looked at again.
 

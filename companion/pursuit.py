@@ -9,10 +9,11 @@ import numpy as np
 from companion.driver import Driver
 from companion.frames import GeoPoint, Pose
 from companion.guidance import Guide, RoverLimits
-from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable
+from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable, with_errand
 from companion.laying import Laid, apart_m, lay_again
 from companion.mapping import EvidenceMap, forget, integrate
 from companion.mission.mission import Mission
+from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Action, Decision
 from companion.output_check import Surroundings
 from companion.planning.registry import make_planner
@@ -49,6 +50,8 @@ class Pursuit:
         self.laid = laid
         self.itinerary: Itinerary = laid.itinerary
         self.doing = "driving"
+        self.maps_begun = 0
+        """Grows whenever what had been mapped is worth nothing any more."""
         self._mission = mission
         self._settings = settings
         self._runner = runner
@@ -104,6 +107,7 @@ class Pursuit:
         if moved_m <= ORIGIN_MOVED_M:
             return False
         self._tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", WARNING)
+        self.maps_begun += 1
         self.laid = lay_again(self.laid, self.itinerary, self._mission, self._settings.mapping, origin)
         self.itinerary = self.laid.itinerary
         before = self.driver
@@ -112,9 +116,15 @@ class Pursuit:
         self._tracker = Tracker(self.evidence, self._settings.traffic)
         return True
 
+    def run_errand(self, errand: ResolvedTarget) -> None:
+        """Drive there first; then the mission goes on."""
+        self.itinerary = with_errand(self.itinerary, errand)
+        self.driver.leave()
+
     def forget_map(self) -> None:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
+        self.maps_begun += 1
         self._tracker = Tracker(self.evidence, self._settings.traffic)
         self.driver.leave()
 

@@ -6,8 +6,10 @@ import math
 from dataclasses import dataclass
 
 from companion.commands import Arm, Command, SetMode
+from companion.guidance import STANDSTILL
 from companion.laying import Laid, lay
 from companion.mission.mission import Mission
+from companion.resuming import Kept, Ownership, lay_resumed, ownership, same_boot
 from companion.safety import Control, unsafe_reason
 from companion.settings import SafetySettings, Settings
 from companion.vehicle import RoverMode, VehicleState
@@ -60,8 +62,13 @@ def start_step(
 class StartUp:
     """The way there, tick by tick. ``missing`` says in words what is awaited."""
 
-    def __init__(self, mission: Mission, settings: Settings, *, arm: bool) -> None:
+    def __init__(self, mission: Mission, settings: Settings, *, arm: bool, kept: Kept | None = None) -> None:
+        """``kept``: the run that is to be taken up."""
         self.missing = ""
+        self.found = ""
+        """What is to be said of a run that has been taken up."""
+        self._kept = kept
+        self._owner: Ownership | None = None
         self._mission = mission
         self._settings = settings
         self._arm = arm
@@ -78,18 +85,31 @@ class StartUp:
             return None, None
         if not self._checked and self._lay(vehicle, now_s) is not None:
             self._checked = True
+        control = self._whose(vehicle, control)
         # Whoever disarms the rover does not want it armed again by itself.
         self._arm = self._arm and not (vehicle.heartbeat is not None and vehicle.heartbeat.armed)
         step = start_step(vehicle, now_s, self._settings.safety, arm=self._arm, control=control)
         self.missing = step.missing
         if step.missing:
-            return None, self._due(step.command, now_s)
-        laid = self._lay(vehicle, now_s)
-        if laid is not None and laid.evidence.base.contains(laid.itinerary.home.cell):
+            return None, self._due(step.command or self._standstill(vehicle), now_s)
+        laid, pose = self._lay(vehicle, now_s), vehicle.pose_at(now_s)
+        if (
+            laid is not None
+            and pose is not None
+            and laid.evidence.base.contains(laid.evidence.base.cell_at(pose.point))
+        ):
             return laid, None
         self.missing = "the rover to stand on the mission's grid"
         self._look_again_s = now_s + LOOK_AGAIN_S
-        return None, None
+        return None, self._standstill(vehicle)
+
+    def _standstill(self, vehicle: VehicleState) -> Command | None:
+        """A rover that an earlier run had set going stops until it is known what it drives on."""
+        ours = self._kept is not None and self._kept.state.control is Control.COMPANION
+        heartbeat = vehicle.heartbeat
+        if not ours or heartbeat is None or heartbeat.mode != RoverMode.GUIDED or not heartbeat.armed:
+            return None
+        return STANDSTILL.setpoint
 
     def _due(self, command: Command | None, now_s: float) -> Command | None:
         if command is None or now_s - self._asked_s <= ASK_AGAIN_S:
@@ -97,8 +117,20 @@ class StartUp:
         self._asked_s = now_s
         return command
 
+    def _whose(self, vehicle: VehicleState, control: Control) -> Control:
+        """Who drives, where an earlier run had the rover: looked at once, then by the mode as ever."""
+        if self._owner is None and self._kept is not None:
+            self._owner = ownership(self._kept.state, vehicle)
+            self._arm = self._arm and (self._owner is None or self._owner.may_arm)
+        return self._owner.control if self._owner is not None and control is Control.NOBODY else control
+
     def _lay(self, vehicle: VehicleState, now_s: float) -> Laid | None:
         pose = vehicle.pose_at(now_s)
         if vehicle.origin is None or vehicle.home is None or pose is None:
             return None
-        return lay(self._mission, self._settings.mapping, vehicle.origin.point, vehicle.home.point, pose)
+        origin, mapping = vehicle.origin.point, self._settings.mapping
+        if self._kept is None or vehicle.position is None:
+            return lay(self._mission, mapping, origin, vehicle.home.point, pose)
+        same = same_boot(self._kept.state, vehicle.position)
+        laid, self.found = lay_resumed(self._kept, self._mission, mapping, origin, now_s, same=same)
+        return laid

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
+from companion.events_targets import TargetAsked
 from companion.frames import GeoPoint, Pose
 from companion.latency import BACK_S, Latency, TimeAnswered, answered, reported
 from companion.reckoning import Reckoned, jump_m, reckoned
@@ -189,6 +190,7 @@ Event = (
     | PlanCountSeen
     | PlanItemSeen
     | PlanChangedSeen
+    | TargetAsked
 )
 
 

@@ -17,13 +17,18 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.app import Companion
 from companion.commands import GuidedPosition
+from companion.disk import OsDisk
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
+from companion.memory import Memory
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.recorder import NullRecorder
+from companion.resuming import Kept
 from companion.settings import Settings
+from companion.state.place import StatePlace
+from companion.state.writer import InlineWriter, StateFile
 from companion.stepping import InlineRunner
 from companion.warmup import warm_up
 from sitl.scenario import scenario_from_mission
@@ -110,8 +115,9 @@ class Rig:
         seed: int = 0,
         arm: bool = True,
         late_s: float = 0.0,
+        state: Path | None = None,
     ) -> None:
-        """``late_s``: how long the vehicle has been switched on when the companion comes."""
+        """``late_s``: how long the vehicle has been switched on when the companion comes; ``state``: the directory where it keeps its state."""
         settings = settings or Settings()
         warm_up(settings, mission.rover.turning_radius_m)
         self.settings = settings
@@ -134,15 +140,25 @@ class Rig:
         self._pilot_mav = mavlink.MAVLink(None, 255, 190)
         self._up, self._down = mavlink.MAVLink(None), mavlink.MAVLink(None)
         self.recorder = NullRecorder()
-        self._arm, self._seed = arm, seed
+        self._arm, self._seed, self._state = arm, seed, state
+        self.state_file = None if state is None else state / "mission.state"
         self.restart_companion(mission)
 
-    def restart_companion(self, mission: Mission) -> None:
-        """A companion that knows nothing yet takes the place of the one before."""
+    def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
+        """A companion that knows nothing yet takes the place of the one before, or with ``resume`` one that takes up what that has left."""
+        memory = None if self._state is None else kept_in(self._state, mission, resume=resume)
         near, self._far = MemoryLink.pair()
         self.link = AutopilotLink(near, Codec(self.settings.link), self.settings.link, self.recorder)
         self.companion = Companion(
-            self.link, self, mission, self.settings, InlineRunner(), self.recorder, seed=self._seed, arm=self._arm
+            self.link,
+            self,
+            mission,
+            self.settings,
+            InlineRunner(),
+            self.recorder,
+            seed=self._seed,
+            arm=self._arm,
+            memory=memory,
         )
         self._watch_positions()
 
@@ -257,6 +273,24 @@ class Rig:
             if not evidence.log_odds[y, x] < 0.0:
                 return distance_m - float(s)
         return 0.0
+
+
+class QuickDisk(OsDisk):
+    """Does not wait for the disk: nothing here takes its power away."""
+
+    def sync(self, handle: int) -> None:
+        pass
+
+    def sync_directory(self, path: Path) -> None:
+        pass
+
+
+def kept_in(directory: Path, mission: Mission, *, resume: bool) -> Memory:
+    """What a run of ``rover-companion`` makes of its state directory."""
+    place = StatePlace(directory)
+    kept = place.load(mission) if resume else None
+    place.close()  # who is killed gives up its lock
+    return Memory(mission, InlineWriter(StateFile(place.file, QuickDisk())), None if kept is None else Kept(*kept))
 
 
 def repacked(message: Any) -> bytes:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -80,10 +82,19 @@ def wait_until(done: Callable[[], bool], limit_s: float) -> None:
 
 @contextmanager
 def process(module: str, *arguments: object) -> Iterator[subprocess.Popen[str]]:
-    """``rover-companion`` (module companion) or ``rover-sitl`` (module sitl); killed in the end."""
+    """``rover-companion`` (module companion) or ``rover-sitl`` (module sitl); killed in the end. Its default place for states is its own."""
     code = f"from {module}.cli.main import main; main()"
     command = [sys.executable, "-c", code, *map(str, arguments)]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as child:
+    with (
+        tempfile.TemporaryDirectory() as states,
+        subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "XDG_STATE_HOME": states},
+        ) as child,
+    ):
         try:
             yield child
         finally:

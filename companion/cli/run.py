@@ -13,6 +13,7 @@ from rich.console import Console
 
 from companion.app import Companion
 from companion.cli.inputs import usable_settings
+from companion.cli.keeping import Keeping
 from companion.cli.live import Live, LiveConsole
 from companion.clock import WallClock
 from companion.itinerary import TargetStatus
@@ -24,6 +25,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import Settings, SettingsError
+from companion.state.place import StatePlaceError
 from companion.stepping import ThreadRunner
 from companion.warmup import warm_up
 
@@ -43,13 +45,25 @@ def run(
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
     record: Annotated[Path | None, typer.Option(help="Directory for the record and the map of this run.")] = None,
+    state: Annotated[Path | None, typer.Option(help="Directory where this rover's state is kept.")] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Go on where the run that kept its state there ended.")
+    ] = False,
 ) -> None:
     """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 130: stopped by a signal."""
     console = LiveConsole(stderr=True)
+
+    def say(text: str) -> None:
+        console.print(text, soft_wrap=True, markup=False, highlight=False)
+
     try:
-        with _StopSignals() as stop:
+        with _StopSignals() as stop, contextlib.ExitStack() as ends:
             settings = usable_settings(settings_file)
             mission = load_mission(mission_file)
+            keeping = Keeping(mission, state, resume=resume, say=say)
+            ends.callback(keeping.close)
+            if keeping.ended:
+                raise typer.Exit(_told(keeping.statuses))
             recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
             link = open_link(connect)
             with console.status("compiling the planner (once a machine) ..."):
@@ -58,13 +72,14 @@ def run(
             place = recorder.directory if isinstance(recorder, Recorder) else None
             if place != record:
                 console.print(f"{record} has a record already; this one goes to {place}", soft_wrap=True)
-            missed = _drive(mission, settings, link, recorder, console, stop, place, seed=seed, arm=arm)
-    except (SettingsError, MissionError, MapError, LinkError, RecordError) as error:
+            keeping.start()
+            code = _drive(mission, settings, link, recorder, console, stop, place, keeping, seed=seed, arm=arm)
+    except (SettingsError, MissionError, MapError, LinkError, RecordError, StatePlaceError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     if stop.asked:
         raise SystemExit(EXIT_STOPPED)  # it has said so itself
-    raise typer.Exit(EXIT_MISSED if missed else EXIT_REACHED)
+    raise typer.Exit(code)
 
 
 def _drive(
@@ -75,31 +90,42 @@ def _drive(
     console: Console,
     stop: _StopSignals,
     record: Path | None,
+    keeping: Keeping,
     *,
     seed: int,
     arm: bool,
-) -> bool:
-    """Drive to the end, close everything, and say what came of it. Returns whether a target was missed."""
+) -> int:
+    """Drive to the end, close everything, and say what came of it. Returns the exit code."""
     runner = ThreadRunner()
     autopilot = AutopilotLink(link, Codec(settings.link), settings.link, recorder)
-    companion = Companion(autopilot, WallClock(), mission, settings, runner, recorder, seed=seed, arm=arm)
+    companion = Companion(
+        autopilot, WallClock(), mission, settings, runner, recorder, seed=seed, arm=arm, memory=keeping.memory
+    )
     stop.listener = companion
     try:
         with Live(console, mission.name) as live:
             companion.run(live.show)
     finally:
         companion.close()
+        keeping.close()
         runner.close()
         link.close()
         recorder.close()
+    code = _told(companion.statuses())
     with contextlib.suppress(OSError):  # nobody reads on: the exit code still tells
-        for name, status in companion.statuses():
-            typer.echo(f"{name}: {status}")
         if record is not None:
             _save_map(companion, record)
             if recorder.problem:
                 typer.echo(recorder.problem, err=True)
-    return any(status is not TargetStatus.REACHED for _, status in companion.statuses())
+    return code
+
+
+def _told(statuses: list[tuple[str, TargetStatus]]) -> int:
+    """Print what became of each target; the exit code that says so too."""
+    with contextlib.suppress(OSError):
+        for name, status in statuses:
+            typer.echo(f"{name}: {status}")
+    return EXIT_REACHED if all(status is TargetStatus.REACHED for _, status in statuses) else EXIT_MISSED
 
 
 def _save_map(companion: Companion, directory: Path) -> None:

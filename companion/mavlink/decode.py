@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.frames import GeoPoint
 from companion.latency import TimeAnswered
-from companion.mavlink import others, ranges
+from companion.mavlink import others, ranges, requests
 from companion.mavlink.framing import Packet
 from companion.mavlink.places import point_of
 from companion.mavlink.texts import TextAssembler
@@ -100,10 +100,21 @@ class Decoder:
             return self._of_autopilot(packet, time_s)
         if packet.message_id in RANGE_MESSAGES:
             return self._range(packet, time_s)
-        return self._of_others(packet, time_s) if packet.message_id in others.RECEIVED else []
+        ours = (*others.RECEIVED, *requests.REQUESTS)
+        return self._of_others(packet, time_s) if packet.message_id in ours else []
+
+    def _asked(self, packet: Packet, time_s: float) -> list[Event]:
+        """What is asked of this very component; what is meant for everybody, or for others, is not ours to answer."""
+        message = self._message(packet)
+        if (message.target_system, message.target_component) != (self.system_id, self.component_id):
+            return []
+        event = requests.target_asked(message, time_s)
+        return [] if event is None else [event]
 
     def _of_others(self, packet: Packet, time_s: float) -> list[Event]:
-        """Where somebody else says that he is, or where a receiver has heard him."""
+        """Where somebody else says that he is, or where a receiver has heard him; or what he asks of us."""
+        if packet.message_id in requests.REQUESTS:
+            return self._asked(packet, time_s)
         if packet.message_id not in others.READERS:
             return []
         event = others.READERS[packet.message_id](self._message(packet), time_s)

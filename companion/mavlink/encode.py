@@ -8,6 +8,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import (
+    AnswerTarget,
     Arm,
     AskTime,
     ChangeSpeed,
@@ -26,6 +27,7 @@ from companion.commands import (
     SetMode,
 )
 from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.mavlink.answers import answer_message
 from companion.mavlink.texts import chunks_of
 
 POSITION_ONLY = 0x0DFC
@@ -89,6 +91,8 @@ class Encoder:
                 return self._say(command)
             case RequestList() | RequestItem() | EndTransfer():
                 return [self._transfer(command)]
+            case AnswerTarget():
+                return [answer_message(command)]
             case _:
                 return [self._command_long(command, confirmation)]
 

@@ -16,6 +16,7 @@ from companion.itinerary import (
     on_time,
     on_unreachable,
     plan_itinerary,
+    with_errand,
 )
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -98,3 +99,38 @@ def test_home_reached_ends_the_mission_and_home_unreachable_holds():
 def test_time_alone_changes_nothing_else(leg):
     state = replace(itinerary(), leg=leg)
     assert on_time(state, 1e9) is state
+
+
+def test_an_errand_comes_first_and_then_the_same_target():
+    state = with_errand(itinerary(), target("errand"))
+    assert state.goal.name == "errand" and not state.ended
+    for after in (on_reached(state, 5.0), blocked(state)):
+        assert after == itinerary()
+
+
+def test_a_stay_that_an_errand_interrupts_is_over():
+    state = with_errand(on_reached(itinerary(), 100.0), target("errand"))
+    assert on_time(state, 100.5) is state
+    state = on_reached(state, 101.0)
+    assert (state.leg, state.goal.name, state.statuses) == (Leg.TRAVEL, "b", (REACHED, PENDING, PENDING))
+
+
+def test_an_errand_while_waiting_at_the_last_target_comes_before_the_end():
+    state = itinerary()
+    for now_s in (10.0, 20.0):
+        state = on_time(on_reached(state, now_s), now_s + 3.0)
+    state = with_errand(on_reached(state, 30.0), target("errand"))
+    assert state.leg is Leg.DONE and not state.ended
+    assert on_reached(state, 40.0).ended
+
+
+def test_a_wait_that_an_errand_interrupts_is_another_try_and_keeps_its_limit():
+    state = with_errand(blocked(itinerary(OnBlocked.WAIT), 10.0), target("errand"))
+    state = on_reached(state, 20.0)
+    assert (state.leg, state.goal.name, state.give_up_s) == (Leg.TRAVEL, "a", 22.0)
+    assert blocked(state, 22.0).goal.name == "b"
+
+
+def test_a_newer_errand_takes_the_place_of_one_under_way():
+    state = with_errand(with_errand(itinerary(), target("first")), target("second"))
+    assert on_reached(state, 5.0) == itinerary()

@@ -1,0 +1,79 @@
+"""``--state`` and ``--resume``: the state that ``run`` keeps, and the one it takes up."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from companion.disk import OsDisk
+from companion.itinerary import TargetStatus
+from companion.memory import Memory
+from companion.mission.mission import Mission
+from companion.resuming import Kept
+from companion.state.place import StatePlace, StatePlaceError, default_directory
+from companion.state.writer import StateFile, ThreadWriter
+
+
+class Keeping:
+    """The state of one run. A context manager: in the end what is left is written, and the directory is free for others.
+
+    Nobody has to keep a state: where none was asked for, a place that cannot be used is only told (``say``). Otherwise raises StatePlaceError.
+    """
+
+    def __init__(self, mission: Mission, directory: Path | None, *, resume: bool, say: Callable[[str], None]) -> None:
+        self.memory: Memory | None = None
+        self.kept: Kept | None = None
+        self._mission = mission
+        self._resume = resume
+        self._place: StatePlace | None = None
+        try:
+            self._place = StatePlace(directory or default_directory(os.environ))
+            self._load(say)
+        except StatePlaceError as error:
+            self.close()
+            if directory is not None or resume:
+                raise
+            say(f"{error}; this run cannot be resumed")
+
+    @property
+    def ended(self) -> bool:
+        """Whether there is nothing to take up, because that mission has been driven to its end."""
+        return self.kept is not None and self.kept.state.ended
+
+    @property
+    def statuses(self) -> list[tuple[str, TargetStatus]]:
+        """What became of the targets of a mission that has ended."""
+        if self.kept is None:
+            return []
+        names = (target.name for target in self._mission.targets)
+        return list(zip(names, self.kept.state.progress.statuses, strict=True))
+
+    def start(self) -> None:
+        """From now on the state is written."""
+        if self._place is not None:
+            writer = ThreadWriter(StateFile(self._place.file, OsDisk()))
+            self.memory = Memory(self._mission, writer, self.kept)
+
+    def close(self) -> None:
+        """Write what is left."""
+        if self.memory is not None:
+            self.memory.close()
+        if self._place is not None:
+            self._place.close()
+
+    def _load(self, say: Callable[[str], None]) -> None:
+        assert self._place is not None
+        if not self._resume:
+            self._place.begin_anew()
+            return
+        found = self._place.load(self._mission)
+        if found is None:
+            say(f"no state in {self._place.directory}: the mission begins at its first target")
+            return
+        self.kept = Kept(*found)
+        state = self.kept.state
+        what = "was driven to its end" if state.ended else "goes on"
+        say(f"{self._mission.name} {what}: {state.reached} of {len(state.progress.statuses)} targets reached")
+        if state.ended:
+            say("to drive it again, start without --resume")

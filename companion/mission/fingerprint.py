@@ -1,0 +1,23 @@
+"""Whether two missions are the same, wherever their files lie and however they are written."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import replace
+
+from companion.mission.mission import Mission, MissionError
+
+
+def fingerprint(mission: Mission) -> str:
+    """SHA-256, in hexadecimal, of all that decides where the rover drives: not of comments, notes and the simulator's part.
+
+    A known map counts with its contents. Raises MissionError when that cannot be read.
+    """
+    plain = replace(mission, source=None, notes=(), sitl=None, prior_map=None)
+    digest = hashlib.sha256(repr(plain).encode())
+    if mission.prior_map is not None:
+        try:
+            digest.update(mission.prior_map.read_bytes())
+        except OSError as error:
+            raise MissionError(f"prior_map: {mission.prior_map}: cannot be read: {error.strerror}") from error
+    return digest.hexdigest()

@@ -1,0 +1,281 @@
+"""A place sent to the companion while it drives: driven first, then the mission goes on; or refused with a reason."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from companion.errands import REPEAT_S
+from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.settings import parse_settings
+from tests.rig import MANUAL, Rig, yard
+from tests.scenarios.test_safety import Frame
+
+ACCEPTED, NOT_NOW, DENIED = 0, 1, 2
+COMPANION = 191
+NAN = math.nan
+
+
+class Asker(Rig):
+    """A rig whose person at the ground station sends places, and hears the answers."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self._ear = mavlink.MAVLink(None)
+        self.answers: list[Any] = []
+        self.said: list[str] = []
+        take = self._pilot.take
+        self._pilot.take = lambda: self._hear(take())  # type: ignore[method-assign]
+
+    def _hear(self, data: bytes) -> bytes:
+        for message in self._ear.parse_buffer(data) or []:
+            if message.get_srcComponent() != COMPANION:
+                continue
+            if message.get_type() in ("COMMAND_ACK", "MISSION_ACK"):
+                self.answers.append(message)
+            elif message.get_type() == "STATUSTEXT":
+                self.said.append(message.text)
+        return data
+
+    def field(self, x: int, y: int) -> tuple[int, int]:
+        """The middle of a field of the yard in 1e-7 degrees; home is field 2, 7."""
+        return self.place(y - 7.0, x - 2.0)
+
+    def place(self, north_m: float, east_m: float) -> tuple[int, int]:
+        home = self.companion.vehicle.home
+        assert home is not None
+        point: GeoPoint = LocalFrame(home.point).to_geo(NedPoint(north_m, east_m))
+        return round(point.lat_deg * 1e7), round(point.lon_deg * 1e7)
+
+    def ask(self, message: Any) -> None:
+        self._pilot.receive(message.pack(self._pilot_mav))
+
+    def reposition(
+        self, place: tuple[int, int], speed: float = -1.0, frame: int = 6, to: tuple[int, int] = (1, COMPANION)
+    ) -> None:
+        head = (*to, frame, 192, 0, 0)
+        self.ask(mavlink.MAVLink_command_int_message(*head, speed, 1.0, 0.0, NAN, *place, NAN))
+
+    def answered(self) -> int:
+        """The one answer to what was asked last."""
+        self.run_for(0.5)
+        assert len(self.answers) == 1, self.answers
+        answer = self.answers.pop()
+        assert (answer.target_system, answer.target_component) == (255, 190)
+        return int(answer.result if answer.get_type() == "COMMAND_ACK" else answer.type)
+
+    def passed_m(self, x: int, y: int) -> float:
+        north_m, east_m = y + 0.5, x + 0.5  # the world's own metres begin at its south-west corner
+        return math.hypot(self.simulator.truth.north_m - north_m, self.simulator.truth.east_m - east_m)
+
+
+@pytest.fixture
+def driving(tmp_path: Path) -> Asker:
+    rig = Asker(yard(tmp_path))
+    rig.until_driven(1.5)
+    return rig
+
+
+def test_a_place_asked_for_is_driven_first_and_then_the_mission_goes_on(driving: Asker) -> None:
+    driving.reposition(driving.field(5, 12))
+    assert driving.answered() == ACCEPTED
+    driving.until(lambda: "Reached errand 1" in driving.texts(), 60.0)
+    assert driving.passed_m(5, 12) < 0.7
+    driving.finish()
+    assert driving.companion.outcome.complete
+    assert driving.passed_m(15, 7) < 0.7
+    said = driving.texts()
+    assert said.index("Heading for errand 1") < said.index("Reached errand 1") < said.index("Reached gate")
+    assert "Mission ended: 1 of 1 targets reached" in said
+    assert driving.simulator.collisions == ()
+
+
+def messages(rig: Asker) -> dict[str, Any]:
+    """The same place in every form that may be sent."""
+    to, place = (1, COMPANION), rig.field(5, 12)
+    degrees = (place[0] * 1e-7, place[1] * 1e-7, 0.0)
+    whole = (*place, 0.0)
+    zeros = (0.0,) * 4
+    return {
+        "command": mavlink.MAVLink_command_int_message(*to, 6, 192, 0, 0, -1.0, 0.0, 0.0, NAN, *whole),
+        "zeros": mavlink.MAVLink_command_int_message(*to, 3, 192, 0, 0, 0.0, 0.0, 0.0, 0.0, *whole),
+        "nans": mavlink.MAVLink_command_int_message(*to, 0, 192, 0, 0, NAN, NAN, NAN, NAN, *place, NAN),
+        "long": mavlink.MAVLink_command_long_message(*to, 192, 0, -1.0, 0.0, 0.0, NAN, *degrees),
+        "item": mavlink.MAVLink_mission_item_int_message(*to, 0, 6, 16, 2, 0, *zeros, *whole),
+        "old item": mavlink.MAVLink_mission_item_message(*to, 0, 3, 16, 2, 0, *zeros, *degrees),
+    }
+
+
+@pytest.mark.parametrize("form", ["zeros", "nans", "long", "item", "old item"])
+def test_every_form_of_a_guided_target_leads_to_the_same_place(driving: Asker, form: str) -> None:
+    wanted = messages(driving)
+    driving.ask(wanted[form])
+    assert driving.answered() == ACCEPTED
+    itinerary = driving.companion.itinerary
+    assert itinerary is not None and itinerary.errand is not None
+    # Floats in degrees are good to a metre here, whole numbers to a centimetre.
+    room_m = 1.0 if form in ("long", "old item") else 0.02
+    assert itinerary.errand.point.distance_m(_local(driving, driving.field(5, 12))) < room_m
+
+
+def _local(rig: Asker, place: tuple[int, int]) -> NedPoint:
+    origin = rig.companion.vehicle.origin
+    assert origin is not None
+    return LocalFrame(origin.point).to_ned(GeoPoint(place[0] * 1e-7, place[1] * 1e-7))
+
+
+UNSAFE = {
+    "wall": ((8, 7), "known obstacle"),
+    "beyond the grid": ((40, 7), "outside the mission's grid"),
+    "far": ((902, 7), "farther than 300 m"),
+}
+
+
+@pytest.mark.parametrize(("field", "reason"), UNSAFE.values(), ids=UNSAFE)
+def test_a_place_that_is_not_safe_is_refused_with_the_reason(
+    tmp_path: Path, field: tuple[int, int], reason: str
+) -> None:
+    rig = Asker(yard(tmp_path, FENCED))
+    rig.until_driven(1.5)
+    rig.reposition(rig.field(*field))
+    assert rig.answered() == DENIED
+    assert any("Errand refused" in text and reason in text for text in rig.texts())
+    assert any("Errand refused" in text for text in rig.said), "the ground station hears it too"
+    assert "Heading for errand 1" not in rig.texts()
+    rig.finish()
+    assert rig.companion.outcome.complete
+
+
+FENCED = """
+[[target]]
+name = "gate"
+field = [15, 7]
+[[keep_out]]
+polygon_fields = [[8, 5], [8, 9], [9, 9], [9, 5]]
+"""
+
+
+def test_a_place_where_an_obstacle_was_seen_is_refused(driving: Asker) -> None:
+    driving.reposition(driving.field(8, 7))
+    assert driving.answered() == DENIED
+    assert any("an obstacle was seen there" in text for text in driving.texts())
+
+
+def test_what_is_no_place_is_refused(driving: Asker) -> None:
+    to, place = (1, COMPANION), driving.field(5, 12)
+    local = mavlink.MAVLink_command_int_message(*to, 1, 192, 0, 0, -1.0, 0.0, 0.0, NAN, 50000, 0, 0.0)
+    body = mavlink.MAVLink_mission_item_int_message(*to, 0, 8, 16, 2, 0, 0, 0, 0, 0, 50000, 0, 0.0)
+    land = mavlink.MAVLink_mission_item_int_message(*to, 0, 6, 21, 2, 0, 0, 0, 0, 0, *place, 0.0)
+    nowhere = mavlink.MAVLink_command_long_message(*to, 192, 0, -1.0, 0.0, 0.0, NAN, NAN, NAN, NAN)
+    for message, result in ((local, DENIED), (body, 2), (land, 3), (nowhere, DENIED)):
+        driving.ask(message)
+        assert driving.answered() == result
+    for place in ((0, 0), (2**31 - 1, 2**31 - 1), (910_000_000, 0)):
+        driving.reposition(place)
+        assert driving.answered() == DENIED
+    driving.reposition(driving.field(5, 12), speed=-3.0)
+    assert driving.answered() == DENIED
+    driving.finish()
+    assert "Heading for errand 1" not in driving.texts()
+
+
+def test_nothing_is_accepted_while_the_rover_is_not_driven(tmp_path: Path) -> None:
+    rig = Asker(yard(tmp_path), arm=False)
+    rig.until(lambda: "a person to arm" in rig.companion.status().doing)
+    rig.reposition(rig.field(5, 12))
+    assert rig.answered() == NOT_NOW
+    rig.run_for(3.0)
+    rig.pilot(400, 1)
+    rig.until_driven(1.5)
+    rig.pilot_mode(MANUAL)
+    rig.until(lambda: rig.mode == MANUAL, 1.5)
+    rig.reposition(rig.field(5, 12))
+    assert rig.answered() == NOT_NOW
+    assert any("not driving" in text and "mode is not GUIDED" in text for text in rig.texts())
+    rig.pilot_mode(15)
+    rig.until(lambda: rig.companion.status().doing == "driving", 3.0)
+    rig.reposition(rig.field(5, 12))
+    assert rig.answered() == ACCEPTED
+
+
+def test_a_repeated_request_changes_nothing(driving: Asker) -> None:
+    place = driving.field(5, 12)
+    for _ in range(3):
+        driving.reposition(place)
+        assert driving.answered() == ACCEPTED
+    driving.until(lambda: driving.passed_m(5, 12) < 1.5, 60.0)
+    driving.reposition(place)
+    driving.until(lambda: "Reached errand 1" in driving.texts(), 60.0)
+    driving.answers.clear()
+    driving.reposition(place)  # once more by a ground station that has not heard the answer
+    assert driving.answered() == ACCEPTED
+    assert sum("Heading for errand" in text for text in driving.texts()) == 1
+    driving.run_for(REPEAT_S)
+    driving.reposition(place)  # and this time it is meant
+    assert driving.answered() == ACCEPTED
+    driving.finish()
+    assert sum("Heading for errand" in text for text in driving.texts()) == 2
+    assert driving.companion.outcome.complete
+
+
+def test_the_newest_request_counts(driving: Asker) -> None:
+    driving.reposition(driving.field(5, 12))
+    assert driving.answered() == ACCEPTED
+    driving.reposition(driving.field(4, 2))
+    assert driving.answered() == ACCEPTED
+    driving.finish()
+    assert "Reached errand 2" in driving.texts() and "Reached errand 1" not in driving.texts()
+    assert driving.companion.outcome.complete
+
+
+def test_a_place_that_cannot_be_reached_is_given_up_and_the_mission_goes_on(tmp_path: Path) -> None:
+    walled = '[[target]]\nname = "corner"\nfield = [20, 2]\n'
+    rig = Asker(yard(tmp_path, walled, sealed=True))
+    rig.until_driven(1.5)
+    rig.reposition(rig.field(15, 7))
+    assert rig.answered() == ACCEPTED
+    rig.finish(600.0)
+    assert any(text.startswith("Unreachable: errand 1") for text in rig.texts())
+    assert rig.companion.outcome.complete
+    assert rig.simulator.collisions == ()
+
+
+def test_what_is_meant_for_others_is_left_alone(driving: Asker) -> None:
+    """The autopilot's own target (which the companion overrules), everybody's, another vehicle's, an upload, another command."""
+    place = driving.field(5, 12)
+    for to in ((1, 1), (1, 0), (0, 0), (2, COMPANION), (1, 190)):
+        driving.reposition(place, to=to)
+    upload = (1, COMPANION, 0, 6, 16, 0, 0, 0.0, 0.0, 0.0, 0.0, *place, 0.0)
+    driving.ask(mavlink.MAVLink_mission_item_int_message(*upload))
+    driving.ask(mavlink.MAVLink_command_long_message(1, COMPANION, 400, 0, *[0.0] * 7))
+    driving.run_for(2.0)
+    assert driving.answers == []
+    assert not any("rrand" in text for text in driving.texts())
+    driving.finish()
+    assert driving.companion.outcome.complete
+
+
+def test_a_speed_is_a_limit_and_never_more_than_the_mission_allows(driving: Asker) -> None:
+    for speed_m_s, taken_m_s in ((0.6, 0.6), (9.0, 2.0), (0.0, None)):
+        driving.reposition(driving.field(5, 12), speed=speed_m_s)
+        assert driving.answered() == ACCEPTED
+        itinerary = driving.companion.itinerary
+        assert itinerary is not None and itinerary.errand is not None
+        assert itinerary.errand.speed_m_s == (None if taken_m_s is None else pytest.approx(taken_m_s))
+
+
+def test_an_errand_keeps_its_place_when_the_origin_moves(tmp_path: Path) -> None:
+    rig = Asker(yard(tmp_path), parse_settings({"link": {"setpoint": "global"}}, "test"))
+    rig.until_driven(1.5)
+    rig.reposition(rig.field(5, 12))
+    assert rig.answered() == ACCEPTED
+    rig.change = Frame(20.0, -35.0)
+    rig.until(lambda: any("origin moved" in text for text in rig.texts()), 3.0)
+    rig.until(lambda: "Reached errand 1" in rig.texts(), 60.0)
+    assert rig.passed_m(5, 12) < 1.5
+    rig.finish()
+    assert rig.companion.outcome.complete

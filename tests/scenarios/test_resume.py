@@ -1,0 +1,284 @@
+"""A companion that is killed at any moment, and one that takes up what it has left: in lock-step, over MAVLink bytes."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.grid import Cell
+from companion.mission.mission import Mission, OnBlocked
+from companion.mission.resolve import ResolvedTarget
+from companion.resuming import Kept
+from companion.safety import Control
+from companion.state.format import decoded
+from companion.state.model import SavedState
+from tests.rig import ARM, GATE, GUIDED, HOLD, MANUAL, Rig, Sent, yard
+
+TWO = GATE + 'hold_s = 2.0\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
+UP_S = 45.0
+RESUMED_S = 2.0
+
+
+def rig_of(folder: Path, targets: str = TWO, *, seed: int = 0, sealed: bool = False) -> tuple[Rig, Mission]:
+    mission = yard(folder, targets, sealed=sealed)
+    return Rig(mission, seed=seed, late_s=UP_S, state=folder / "state"), mission
+
+
+def state_in(folder: Path) -> SavedState:
+    return decoded((folder / "state" / "mission.state").read_bytes())[0]
+
+
+def kill_and_resume(rig: Rig, mission: Mission) -> None:
+    """The companion is gone between two ticks; what it said last is still on its way, what it was about to write is lost."""
+    beside = Path(str(rig.state_file) + ".new")
+    beside.write_bytes(b"half a sta")
+    rig.restart_companion(mission, resume=True)
+
+
+def assert_setpoints_only_when_ours(sent: list[Sent]) -> None:
+    setpoints = [one for one in sent if one.is_setpoint]
+    assert setpoints
+    assert all(one.mode == GUIDED and one.armed for one in setpoints)
+
+
+def goes_on_after_s(rig: Rig, since_s: float) -> float:
+    """So long after a moment the companion has led the rover somewhere again."""
+
+    def led() -> list[float]:
+        return [one.time_s for one in rig.sent_since(since_s) if one.is_setpoint and not one.is_standstill]
+
+    rig.until(lambda: bool(led()), 20.0)
+    return led()[0] - since_s
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_killed_at_random_times_it_drives_the_mission_to_its_end(tmp_path: Path, seed: int) -> None:
+    rig, mission = rig_of(tmp_path, seed=seed)
+    rng = np.random.default_rng(seed)
+    said: list[str] = []
+    for _ in range(3):
+        rig.run_for(float(rng.uniform(0.1, 14.0)))
+        if rig.companion.done:
+            break
+        said += rig.texts()
+        begun = rig.companion.driver is not None
+        kill_and_resume(rig, mission)
+        if begun and rig.mode == GUIDED:
+            assert goes_on_after_s(rig, rig.now_s()) <= RESUMED_S
+    rig.finish()
+    said += rig.texts()
+    assert rig.companion.outcome.complete, said
+    counts = Counter(said)
+    assert (counts["Reached gate"], counts["Reached corner"]) == (1, 1), "what was reached is not driven to again"
+    assert rig.simulator.collisions == ()
+    assert_setpoints_only_when_ours(rig.sent)
+    assert state_in(tmp_path).ended and state_in(tmp_path).reached == 2
+
+
+def test_the_same_kill_gives_the_same_run(tmp_path: Path) -> None:
+    bytes_sent = []
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+        rig, mission = rig_of(tmp_path / name)
+        rig.until_driven(9.0)
+        kill_and_resume(rig, mission)
+        rig.finish()
+        bytes_sent.append([bytes(one.message.get_msgbuf()) for one in rig.sent])
+    assert bytes_sent[0] == bytes_sent[1]
+
+
+@pytest.mark.parametrize("metres", [0.5, 6.0, 12.0])
+def test_map_and_past_path_are_there_again(tmp_path: Path, metres: float) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(metres)
+    rig.run_for(0.5)
+    assert rig.companion.evidence is not None
+    before = rig.companion.evidence.log_odds.copy()
+    kill_and_resume(rig, mission)
+    assert goes_on_after_s(rig, rig.now_s()) <= RESUMED_S
+    evidence, driver = rig.companion.evidence, rig.companion.driver
+    assert evidence is not None and driver is not None
+    seen_before, seen_now = before != 0.0, evidence.log_odds != 0.0
+    assert (seen_before & seen_now).sum() > 0.8 * seen_before.sum(), "what had been seen, but for the last seconds"
+    state = driver.leg[0]
+    assert state is not None and state.past[0] == Cell(2, 7), "the way back to the start"
+    assert rig.companion.itinerary is not None and rig.companion.itinerary.home.cell == Cell(2, 7)
+    assert any(text.startswith("Resumed with its map, 0 targets reached") for text in rig.texts())
+
+
+def test_an_errand_is_run_to_its_end_and_then_the_mission(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(3.0)
+    pursuit = rig.companion._pursuit
+    assert pursuit is not None
+    centre = pursuit.evidence.base.centre_of(Cell(5, 12))
+    pursuit.run_errand(ResolvedTarget("errand 1", centre, Cell(5, 12), 0.0, OnBlocked.SKIP, 1.5))
+    rig.run_for(0.5)
+    kill_and_resume(rig, mission)
+    goes_on_after_s(rig, rig.now_s())
+    itinerary = rig.companion.itinerary
+    assert itinerary is not None and itinerary.errand is not None and itinerary.errand.cell == Cell(5, 12)
+    rig.until(lambda: rig.companion.itinerary is not None and rig.companion.itinerary.errand is None)
+    truth = rig.simulator.truth
+    assert math.hypot(truth.north_m - 12.5, truth.east_m - 5.5) < 1.5
+    rig.finish()
+    assert rig.companion.outcome.complete
+
+
+def test_a_rover_on_its_way_back_goes_on_back(tmp_path: Path) -> None:
+    targets = GATE + 'on_blocked = "return"\n'
+    rig, mission = rig_of(tmp_path, targets, sealed=True)
+    rig.until(lambda: rig.companion.itinerary is not None and rig.companion.itinerary.leg == "home", 200.0)
+    kill_and_resume(rig, mission)
+    rig.finish()
+    assert [status for _, status in rig.companion.statuses()] == ["unreachable"]
+    truth = rig.simulator.truth
+    assert math.hypot(truth.north_m - 7.5, truth.east_m - 2.5) < 1.5
+    assert sum("Unreachable: gate" in text for text in rig.texts()) == 0, "it had been found out before"
+    assert rig.simulator.collisions == ()
+
+
+def test_the_link_comes_up_and_within_two_seconds_it_drives(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(5.0)
+    rig.cut = True
+    kill_and_resume(rig, mission)
+    rig.run_for(8.0)
+    rig.cut = False
+    assert goes_on_after_s(rig, rig.now_s()) <= RESUMED_S
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+def lose_power(rig: Rig, mission: Mission) -> None:
+    """Of the whole rover, autopilot and companion; it is back at once."""
+    rig.simulator._reboot()
+    rig.restart_companion(mission, resume=True)
+
+
+def test_after_a_loss_of_power_it_arms_and_goes_on_where_it_was(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until(lambda: "Heading for corner" in rig.texts())
+    rig.run_for(2.0)
+    lose_power(rig, mission)
+    rig.finish()
+    assert rig.companion.outcome.complete, rig.texts()
+    assert "Reached gate" not in rig.texts()
+    assert any("Resumed with the obstacles of its map" in text for text in rig.texts())
+    assert rig.simulator.collisions == ()
+    assert_setpoints_only_when_ours(rig.sent)
+    truth = rig.simulator.truth
+    assert math.hypot(truth.north_m - 3.5, truth.east_m - 4.5) < 1.5, (
+        "home is where the mission began, not where it was switched on"
+    )
+
+
+def test_after_a_loss_of_power_the_ground_must_be_seen_anew(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(9.0)
+    lose_power(rig, mission)
+    rig.until(lambda: rig.companion.evidence is not None, 90.0)
+    evidence = rig.companion.evidence
+    assert evidence is not None and evidence.log_odds.min() == 0.0 < evidence.log_odds.max()
+    rig.finish()
+    assert max(rig.beyond_m) <= 1.5 + 1e-6
+
+
+@pytest.mark.parametrize("alive", [True, False], ids=["before", "while it is dead"])
+@pytest.mark.parametrize("mode", [MANUAL, HOLD])
+def test_a_rover_that_a_person_has_taken_stays_with_that_person(tmp_path: Path, mode: int, alive: bool) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(4.0)
+    if alive:
+        rig.pilot_mode(mode)
+        rig.until(lambda: rig.mode == mode, 2.0)
+        rig.run_for(0.2)
+        assert state_in(tmp_path).control is Control.PERSON
+    else:
+        rig.cut = True
+        rig.pilot_mode(mode)
+        rig.run_for(0.1)
+        rig.cut = False
+    kill_and_resume(rig, mission)
+    since_s = rig.now_s()
+    rig.run_for(8.0)
+    assert rig.mode == mode
+    assert [one for one in rig.sent_since(since_s + 0.1) if one.moves_or_changes] == []
+    assert "waiting for a person to set GUIDED" in rig.companion.status().doing
+    rig.pilot_mode(GUIDED)
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+def test_a_rover_disarmed_by_a_person_is_not_armed_after_a_restart(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(4.0)
+    rig.pilot(ARM, 0)
+    rig.until(lambda: not rig.armed, 2.0)
+    kill_and_resume(rig, mission)
+    since_s = rig.now_s()
+    rig.run_for(10.0)
+    assert [one for one in rig.sent_since(since_s) if one.moves_or_changes] == []
+    assert "a person to arm" in rig.companion.status().doing
+    rig.pilot(ARM, 1)
+    rig.finish()
+    assert rig.companion.outcome.complete
+
+
+def test_after_an_orderly_stop_it_goes_on_by_itself(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(4.0)
+    rig.companion.stop()
+    rig.finish()
+    state = state_in(tmp_path)
+    assert state.released and not state.ended
+    rig.run_for(1.0)
+    rig.restart_companion(mission, resume=True)
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+def test_an_error_in_the_program_leaves_a_state_to_go_on_from(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(4.0)
+    rig.companion.close()
+    state = state_in(tmp_path)
+    assert state.released and not state.ended
+    rig.restart_companion(mission, resume=True)
+    rig.finish()
+    assert rig.companion.outcome.complete
+
+
+def test_a_jump_of_the_position_is_not_survived_by_the_map(tmp_path: Path) -> None:
+    """A crash right after it must not bring back a map that lies elsewhere now."""
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(6.0)
+    rig.run_for(1.0)
+
+    def moved(message: object) -> object:
+        if message.get_type() == "LOCAL_POSITION_NED":  # type: ignore[attr-defined]
+            message.x -= 3.0  # type: ignore[attr-defined]
+        return message
+
+    rig.change = moved
+    rig.until(lambda: any("Position jumped" in text for text in rig.texts()), 3.0)
+    kept = Kept(*decoded((tmp_path / "state" / "mission.state").read_bytes()))
+    assert not kept.rasters["log_odds"].any()
+    kill_and_resume(rig, mission)
+    rig.until(lambda: rig.companion.evidence is not None, 3.0)
+    evidence = rig.companion.evidence
+    assert evidence is not None and not (evidence.log_odds[56:80, 64:72] >= 0.6).any(), "the wall where it was before"
+
+
+def test_a_disk_that_fails_is_told_once_and_the_mission_goes_on(tmp_path: Path) -> None:
+    rig, _ = rig_of(tmp_path)
+    rig.until_driven(2.0)
+    shutil.rmtree(tmp_path / "state")
+    rig.finish()
+    assert rig.companion.outcome.complete
+    assert sum("the state cannot be saved: No such file" in text for text in rig.texts()) == 1
