@@ -46,8 +46,11 @@ def followed(sticks: Sticks, event: SticksSeen) -> Sticks:
         return sticks
     if sticks.rest_us is None:
         return Sticks(now_us)
-    rest = tuple(
-        min(one, two, key=lambda us: abs(us - MIDDLE_US)) for one, two in zip(sticks.rest_us, now_us, strict=True)
-    )
-    away = any(abs(us - still) > MOVED_US for us, still in zip(now_us, rest, strict=True))
-    return replace(sticks, rest_us=(rest[0], rest[1]), away=sticks.away + 1 if away else 0)
+    rest_us = tuple(_between(still, now) for still, now in zip(sticks.rest_us, now_us, strict=True))
+    away = any(abs(now - rest) > MOVED_US for rest, now in zip(rest_us, now_us, strict=True))
+    return replace(sticks, rest_us=(rest_us[0], rest_us[1]), away=sticks.away + 1 if away else 0)
+
+
+def _between(rest_us: int, now_us: int) -> int:
+    """The place nearest to ``now_us`` from where it rested to the middle."""
+    return min(max(now_us, min(rest_us, MIDDLE_US)), max(rest_us, MIDDLE_US))

@@ -307,11 +307,13 @@ def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, Oth
 
 
 def _with_heartbeat(state: VehicleState, event: HeartbeatSeen) -> VehicleState:
-    """Mode and arming; whoever sets GUIDED anew has looked after position, clock and sticks."""
-    before = state.heartbeat
-    if before is None or before.mode == RoverMode.GUIDED or event.mode != RoverMode.GUIDED:
-        return replace(state, heartbeat=event)
-    return replace(state, heartbeat=event, frozen=False, restarted=False, sticks=Sticks())
+    """Mode and arming; whoever sets GUIDED anew has looked after position and clock, and has the sticks as he wants them."""
+    before, state = state.heartbeat, replace(state, heartbeat=event)
+    if before is None:
+        return state
+    if before.mode != RoverMode.GUIDED == event.mode:
+        return replace(state, frozen=False, restarted=False, sticks=Sticks())
+    return replace(state, sticks=Sticks()) if event.armed and not before.armed else state
 
 
 def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:
