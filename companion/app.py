@@ -29,7 +29,7 @@ from companion.recorder import DecisionLog
 from companion.reporting import Outcome, Reporter, Status
 from companion.safety import Control, Reaction, Watch, awaited, check, latched
 from companion.settings import Settings
-from companion.startup import StartUp
+from companion.startup import StartUp, overruled
 from companion.stepping import StepRunner
 from companion.traffic import announced
 from companion.vehicle import Event, RangeSeen, RoverMode, TextSeen, VehicleState, fold
@@ -228,11 +228,12 @@ class Companion:
 
     def _begin(self, now_s: float) -> Pursuit | None:
         """Everything before the first metre; once the rover may be driven, the mission on the map."""
-        self.watch = Watch(latched(self.watch.control, self.vehicle))
         if self._autopilot.twin_heard(now_s):
             self._reporter.doing = "waiting for another companion with the same component id to fall silent"
             return None
-        laid, command = self._start_up.step(self.vehicle, self.watch.control, now_s)
+        taken = overruled(self._autopilot.last_ack(SetMode(RoverMode.GUIDED)), self.vehicle.heartbeat)
+        control = Control.PERSON if taken else self.watch.control
+        laid, command = self._start_up.step(self.vehicle, control, now_s)
         if command is not None:
             self._send(command, now_s)
         refused = self._autopilot.last_ack(Arm())
@@ -268,6 +269,8 @@ class Companion:
             idle = self._pursuit is None or self._stopped or self._handover.begun
             self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
         if self._pursuit is None:
+            # At every heartbeat: a person may take the rover out of GUIDED within a tick of our having set it.
+            self.watch = Watch(latched(self.watch.control, self.vehicle))
             return
         if isinstance(event, RangeSeen) and self._watchdogs.scan_fits and not self._whereabouts.position_doubted:
             pose, attitude = self.vehicle.pose_at(event.time_s), self.vehicle.attitude

@@ -78,6 +78,10 @@ def check(
     watch = replace(watch, control=control)
     if not heartbeat.armed:
         return replace(watch, unsafe_since_s=None), Verdict(Reaction.SILENT, "disarmed")
+    if vehicle.sticks.moved:
+        return Watch(Control.PERSON, None, hold_sent=True, hold_s=now_s), Verdict(
+            Reaction.HOLD, "the sticks were moved"
+        )
     reason = unsafe_reason(vehicle, now_s, settings) or doubt
     if not reason:
         return replace(watch, unsafe_since_s=None), Verdict(Reaction.DRIVE)
@@ -100,12 +104,21 @@ def awaited(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> st
         wanted.append("arm (or end this run, and start it again with --arm)")
     if not wanted:
         return ""
-    data = unsafe_reason(vehicle, now_s, settings)
+    data = data_reason(vehicle, now_s, settings)
     return f"{f'good data ({data}) and ' if data else ''}a person to {' and '.join(wanted)}"
 
 
 def unsafe_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> str:
-    """Why the rover must not move now, in words; empty when it may."""
+    """Why the rover must not move now, in words; empty when it may. The latter two are over when a person sets GUIDED."""
+    if reason := data_reason(vehicle, now_s, settings):
+        return reason
+    if vehicle.restarted:
+        return "the autopilot's clock has run back"
+    return "position stands still while the velocity says otherwise" if vehicle.frozen else ""
+
+
+def data_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> str:
+    """What is missing, old or wrong in the data itself, so that nobody may drive on it; empty when it is good."""
     ages = (
         ("autopilot heartbeat", vehicle.heartbeat, settings.heartbeat_s),
         ("position", vehicle.position, settings.stale_s),
@@ -120,12 +133,8 @@ def unsafe_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings)
             return f"{name} silent for over {limit_s:g} s"
     if not vehicle.ekf_ok:
         return "EKF has no position"
-    if vehicle.restarted:
-        return "the autopilot's clock has run back"
     if now_s - vehicle.latency.jumped_s < settings.settle_s:
         return "the autopilot's clock has jumped"
     if vehicle.latency.lasting_s > settings.latency_s:
         return f"link later than {settings.latency_s:g} s"
-    if vehicle.frozen:
-        return "position stands still while the velocity says otherwise"
     return ""

@@ -10,12 +10,14 @@ from companion.guidance import STANDSTILL
 from companion.laying import Laid, lay
 from companion.mission.mission import Mission
 from companion.resuming import Kept, Ownership, lay_resumed, ownership, same_boot
-from companion.safety import Control, unsafe_reason
+from companion.safety import Control, data_reason
 from companion.settings import SafetySettings, Settings
-from companion.vehicle import RoverMode, VehicleState
+from companion.vehicle import AckSeen, HeartbeatSeen, RoverMode, VehicleState
 
 ASK_AGAIN_S = 3.0
 """A command that has not worked is given again after so long."""
+TAKEN_S = 0.5
+"""A heartbeat so long after the answer to a mode change shows what has become of it."""
 LOOK_AGAIN_S = 2.0
 """A rover that stands beside the mission's grid is looked at again after so long."""
 
@@ -45,7 +47,7 @@ def start_step(
         return StartStep("the autopilot's heartbeat")
     if vehicle.origin is None or vehicle.home is None:
         return StartStep("the autopilot's origin and home")
-    reason = unsafe_reason(vehicle, now_s, settings)
+    reason = data_reason(vehicle, now_s, settings)
     if reason:
         return StartStep(f"good data ({reason})")
     if vehicle.heartbeat.mode != RoverMode.GUIDED:
@@ -57,6 +59,13 @@ def start_step(
     if not vehicle.heartbeat.armed:
         return StartStep("arming", Arm()) if arm else StartStep("a person to arm (or run with --arm)")
     return StartStep("")
+
+
+def overruled(ack: AckSeen | None, heartbeat: HeartbeatSeen | None) -> bool:
+    """Whether somebody has chosen another mode since the autopilot took ours, though no heartbeat showed GUIDED between."""
+    if ack is None or ack.result != 0 or heartbeat is None:
+        return False
+    return heartbeat.mode != RoverMode.GUIDED and heartbeat.time_s - ack.time_s > TAKEN_S
 
 
 class StartUp:

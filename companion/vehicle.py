@@ -15,6 +15,7 @@ from companion.frames import GeoPoint, Pose
 from companion.latency import BACK_S, Latency, TimeAnswered, answered, reported
 from companion.reckoning import Reckoned, jump_m, reckoned
 from companion.scan import RangeScan
+from companion.sticks import Sticks, SticksSeen, followed
 
 EKF_POSITION = 8 | 16
 """POS_HORIZ_REL or POS_HORIZ_ABS: one of them must be set to drive."""
@@ -191,6 +192,7 @@ Event = (
     | PlanItemSeen
     | PlanChangedSeen
     | TargetAsked
+    | SticksSeen
 )
 
 
@@ -220,6 +222,8 @@ class VehicleState:
     """The autopilot's boot time has run back: kept until a person sets GUIDED again."""
     latency: Latency = field(default_factory=Latency)
     """How late the link is."""
+    sticks: Sticks = field(default_factory=Sticks)
+    """Whether a pilot has taken hold of them since a person set GUIDED."""
     parameters: dict[str, float] = field(default_factory=dict)
     others: dict[str, OtherSeen] = field(default_factory=dict)
     """Who else is about, by name."""
@@ -271,6 +275,8 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
             return replace(state, scan=event, scan_ahead=event if event.scan.looks_ahead else state.scan_ahead)
         case TargetSeen():
             return replace(state, target=event)
+        case SticksSeen():
+            return replace(state, sticks=followed(state.sticks, event))
         case TimeAnswered():
             return replace(state, latency=answered(state.latency, event))
         case _:
@@ -301,10 +307,13 @@ def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, Oth
 
 
 def _with_heartbeat(state: VehicleState, event: HeartbeatSeen) -> VehicleState:
-    """Mode and arming; whoever sets GUIDED anew has looked after the position."""
-    set_anew = state.heartbeat is not None and state.heartbeat.mode != RoverMode.GUIDED == event.mode
-    restarted = state.restarted and not set_anew
-    return replace(state, heartbeat=event, frozen=state.frozen and not set_anew, restarted=restarted)
+    """Mode and arming; whoever sets GUIDED anew has looked after position and clock, and has the sticks as he wants them."""
+    before, state = state.heartbeat, replace(state, heartbeat=event)
+    if before is None:
+        return state
+    if before.mode != RoverMode.GUIDED == event.mode:
+        return replace(state, frozen=False, restarted=False, sticks=Sticks())
+    return replace(state, sticks=Sticks()) if event.armed and not before.armed else state
 
 
 def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:

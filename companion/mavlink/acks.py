@@ -10,6 +10,8 @@ from companion.vehicle import AckSeen, HeartbeatSeen
 
 TIMEOUT_S = 1.0
 TRIES = 3
+STALE_S = 5.0
+"""A command that could not be repeated for so long is not repeated at all."""
 NO_ANSWER = -1
 """Result of a command that was never answered (MAV_RESULT itself begins at 0)."""
 IN_PROGRESS = 5
@@ -63,6 +65,10 @@ class AckKeeper:
         """Commands to repeat now, each with its count of repetitions."""
         again: list[tuple[Command, int]] = []
         for number, pending in list(self._open.items()):
+            if now_s - pending.sent_s > STALE_S:
+                # Nobody was heard meanwhile: whatever a person has chosen since then is not known.
+                del self._open[number]
+                continue
             if now_s - pending.sent_s < TIMEOUT_S or not self._may_repeat(pending):
                 continue
             if pending.tries >= TRIES:
@@ -76,7 +82,7 @@ class AckKeeper:
     def _changed(self, pending: _Pending) -> bool:
         """Whether mode or arming are no longer as when the command was first sent."""
         before, now = pending.heartbeat, self._heartbeat
-        if before is None or now is None or isinstance(pending.command, ChangeSpeed):
+        if before is None or now is None:
             return False
         return (before.mode, before.armed) != (now.mode, now.armed)
 

@@ -16,6 +16,7 @@ from companion.mavlink.framing import Packet
 from companion.mavlink.places import point_of
 from companion.mavlink.texts import TextAssembler
 from companion.scan import RangeScan
+from companion.sticks import SticksSeen
 from companion.vehicle import (
     AckSeen,
     AttitudeSeen,
@@ -82,6 +83,7 @@ class Decoder:
             mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: _home,
             mavlink.MAVLINK_MSG_ID_TIMESYNC: _time_answered,
+            mavlink.MAVLINK_MSG_ID_RC_CHANNELS: _sticks,
         }
 
     def decode(self, packet: Packet, time_s: float) -> list[Event]:
@@ -275,6 +277,10 @@ def _target(message: Any, time_s: float) -> Event | None:
 
 def _ekf(message: Any, time_s: float) -> Event:
     return EkfStatusSeen(time_s, message.flags)
+
+
+def _sticks(message: Any, time_s: float) -> Event:
+    return SticksSeen(time_s, message.chan1_raw, message.chan3_raw)
 
 
 def _time_answered(message: Any, time_s: float) -> Event | None:

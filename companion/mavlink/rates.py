@@ -18,6 +18,7 @@ LONGEST_WAIT_S = 30.0
 EKF_HZ = 5.0
 """Silence for a second stops the rover: on a bad line several in a row may be lost before that."""
 SLOW_HZ = 2.0
+STICKS_HZ = 5.0
 HEARTBEAT_HZ = 5.0
 """Mode and arming are known only from it: at the 1 Hz that comes unasked, a pilot could be overlooked for a second."""
 
@@ -62,6 +63,7 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
         WantedRate(mavlink.MAVLINK_MSG_ID_ATTITUDE, settings.attitude_rate_hz),
         WantedRate(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, SLOW_HZ),
         WantedRate(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, EKF_HZ),
+        WantedRate(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, STICKS_HZ, always=False, told=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_RANGEFINDER, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, SLOW_HZ, always=False, told=False),

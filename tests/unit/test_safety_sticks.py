@@ -1,0 +1,57 @@
+"""Sticks in RC_CHANNELS: what counts as taking hold of them."""
+
+from __future__ import annotations
+
+import pytest
+
+from companion.safety import Control, Reaction, Watch, check
+from companion.settings import SafetySettings
+from companion.sticks import Sticks, SticksSeen, followed
+from companion.vehicle import fold
+from tests.unit.test_safety import HOLD, vehicle
+
+
+def after(*places_us: tuple[int, int]) -> Sticks:
+    sticks = Sticks()
+    for steering_us, throttle_us in places_us:
+        sticks = followed(sticks, SticksSeen(0.0, steering_us, throttle_us))
+    return sticks
+
+
+@pytest.mark.parametrize(
+    ("places_us", "moved"),
+    [
+        ([(1500, 1500)] * 5, False),
+        ([(1500, 1500), (1620, 1500), (1620, 1500)], True),
+        ([(1500, 1500), (1500, 1380), (1500, 1380)], True),
+        ([(1500, 1500), (1620, 1500)], False),
+        ([(1500, 1500), (1620, 1500), (1500, 1500), (1620, 1500)], False),  # disturbed now and then
+        ([(1500, 1500)] + [(1590, 1410)] * 5, False),
+        ([(1500, 1100)] * 5, False),  # a throttle that rests at the bottom
+        ([(1500, 1100)] + [(1500, 1500)] * 5, False),  # let go
+        ([(1500, 1100), (1500, 1500), (1500, 1100), (1500, 1100)], True),
+        ([(1800, 1500), (1500, 1500), (1500, 1500)], False),
+        ([(1450, 1500), (1560, 1500), (1560, 1500)], False),  # through the middle, but not far beyond
+        ([(1900, 1500), (1100, 1500), (1100, 1500)], True),
+        ([(1800, 1500), (1950, 1500), (1950, 1500)], True),
+        ([(1500, 1500), (0, 0), (65535, 65535), (0, 0)], False),  # no receiver
+        ([(0, 0)] * 3 + [(1700, 1500)] * 3, False),  # switched on with the stick held
+    ],
+)
+def test_what_counts_as_taking_hold(places_us: list[tuple[int, int]], moved: bool):
+    assert after(*places_us).moved is moved
+
+
+def test_moved_sticks_are_a_hold_at_once_and_then_silence_until_guided_is_set_anew():
+    state = vehicle(10.0)
+    for steering_us in (1500, 1900, 1900):
+        state = fold(state, SticksSeen(10.0, steering_us, 1500))
+    watch, verdict = check(Watch(Control.COMPANION), state, 10.0, SafetySettings())
+    assert (verdict.reaction, verdict.reason) == (Reaction.HOLD, "the sticks were moved")
+    assert check(watch, state, 10.1, SafetySettings())[1].reaction is Reaction.SILENT
+    for seen, reaction in ((vehicle(11.0, HOLD), Reaction.SILENT), (vehicle(12.0), Reaction.DRIVE)):
+        state = fold(state, seen.heartbeat)
+        fresh = fold(seen, seen.heartbeat)
+        watch, verdict = check(watch, fresh, seen.heartbeat.time_s, SafetySettings())
+        assert verdict.reaction is reaction
+    assert not state.sticks.moved
