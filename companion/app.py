@@ -263,7 +263,7 @@ class Companion:
     def _take_in(self, event: Event) -> None:
         """Scans go into the map; a position that jumps, or an origin that moves, makes the map worthless."""
         if isinstance(event, TextSeen) and event.severity <= WARNING:
-            self._reporter.note(f"autopilot: {event.text}")
+            self._reporter.note(f"autopilot: {event.text}", event.severity)
         self._watchdogs.take_in(event, self.vehicle)
         if isinstance(event, TargetAsked):
             idle = self._pursuit is None or self._stopped or self._handover.begun
@@ -335,7 +335,7 @@ class Companion:
 
     def _tell(self, text: str, severity: int) -> None:
         """Say it to the ground station, not twice in a row."""
-        if self._reporter.say(text):
+        if self._reporter.say(text, severity):
             self._autopilot.send(Say(severity, text), self._clock.now_s())
 
     def _tell_once(self, text: str) -> None:

@@ -94,7 +94,9 @@ class Memory:
         elif self._rows is None and not doubted and self._is_due(now_s, position) and not self._writer.busy:
             self._rows = _rows(pursuit.evidence)
         band = None if self._rows is None else next(self._rows, None)
-        if band is not None:
+        if done and not doubted:  # nobody waits any more
+            self._writer.put(Update(dict(_rows(pursuit.evidence))))
+        elif band is not None:
             self._writer.put(Update(dict([band])))
         through = self._rows is not None and band is None
         if through:

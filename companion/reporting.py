@@ -17,6 +17,14 @@ STEPS_KEPT = 100_000
 
 
 @dataclass(frozen=True, slots=True)
+class News:
+    """A text and how severe it is (as in MAVLink: 6 info, 4 warning, 3 error)."""
+
+    severity: int
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
 class Status:
     """What a person wants to see while it drives. ``news``: what was said, by the autopilot as well, in this tick."""
 
@@ -28,7 +36,7 @@ class Status:
     targets_reached: int
     targets: int
     steps: int
-    news: tuple[str, ...] = ()
+    news: tuple[News, ...] = ()
 
 
 @dataclass
@@ -51,21 +59,21 @@ class Reporter:
 
     said: list[str]
     doing: str = "connecting"
-    news: list[str] = field(default_factory=list)
+    news: list[News] = field(default_factory=list)
     _slow_since_s: dict[int, float] = field(default_factory=dict)
     _told: set[str] = field(default_factory=set)
 
-    def say(self, text: str) -> bool:
+    def say(self, text: str, severity: int) -> bool:
         """Note a text for the ground station; False when it is what was said last."""
         if self.said and self.said[-1] == text:
             return False
         self.said.append(text)
-        self.news.append(text)
+        self.news.append(News(severity, text))
         return True
 
-    def note(self, text: str) -> None:
+    def note(self, text: str, severity: int) -> None:
         """Note a text for those who watch the companion itself."""
-        self.news.append(text)
+        self.news.append(News(severity, text))
 
     def faults(self, rates: tuple[RateFault, ...], problem: str, now_s: float) -> list[str]:
         """What is to be said of messages that come too seldom for some time, and of a record that has ended; each once."""

@@ -6,7 +6,8 @@ A search on a large map may take long; heartbeat, watchdogs and stop commands mu
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import Future, ThreadPoolExecutor
+from queue import SimpleQueue
+from threading import Thread
 from typing import Protocol
 
 from companion.navigator import Decision, NavState
@@ -60,28 +61,41 @@ class InlineRunner:
 
 
 class ThreadRunner:
-    """Computes beside the loop; the compiled kernels release the interpreter lock."""
+    """Computes beside the loop; the compiled kernels release the interpreter lock. The thread never keeps the program from ending."""
 
     def __init__(self) -> None:
-        self._pool = ThreadPoolExecutor(max_workers=1, thread_name_prefix="navigator")
-        self._future: Future[tuple[NavState, Decision]] | None = None
+        self._calls: SimpleQueue[StepCall | None] = SimpleQueue()
+        self._results: SimpleQueue[tuple[NavState, Decision] | BaseException] = SimpleQueue()
+        self._busy = False
+        Thread(target=self._work, name="navigator", daemon=True).start()
 
     @property
     def busy(self) -> bool:
         """Whether a step runs or its result waits."""
-        return self._future is not None
+        return self._busy
 
     def start(self, call: StepCall) -> None:
         """Hand the step to the thread."""
-        self._future = self._pool.submit(call)
+        self._busy = True
+        self._calls.put(call)
 
     def take(self) -> tuple[NavState, Decision] | None:
         """The result if the thread has it; raises what the step raised."""
-        if self._future is None or not self._future.done():
+        if self._results.empty():
             return None
-        future, self._future = self._future, None
-        return future.result()
+        result = self._results.get()
+        self._busy = False
+        if isinstance(result, BaseException):
+            raise result
+        return result
 
     def close(self) -> None:
         """Do not wait for a step that nobody will take."""
-        self._pool.shutdown(wait=False, cancel_futures=True)
+        self._calls.put(None)
+
+    def _work(self) -> None:
+        while (call := self._calls.get()) is not None:
+            try:
+                self._results.put(call())
+            except BaseException as error:
+                self._results.put(error)

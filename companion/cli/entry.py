@@ -5,9 +5,14 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import cast
 
+from companion.cli.kernels import VARIABLE, choose_place
+
 EXIT_USAGE, EXIT_STOPPED = 2, 130
+HERE = Path(__file__).parents[1]
+"""The package ``companion``; ``sitl`` is installed beside it."""
 
 
 class StoppedError(Exception):
@@ -19,11 +24,28 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
 
     Loading them imports the compiler and takes most of a second, in which an interrupt must not end in a traceback.
     """
+    if fault := unsuitable(sys.maxsize):
+        print(f"{name}: {fault}", file=sys.stderr)
+        return EXIT_USAGE
+    try:
+        choose_place(os.environ, (HERE, HERE.with_name("sitl")))
+    except OSError as error:
+        print(f"{name}: no place for compiled kernels ({error.strerror or error}); set {VARIABLE}", file=sys.stderr)
+        return EXIT_USAGE
     try:
         return _run(name, load())
     except KeyboardInterrupt:
         print(f"{name}: stopped by Ctrl-C", file=sys.stderr)
         return EXIT_STOPPED
+
+
+def unsuitable(greatest_int: int) -> str:
+    """Why this machine will not do, in words; empty if it will. ``greatest_int`` is ``sys.maxsize``."""
+    if greatest_int < 2**32:
+        return (
+            "needs a 64-bit system, and this Python is a 32-bit one; on a Raspberry Pi install Raspberry Pi OS (64-bit)"
+        )
+    return ""
 
 
 def _run(name: str, commands: Callable[..., object]) -> int:

@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.status import Status as Spinner
 
 from companion.app import Status
+from companion.cli.levels import INFO, Reader, levelled
 
 UPDATE_S = 0.25
 
@@ -29,8 +30,9 @@ class LiveConsole(Console):
 class Live:
     """A context manager; ``show`` takes the companion's status after every tick."""
 
-    def __init__(self, console: Console, name: str) -> None:
+    def __init__(self, console: Console, name: str, reader: Reader = Reader.PERSON) -> None:
         self._console = console
+        self._reader = reader
         self._name = name
         self._spinner = Spinner("connecting", console=console, refresh_per_second=4.0) if console.is_terminal else None
         self._shown = ""
@@ -61,19 +63,20 @@ class Live:
             self._broken = True
 
     def _show(self, status: Status) -> None:
-        for text in status.news:
-            self._print(text)
+        for news in status.news:
+            self._print(news.text, news.severity)
         if self._spinner is None:
             line = f"{status.doing}{f': {status.target}' if status.target else ''}"
             if line != self._shown:
                 self._shown = line
-                self._print(line)
+                self._print(line, INFO)
         elif status.time_s - self._updated_s >= UPDATE_S:
             self._updated_s = status.time_s
             self._spinner.update(_line(status))
 
-    def _print(self, text: str) -> None:
-        self._console.print(f"{self._name}: {text}", soft_wrap=True, markup=False, highlight=False)
+    def _print(self, text: str, severity: int) -> None:
+        line = levelled(f"{self._name}: {text}", severity, self._reader)
+        self._console.print(line, soft_wrap=True, markup=False, highlight=False)
 
 
 def _line(status: Status) -> str:

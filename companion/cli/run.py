@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from companion.app import Companion
+from companion.app import Companion, Status
 from companion.cli.inputs import usable_settings
 from companion.cli.keeping import Keeping
+from companion.cli.levels import ERROR, INFO, Reader, levelled, reader_of
 from companion.cli.live import Live, LiveConsole
+from companion.cli.service import Service
 from companion.clock import WallClock
 from companion.itinerary import TargetStatus
 from companion.mapfiles import MapError
@@ -30,6 +32,7 @@ from companion.stepping import ThreadRunner
 from companion.warmup import warm_up
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+STDERR = 2
 EXIT_REACHED, EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED = 0, 2, 3, 130
 
 
@@ -53,8 +56,10 @@ def run(
     """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 130: stopped by a signal."""
     console = LiveConsole(stderr=True)
 
+    reader = reader_of(STDERR, os.environ)
+
     def say(text: str) -> None:
-        console.print(text, soft_wrap=True, markup=False, highlight=False)
+        console.print(levelled(text, INFO, reader), soft_wrap=True, markup=False, highlight=False)
 
     try:
         with _StopSignals() as stop, contextlib.ExitStack() as ends:
@@ -71,11 +76,12 @@ def run(
             link.read()  # what piled up meanwhile is old
             place = recorder.directory if isinstance(recorder, Recorder) else None
             if place != record:
-                console.print(f"{record} has a record already; this one goes to {place}", soft_wrap=True)
+                say(f"{record} has a record already; this one goes to {place}")
             keeping.start()
-            code = _drive(mission, settings, link, recorder, console, stop, place, keeping, seed=seed, arm=arm)
+            live = Live(console, mission.name, reader)
+            code = _drive(mission, settings, link, recorder, live, stop, place, keeping, seed=seed, arm=arm)
     except (SettingsError, MissionError, MapError, LinkError, RecordError, StatePlaceError) as error:
-        typer.echo(str(error), err=True)
+        typer.echo(levelled(str(error), ERROR, reader) if reader is Reader.JOURNAL else str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     if stop.asked:
         raise SystemExit(EXIT_STOPPED)  # it has said so itself
@@ -87,7 +93,7 @@ def _drive(
     settings: Settings,
     link: ByteLink,
     recorder: Recorder | NullRecorder,
-    console: Console,
+    live: Live,
     stop: _StopSignals,
     record: Path | None,
     keeping: Keeping,
@@ -102,10 +108,18 @@ def _drive(
         autopilot, WallClock(), mission, settings, runner, recorder, seed=seed, arm=arm, memory=keeping.memory
     )
     stop.listener = companion
+    service = Service(os.environ)
+
+    def show(status: Status) -> None:
+        live.show(status)
+        service.show(status)
+
+    service.ready()
     try:
-        with Live(console, mission.name) as live:
-            companion.run(live.show)
+        with live:
+            companion.run(show)
     finally:
+        service.stopping()
         companion.close()
         keeping.close()
         runner.close()

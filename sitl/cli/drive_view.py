@@ -54,7 +54,7 @@ class DriveView:
     def observe(self, status: Status) -> None:
         """A new moment of the run; drawn if the last picture is old enough."""
         self._watching.note_track()
-        for text in status.news:
+        for text in (news.text for news in status.news):
             self._watching.tell(f"{status.time_s:.0f} s: {text}")
         decision = status.decision
         if decision is not None and decision is not self._decided and decision.part is not Part.EXPLORE:

@@ -8,15 +8,15 @@ from rich.console import Console
 
 from companion.cli.live import Live
 from companion.mavlink.rates import RateFault
-from companion.reporting import FAULT_AFTER_S, Reporter, Status
+from companion.reporting import FAULT_AFTER_S, News, Reporter, Status
 
 SLOW = RateFault(32, 10.0, 1.0)
 
 
 def test_nothing_is_said_twice_in_a_row() -> None:
     reporter = Reporter([])
-    assert [reporter.say(text) for text in ("a", "a", "b", "a")] == [True, False, True, True]
-    assert reporter.said == reporter.news == ["a", "b", "a"]
+    assert [reporter.say(text, 6) for text in ("a", "a", "b", "a")] == [True, False, True, True]
+    assert reporter.said == [news.text for news in reporter.news] == ["a", "b", "a"]
 
 
 def test_a_low_rate_is_told_once_and_only_when_it_lasts() -> None:
@@ -33,7 +33,7 @@ def test_a_low_rate_is_told_once_and_only_when_it_lasts() -> None:
 
 
 def status(doing: str, *news: str, target: str = "", time_s: float = 0.0) -> Status:
-    return Status(time_s, doing, None, None, target, 1, 2, 7, news)
+    return Status(time_s, doing, None, None, target, 1, 2, 7, tuple(News(6, text) for text in news))
 
 
 def test_without_a_terminal_every_change_is_a_line() -> None:

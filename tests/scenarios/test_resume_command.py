@@ -1,0 +1,109 @@
+"""``rover-companion run --resume`` as a process of its own, killed and stopped while it drives a rover on a TCP port."""
+
+from __future__ import annotations
+
+import re
+import signal
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from companion.cli.commands import app
+from companion.mission.fingerprint import fingerprint
+from companion.state.format import decoded, encoded
+from companion.state.model import SavedProgress
+from tests.rig import GATE, HOLD, yard
+from tests.served import finished, mission_path, process, served, wait_until
+from tests.states import a_state
+
+TWO = GATE + 'hold_s = 0.5\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
+
+
+@pytest.mark.slow
+def test_killed_at_random_times_the_mission_is_driven_to_its_end(tmp_path: Path) -> None:
+    mission = yard(tmp_path, TWO)
+    run_it = ("run", mission_path(mission), "--arm", "--state", tmp_path / "state", "--connect")
+    rng = np.random.default_rng(1)
+    said = ""
+    with served(mission) as world:
+        for number in range(3):
+            more = ("--resume",) if number else ()
+            with process("companion", *run_it, world.url, *more) as run:
+                if number == 2:
+                    code, out, err = finished(run, 90.0)
+                    break
+                goal_m = world.simulator.driven_m + float(rng.uniform(1.0, 7.0))
+                wait_until(lambda goal_m=goal_m: world.simulator.driven_m > goal_m, 60.0)
+                run.kill()
+                said += finished(run, 5.0)[2]
+        assert world.simulator.collisions == ()
+    assert (code, out) == (0, "gate: reached\ncorner: reached\n"), err
+    assert (said + err).count("Reached gate") == 1
+    assert "Resumed with its map" in err and "Traceback" not in said + err
+
+
+def test_sigterm_stops_the_rover_saves_and_is_gone_within_a_second(tmp_path: Path) -> None:
+    """A second, and one more for this machine, which does other things as well."""
+    mission = yard(tmp_path, TWO)
+    run_it = ("run", mission_path(mission), "--arm", "--state", tmp_path / "state")
+    with served(mission) as world:
+        with process("companion", *run_it, "--connect", world.url) as run:
+            wait_until(lambda: world.simulator.driven_m > 5.0, 60.0)
+            run.send_signal(signal.SIGTERM)
+            began_s = time.monotonic()
+            code, _, err = finished(run, 10.0)
+            took_s = time.monotonic() - began_s
+        assert code == 130 and took_s < 2.0, err
+        assert world.mode() == HOLD
+        state, rasters = decoded((tmp_path / "state" / "mission.state").read_bytes())
+        assert state.released and not state.ended and rasters["log_odds"].any()
+        with process("companion", *run_it, "--connect", world.url, "--resume") as run:
+            assert run.stderr is not None
+            assert any("Resumed with its map" in line for line in iter(run.stderr.readline, ""))
+            run.send_signal(signal.SIGTERM)
+            assert finished(run, 10.0)[0] == 130
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "said"),
+    [
+        (
+            "another mission",
+            2,
+            r"mission\.state: of another mission \('Yard', 1 of 1 targets reached\); resume that one",
+        ),
+        (
+            "damaged",
+            2,
+            r"mission\.state: damaged \(its checksum is wrong\); kept as mission\.state\.damaged; the next start",
+        ),
+        ("ended", 0, "Yard was driven to its end: 1 of 1 targets reached"),
+    ],
+)
+def test_a_state_that_cannot_be_taken_up_is_told_before_anything_is_connected(
+    tmp_path: Path, fault: str, code: int, said: str
+) -> None:
+    mission = yard(tmp_path)
+    values = {**a_state().progress.model_dump(), "statuses": ["reached"], "leg": "done", "index": 1}
+    state = a_state(mission_sha256=fingerprint(mission), ended=True, progress=SavedProgress.model_validate(values))
+    data = encoded(state, {})
+    (tmp_path / "state").mkdir()
+    (tmp_path / "state" / "mission.state").write_bytes(data[:-50] if fault == "damaged" else data)
+    if fault == "another mission":
+        mission_path(mission).write_text(mission_path(mission).read_text().replace("[15, 7]", "[16, 7]"))
+    arguments = [
+        "run",
+        mission_path(mission),
+        "--connect",
+        "tcp:127.0.0.1:9",
+        "--state",
+        tmp_path / "state",
+        "--resume",
+    ]
+    result = CliRunner().invoke(app, [str(word) for word in arguments])
+    assert result.exit_code == code
+    assert result.stdout == ("gate: reached\n" if code == 0 else "")
+    assert len(result.stderr.splitlines()) == (2 if code == 0 else 1) and re.search(said, result.stderr)
