@@ -162,9 +162,9 @@ class SerialEndpoint:
 
     def exchange(self, simulator: Simulator, now_s: float) -> None:
         """Bytes in, whole packets out."""
+        queued = self._link.take()  # what was said before a restart is still sent: the answer to who asked for it
         if self._link.dropped:
             self._link = simulator.connect(self._serial_port, f"serial line {self._serial_port}")
-        queued = self._link.take()
         try:
             if self._line.descriptor() is None:
                 self._line.reopen(now_s)

@@ -67,9 +67,10 @@ class UdpEndpoint:
             self._partner(sender, simulator, now_s).link.receive(data)
         self._forget_silent(simulator, now_s)
         for address, partner in self._partners.items():
+            queued = partner.link.take()  # what was said before a restart is still sent: the answer to who asked for it
             if partner.link.dropped:
                 partner.link = simulator.connect(self._serial_port, f"udp:{place_text(address)}")
-            for piece in datagrams(partner.link.take()):
+            for piece in datagrams(queued):
                 with contextlib.suppress(OSError):
                     self._socket.sendto(piece, address)
 
