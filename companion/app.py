@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from companion.attendant import Attendant
 from companion.clock import Clock, stopwatch_s
 from companion.commands import Arm, Command, Say, SetMode
 from companion.driver import Driver
@@ -61,6 +62,7 @@ class Companion:
         seed: int,
         arm: bool,
         memory: Memory | None = None,
+        keep_settings: Callable[[Settings], None] | None = None,
     ) -> None:
         self.vehicle = VehicleState()
         self.outcome = Outcome()
@@ -85,6 +87,8 @@ class Companion:
         self._followed_s = clock.now_s()
         self._stopped = False
         self._stop_asked = False
+        tuned = (self._outbox, self._whereabouts, self._start_up)
+        self._attendant = Attendant(settings, autopilot, self._tell, keep_settings, tuned)
         self._handover = HandOver(autopilot, self._send)
         self._done = False
 
@@ -138,7 +142,9 @@ class Companion:
         self._reporter.news.clear()
         for event in self._autopilot.poll(now_s):
             self.vehicle = fold(self.vehicle, event)
+            self._attendant.take(event)
             self._take_in(event)
+        self._settings = self._attendant.attend(self._pursuit, now_s)
         if self._stop_asked and not self._handover.begun:
             self._hand_over(now_s, "stopped by the user")
         if not self._handover.begun:
@@ -322,6 +328,8 @@ class Companion:
 
     def _tell_of_faults(self, now_s: float) -> None:
         """What a person should know though it stops nothing, once each."""
+        if self._autopilot.signing_trouble and self.vehicle.heartbeat is not None:
+            self._tell_once(self._autopilot.signing_trouble)
         if self._pursuit is not None:
             if self._autopilot.twin_heard(now_s):
                 self._tell_once("Another companion speaks as this component: stop one of them")

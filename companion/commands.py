@@ -111,6 +111,25 @@ class EndTransfer:
 
 
 @dataclass(frozen=True, slots=True)
+class TellParameter:
+    """One of the companion's own parameters, at its place in the list of ``count``."""
+
+    name: str
+    value: float
+    index: int
+    count: int
+    whole_number: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class TellFigure:
+    """A figure for people to watch; its name has at most 10 characters."""
+
+    name: str
+    value: float
+
+
+@dataclass(frozen=True, slots=True)
 class Say:
     """Text for the people at the ground station; severity as in MAVLink (6 info, 4 warning, 2 critical)."""
 
@@ -145,6 +164,8 @@ Command = (
     | EndTransfer
     | Say
     | AnswerTarget
+    | TellParameter
+    | TellFigure
 )
 
 __all__ = [
@@ -166,4 +187,6 @@ __all__ = [
     "Say",
     "SetMode",
     "Setpoint",
+    "TellFigure",
+    "TellParameter",
 ]

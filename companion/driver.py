@@ -109,6 +109,14 @@ class Driver:
         """Whether a step is under way, so that the generator of random numbers is between two states."""
         return self._runner.busy
 
+    def retune(self, settings: Settings) -> None:
+        """Other settings from the next tick on; the leg goes on."""
+        self._settings = settings
+        self.searcher.settings = settings.navigator
+        self._recovery.retune(settings.guidance)
+        if self._helm is not None:
+            self._helm.retune(settings)
+
     @property
     def goal(self) -> ResolvedTarget | None:
         """Where this leg leads."""
@@ -176,7 +184,8 @@ class Driver:
         rover = self._rover
         if self._goal.speed_m_s is not None:
             rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
-        planned_m_s = max(self.route.planned_m_s, self._settings.guidance.min_speed_m_s)
+        guidance = self._settings.guidance
+        planned_m_s = min(max(self.route.planned_m_s, guidance.min_speed_m_s), guidance.max_speed_m_s)
         rover = replace(rover, cruise_speed_m_s=min(rover.cruise_speed_m_s, planned_m_s))
         now = self._guided(self.route, pose, speed_m_s, rover)
         if self._recovery.is_stuck(pose, now):
@@ -240,6 +249,7 @@ class Driver:
         fastest_m_s = self._rover.cruise_speed_m_s
         if self._goal is not None and self._goal.speed_m_s is not None:
             fastest_m_s = self._goal.speed_m_s
+        fastest_m_s = min(fastest_m_s, self._settings.guidance.max_speed_m_s)
         slowest_m_s = min(self._settings.guidance.min_speed_m_s, fastest_m_s)
         resolution_m = self.evidence.base.resolution_m
         turning_radius_m = self._rover.turning_radius_m * self._settings.steering.planned_radius

@@ -7,7 +7,7 @@ import math
 from companion.commands import ChangeSpeed, Command, GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
 from companion.frames import wrap_pi_rad
 from companion.guidance import Guide
-from companion.settings import GuidanceSettings
+from companion.settings import GuidanceSettings, Settings
 
 VELOCITY_PERIOD_S = 0.2
 SPEED_PERIOD_S = 0.5
@@ -20,6 +20,10 @@ class Outbox:
     def __init__(self, settings: GuidanceSettings) -> None:
         self._settings = settings
         self.reset()
+
+    def retune(self, settings: Settings) -> None:
+        """Other settings from now on."""
+        self._settings = settings.guidance
 
     def reset(self) -> None:
         """Forget what was sent: the next setpoint goes out at once."""

@@ -93,6 +93,12 @@ class Pursuit:
         """Every target's name and what has become of it so far."""
         return [(t.name, status) for t, status in zip(self.itinerary.targets, self.itinerary.statuses, strict=True)]
 
+    def retune(self, settings: Settings) -> None:
+        """Other settings from the next tick on; those of the map itself and the planner stay."""
+        self._settings = settings
+        self._tracker.retune(settings.traffic)
+        self.driver.retune(settings)
+
     def map_scan(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
         """Take a scan into the map, unless it is smeared by turning."""
         if abs(yaw_rate_rad_s) <= np.radians(self._settings.mapping.max_yaw_rate_deg_s):

@@ -40,6 +40,10 @@ class Recovery:
         self._back_until_s = -math.inf
         self._stuck_places: dict[Cell, int] = {}
 
+    def retune(self, settings: GuidanceSettings) -> None:
+        """Other settings from now on."""
+        self._settings = settings
+
     def begin(self, pose: Pose) -> None:
         """From here and now on progress is expected."""
         self._progress = Progress(pose, pose.time_s, pose.time_s)

@@ -85,6 +85,10 @@ class StartUp:
         self._look_again_s = -math.inf
         self._checked = False
 
+    def retune(self, settings: Settings) -> None:
+        """Other settings from now on."""
+        self._settings = settings
+
     def step(self, vehicle: VehicleState, control: Control, now_s: float) -> tuple[Laid | None, Command | None]:
         """The mission on the ground once the rover may be driven; until then the command to give now, if any.
 

@@ -80,6 +80,10 @@ class Helm:
         self.backwards = False
         self._told_m = 0.0
 
+    def retune(self, settings: Settings) -> None:
+        """Other settings from now on."""
+        self._settings = settings
+
     def reset(self) -> None:
         """The leg is over: no manoeuvre is under way."""
         self.manoeuvre = None

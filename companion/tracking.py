@@ -111,6 +111,10 @@ class Tracker:
         self._tracks: tuple[Track, ...] = ()
         self._numbers = 0
 
+    def retune(self, settings: TrafficSettings) -> None:
+        """Other settings from now on."""
+        self._settings = settings
+
     def take(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
         """Look through a scan that has not been taken into the map yet."""
         if abs(yaw_rate_rad_s) > MAX_YAW_RATE_RAD_S or len(scan.bearing_rad) < LEAST_BEAMS:

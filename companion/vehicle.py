@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
+from companion.events_parameters import ParameterRequest
 from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.events_targets import TargetAsked
 from companion.frames import GeoPoint, Pose
@@ -193,6 +194,7 @@ Event = (
     | PlanChangedSeen
     | TargetAsked
     | SticksSeen
+    | ParameterRequest
 )
 
 

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from companion.laying import apart_m
 from companion.pursuit import Pursuit, Tell
+from companion.settings import Settings
 from companion.vehicle import Event, HomeSeen, LocalPositionSeen, OriginSeen, VehicleState
 
 WARNING = 4
@@ -31,6 +32,10 @@ class Whereabouts:
         self._doubt_s = 0.0
         self._asked_s = self._settled_s = -math.inf
         self._home_told = False
+
+    def retune(self, settings: Settings) -> None:
+        """Other settings from now on."""
+        self._jump_m = settings.safety.jump_m
 
     @property
     def position_doubted(self) -> bool:

@@ -20,6 +20,7 @@ from companion.commands import GuidedPosition
 from companion.disk import OsDisk
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
+from companion.mavlink.signing import Signer
 from companion.mavlink.transport import MemoryLink
 from companion.memory import Memory
 from companion.mission.load import load_mission
@@ -116,8 +117,11 @@ class Rig:
         arm: bool = True,
         late_s: float = 0.0,
         state: Path | None = None,
+        port: int = 0,
+        signer: Signer | None = None,
     ) -> None:
-        """``late_s``: how long the vehicle has been switched on when the companion comes; ``state``: the directory where it keeps its state."""
+        """``late_s``: how long the vehicle has been switched on when the companion comes; ``state``: the directory where it keeps its
+        state; ``port``: the vehicle's serial port it is on."""
         settings = settings or Settings()
         warm_up(settings, mission.rover.turning_radius_m)
         self.settings = settings
@@ -135,7 +139,8 @@ class Rig:
         self._now_s = self.simulator.time_s
         self._mode: int | None = None
         self._armed = False
-        self._vehicle = self.simulator.connect()
+        self._vehicle = self.simulator.connect(port)
+        self.signer = signer
         self._pilot = self.simulator.connect()
         self._pilot_mav = mavlink.MAVLink(None, 255, 190)
         self._up, self._down = mavlink.MAVLink(None), mavlink.MAVLink(None)
@@ -148,7 +153,9 @@ class Rig:
         """A companion that knows nothing yet takes the place of the one before, or with ``resume`` one that takes up what that has left."""
         memory = None if self._state is None else kept_in(self._state, mission, resume=resume)
         near, self._far = MemoryLink.pair()
-        self.link = AutopilotLink(near, Codec(self.settings.link), self.settings.link, self.recorder)
+        self.link = AutopilotLink(
+            near, Codec(self.settings.link, signer=self.signer), self.settings.link, self.recorder
+        )
         self.companion = Companion(
             self.link,
             self,
@@ -223,6 +230,10 @@ class Rig:
         """A person at the ground station."""
         filled = [*parameters, *([0.0] * (7 - len(parameters)))]
         message = mavlink.MAVLink_command_long_message(1, 1, command, 0, *filled)
+        self._pilot.receive(message.pack(self._pilot_mav))
+
+    def station(self, message: Any) -> None:
+        """Anything else that a ground station sends."""
         self._pilot.receive(message.pack(self._pilot_mav))
 
     def pilot_mode(self, mode: int) -> None:

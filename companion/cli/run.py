@@ -12,16 +12,18 @@ from typing import Annotated
 import typer
 
 from companion.app import Companion, Status
-from companion.cli.inputs import usable_settings
+from companion.cli.inputs import OutputError, usable_settings
 from companion.cli.keeping import Keeping
 from companion.cli.levels import ERROR, INFO, Reader, levelled, reader_of
 from companion.cli.live import Live, LiveConsole
 from companion.cli.service import Service
+from companion.cli.state import StateFiles
 from companion.clock import WallClock
 from companion.itinerary import TargetStatus
 from companion.mapfiles import MapError
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
+from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError, open_link
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
@@ -33,6 +35,16 @@ from companion.warmup import warm_up
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 STDERR = 2
+BAD_INPUT = (
+    SettingsError,
+    MissionError,
+    MapError,
+    LinkError,
+    RecordError,
+    StatePlaceError,
+    OutputError,
+    SigningKeyError,
+)
 EXIT_REACHED, EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED = 0, 2, 3, 130
 
 
@@ -52,6 +64,9 @@ def run(
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on where the run that kept its state there ended.")
     ] = False,
+    signing_key: Annotated[
+        Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
+    ] = None,
 ) -> None:
     """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 130: stopped by a signal."""
     console = LiveConsole(stderr=True)
@@ -63,7 +78,10 @@ def run(
 
     try:
         with _StopSignals() as stop, contextlib.ExitStack() as ends:
-            settings = usable_settings(settings_file)
+            files = StateFiles(state)
+            ends.callback(files.close)
+            settings = files.settings(usable_settings(settings_file), say)
+            signer = files.signer(signing_key)
             mission = load_mission(mission_file)
             keeping = Keeping(mission, state, resume=resume, say=say)
             ends.callback(keeping.close)
@@ -78,9 +96,12 @@ def run(
             if place != record:
                 say(f"{record} has a record already; this one goes to {place}")
             keeping.start()
+            autopilot = AutopilotLink(link, Codec(settings.link, signer=signer), settings.link, recorder)
             live = Live(console, mission.name, reader)
-            code = _drive(mission, settings, link, recorder, live, stop, place, keeping, seed=seed, arm=arm)
-    except (SettingsError, MissionError, MapError, LinkError, RecordError, StatePlaceError) as error:
+            code = _drive(
+                mission, settings, link, autopilot, recorder, live, stop, place, keeping, files, seed=seed, arm=arm
+            )
+    except BAD_INPUT as error:
         typer.echo(levelled(str(error), ERROR, reader) if reader is Reader.JOURNAL else str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     if stop.asked:
@@ -92,20 +113,30 @@ def _drive(
     mission: Mission,
     settings: Settings,
     link: ByteLink,
+    autopilot: AutopilotLink,
     recorder: Recorder | NullRecorder,
     live: Live,
     stop: _StopSignals,
     record: Path | None,
     keeping: Keeping,
+    files: StateFiles,
     *,
     seed: int,
     arm: bool,
 ) -> int:
     """Drive to the end, close everything, and say what came of it. Returns the exit code."""
     runner = ThreadRunner()
-    autopilot = AutopilotLink(link, Codec(settings.link), settings.link, recorder)
     companion = Companion(
-        autopilot, WallClock(), mission, settings, runner, recorder, seed=seed, arm=arm, memory=keeping.memory
+        autopilot,
+        WallClock(),
+        mission,
+        settings,
+        runner,
+        recorder,
+        seed=seed,
+        arm=arm,
+        memory=keeping.memory,
+        keep_settings=files.keep,
     )
     stop.listener = companion
     service = Service(os.environ)
@@ -127,6 +158,9 @@ def _drive(
         recorder.close()
     code = _told(companion.statuses())
     with contextlib.suppress(OSError):  # nobody reads on: the exit code still tells
+        for line in (files.close(), str(autopilot.codec.counters.refused)):
+            if line:
+                typer.echo(line, err=True)
         if record is not None:
             _save_map(companion, record)
             if recorder.problem:

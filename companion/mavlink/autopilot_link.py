@@ -73,7 +73,13 @@ class AutopilotLink:
         """While no rover has been heard: where was listened, and who spoke instead."""
         refused = self._codec.refused_type
         other = "" if refused is None else f" (heard a vehicle of type {refused}, which is no ArduPilot rover)"
-        return f" on {self.description}{other}"
+        signing = self._codec.signing_trouble
+        return f" on {self.description}{other}{f' ({signing})' if signing else ''}"
+
+    @property
+    def signing_trouble(self) -> str:
+        """What is wrong with signatures, in words; empty for nothing."""
+        return self._codec.signing_trouble
 
     @property
     def codec(self) -> Codec:
@@ -102,6 +108,8 @@ class AutopilotLink:
         """What has come in since the last call."""
         events: list[Event] = []
         for packet in self._codec.packets(self._link.read()):
+            if not self._codec.accepts(packet):
+                continue
             self._log.packet(now_s, packet.raw)
             if self._codec.is_own_heartbeat(packet) and packet.raw not in self._own:  # some networks send all back
                 self._twin_s = now_s

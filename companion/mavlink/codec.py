@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 from companion.commands import Command
 from companion.frames import GeoPoint
-from companion.mavlink.decode import MISSION_ACK_COMMAND, Decoder
+from companion.mavlink.decode import AUTOPILOT, MISSION_ACK_COMMAND, Decoder
 from companion.mavlink.encode import EncodeError, Encoder, command_number
-from companion.mavlink.framing import Framer, Packet
+from companion.mavlink.framing import MAGIC_V2, SIGNED, Framer, Packet
+from companion.mavlink.signing import Refused, Signer, trouble
 from companion.settings import LinkSettings
 from companion.vehicle import Event
 
@@ -28,6 +29,8 @@ class LinkCounters:
     """Packets of other vehicles and ground stations, or before the vehicle was known."""
     lost: int
     """Packets of the autopilot that are missing, by their sequence numbers."""
+    refused: Refused
+    """Packets that were not believed, because of their signature or for want of one."""
 
 
 class Codec:
@@ -37,10 +40,12 @@ class Codec:
     The companion speaks under the vehicle's system id. Any bytes may be fed; none make it fail.
     """
 
-    def __init__(self, settings: LinkSettings, system_id: int = 1) -> None:
+    def __init__(self, settings: LinkSettings, system_id: int = 1, signer: Signer | None = None) -> None:
         self._framer = Framer()
         self._decoder = Decoder(system_id, settings.component_id)
-        self._encoder = Encoder(settings.setpoint, settings.component_id)
+        self._encoder = Encoder(settings.setpoint, settings.component_id, signer)
+        self._signer = signer
+        self._signed_heard = False
 
     @property
     def system_id(self) -> int:
@@ -81,11 +86,34 @@ class Codec:
     def counters(self) -> LinkCounters:
         """How good the line is."""
         decoder = self._decoder
-        return LinkCounters(self._framer.bad_bytes, self._framer.unknown, decoder.other_systems, decoder.lost)
+        refused = Refused() if self._signer is None else self._signer.refused
+        return LinkCounters(self._framer.bad_bytes, self._framer.unknown, decoder.other_systems, decoder.lost, refused)
+
+    @property
+    def signing_trouble(self) -> str:
+        """What is wrong with signatures, in words; empty for nothing."""
+        if self._signer is None:
+            if not self._signed_heard:
+                return ""
+            return "The autopilot signs: without --signing-key it ignores us, but on its first port"
+        return trouble(self._signer.refused, self.vehicle_known)
+
+    def accepts(self, packet: Packet) -> bool:
+        """Whether to believe a packet: with a key, only if it is signed with it, and newer than those before."""
+        if self._signer is not None:
+            return self._signer.accepts(packet)
+        signed = packet.raw[0] == MAGIC_V2 and bool(packet.raw[2] & SIGNED)
+        self._signed_heard |= signed and (packet.system_id, packet.component_id) == (self.system_id, AUTOPILOT)
+        return True
 
     def decode(self, data: bytes, time_s: float) -> list[Event]:
         """The events in these bytes; pieces of packets are kept for the next call. ``time_s``: the companion's clock."""
-        return [event for packet in self.packets(data) for event in self.decode_packet(packet, time_s)]
+        return [
+            event
+            for packet in self.packets(data)
+            if self.accepts(packet)
+            for event in self.decode_packet(packet, time_s)
+        ]
 
     def packets(self, data: bytes) -> list[Packet]:
         """The whole packets in these bytes, of whomever and whatever (for recording)."""

@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.frames import GeoPoint
 from companion.latency import TimeAnswered
-from companion.mavlink import others, ranges, requests
+from companion.mavlink import others, parameter_requests, ranges, requests
 from companion.mavlink.framing import Packet
 from companion.mavlink.places import point_of
 from companion.mavlink.texts import TextAssembler
@@ -90,6 +90,9 @@ class Decoder:
         """The events of one packet; none when it is of no interest, from somebody else, repeated or too old."""
         if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not self.vehicle_known:
             self._learn(packet)
+        if packet.message_id in parameter_requests.READERS and self.vehicle_known:
+            asked = parameter_requests.request(self._message(packet), self.system_id, self.component_id, time_s)
+            return [] if asked is None else [asked]
         if packet.system_id != self.system_id or not self.vehicle_known:
             self.other_systems += 1
             return self._of_others(packet, time_s) if self.vehicle_known else []

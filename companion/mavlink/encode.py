@@ -25,9 +25,12 @@ from companion.commands import (
     RequestRate,
     Say,
     SetMode,
+    TellFigure,
+    TellParameter,
 )
 from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.answers import answer_message
+from companion.mavlink.signing import Signer
 from companion.mavlink.texts import chunks_of
 
 POSITION_ONLY = 0x0DFC
@@ -49,10 +52,14 @@ class EncodeError(Exception):
 class Encoder:
     """Writes packets under one system and component id, numbered in order."""
 
-    def __init__(self, setpoint_form: str, component_id: int) -> None:
+    def __init__(self, setpoint_form: str, component_id: int, signer: Signer | None = None) -> None:
         self._form = setpoint_form
         self._mav: Any = mavlink.MAVLink(None)
         self._mav.srcComponent = component_id
+        self._signer = signer
+        if signer is not None:
+            self._mav.signing.secret_key = signer.key
+            self._mav.signing.sign_outgoing = True
         self._text_id = 0
         self._system_id = 1
         self._boot_ms = 0
@@ -69,6 +76,8 @@ class Encoder:
         return [self._packed(message) for message in self._messages(command, origin, confirmation)]
 
     def _packed(self, message: Any) -> bytes:
+        if self._signer is not None:
+            self._mav.signing.timestamp = self._signer.next_timestamp()
         raw = bytes(message.pack(self._mav))
         self._mav.seq = (self._mav.seq + 1) % 256
         return raw
@@ -93,6 +102,11 @@ class Encoder:
                 return [self._transfer(command)]
             case AnswerTarget():
                 return [answer_message(command)]
+            case TellParameter():
+                return [_parameter_value(command)]
+            case TellFigure():
+                name = command.name.encode("ascii")
+                return [mavlink.MAVLink_named_value_float_message(self._boot_ms, name, command.value)]
             case _:
                 return [self._command_long(command, confirmation)]
 
@@ -182,6 +196,13 @@ def _heartbeat() -> Any:
     return mavlink.MAVLink_heartbeat_message(
         mavlink.MAV_TYPE_ONBOARD_CONTROLLER, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, mavlink.MAV_STATE_ACTIVE, 3
     )
+
+
+def _parameter_value(command: TellParameter) -> Any:
+    """Whole numbers travel as such in the float, as ArduPilot sends them, not as its bytes."""
+    kind = mavlink.MAV_PARAM_TYPE_INT32 if command.whole_number else mavlink.MAV_PARAM_TYPE_REAL32
+    name = command.name.encode("ascii")
+    return mavlink.MAVLink_param_value_message(name, command.value, kind, command.count, command.index)
 
 
 def command_number(command: Command) -> int | None:

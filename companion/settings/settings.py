@@ -138,6 +138,9 @@ class GuidanceSettings(Section):
         1.5, gt=0.0, description="never faster than this with single thin beams, between which much stays unseen"
     )
     min_speed_m_s: float = Field(0.5, gt=0.0, description="never asked to go slower than this")
+    max_speed_m_s: float = Field(
+        20.0, gt=0.0, description="never asked to go faster than this, whatever the mission says"
+    )
     stuck_after_s: float = Field(6.0, gt=0.0, description="no progress for so long: back out and plan anew")
     back_out_m: float = Field(0.8, ge=0.0, description="how far to back out")
     back_out_speed_m_s: float = Field(0.4, gt=0.0, description="how fast to back out")
@@ -235,6 +238,12 @@ class LinkSettings(Section):
     attitude_rate_hz: float = Field(20.0, gt=0.0, le=50.0, description="asked for: ATTITUDE")
     range_rate_hz: float = Field(
         10.0, gt=0.0, le=50.0, description="asked for: DISTANCE_SENSOR and RANGEFINDER, where there are any"
+    )
+    figures_hz: float = Field(
+        1.0,
+        ge=0.0,
+        le=10.0,
+        description="how often the figures for ground stations are sent (NAMED_VALUE_FLOAT); 0 never",
     )
     tick_hz: float = Field(20.0, ge=5.0, le=100.0, description="the companion's own loop")
     component_id: int = Field(191, ge=1, le=255, description="the companion's own; its system id is the vehicle's")

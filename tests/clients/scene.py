@@ -137,8 +137,8 @@ class Scene:
 
 
 @contextmanager
-def scene(folder: Path, companion_on: str) -> Iterator[Scene]:
-    """``companion_on``: tcp or udp; the ground station gets the other one. Nobody arms yet."""
+def scene(folder: Path, companion_on: str, *options: object) -> Iterator[Scene]:
+    """``companion_on``: tcp or udp; the ground station gets the other one. ``options`` of the companion. Nobody arms yet."""
     path = mission_path(yard(folder, TARGETS))
     path.write_text(path.read_text().replace("cruise_speed_m_s = 2.0", f"cruise_speed_m_s = {CRUISE_M_S}"))
     tcp, udp = free_port(), free_port(socket.SOCK_DGRAM)
@@ -149,7 +149,7 @@ def scene(folder: Path, companion_on: str) -> Iterator[Scene]:
     warm_up(Settings())
     with program(folder, "-c", "from sitl.cli.main import main; main()", *sitl) as serve:
         serve.says(f"sending to {listen[1]}", limit_s=180.0)
-        run = ["run", path, "--connect", url]
+        run = ["run", path, "--connect", url, "--state", folder / "state", *options]
         with program(folder, "-c", "from companion.cli.main import main; main()", *run) as companion:
             witness = Witness(tcp)
             try:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -10,6 +11,7 @@ from pathlib import Path
 import pytest
 from pymavlink import mavwp
 
+from companion.tuning import TABLE
 from tests.clients.program import Program, installed, program
 from tests.clients.scene import HOME_DEG, PLACES, Scene, metres_from_home, scene
 from tests.rig import GUIDED, HOLD
@@ -86,14 +88,38 @@ def lists_up_and_down(ground: Program, here: Scene, folder: Path) -> None:
         )
 
 
+def tuned(ground: Program, here: Scene, folder: Path) -> None:
+    """The companion's own parameters: by MAVProxy as a person types them, then by pymavlink; kept in the state directory."""
+    kept = folder / "state" / "tuned.toml"
+    ground.told("set target_component 191", rf"Received {len(TABLE)} parameters")
+    ground.told("param show CMP_HORIZON", r"CMP_HORIZON +8\.0")
+    ground.told("param set CMP_HORIZON 6", r"AP: CMP_HORIZON 8 -> 6")
+    ground.told("param fetch CMP_HORIZON", r"CMP_HORIZON = 6\.0")
+    ground.told("param set CMP_HORIZON 600", r"Failed to set CMP_HORIZON to 600 \(invalid returned value 6\.0\)")
+    ground.says("AP: CMP_HORIZON stays 6: 600 not in 2..30")
+    ground.tell("set target_component 1")
+    here.companion.says("CMP_HORIZON stays 6")
+    assert tomllib.loads(kept.read_text()) == {"guidance": {"horizon_m": 6.0}}
+
+    mav = here.witness.link.mav
+    mav.param_set_send(1, 191, b"CMP_STUCK", 9.0, 9)
+    answer = here.witness.wait(lambda m: m.get_type() == "PARAM_VALUE" and m.get_srcComponent() == 191)
+    assert (answer.param_id, answer.param_value, answer.param_count) == ("CMP_STUCK", 9.0, len(TABLE))
+    mav.param_request_read_send(1, 191, b"CMP_HORIZON", -1)
+    assert here.witness.wait(lambda m: m.get_type() == "PARAM_VALUE" and m.param_id == "CMP_HORIZON").param_value == 6.0
+
+
 @pytest.mark.slow
 def test_mavproxy_beside_the_companion(tmp_path: Path) -> None:
     with scene(tmp_path, companion_on="udp") as here, mavproxy(tmp_path, here.tcp) as ground:
         ground.says(r"Received \d+ parameters")
         here.may_be_armed()
+        tuned(ground, here, tmp_path)
         ground.told("mode guided", "DO_SET_MODE: ACCEPTED")
         ground.told("arm throttle", "AP: Throttle armed")
         here.driving()
+        figure = here.witness.wait(lambda m: m.get_type() == "NAMED_VALUE_FLOAT")
+        assert figure.get_srcComponent() == 191
 
         assert float(ground.told("param show WP_SPEED", r"WP_SPEED +([\d.]+)")[1]) == pytest.approx(0.4)
         ground.tell("param set RTL_SPEED 0.25")  # it does not answer
@@ -119,3 +145,19 @@ def test_mavproxy_beside_the_companion(tmp_path: Path) -> None:
         assert here.witness.mode == GUIDED
         here.untouched()
         assert "Traceback" not in ground.output
+
+
+@pytest.mark.slow
+def test_mavproxy_gives_the_vehicle_the_key_that_the_companion_has(tmp_path: Path) -> None:
+    """The companion is on a port where the vehicle believes only signed packets."""
+    key = tmp_path / "key"
+    key.write_text("green-meadow\n")
+    key.chmod(0o600)
+    with scene(tmp_path, "udp", "--signing-key", key) as here, mavproxy(tmp_path, here.tcp) as ground:
+        here.companion.says("has the autopilot been given the key?")
+        ground.told("signing setup green-meadow", "Setup signing key")
+        here.companion.says("a person to arm")
+        here.witness.until(lambda: here.witness.mode == GUIDED)
+        ground.told("set target_component 191", rf"Received {len(TABLE)} parameters")
+        ground.told("param set CMP_HORIZON 6", "AP: CMP_HORIZON 8 -> 6")
+        assert int((tmp_path / "state" / "signing-time").read_text()) > 0

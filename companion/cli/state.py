@@ -1,0 +1,57 @@
+"""What ``rover-companion run`` keeps beyond its end, in the directory that ``--state`` names, and the signing that needs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from companion.cli.inputs import writable
+from companion.mavlink.signing import Signer, load_key
+from companion.mavlink.signing_time import TimeFile
+from companion.saving import Saver
+from companion.settings import Settings
+from companion.tuning import as_toml, differences, with_tuned
+
+TUNED = "tuned.toml"
+"""Settings that a ground station has changed."""
+SIGNING_TIME = "signing-time"
+"""The signing timestamp, saved ahead."""
+
+
+class StateFiles:
+    """The files of a state directory; without one nothing is kept."""
+
+    def __init__(self, directory: Path | None) -> None:
+        """Raises OutputError if nothing can be written there."""
+        self._directory = directory
+        self._saver = Saver()
+        self._base = Settings()
+        if directory is not None:
+            writable(directory / TUNED)
+
+    def settings(self, base: Settings, tell: Callable[[str], None]) -> Settings:
+        """The settings with what ground stations have changed in earlier runs. Raises SettingsError."""
+        self._base = base
+        if self._directory is None:
+            return base
+        settings = with_tuned(base, self._directory / TUNED)
+        if tuned := differences(base, settings):
+            tell(f"tuned from a ground station: {', '.join(tuned)}")
+        return settings
+
+    def keep(self, tuned: Settings) -> None:
+        """Keep them for the next run; returns at once."""
+        if self._directory is not None:
+            self._saver.save(self._directory / TUNED, as_toml(self._base, tuned).encode())
+
+    def signer(self, key_file: Path | None) -> Signer | None:
+        """Signs with the key of a file, None without one. Raises SigningKeyError."""
+        if key_file is None:
+            return None
+        saved = None if self._directory is None else TimeFile(self._directory / SIGNING_TIME, self._saver)
+        return Signer(load_key(key_file), saved=saved)
+
+    def close(self) -> str:
+        """Write what is left; why something could not be written, or nothing."""
+        self._saver.close()
+        return self._saver.problem

@@ -1,0 +1,195 @@
+"""Signed packets (MAVLink guide, "Message Signing"): signed with a key and the time, and believed only if signed so."""
+
+from __future__ import annotations
+
+import hashlib
+import hmac
+import math
+import stat
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import Protocol
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from companion.clock import unix_time_us
+from companion.mavlink.framing import MAGIC_V2, SIGNATURE, SIGNED, Packet
+
+TICKS_PER_S = 100_000
+"""Signing timestamps count 10 microseconds since the beginning of 2015 (UTC)."""
+EPOCH_UNIX_S = 1_420_070_400
+MINUTE = 60 * TICKS_PER_S
+"""A sender that has not been heard before may be so late, no more."""
+LAST_TICK = (1 << 48) - 1
+AHEAD = 60 * TICKS_PER_S
+"""The time is saved so far ahead of what has been used,"""
+AGAIN = 30 * TICKS_PER_S
+"""and again when less than this is left of it: every half minute."""
+MOST_STREAMS = 64
+HEX_DIGITS = 64
+LONGEST_KEY = 1024
+ACCEPTED_UNSIGNED = frozenset({mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO})
+"""What radios say of themselves, having no key; as in ArduPilot. Nothing is done upon either."""
+
+
+class SigningKeyError(Exception):
+    """A key file that cannot be used; the text is one line with file, reason and remedy."""
+
+
+def load_key(path: Path) -> bytes:
+    """The 32 bytes of a key file: 64 hexadecimal digits, or else a passphrase, of which it is the SHA-256.
+
+    So MAVProxy and Mission Planner make a key of a passphrase. Raises SigningKeyError, also if others may read the file.
+    """
+    try:
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode):
+            raise SigningKeyError(f"{path}: not a file; name a file with the passphrase or 64 hexadecimal digits")
+        if mode & (stat.S_IRWXG | stat.S_IRWXO):
+            raise SigningKeyError(f"{path}: others may use this file (mode {stat.S_IMODE(mode):04o}); chmod 600 {path}")
+        with path.open("rb") as file:
+            data = file.read(LONGEST_KEY + 1)
+    except OSError as error:
+        raise SigningKeyError(f"{path}: cannot be read: {error.strerror or error}") from error
+    try:
+        text = data.decode().removesuffix("\n").removesuffix("\r")
+    except UnicodeDecodeError as error:
+        raise SigningKeyError(f"{path}: not text; 32 bytes are written as 64 hexadecimal digits") from error
+    if not text or "\n" in text or len(data) > LONGEST_KEY:
+        raise SigningKeyError(f"{path}: one line is wanted: a passphrase, or 64 hexadecimal digits")
+    if len(text) != HEX_DIGITS or any(digit not in "0123456789abcdefABCDEF" for digit in text):
+        return hashlib.sha256(text.encode()).digest()
+    key = bytes.fromhex(text)
+    if not any(key):
+        raise SigningKeyError(f"{path}: a key of zeros means no signing; choose another one")
+    return key
+
+
+def ticks_now() -> int:
+    """The computer's clock as a signing timestamp; it may be wrong."""
+    return max(0, unix_time_us() - EPOCH_UNIX_S * 1_000_000) // 10
+
+
+class SavedTime(Protocol):
+    """Keeps a timestamp beyond the end of the program."""
+
+    @property
+    def saved(self) -> float:
+        """The newest timestamp that is safely kept; inf if nothing is to be kept."""
+        ...
+
+    def save(self, timestamp: int) -> None:
+        """Keep this one; returns at once, ``saved`` follows."""
+        ...
+
+
+class NotSaved:
+    """For those who rely on the computer's clock."""
+
+    saved = math.inf
+
+    def save(self, timestamp: int) -> None:
+        """Nothing to do."""
+
+
+class Refusal(StrEnum):
+    """Why a packet is not believed."""
+
+    UNSIGNED = "unsigned"
+    WRONG = "signed with another key"
+    OLD = "signed too long ago"
+
+
+@dataclass(slots=True)
+class Refused:
+    """How many packets were not believed, by reason."""
+
+    unsigned: int = 0
+    wrong: int = 0
+    old: int = 0
+
+    def __str__(self) -> str:
+        """In words; empty for none."""
+        named = (
+            (self.unsigned, "unsigned"),
+            (self.wrong, "signed with another key"),
+            (self.old, "signed too long ago"),
+        )
+        parts = [f"{count} {what}" for count, what in named if count]
+        return f"packets refused: {', '.join(parts)}" if parts else ""
+
+    def count(self, why: Refusal) -> None:
+        """One more."""
+        self.unsigned += why is Refusal.UNSIGNED
+        self.wrong += why is Refusal.WRONG
+        self.old += why is Refusal.OLD
+
+
+class Signer:
+    """One key. ``clock``: the time in ticks, right or wrong; ``saved``: no timestamp up to what was saved may be used again.
+
+    Its own timestamps never go back, whatever the clock does, also over restarts: none is used that does not lie
+    below what has been saved, unless only a packet's worth beyond the last one.
+    """
+
+    def __init__(self, key: bytes, clock: Callable[[], int] = ticks_now, saved: SavedTime | None = None) -> None:
+        self.key = key
+        self.refused = Refused()
+        self._clock = clock
+        self._saved = saved or NotSaved()
+        self._sent = 0 if self._saved.saved == math.inf else int(self._saved.saved)
+        self._asked = self._sent
+        self._heard = 0
+        self._streams: dict[tuple[int, int, int], int] = {}
+
+    def next_timestamp(self) -> int:
+        """For the next packet: the time, but later than any before."""
+        now = max(self._clock(), self._heard)
+        if now + AGAIN > self._asked:
+            self._asked = min(now + AHEAD, LAST_TICK)
+            self._saved.save(self._asked)
+        self._sent = min(max(self._sent + 1, int(min(now, self._saved.saved))), LAST_TICK)
+        return self._sent
+
+    def accepts(self, packet: Packet) -> bool:
+        """Whether to believe a packet; if not, it is counted."""
+        why = self._refusal(packet)
+        if why is not None:
+            self.refused.count(why)
+        return why is None
+
+    def _refusal(self, packet: Packet) -> Refusal | None:
+        """pymavlink's own check notes the time of a packet before it looks at its signature: a forger could silence a sender."""
+        raw = packet.raw
+        if raw[0] != MAGIC_V2 or not raw[2] & SIGNED:
+            return None if packet.message_id in ACCEPTED_UNSIGNED else Refusal.UNSIGNED
+        if not hmac.compare_digest(hashlib.sha256(self.key + raw[:-6]).digest()[:6], raw[-6:]):
+            return Refusal.WRONG
+        stream = (raw[-SIGNATURE], packet.system_id, packet.component_id)
+        timestamp = int.from_bytes(raw[-12:-6], "little")
+        newest = self._streams.get(stream)
+        if newest is None:
+            if len(self._streams) >= MOST_STREAMS or timestamp + MINUTE < max(self._sent, self._heard):
+                return Refusal.OLD
+        elif timestamp <= newest:
+            return Refusal.OLD
+        self._streams[stream] = timestamp
+        self._heard = max(self._heard, timestamp)
+        return None
+
+
+def trouble(refused: Refused, vehicle_known: bool) -> str:
+    """What refused packets mean, in words for people; empty for none. Of several reasons the gravest."""
+    if not vehicle_known:
+        if refused.wrong:
+            return "Heard only packets that are signed with another key: is it the key that the autopilot was given?"
+        if refused.old:
+            return "Heard only packets that were signed too long ago: is this computer's clock ahead?"
+        return "Heard only unsigned packets: has the autopilot been given the key?" if refused.unsigned else ""
+    if refused.wrong:
+        return "Ignoring packets that are signed with another key"
+    if refused.old:
+        return "Ignoring packets that were signed too long ago, or are heard again"
+    return "Ignoring unsigned packets" if refused.unsigned else ""

@@ -1,0 +1,39 @@
+"""The signing timestamp in a file, so that it does not go back when the program, or the computer's clock, begins anew."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from companion.mavlink.signing import LAST_TICK, SigningKeyError
+from companion.saving import Saver
+
+
+class TimeFile:
+    """Read at once, written by a thread. Raises SigningKeyError when the file is there and cannot be used."""
+
+    def __init__(self, path: Path, saver: Saver) -> None:
+        self._path = path
+        self._saver = saver
+        self.saved: float = _read(path)
+
+    def save(self, timestamp: int) -> None:
+        """Write it; ``saved`` follows when that is done, also if it failed: a full disk must not silence the rover."""
+
+        def done() -> None:
+            self.saved = timestamp
+
+        self._saver.save(self._path, f"{timestamp}\n".encode(), done)
+
+
+def _read(path: Path) -> int:
+    remedy = "delete it if the computer's clock is right and was so before"
+    try:
+        with path.open("rb") as file:
+            text = file.read(64)
+    except FileNotFoundError:
+        return 0
+    except OSError as error:
+        raise SigningKeyError(f"{path}: cannot be read: {error.strerror or error}; make it readable") from error
+    if not text.strip().isdigit() or not 0 <= int(text) <= LAST_TICK:
+        raise SigningKeyError(f"{path}: not a signing timestamp; {remedy}")
+    return int(text)

@@ -1,0 +1,110 @@
+"""A ground station changes settings while the rover drives; through the simulated autopilot's router, in lock-step."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from typer.testing import CliRunner
+
+from companion.cli.commands import app
+from companion.tuning import TABLE
+from tests.rig import Rig, yard
+from tests.served import mission_path
+
+LIST_S = 1.5
+
+
+def values(rig: Rig, since_s: float) -> dict[str, float]:
+    return {s.message.param_id: s.message.param_value for s in rig.sent_since(since_s) if s.kind == "PARAM_VALUE"}
+
+
+def ask_list(rig: Rig, component: int) -> dict[str, float]:
+    since_s = rig.now_s()
+    rig.station(mavlink.MAVLink_param_request_list_message(1, component))
+    rig.run_for(LIST_S)
+    return values(rig, since_s)
+
+
+def put(rig: Rig, name: str, value: float, component: int = 191) -> dict[str, float]:
+    since_s = rig.now_s()
+    rig.station(mavlink.MAVLink_param_set_message(1, component, name.encode(), value, 9))
+    rig.run_for(0.5)
+    return values(rig, since_s)
+
+
+def speeds(rig: Rig, since_s: float) -> list[float]:
+    return [s.message.param2 for s in rig.sent_since(since_s) if s.command == 178]
+
+
+def test_settings_are_listed_and_changed_on_the_way(tmp_path: Path) -> None:
+    rig = Rig(yard(tmp_path), late_s=45.0)
+    rig.run_for(1.0)
+    assert ask_list(rig, 1) == {}  # the autopilot's alone
+    for component in (0, 191):
+        assert list(ask_list(rig, component)) == [parameter.name for parameter in TABLE]
+
+    rig.until_driven(1.0)
+    assert max(speeds(rig, 0.0)) > 1.0
+    assert put(rig, "CMP_SPD_MAX", 0.6) == {"CMP_SPD_MAX": 0.6000000238418579}
+    assert put(rig, "CMP_SPD_MAX", 60.0) == {"CMP_SPD_MAX": 0.6000000238418579}
+    assert "CMP_SPD_MAX stays 0.6: 60 not in 0.1..20" in rig.texts()
+    goal, since_s = rig.companion.status().target, rig.now_s()
+    rig.run_for(3.0)
+    assert rig.speed_m_s < 0.75
+    assert speeds(rig, since_s) and max(speeds(rig, since_s)) < 0.601
+    assert rig.companion.status().target == goal and rig.texts().count(f"Heading for {goal}") == 1
+    rig.finish()
+    assert rig.companion.outcome.complete
+
+
+def test_everything_that_keeps_settings_hears_of_a_change(tmp_path: Path) -> None:
+    rig = Rig(yard(tmp_path), late_s=45.0)
+    rig.until_driven(0.5)
+    put(rig, "CMP_STALE", 0.7)
+    put(rig, "CMP_JUMP", 3.0)
+    put(rig, "CMP_STUCK", 9.0)
+    put(rig, "CMP_WAIT_RETRY", 7.0)
+    companion: Any = rig.companion
+    assert companion._settings.safety.stale_s == 0.7
+    assert companion._whereabouts._jump_m == 3.0
+    assert companion._pursuit._settings is companion.driver._settings is companion._settings
+    assert companion.driver._recovery._settings.stuck_after_s == 9.0
+    assert companion._outbox._settings is companion._settings.guidance
+    assert companion.driver.searcher.settings.wait_retry_s == 7.0
+    assert companion._pursuit._tracker._settings is companion._settings.traffic
+
+
+def test_a_watchdog_that_was_shortened_acts_sooner(tmp_path: Path) -> None:
+    rig = Rig(yard(tmp_path), late_s=45.0)
+    rig.until_driven(0.5)
+    put(rig, "CMP_HOLD_AFTER", 0.5)
+    rig.change = lambda message: None if message.get_type() == "LOCAL_POSITION_NED" else message
+    lost_s = rig.now_s()
+    rig.until(lambda: any(s.command == 176 and s.message.param2 == 4 for s in rig.sent_since(lost_s)), 5.0)
+    assert rig.now_s() - lost_s < 2.0  # a second until stale, half a second until HOLD; by default 3 s
+
+
+def test_a_damaged_file_of_tuned_settings_stops_the_run_before_it_begins(tmp_path: Path) -> None:
+    mission = mission_path(yard(tmp_path))
+    state = tmp_path / "state"
+    state.mkdir()
+    (state / "tuned.toml").write_text("[guidance]\nhorizon_m = -3\n")
+    answer = CliRunner().invoke(app, ["run", str(mission), "--connect", "udpin:127.0.0.1:0", "--state", str(state)])
+    assert answer.exit_code == 2
+    assert "tuned.toml: guidance.horizon_m" in answer.output and "delete it" in answer.output
+
+
+def test_the_figures_come_once_a_second(tmp_path: Path) -> None:
+    rig = Rig(yard(tmp_path), late_s=45.0)
+    rig.until_driven(1.0)
+    since_s = rig.now_s()
+    rig.run_for(5.0)
+    told = [s.message for s in rig.sent_since(since_s) if s.kind == "NAMED_VALUE_FLOAT"]
+    names = [message.name for message in told]
+    assert set(names) == {"NAV_PART", "PATH_COST", "SEARCH_MS", "PROGRESS"}
+    assert all(4 <= names.count(name) <= 6 for name in names)
+    newest = {message.name: message.value for message in told}
+    assert newest["NAV_PART"] in (1.0, 2.0, 3.0)
+    assert newest["PATH_COST"] > 0.0 and newest["SEARCH_MS"] > 0.0 and newest["PROGRESS"] == 0.0
