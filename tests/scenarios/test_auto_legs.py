@@ -42,9 +42,9 @@ def as_file(folder: Path, rows: list[Row]) -> Mission:
 
 def in_auto(folder: Path, rows: list[Row], *, sealed: bool = False) -> Asker:
     """The rover has just been armed and put into AUTO by a person."""
-    rig = Asker(yard(folder, sealed=sealed), arm=False)
+    rig = Asker(yard(folder, sealed=sealed), arm=False, late_s=46.0, state=folder / "state")
     rig.restart_companion(as_file(folder, rows))
-    rig.run_for(46.0)
+    rig.run_for(3.0)
     assert "a person to arm and to set AUTO" in rig.companion.status().doing
     uploaded = [tuple(round(value * 1e7) for value in place_deg(field)) for _, _, field in rows]
     rig.upload([(command, params, place) for (command, params, _), place in zip(rows, uploaded, strict=True)])
@@ -274,3 +274,11 @@ def test_errands_are_not_for_legs_of_auto(tmp_path: Path) -> None:
     rig = in_leg(tmp_path)
     rig.reposition(rig.field(5, 12))
     assert rig.answered() == 1
+
+
+def test_a_companion_that_is_killed_in_a_leg_takes_it_up_again(tmp_path: Path) -> None:
+    rig = in_leg(tmp_path)
+    rig.restart_companion(as_file(tmp_path, ROUND_THE_WALL), resume=True)
+    rig.finish(120.0)
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+    assert_steered_only_in_the_leg(rig)
