@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from companion.attendant import Attendant
+from companion.auto_legs import AutoLegs
 from companion.clock import Clock, stopwatch_s
 from companion.commands import Arm, Command, Say, SetMode
 from companion.driver import Driver
@@ -64,7 +65,7 @@ class Companion:
         memory: Memory | None = None,
         keep_settings: Callable[[Settings], None] | None = None,
     ) -> None:
-        self.vehicle = VehicleState()
+        self.vehicle = VehicleState(in_auto=mission.in_auto)
         self.outcome = Outcome()
         self.watch = Watch()
         self._pursuit: Pursuit | None = None
@@ -84,6 +85,7 @@ class Companion:
         self._watchdogs = Watchdogs()
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
         self._errands = Errands(mission, settings.safety, self._send, self._tell)
+        self._legs = AutoLegs(self._tell)
         self._followed_s = clock.now_s()
         self._stopped = False
         self._stop_asked = False
@@ -204,6 +206,9 @@ class Companion:
             self._pursuit = self._begin(now_s)
             if self._pursuit is None:
                 return
+        if self._legs.follow(self.vehicle, self._pursuit):
+            self._end(self._pursuit, now_s)
+            return
         if self._whereabouts.must_ask(now_s):
             self._autopilot.ask_places()
         before = self.watch.control
@@ -293,9 +298,14 @@ class Companion:
         others = announced(self.vehicle, pose, self._mission.rover.radius_m, self._settings.traffic)
         guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s, others)
         self._reporter.doing = pursuit.doing
+        guide = self._legs.guide(guide, pursuit, self._settings.guidance.min_speed_m_s)
         if guide is not None:
             self._command(self.output_check.passed(guide, pose, self.vehicle.speed_m_s, pursuit.surroundings), now_s)
-            return
+        else:
+            self._end(pursuit, now_s)
+
+    def _end(self, pursuit: Pursuit, now_s: float) -> None:
+        """The mission is over, one way or another."""
         self.outcome.targets = pursuit.statuses()
         self._tell(f"Mission ended: {pursuit.reached} of {len(self.outcome.targets)} targets reached", INFO)
         self._hand_over(now_s, "done")

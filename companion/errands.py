@@ -10,12 +10,12 @@ from companion.events_targets import TargetAnswer, TargetAsked
 from companion.frames import LocalFrame, NedPoint
 from companion.grid import OBSTACLE
 from companion.itinerary import Leg
-from companion.mapping import EvidenceMap
+from companion.laying import Laid
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.pursuit import Pursuit, Tell
 from companion.settings import SafetySettings
-from companion.vehicle import RoverMode, VehicleState
+from companion.vehicle import VehicleState
 
 INFO, WARNING = 6, 4
 REPEAT_S = 5.0
@@ -24,14 +24,19 @@ SAME_M = 0.02
 """Places nearer to each other than this are one: a radio's rounding."""
 
 
-def refusal(place: NedPoint, here: NedPoint, evidence: EvidenceMap, reach_m: float) -> str:
+def refusal(place: NedPoint, here: NedPoint, laid: Laid, reach_m: float) -> str:
     """Why the rover must not be sent to a place, in words; empty when it may, as far as is known. The rest is found on the way."""
     distance_m = here.distance_m(place)
     if distance_m > reach_m:
         return f"{distance_m:.0f} m away, farther than {reach_m:g} m"
+    evidence, bounds = laid.evidence, laid.bounds
     cell = evidence.base.cell_at(place)
     if not evidence.base.contains(cell):
         return "outside the mission's grid"
+    if fence := bounds.outside(place):
+        return f"beyond {fence}"
+    if room := bounds.too_near(place):
+        return f"it must be {room}"
     if evidence.base.weights[cell.y, cell.x] >= OBSTACLE:
         return "in or too near a fence or a known obstacle"
     if evidence.grid.weights[cell.y, cell.x] >= OBSTACLE:
@@ -81,7 +86,7 @@ class Errands:
         if self._is_repeated(asked, place, pursuit):
             self._heard_s = asked.time_s
             return TargetAnswer.ACCEPTED, ""
-        if reason := refusal(place, pose.point, pursuit.evidence, self._reach_m):
+        if reason := refusal(place, pose.point, pursuit.laid, self._reach_m):
             return TargetAnswer.DENIED, reason
         self._last, self._heard_s = asked, asked.time_s
         self._count += 1
@@ -101,5 +106,5 @@ class Errands:
 
 
 def _may_drive(vehicle: VehicleState) -> bool:
-    """As the newest heartbeat says, which may have come with the request itself."""
-    return vehicle.heartbeat is not None and vehicle.heartbeat.armed and vehicle.heartbeat.mode == RoverMode.GUIDED
+    """As the newest heartbeat says, which may have come with the request itself. AUTO's legs are not for errands."""
+    return not vehicle.in_auto and vehicle.is_ours and vehicle.heartbeat is not None and vehicle.heartbeat.armed

@@ -1,8 +1,8 @@
-"""Places that others ask the companion to drive to while it drives: a ground station's guided target."""
+"""Places that others give to the companion: a ground station's guided target, a leg that the autopilot's AUTO hands over."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from companion.frames import GeoPoint
@@ -52,3 +52,76 @@ class TargetAsked:
     speed_m_s: float | None = None
     fault: TargetAnswer = TargetAnswer.ACCEPTED
     reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LegSeen:
+    """SET_POSITION_TARGET_GLOBAL_INT of the autopilot to us: in AUTO, at NAV_GUIDED_ENABLE, once a second (ArduRover's ModeAuto)."""
+
+    time_s: float
+    point: GeoPoint
+
+
+GUIDED_TARGET = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ItemReachedSeen:
+    """MISSION_ITEM_REACHED: a mission item is done; a guided target that was reached is told of as item 0."""
+
+    time_s: float
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class ItemCurrentSeen:
+    """MISSION_CURRENT: the navigation item under way."""
+
+    time_s: float
+    index: int
+
+
+LEG_KEPT_S = 2.5
+"""The autopilot repeats it every second: two repetitions may be lost, then nobody knows whether the leg is still ours."""
+
+
+class LegState(StrEnum):
+    """What is known of a leg that was handed over."""
+
+    LIVE = "live"
+    SILENT = "silent"
+    """Not handed over any more, or not in AUTO: it may be again."""
+    OVER = "over"
+    """The autopilot has gone on to another item."""
+
+
+@dataclass(frozen=True, slots=True)
+class GuidedLeg:
+    """A leg of AUTO's mission. ``told_s``: when it was handed over last; ``index``: its item, as soon as that is known."""
+
+    point: GeoPoint
+    told_s: float
+    index: int | None = None
+    state: LegState = LegState.LIVE
+
+
+def leg_after(leg: GuidedLeg | None, event: LegSeen | ItemReachedSeen | ItemCurrentSeen) -> GuidedLeg | None:
+    """The leg after one more event."""
+    if isinstance(event, LegSeen):
+        goes_on = leg is not None and leg.state is not LegState.OVER and leg.point == event.point
+        return GuidedLeg(event.point, event.time_s, leg.index if leg is not None and goes_on else None)
+    if leg is None or leg.state is LegState.OVER:
+        return leg
+    if isinstance(event, ItemReachedSeen):
+        ours = event.index == leg.index or (leg.index is None and event.index != GUIDED_TARGET)
+        return replace(leg, state=LegState.OVER) if ours else leg
+    if leg.index is None:
+        return replace(leg, index=event.index) if leg.state is LegState.LIVE else leg
+    return leg if event.index == leg.index else replace(leg, state=LegState.OVER)
+
+
+def leg_at_heartbeat(leg: GuidedLeg | None, time_s: float, *, in_auto: bool) -> GuidedLeg | None:
+    """A leg is silent when AUTO (armed) has been left, or when it has not been handed over for too long."""
+    if leg is None or leg.state is not LegState.LIVE or (in_auto and time_s - leg.told_s <= LEG_KEPT_S):
+        return leg
+    return replace(leg, state=LegState.SILENT)

@@ -37,7 +37,7 @@ class HandOver:
         """Stop the rover and ask for HOLD; False, and nothing is sent, if the rover is not ours."""
         self._leave_at_s = now_s
         heartbeat = vehicle.heartbeat
-        if heartbeat is None or heartbeat.mode != RoverMode.GUIDED or control is not Control.COMPANION:
+        if heartbeat is None or not vehicle.is_ours or control is not Control.COMPANION:
             return False
         self._leave_at_s = now_s + HAND_OVER_S
         if heartbeat.armed:
@@ -48,11 +48,11 @@ class HandOver:
         return True
 
     def is_over(self, vehicle: VehicleState, now_s: float) -> bool:
-        """Whether the rover has left GUIDED, or has said that it will, or time is up."""
+        """Whether the rover is no longer ours, or has said that it will, or time is up."""
         assert self._leave_at_s is not None
         ack = self._autopilot.last_ack(SetMode(RoverMode.HOLD))
         answered = ack is not None and ack.result == 0 and ack.time_s > self._leave_at_s - HAND_OVER_S
-        left = vehicle.heartbeat is not None and vehicle.heartbeat.mode != RoverMode.GUIDED
+        left = vehicle.heartbeat is not None and not vehicle.is_ours
         over = answered or left or now_s >= self._leave_at_s
         if not over and now_s >= self._again_s:
             self._again_s = now_s + AGAIN_S

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -70,6 +71,22 @@ def with_errand(itinerary: Itinerary, errand: ResolvedTarget) -> Itinerary:
     elif itinerary.leg is Leg.WAIT:
         itinerary = replace(itinerary, leg=Leg.TRAVEL)
     return replace(itinerary, errand=errand)
+
+
+def parked(itinerary: Itinerary) -> Itinerary:
+    """Nowhere to go until somebody says so; all over when every target has had its turn."""
+    over = TargetStatus.PENDING not in itinerary.statuses
+    return replace(itinerary, leg=Leg.DONE if over else Leg.STAY, until_s=math.inf)
+
+
+def sent_to(itinerary: Itinerary, index: int) -> Itinerary:
+    """To this target, whatever the order."""
+    return replace(itinerary, index=index, leg=Leg.TRAVEL, give_up_s=None)
+
+
+def ended_at(itinerary: Itinerary, status: TargetStatus) -> Itinerary:
+    """Somebody else has ended this target: that is what has become of it."""
+    return parked(_marked(itinerary, status))
 
 
 def relaid(

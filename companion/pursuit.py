@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -162,6 +163,8 @@ class Pursuit:
         elif decision.action is Action.UNREACHABLE:
             self._tell(f"Unreachable: {goal.name} ({decision.reason})", WARNING)
             navigator = self._settings.navigator
-            self.itinerary = on_unreachable(self.itinerary, now_s, navigator.wait_retry_s, navigator.wait_limit_s)
+            # How long a leg of AUTO may take is the autopilot's to say (DO_GUIDED_LIMITS).
+            limit_s = math.inf if self._mission.in_auto else navigator.wait_limit_s
+            self.itinerary = on_unreachable(self.itinerary, now_s, navigator.wait_retry_s, limit_s)
         if decision.action in (Action.REACHED, Action.UNREACHABLE):
             self.driver.leave()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from companion.settings import SafetySettings
-from companion.vehicle import RoverMode, VehicleState
+from companion.vehicle import VehicleState
 
 HOLD_AGAIN_S = 2.0
 """A heartbeat that still shows GUIDED so long after our HOLD means that HOLD never arrived."""
@@ -52,8 +52,8 @@ class Verdict:
 
 
 def latched(control: Control, vehicle: VehicleState) -> Control:
-    """Who drives, by the mode: GUIDED is the companion's; a rover that leaves GUIDED has been taken by a person."""
-    if vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.GUIDED:
+    """Who drives, by the mode: GUIDED (or a leg that AUTO hands over) is the companion's; a rover that leaves it is a person's."""
+    if vehicle.is_ours:
         return Control.COMPANION
     return Control.NOBODY if control is Control.NOBODY else Control.PERSON
 
@@ -69,7 +69,7 @@ def check(
     control = latched(watch.control, vehicle)
     heartbeat = vehicle.heartbeat
     if heartbeat is None or control is not Control.COMPANION:
-        return Watch(control), Verdict(Reaction.SILENT, "" if control is Control.NOBODY else "mode is not GUIDED")
+        return Watch(control), Verdict(Reaction.SILENT, "" if control is Control.NOBODY else _not_ours(vehicle))
     if watch.hold_sent:
         # The heartbeat may still show GUIDED just after our own HOLD: wait until it has been seen to leave GUIDED.
         if heartbeat.armed and heartbeat.time_s >= watch.hold_s + HOLD_AGAIN_S:
@@ -99,7 +99,7 @@ def awaited(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> st
     heartbeat = vehicle.heartbeat
     if heartbeat is None or now_s - heartbeat.time_s > settings.heartbeat_s:
         return "the autopilot to be heard again"
-    wanted = [] if heartbeat.mode == RoverMode.GUIDED else ["set GUIDED"]
+    wanted = [] if heartbeat.mode == vehicle.own_mode else [f"set {vehicle.own_mode.name}"]
     if not heartbeat.armed:
         wanted.append("arm (or end this run, and start it again with --arm)")
     if not wanted:
@@ -138,3 +138,11 @@ def data_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings) -
     if vehicle.latency.lasting_s > settings.latency_s:
         return f"link later than {settings.latency_s:g} s"
     return ""
+
+
+def _not_ours(vehicle: VehicleState) -> str:
+    """Why the companion must not steer, by the mode."""
+    heartbeat = vehicle.heartbeat
+    if vehicle.in_auto and heartbeat is not None and heartbeat.mode == vehicle.own_mode:
+        return "AUTO goes on by itself"
+    return f"mode is not {vehicle.own_mode.name}"

@@ -50,6 +50,9 @@ def start_step(
     reason = data_reason(vehicle, now_s, settings)
     if reason:
         return StartStep(f"good data ({reason})")
+    if vehicle.in_auto:
+        ready = vehicle.heartbeat.mode == RoverMode.AUTO and vehicle.heartbeat.armed
+        return StartStep("" if ready else "a person to arm and to set AUTO (the autopilot drives this mission)")
     if vehicle.heartbeat.mode != RoverMode.GUIDED:
         if control is Control.PERSON:
             return StartStep("a person to set GUIDED (the rover was taken out of it)")

@@ -11,7 +11,16 @@ from enum import IntEnum
 
 from companion.events_parameters import ParameterRequest
 from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
-from companion.events_targets import TargetAsked
+from companion.events_targets import (
+    GuidedLeg,
+    ItemCurrentSeen,
+    ItemReachedSeen,
+    LegSeen,
+    LegState,
+    TargetAsked,
+    leg_after,
+    leg_at_heartbeat,
+)
 from companion.frames import GeoPoint, Pose
 from companion.latency import BACK_S, Latency, TimeAnswered, answered, reported
 from companion.reckoning import Reckoned, jump_m, reckoned
@@ -195,6 +204,9 @@ Event = (
     | TargetAsked
     | SticksSeen
     | ParameterRequest
+    | LegSeen
+    | ItemReachedSeen
+    | ItemCurrentSeen
 )
 
 
@@ -229,6 +241,22 @@ class VehicleState:
     parameters: dict[str, float] = field(default_factory=dict)
     others: dict[str, OtherSeen] = field(default_factory=dict)
     """Who else is about, by name."""
+    in_auto: bool = False
+    """Whether the companion drives legs that AUTO hands over, instead of a mission of its own in GUIDED."""
+    leg: GuidedLeg | None = None
+    """The last leg that was handed over."""
+
+    @property
+    def own_mode(self) -> RoverMode:
+        """The mode in which the companion may steer."""
+        return RoverMode.AUTO if self.in_auto else RoverMode.GUIDED
+
+    @property
+    def is_ours(self) -> bool:
+        """Whether the companion may steer, by the mode: in GUIDED; or, if it serves AUTO, there while a leg is handed over."""
+        if self.heartbeat is None or self.heartbeat.mode != self.own_mode:
+            return False
+        return not self.in_auto or (self.leg is not None and self.leg.state is LegState.LIVE)
 
     def pose_at(self, time_s: float) -> Pose | None:
         """Position and heading carried forward to a moment with the last known velocities; None if not known yet."""
@@ -294,6 +322,8 @@ def _fold_seldom(state: VehicleState, event: Event) -> VehicleState:
             return replace(state, home=event)
         case OtherSeen():
             return replace(state, others=_with_other(state.others, event))
+        case LegSeen() | ItemReachedSeen() | ItemCurrentSeen():
+            return replace(state, leg=leg_after(state.leg, event))
         case PrearmSeen():
             return replace(state, prearm=event)
         case ParameterSeen():
@@ -309,11 +339,12 @@ def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, Oth
 
 
 def _with_heartbeat(state: VehicleState, event: HeartbeatSeen) -> VehicleState:
-    """Mode and arming; whoever sets GUIDED anew has looked after position and clock, and has the sticks as he wants them."""
-    before, state = state.heartbeat, replace(state, heartbeat=event)
+    """Mode and arming; whoever sets our mode anew has looked after position and clock, and has the sticks as he wants them."""
+    leg = leg_at_heartbeat(state.leg, event.time_s, in_auto=event.armed and event.mode == RoverMode.AUTO)
+    before, state = state.heartbeat, replace(state, heartbeat=event, leg=leg)
     if before is None:
         return state
-    if before.mode != RoverMode.GUIDED == event.mode:
+    if before.mode != state.own_mode == event.mode:
         return replace(state, frozen=False, restarted=False, sticks=Sticks())
     return replace(state, sticks=Sticks()) if event.armed and not before.armed else state
 

@@ -71,7 +71,7 @@ def _targets(mission: Mission) -> Table:
     table = Table("", "target", "place", "hold", "if blocked", "speed")
     for number, target in enumerate(mission.targets, start=1):
         speed_m_s = target.speed_m_s or mission.rover.cruise_speed_m_s
-        hold = f"{target.hold_s:g} s" if target.hold_s else "-"
+        hold = "AUTO's" if mission.in_auto else f"{target.hold_s:g} s" if target.hold_s else "-"
         name, place = escape(target.name), place_text(target.place)
         table.add_row(str(number), name, place, hold, target.on_blocked.value, f"{speed_m_s:g} m/s")
     return table

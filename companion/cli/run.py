@@ -83,6 +83,7 @@ def run(
             settings = files.settings(usable_settings(settings_file), say)
             signer = files.signer(signing_key)
             mission = load_mission(mission_file)
+            _refuse_arming(mission, arm=arm)
             keeping = Keeping(mission, state, resume=resume, say=say)
             ends.callback(keeping.close)
             if keeping.ended:
@@ -107,6 +108,13 @@ def run(
     if stop.asked:
         raise SystemExit(EXIT_STOPPED)  # it has said so itself
     raise typer.Exit(code)
+
+
+def _refuse_arming(mission: Mission, *, arm: bool) -> None:
+    if mission.in_auto and arm:
+        raise MissionError(
+            f"{mission.source or mission.name}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE), so a person arms; leave out --arm"
+        )
 
 
 def _drive(

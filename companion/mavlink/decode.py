@@ -9,6 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
+from companion.events_targets import ItemCurrentSeen, ItemReachedSeen, LegSeen
 from companion.frames import GeoPoint
 from companion.latency import TimeAnswered
 from companion.mavlink import others, parameter_requests, ranges, requests
@@ -80,6 +81,9 @@ class Decoder:
             mavlink.MAVLINK_MSG_ID_COMMAND_ACK: self._command_ack,
             mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT: _target,
             mavlink.MAVLINK_MSG_ID_RANGEFINDER: self._rangefinder,
+            mavlink.MAVLINK_MSG_ID_SET_POSITION_TARGET_GLOBAL_INT: self._leg,
+            mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: _item_reached,
+            mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: _item_current,
             mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: _home,
             mavlink.MAVLINK_MSG_ID_TIMESYNC: _time_answered,
@@ -263,9 +267,23 @@ class Decoder:
         head = (message.mission_type, message.seq, message.command, message.frame)
         return PlanItemSeen(time_s, *head, params, *place, bool(message.autocontinue))
 
+    def _leg(self, message: Any, time_s: float) -> Event | None:
+        """A leg of AUTO that is handed over to this very component."""
+        ours = (message.target_system, message.target_component) == (self.system_id, self.component_id)
+        point = point_of(message.lat_int, message.lon_int) if ours and requests.is_place(message) else None
+        return None if point is None else LegSeen(time_s, point)
+
     def _is_for_us(self, message: Any) -> bool:
         """Answers to a ground station come by as well; 0 is everybody (and what a MAVLink 1 answer says)."""
         return message.target_system in (0, self.system_id) and message.target_component in (0, self.component_id)
+
+
+def _item_reached(message: Any, time_s: float) -> Event:
+    return ItemReachedSeen(time_s, message.seq)
+
+
+def _item_current(message: Any, time_s: float) -> Event:
+    return ItemCurrentSeen(time_s, message.seq)
 
 
 def _home(message: Any, time_s: float) -> Event | None:

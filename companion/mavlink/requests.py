@@ -20,6 +20,8 @@ GLOBAL_FRAMES = (0, 3, 5, 6, 10, 11)
 """Latitude and longitude, with altitudes of several kinds, none of which matters to a rover (as ArduRover takes them)."""
 GUIDED_ITEM = 2
 """``current`` of a mission item that is no part of a mission but a guided target."""
+NO_POSITION = 0b11
+"""Bits of a type mask: x or y does not count."""
 KEEP_SPEED = (-1.0, 0.0)
 
 
@@ -48,6 +50,11 @@ def target_asked(message: Any, time_s: float) -> TargetAsked | None:
     if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
         return _refused(time_s, asker, form, TargetAnswer.BAD_VALUE, f"a speed of {speed_m_s:g} m/s")
     return TargetAsked(time_s, asker, form, point, speed_m_s)
+
+
+def is_place(message: Any) -> bool:
+    """Whether a SET_POSITION_TARGET_GLOBAL_INT says a place; ArduRover says it in frame 6, its older versions in others."""
+    return message.coordinate_frame in GLOBAL_FRAMES and not message.type_mask & NO_POSITION
 
 
 def _refused(time_s: float, asker: Asker, form: TargetForm, fault: TargetAnswer, reason: str) -> TargetAsked:

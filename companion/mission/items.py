@@ -13,11 +13,14 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from companion.frames import GeoPoint
+from companion.grid import BASE_WEIGHT
 from companion.mission import mav_commands as mav
-from companion.mission.mission import Area, HomePoint, Mission, Place, Target, open_ring
+from companion.mission.mission import Area, HomePoint, Mission, OnBlocked, Place, Target, WeightedArea, open_ring
 
 MAX_ITEMS = 100_000
 MAX_TARGETS = 10_000
+GROUND_M = 1.0
+"""Ground beside the ways that the autopilot drives by itself."""
 
 
 class ItemError(Exception):
@@ -57,6 +60,9 @@ class _Walk:
     ended_by: Item | None = None
     visits: Counter[int] = field(default_factory=Counter)
     jumps: Counter[int] = field(default_factory=Counter)
+    in_auto: bool = False
+    passed: list[GeoPoint] = field(default_factory=list)
+    """Where the autopilot drives by itself."""
 
     def note(self, text: str) -> None:
         if text not in self.notes:
@@ -79,6 +85,8 @@ def understand(items: Sequence[Item], path: Path, name: str, planned_home: GeoPo
         targets=tuple(walk.targets),
         keep_out=tuple(fences.keep_out),
         keep_in=tuple(fences.keep_in),
+        weighted=_ground_of(walk.passed),
+        in_auto=walk.in_auto,
         planned_home=planned_home,
         source=path,
         notes=(*walk.notes, *fences.notes),
@@ -127,7 +135,7 @@ def circle(centre: GeoPoint, radius_m: float, what: str) -> Area:
 
 
 def _walked(items: Sequence[Item]) -> _Walk:
-    walk = _Walk()
+    walk = _Walk(in_auto=any(_hands_over(item) for item in items))
     places = {item.index: i for i, item in enumerate(items)}
     i = steps = 0
     while i < len(items):
@@ -138,7 +146,9 @@ def _walked(items: Sequence[Item]) -> _Walk:
         if item.command == mav.DO_JUMP:
             i = _jumped(item, i, places, walk)
             continue
-        if item.command in _TRAVEL:
+        if walk.in_auto:
+            _drive_or_pass(item, walk)
+        elif item.command in _TRAVEL:
             _travel(item, walk)
         elif item.command == mav.NAV_DELAY:
             _delay(item, walk)
@@ -201,6 +211,38 @@ def _note_unused(item: Item, walk: _Walk) -> None:
             walk.note(f"{item.label}: {name} {item.param(number):g} is not used")
     if not item.autocontinue:
         walk.note(f"{item.label}: the rover goes on after it, though autocontinue is off")
+
+
+# --- legs of a mission that the autopilot drives itself, in AUTO ---------------------------------------------------------
+
+
+def _hands_over(item: Item) -> bool:
+    return item.command == mav.NAV_GUIDED_ENABLE and item.param(1) > 0.0
+
+
+def _drive_or_pass(item: Item, walk: _Walk) -> None:
+    """What is handed over is a target, in which the autopilot keeps the rover until it has had enough; the rest is its own affair."""
+    if _hands_over(item):
+        place = _place(item, walk)
+        walk.visits[item.index] += 1
+        turn = walk.visits[item.index]
+        name = f"guided item {item.index}" if turn == 1 else f"guided item {item.index} pass {turn}"
+        assert place is not None
+        walk.targets.append(Target(name, place, hold_s=math.inf, on_blocked=OnBlocked.WAIT, speed_m_s=None))
+        walk.note("the autopilot drives this mission itself, in AUTO; the companion drives what it hands over")
+    elif (
+        item.command <= mav.NAV_LAST and item.frame in mav.GLOBAL_FRAMES and (item.lat_deg, item.lon_deg) != (0.0, 0.0)
+    ):
+        walk.passed.append(geo_point(item.lat_deg, item.lon_deg, item.label))
+
+
+def _ground_of(passed: list[GeoPoint]) -> tuple[WeightedArea, ...]:
+    """The grid is laid round the autopilot's own ways too: the rover must not come from beyond it. They weigh what all ground does."""
+    if not passed:
+        return ()
+    alone = len(set(passed)) == 1
+    area = Area((passed[0],), radius_m=GROUND_M) if alone else Area(tuple(passed), width_m=GROUND_M)
+    return (WeightedArea(area, BASE_WEIGHT),)
 
 
 def _delay(item: Item, walk: _Walk) -> None:

@@ -139,7 +139,8 @@ class Mission:
     """Everything that a mission file says. ``notes`` tells people what was understood beyond the targets.
 
     ``prior_map`` is a known map, its field size where the file has none (None: the grid's), and where its outer south-west
-    corner lies from home (None: as the file says, or on the grid). Ground is passable inside all of ``keep_in`` and outside each of ``keep_out``.
+    corner lies from home (None: as the file says, or on the grid). ``in_auto``: the autopilot drives this mission itself, in AUTO, and
+    hands its targets over to the companion, in an order of its own (NAV_GUIDED_ENABLE). Ground is passable inside all of ``keep_in`` and outside each of ``keep_out``.
     """
 
     name: str
@@ -155,4 +156,5 @@ class Mission:
     planned_home: GeoPoint | None = None
     sitl: SitlSpec | None = None
     source: Path | None = None
+    in_auto: bool = False
     notes: tuple[str, ...] = ()

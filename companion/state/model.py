@@ -13,7 +13,9 @@ from companion.safety import Control
 Latitude = Annotated[float, Field(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
 Metres = Annotated[float, Field(ge=-1e7, le=1e7)]
-Seconds = Annotated[float, Field(ge=0.0, le=1e9)]
+LONGEST_S = 1e9
+"""Stands for "for ever", too."""
+Seconds = Annotated[float, Field(ge=0.0, le=LONGEST_S)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
 FieldNumber = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 Geo = tuple[Latitude, Longitude]

@@ -13,6 +13,7 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigator import NavState
 from companion.safety import Control
 from companion.state.model import (
+    LONGEST_S,
     SavedDraws,
     SavedErrand,
     SavedGround,
@@ -85,10 +86,14 @@ def _progress(itinerary: Itinerary, now_s: float) -> SavedProgress:
         statuses=itinerary.statuses,
         index=itinerary.index,
         leg=itinerary.leg,
-        left_s=max(0.0, itinerary.until_s - now_s),
-        give_up_left_s=None if give_up_s is None else max(0.0, give_up_s - now_s),
+        left_s=_left_s(itinerary.until_s, now_s),
+        give_up_left_s=None if give_up_s is None else _left_s(give_up_s, now_s),
         errand=None if itinerary.errand is None else _errand(itinerary.errand),
     )
+
+
+def _left_s(until_s: float, now_s: float) -> float:
+    return min(max(0.0, until_s - now_s), LONGEST_S)
 
 
 def _errand(errand: ResolvedTarget) -> SavedErrand:

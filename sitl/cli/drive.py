@@ -177,7 +177,7 @@ def _mission(
             raise MissionError("drive: give a MISSION file, or --world MAP with --start X,Y and --target X,Y")
         if start or target or top_left or prior or resolution_m is not None:
             raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
-        return load_mission(mission_file)
+        return _driven_here(load_mission(mission_file))
     if prior and world.suffix.lower() == ".toml":
         raise MissionError(f"drive: --prior: {world} is drawn in shapes; the companion can be given a map only")
     ground = ground_grid(world, resolution_m)
@@ -185,7 +185,7 @@ def _mission(
     if mission_file is not None:
         if target is not None:
             raise MissionError("drive: --target goes with --world alone; the mission has its own targets")
-        return mission_in_world(load_mission(mission_file), world, ground, begin, prior=prior)
+        return mission_in_world(_driven_here(load_mission(mission_file)), world, ground, begin, prior=prior)
     if begin is None or target is None:
         raise MissionError("drive: --world without a mission needs --start X,Y and --target X,Y")
     end = field_at(ground, target, "--target", top_left=top_left)
@@ -244,3 +244,13 @@ def _print_summary(report: Report, console: Console) -> None:
     for key, value in rows.items():
         table.add_row(key, value)
     console.print(table)
+
+
+def _driven_here(mission: Mission) -> Mission:
+    """The mission, unless it is the autopilot's to drive."""
+    if mission.in_auto:
+        raise MissionError(
+            f"{mission.source}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE); use rover-sitl serve, upload the mission, "
+            "and rover-companion run"
+        )
+    return mission

@@ -362,3 +362,40 @@ def test_a_real_fence_file_has_its_areas() -> None:
     mission = load_qgc(SHARED / "data" / "missions" / "pymavlink" / "fence-110.txt")
     assert [len(area.places) for area in mission.keep_in] == [8]
     assert [area.radius_m for area in mission.keep_out] == [20.0, 20.0]
+
+
+def guided(index: int, p1: float = 1, lat: float = 53.3) -> str:
+    return do(index, 92, p1, lat=lat, lon=23.3)
+
+
+def test_a_mission_that_hands_legs_over_is_the_autopilots_own(tmp_path: Path) -> None:
+    """Its other commands are none of ours, whatever they are; the ground where the autopilot drives belongs to the grid."""
+    items = (
+        HOME,
+        waypoint(1),
+        do(2, 222, 60),
+        guided(3),
+        do(4, 181),
+        do(5, 21, lat=53.4, lon=23.4),
+        guided(6, lat=53.35),
+    )
+    mission = load_mission(wpl(tmp_path, *items))
+    assert mission.in_auto and names(mission) == ["guided item 3", "guided item 6"]
+    assert [target.place for target in mission.targets] == [GeoPoint(53.3, 23.3), GeoPoint(53.35, 23.3)]
+    (ground,) = mission.weighted
+    assert ground.weight == 0.5 and set(ground.area.places) == {GeoPoint(53.2, 23.2), GeoPoint(53.4, 23.4)}
+    assert any("in AUTO" in note for note in mission.notes)
+
+
+def test_a_leg_that_is_jumped_back_to_is_handed_over_again(tmp_path: Path) -> None:
+    mission = load_mission(wpl(tmp_path, HOME, guided(1), waypoint(2), do(3, 177, 1, 1)))
+    assert names(mission) == ["guided item 1", "guided item 1 pass 2"]
+
+
+def test_a_leg_without_a_place_is_refused(tmp_path: Path) -> None:
+    assert "item 1: NAV_GUIDED_ENABLE (92): has no place" in refusal(wpl(tmp_path, HOME, do(1, 92, 1)))
+
+
+def test_guided_that_is_switched_off_alone_is_not_understood(tmp_path: Path) -> None:
+    text = refusal(wpl(tmp_path, HOME, waypoint(1), guided(2, p1=0)))
+    assert text.startswith("item 2: NAV_GUIDED_ENABLE (92): not understood")
