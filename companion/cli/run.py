@@ -64,7 +64,8 @@ def run(
             ends.callback(keeping.close)
             if keeping.ended:
                 raise typer.Exit(_told(keeping.statuses))
-            recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
+            given = {"settings": settings_file} if settings_file else {}
+            recorder = Recorder(record, mission, settings, seed, arm=arm, files=given) if record else NullRecorder()
             link = open_link(connect)
             with console.status("compiling the planner (once a machine) ..."):
                 warm_up(settings, mission.rover.turning_radius_m)
