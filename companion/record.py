@@ -17,7 +17,7 @@ from companion.mission.as_json import from_json
 from companion.mission.mission import Mission, MissionError
 from companion.provenance import versions
 from companion.recorded_files import RecordError
-from companion.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS
+from companion.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS, settings_sum
 from companion.rounds import Round, unpacked
 from companion.settings import Settings, SettingsError, parse_settings
 
@@ -52,6 +52,7 @@ class Meta(BaseModel):
     seed: int
     arm: bool
     settings: dict[str, object]
+    settings_sha256: str
     versions: dict[str, str]
     inputs: list[Entry]
     end: dict[str, Length] | None
@@ -104,6 +105,8 @@ def load_record(directory: Path) -> Record:
     try:
         mission = from_json((directory / MISSION).read_bytes(), str(directory / MISSION))
         settings = parse_settings(dict(meta.settings), str(directory / META))
+        if settings_sum(settings) != meta.settings_sha256:
+            raise RecordError(f"{directory / META}: settings changed since the run; a replay needs them as they were")
     except OSError as error:
         raise RecordError(
             f"{directory / MISSION}: cannot be read: {error.strerror}; there is nothing to replay"

@@ -222,6 +222,11 @@ def decision_line(time_s: float, target: str, decision: Decision) -> str:
     )
 
 
+def settings_sum(settings: Settings) -> str:
+    """SHA-256 of all settings."""
+    return hashlib.sha256(json.dumps(settings.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()
+
+
 def unused(directory: Path) -> Path:
     """The directory itself, or with the first number from 2 on that has no record in it yet."""
     candidate, number = directory, 2
@@ -234,15 +239,13 @@ def unused(directory: Path) -> Path:
 def _meta(
     mission: Mission | None, settings: Settings, seed: int, arm: bool, start_us: int, inputs: list[Copied]
 ) -> dict[str, object]:
-    values = settings.model_dump(mode="json")
-    canonical = json.dumps(values, sort_keys=True).encode()
     return {
         "format": FORMAT,
         "mission": None if mission is None else mission.name,
         "seed": seed,
         "arm": arm,
-        "settings": values,
-        "settings_sha256": hashlib.sha256(canonical).hexdigest(),
+        "settings": settings.model_dump(mode="json"),
+        "settings_sha256": settings_sum(settings),
         "start_unix_us": start_us,
         "versions": versions(),
         "inputs": [entry._asdict() for entry in inputs],

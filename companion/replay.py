@@ -6,6 +6,7 @@ everything else that did not follow from bytes and files (docs/record.md).
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
@@ -47,7 +48,7 @@ class Tape:
     description = "record"
     problem = ""
 
-    def __init__(self, record: Record, on_decision: Callable[[int], None]) -> None:
+    def __init__(self, record: Record, on_decision: Callable[[int, float, str, Decision], None]) -> None:
         self.result = Replayed()
         self._record = record
         self._rounds: Iterator[Heard] = record.rounds()
@@ -88,9 +89,9 @@ class Tape:
         self._compare_said(last=True)
         if self._next is not None:
             self.differs("the replay has ended, and the run went on")
-        if self._record.whole and self.result.decisions < len(self._record.decisions):
-            missing = len(self._record.decisions) - self.result.decisions
-            self.differs(f"{missing} recorded decisions are missing in the replay")
+        missing = [line for line in self._record.decisions[self.result.decisions :] if self._is_due(line)]
+        if missing:
+            self.differs(f"{len(missing)} recorded decisions are missing in the replay")
 
     # The companion's clock and link ------------------------------------------------------------------------------
 
@@ -134,12 +135,17 @@ class Tape:
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
         """Compared with the recorded one of the same number."""
         number, self.result.decisions = self.result.decisions, self.result.decisions + 1
-        self._on_decision(self.result.decisions)
+        self._on_decision(self.result.decisions, time_s, target, decision)
         if number >= len(self._record.decisions):
             if self._record.whole:
                 self.differs(f"decision {number + 1} ({decision.reason}) was not made in the run")
         elif self._record.decisions[number] != decision_line(time_s, target, decision):
             self.differs(f"decision {number + 1}: {decision.reason}, recorded: {self._record.decisions[number]:.200}")
+
+    def _is_due(self, line: str) -> bool:
+        """Whether a recorded decision should have been made by now; of a record that was cut the last rounds may be missing."""
+        time_s = json.loads(line)["time_s"]
+        return self._record.whole or time_s < self.round.time_s
 
     def _compare_said(self, *, last: bool) -> None:
         """A run may have been broken off in the middle of its last round."""
@@ -195,14 +201,14 @@ class Observer:
     def step_begins(self, companion: Companion) -> None:
         """The navigator's step is about to be computed."""
 
-    def decided(self, companion: Companion, number: int) -> None:
+    def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """A decision was made; they count from 1."""
 
 
 def replay(record: Record, observer: Observer | None = None) -> Replayed:
     """Run the companion of a record again. Raises RecordError when the record turns out to be damaged."""
     look = observer or Observer()
-    tape = Tape(record, lambda number: look.decided(companion, number))
+    tape = Tape(record, lambda *decided: look.decided(companion, *decided))
     runner = TapeRunner(tape, lambda: look.step_begins(companion))
     tape.advance()
     link = record.settings.link
