@@ -27,7 +27,7 @@ class Copied(NamedTuple):
     sha256: str
 
 
-def copied(directory: Path, mission: Mission | None, files: Mapping[str, Path]) -> list[Copied]:
+def copied(directory: Path, mission: Mission | None, files: Mapping[str, Path | None]) -> list[Copied]:
     """Copy all files of a mission, in the folders they have to each other, and the others by their kind. Raises OSError."""
     entries: list[Copied] = []
     own = () if mission is None else files_of(mission)
@@ -35,8 +35,9 @@ def copied(directory: Path, mission: Mission | None, files: Mapping[str, Path]) 
     for path in own:
         place = Path(INPUTS, "mission", os.path.relpath(path, together))
         entries.append(_copy(directory, "mission file", place, path))
-    for kind, path in files.items():
-        entries.append(_copy(directory, kind, Path(INPUTS, kind, path.name), path))
+    for kind, given in files.items():
+        if given is not None:
+            entries.append(_copy(directory, kind, Path(INPUTS, kind, given.name), given))
     return entries
 
 

@@ -25,6 +25,8 @@ __all__ = ["DecisionLog", "NullRecorder", "RecordError", "Recorder", "decision_l
 FORMAT = 2
 """Of the whole directory; a reader refuses others."""
 META, MISSION, PACKETS, ROUNDS, DECISIONS = "meta.json", "mission.json", "link.tlog", "rounds.bin", "decisions.jsonl"
+STATE = "state"
+"""The kind of input file that an earlier run has left."""
 FLUSH_S = 1.0
 
 
@@ -75,7 +77,7 @@ class Recorder:
     """Writes the directory that docs/record.md describes.
 
     A directory that has a record keeps it: the new one goes to the same name with a number, see ``directory``. ``files`` are further files that
-    the run follows from, by what they are; they are copied. Raises RecordError if the directory cannot be written. Later a full
+    the run follows from, by what they are (None: there is none); they are copied. Raises RecordError if the directory cannot be written. Later a full
     disk ends the record, never the run: see ``problem``.
     """
 
@@ -87,7 +89,7 @@ class Recorder:
         seed: int,
         *,
         arm: bool = False,
-        files: Mapping[str, Path] | None = None,
+        files: Mapping[str, Path | None] | None = None,
     ) -> None:
         self.directory = unused(directory)
         self.problem = ""

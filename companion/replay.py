@@ -14,11 +14,16 @@ from companion.app import Companion
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.naming import compared, named
+from companion.memory import Memory
 from companion.mission.mission import MissionError
 from companion.navigator import Decision, NavState
 from companion.record import Heard, Record
-from companion.recorder import decision_line
+from companion.recorded_files import RecordError
+from companion.recorder import STATE, decision_line
+from companion.resuming import Kept
 from companion.rounds import Mark, Round
+from companion.state.format import StateError, decoded
+from companion.state.writer import Update
 from companion.stepping import StepCall
 
 Answer = tuple[NavState, Decision]
@@ -214,7 +219,15 @@ def replay(record: Record, observer: Observer | None = None) -> Replayed:
     link = record.settings.link
     autopilot = AutopilotLink(tape, Codec(link), link, tape)
     companion = Companion(
-        autopilot, tape, record.mission, record.settings, runner, tape, seed=record.meta.seed, arm=record.meta.arm
+        autopilot,
+        tape,
+        record.mission,
+        record.settings,
+        runner,
+        tape,
+        seed=record.meta.seed,
+        arm=record.meta.arm,
+        memory=_memory(record),
     )
     tape.result.companion = companion
     try:
@@ -225,6 +238,30 @@ def replay(record: Record, observer: Observer | None = None) -> Replayed:
     tape.end()
     tape.result.targets = [(name, str(status)) for name, status in companion.statuses()]
     return tape.result
+
+
+def _memory(record: Record) -> Memory | None:
+    """What an earlier run has left, if this one took it up. Raises RecordError."""
+    file = record.input(STATE)
+    if file is None:
+        return None
+    try:
+        return Memory(record.mission, _NoWriter(), Kept(*decoded(file.read_bytes())))
+    except StateError as error:
+        raise RecordError(f"{file}: {error}") from error
+
+
+class _NoWriter:
+    """A replay keeps nothing."""
+
+    busy = False
+    problem = ""
+
+    def put(self, update: Update) -> None:
+        """Not kept."""
+
+    def close(self) -> None:
+        """Nothing to write."""
 
 
 def _round(companion: Companion, tape: Tape) -> bool:

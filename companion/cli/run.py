@@ -23,7 +23,7 @@ from companion.mavlink.codec import Codec
 from companion.mavlink.transport import ByteLink, LinkError, open_link
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
-from companion.recorder import NullRecorder, Recorder, RecordError
+from companion.recorder import STATE, NullRecorder, Recorder, RecordError
 from companion.settings import Settings, SettingsError
 from companion.state.place import StatePlaceError
 from companion.stepping import ThreadRunner
@@ -64,7 +64,7 @@ def run(
             ends.callback(keeping.close)
             if keeping.ended:
                 raise typer.Exit(_told(keeping.statuses))
-            given = {"settings": settings_file} if settings_file else {}
+            given = {"settings": settings_file, STATE: keeping.file if keeping.kept else None}
             recorder = Recorder(record, mission, settings, seed, arm=arm, files=given) if record else NullRecorder()
             link = open_link(connect)
             with console.status("compiling the planner (once a machine) ..."):

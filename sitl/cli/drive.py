@@ -89,8 +89,7 @@ def drive(
         for note in scenario.notes:
             typer.echo(note, err=True)
         if record is not None:
-            given = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
-            files = {kind: path for kind, path in given.items() if path is not None}
+            files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
             recorder = Recorder(record, mission, settings, seed, arm=True, files=files)
         picture(image)
         writable(json_file)
