@@ -117,11 +117,6 @@ class Driver:
         return self._runner.busy
 
     @property
-    def state(self) -> NavState | None:
-        """The navigator's memory; None while there is no leg."""
-        return self._state
-
-    @property
     def goal(self) -> ResolvedTarget | None:
         """Where this leg leads."""
         return self._goal

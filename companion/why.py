@@ -109,11 +109,12 @@ class Watcher(Observer):
 
     def _seen(self, companion: Companion) -> _Scene | None:
         driver, pose = companion.driver, companion.status().pose
-        if driver is None or driver.state is None or pose is None:
+        state = None if driver is None else driver.leg[0]
+        if driver is None or state is None or pose is None:
             return None
         grid = driver.evidence.grid.with_weights(driver.evidence.grid.weights.copy())
         weighed = with_turning_cost(grid, pose, self._settings.guidance, self._turning_radius_m)
-        return _Scene(pose, driver.state, driver.evidence.base, grid, weighed, known_fields(driver.evidence))
+        return _Scene(pose, state, driver.evidence.base, grid, weighed, known_fields(driver.evidence))
 
     def _take(self, candidate: Candidate) -> None:
         if self._scene is not None:

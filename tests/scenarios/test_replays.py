@@ -20,6 +20,7 @@ from companion.app import Companion
 from companion.cli.commands import app
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
+from companion.mavlink.transport import MemoryLink
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.navigator import Decision, NavState
@@ -34,7 +35,7 @@ from sitl.cli.commands import app as sitl_app
 from sitl.fault_file import load_faults
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
-from tests.rig import Rig, yard
+from tests.rig import Rig, kept_in, yard
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 FILES = ("link.tlog", "rounds.bin", "decisions.jsonl")
@@ -118,14 +119,17 @@ class Recorded(Rig):
 
     def __init__(self, folder: Path, mission: Mission) -> None:
         self.place = folder / "record"
-        super().__init__(mission)
+        super().__init__(mission, state=folder / "state")
 
-    def restart_companion(self, mission: Mission) -> None:
-        super().restart_companion(mission)
-        self.recorder = Recorder(self.place, mission, self.settings, 0, arm=True)  # type: ignore[assignment]
-        self.link = AutopilotLink(self.link._link, Codec(self.settings.link), self.settings.link, self.recorder)
+    def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
+        assert self._state is not None
+        memory = kept_in(self._state, mission, resume=resume)
+        files = {"state": self.state_file if resume else None}
+        self.recorder = Recorder(self.place, mission, self.settings, 0, arm=True, files=files)
+        near, self._far = MemoryLink.pair()
+        self.link = AutopilotLink(near, Codec(self.settings.link), self.settings.link, self.recorder)
         self.companion = Companion(
-            self.link, self, mission, self.settings, LateRunner(), self.recorder, seed=0, arm=True
+            self.link, self, mission, self.settings, LateRunner(), self.recorder, seed=0, arm=True, memory=memory
         )
 
 
@@ -143,6 +147,21 @@ def test_answers_of_a_thread_are_handed_over_when_the_run_had_them(tmp_path: Pat
     result = replay(load_record(rig.place))
     assert result.decisions <= 1, "nothing but: we are there"
     assert any("recorded decisions are missing" in line for line in result.differences)
+
+
+def test_a_run_that_took_up_another_is_replayed_from_the_copy_of_its_state(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    rig = Recorded(tmp_path, mission)
+    rig.until_driven(6.0)
+    rig.recorder.close()
+    rig.restart_companion(mission, resume=True)
+    rig.finish()
+    rig.recorder.close()
+    shutil.rmtree(tmp_path / "state")
+    assert rig.recorder.directory.name == "record-2"
+    assert_same(rig.place)
+    loaded = assert_same(rig.recorder.directory)
+    assert json.loads(loaded.decisions[0])["path"][0][0] > 4, "it went on where it was"
 
 
 def reopened(record: Path) -> None:
