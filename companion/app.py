@@ -29,10 +29,11 @@ from companion.output_check import OutputCheck
 from companion.pursuit import Pursuit
 from companion.recorder import DecisionLog
 from companion.reporting import Outcome, Reporter, Status
+from companion.rounds import Mark
 from companion.safety import Control, Reaction, Watch, awaited, check, latched
 from companion.settings import Settings
 from companion.startup import StartUp, overruled
-from companion.stepping import StepRunner
+from companion.stepping import NotedRunner, StepRunner
 from companion.traffic import announced
 from companion.vehicle import Event, RangeSeen, RoverMode, TextSeen, VehicleState, fold
 from companion.watchdogs import Watchdogs
@@ -73,7 +74,7 @@ class Companion:
         self._clock = clock
         self._mission = mission
         self._settings = settings
-        self._runner = runner
+        self._runner = NotedRunner(runner, lambda: log.mark(Mark.ANSWER))
         self._log = log
         self._rng = np.random.default_rng(seed)
         self._memory = memory
@@ -81,12 +82,13 @@ class Companion:
         self._outbox = Outbox(settings.guidance)
         self.output_check = OutputCheck(self._tell)
         self._reporter = Reporter(self.outcome.said)
-        self._next_tick_s = clock.now_s()
+        self._next_tick_s = now_s = clock.now_s()
+        log.begin(now_s, Mark.BEGIN)
         self._watchdogs = Watchdogs()
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
         self._errands = Errands(mission, settings.safety, self._send, self._tell)
         self._legs = AutoLegs(self._tell)
-        self._followed_s = clock.now_s()
+        self._followed_s = now_s
         self._stopped = False
         self._stop_asked = False
         tuned = (self._outbox, self._whereabouts, self._start_up)
@@ -148,6 +150,7 @@ class Companion:
             self._take_in(event)
         self._settings = self._attendant.attend(self._pursuit, now_s)
         if self._stop_asked and not self._handover.begun:
+            self._log.mark(Mark.STOP)
             self._hand_over(now_s, "stopped by the user")
         if not self._handover.begun:
             self._act(now_s)
@@ -167,6 +170,7 @@ class Companion:
         if self._done or self._handover.begun:
             return
         now_s = self._clock.now_s()
+        self._log.begin(now_s, Mark.CLOSE)
         self._hand_over(now_s, "error")
         while not self._handover.is_over(self.vehicle, now_s):
             now_s += 1.0 / self._settings.link.tick_hz

@@ -51,8 +51,15 @@ class Driver:
     """One leg after the other, on one map."""
 
     def __init__(
-        self, evidence: EvidenceMap, rover: RoverLimits, settings: Settings, searcher: Searcher, runner: StepRunner
+        self,
+        evidence: EvidenceMap,
+        rover: RoverLimits,
+        settings: Settings,
+        searcher: Searcher,
+        runner: StepRunner,
+        seed: int | None = None,
     ) -> None:
+        """``seed``: of the navigator's own choices; None: drawn from the searcher's generator."""
         self.evidence = evidence
         self.searcher = searcher
         self.tally = Tally()
@@ -65,7 +72,7 @@ class Driver:
         self._state: NavState | None = None
         self._recovery = Recovery(evidence, rover.radius_m, settings.guidance)
         self._doubts_left = 0
-        self._seed = int(searcher.rng.integers(2**63))
+        self.seed = int(searcher.rng.integers(2**63)) if seed is None else seed
         self._epoch = 0
         self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
         self._helm = Helm(evidence, settings) if rover.turning_radius_m > 0.0 else None
@@ -82,7 +89,7 @@ class Driver:
         self._goal = goal
         self._epoch += 1
         cell = self.evidence.base.cell_at(pose.point)
-        seed = (self._seed + self._epoch) % 2**63
+        seed = (self.seed + self._epoch) % 2**63
         self._state = begin(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
         self.route = None
         self.decision = None

@@ -118,7 +118,9 @@ class Pursuit:
         self.laid = lay_again(self.laid, self.itinerary, self._mission, self._settings.mapping, origin)
         self.itinerary = self.laid.itinerary
         before = self.driver
-        self.driver = Driver(self.evidence, self._limits, self._settings, before.searcher, self._runner)
+        # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
+        searcher, seed = before.searcher, before.seed
+        self.driver = Driver(self.evidence, self._limits, self._settings, searcher, self._runner, seed)
         self.driver.tally = before.tally
         self._tracker = Tracker(self.evidence, self._settings.traffic)
         return True

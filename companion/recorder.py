@@ -1,28 +1,37 @@
-"""The record of a run: every packet, every decision, and what it was run with."""
+"""The record of a run: what went in, what was decided, what was said, and what it was run with (docs/record.md)."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import shutil
 import struct
+import zlib
+from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Protocol
 
 from companion.clock import unix_time_us
+from companion.mission.as_json import to_json
+from companion.mission.mission import Mission
 from companion.navigator import Decision
 from companion.provenance import versions
+from companion.recorded_files import Copied, RecordError, copied, in_record, replaced
+from companion.rounds import Mark, Round
 from companion.settings import Settings
 
+__all__ = ["DecisionLog", "NullRecorder", "RecordError", "Recorder", "decision_line", "unused"]
+
+FORMAT = 2
+"""Of the whole directory; a reader refuses others."""
+META, MISSION, PACKETS, ROUNDS, DECISIONS = "meta.json", "mission.json", "link.tlog", "rounds.bin", "decisions.jsonl"
+STATE = "state"
+"""The kind of input file that an earlier run has left."""
 FLUSH_S = 1.0
 
 
-class RecordError(Exception):
-    """A record that cannot be begun; the text is one line with the place, the reason and the remedy."""
-
-
 class DecisionLog(Protocol):
-    """Takes the navigator's decisions."""
+    """Takes the navigator's decisions, and what came to the companion other than in bytes."""
 
     problem: str
     """Why the record has ended early; empty while all is well."""
@@ -31,16 +40,33 @@ class DecisionLog(Protocol):
         """One decision on the way to a target; ``time_s`` is the companion's clock."""
         ...
 
+    def begin(self, time_s: float, mark: Mark) -> None:
+        """A round in which nothing is heard: the companion was made, or goes its way out."""
+        ...
+
+    def mark(self, mark: Mark) -> None:
+        """Something has come from outside in this round."""
+        ...
+
 
 class NullRecorder:
     """Records nothing."""
 
     problem = ""
 
-    def packet(self, time_s: float, raw: bytes) -> None:
+    def heard(self, time_s: float, packets: list[bytes]) -> None:
+        """Ignored."""
+
+    def said(self, time_s: float, raw: bytes) -> None:
         """Ignored."""
 
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
+        """Ignored."""
+
+    def begin(self, time_s: float, mark: Mark) -> None:
+        """Ignored."""
+
+    def mark(self, mark: Mark) -> None:
         """Ignored."""
 
     def close(self) -> None:
@@ -48,42 +74,143 @@ class NullRecorder:
 
 
 class Recorder:
-    """Writes a directory: ``link.tlog`` (both directions, as ground stations write it), ``decisions.jsonl``, ``meta.json`` and a
-    copy of the mission file.
+    """Writes the directory that docs/record.md describes.
 
-    A directory that has a record keeps it: the new one goes to the same name with a number, see ``directory``. Raises
-    RecordError if the directory cannot be written. Later a full disk ends the record, never the run: see ``problem``.
+    A directory that has a record keeps it: the new one goes to the same name with a number, see ``directory``. ``files`` are further files that
+    the run follows from, by what they are (None: there is none); they are copied. Raises RecordError if the directory cannot be written. Later a full
+    disk ends the record, never the run: see ``problem``.
     """
 
-    def __init__(self, directory: Path, mission_file: Path | None, settings: Settings, seed: int) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        mission: Mission | None,
+        settings: Settings,
+        seed: int,
+        *,
+        arm: bool = False,
+        files: Mapping[str, Path | None] | None = None,
+    ) -> None:
         self.directory = unused(directory)
-        self._files: list[IO[bytes]] = []
+        self.problem = ""
+        """Why the record ends early; empty while all is well."""
+        self._files: dict[str, IO[bytes]] = {}
+        self._sums: dict[str, tuple[int, int]] = {}
         self._clock_at_start_s: float | None = None
         self._flushed_s = 0.0
         self._start_us = unix_time_us()
-        self._meta = _meta(mission_file, settings, seed, self._start_us)
-        self.problem = ""
-        """Why the record ends early; empty while all is well."""
+        self._round: Round | None = None
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
-            if mission_file is not None:
-                shutil.copyfile(mission_file, self.directory / f"mission{mission_file.suffix}")
-            self._write_meta()
-            self._packets = self._open("link.tlog")
-            self._decisions = self._open("decisions.jsonl")
+            inputs = copied(self.directory, mission, files or {})
+            if mission is not None:
+                known = None if mission.prior_map is None else Path(in_record(inputs, mission.prior_map))
+                text = to_json(replace(mission, prior_map=known)).encode()
+                replaced(self.directory / MISSION, text)
+                inputs.append(Copied("mission", MISSION, str(mission.source or ""), hashlib.sha256(text).hexdigest()))
+            self._meta = _meta(mission, settings, seed, arm, self._start_us, inputs)
+            self._write_meta(None)
+            for name in (PACKETS, ROUNDS, DECISIONS):
+                self._files[name] = (self.directory / name).open("wb")
+                self._sums[name] = (0, 0)
         except OSError as error:
             self.close()
             raise RecordError(
                 f"{self.directory}: cannot record here: {error.strerror or error}; choose a directory that can be written"
             ) from error
 
-    def packet(self, time_s: float, raw: bytes) -> None:
-        """One packet of either direction: microseconds since 1970, big-endian, then the bytes."""
-        self._write(self._packets, struct.pack(">Q", self._unix_us(time_s)) + raw, time_s)
+    def begin(self, time_s: float, mark: Mark) -> None:
+        """A round in which nothing is heard."""
+        self.heard(time_s, [], mark)
+
+    def heard(self, time_s: float, packets: list[bytes], mark: Mark = Mark(0)) -> None:  # noqa: B008 - frozen
+        """A new round, and the packets that came in it."""
+        self._end_round()
+        self._round = Round(time_s, len(packets), 0, mark)
+        for raw in packets:
+            self._packet(time_s, raw)
+        if time_s - self._flushed_s >= FLUSH_S:
+            self._flush(time_s)
+
+    def said(self, time_s: float, raw: bytes) -> None:
+        """One packet of ours."""
+        if self._round is not None:
+            self._round = self._round._replace(said=self._round.said + 1)
+        self._packet(time_s, raw)
+
+    def mark(self, mark: Mark) -> None:
+        """Something has come from outside in this round."""
+        if self._round is not None:
+            self._round = self._round._replace(marks=self._round.marks | mark)
 
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
         """One line of JSON."""
-        entry = {
+        self._write(DECISIONS, decision_line(time_s, target, decision).encode() + b"\n")
+
+    def close(self) -> None:
+        """Write what is left, and that it is all; more than once is fine."""
+        if not self._files:
+            return
+        self._end_round()
+        for file in self._files.values():
+            try:
+                file.close()
+            except OSError as error:
+                self.problem = self.problem or self._ended(error)
+        self._files = {}
+        if not self.problem:
+            try:
+                self._write_meta({name: {"bytes": size, "crc32": crc} for name, (size, crc) in self._sums.items()})
+            except OSError as error:
+                self.problem = self._ended(error)
+
+    def _packet(self, time_s: float, raw: bytes) -> None:
+        """Microseconds since 1970, big-endian, then the bytes, as ground stations write it."""
+        if self._clock_at_start_s is None:
+            self._clock_at_start_s = time_s
+        stamp_us = max(0, self._start_us + round((time_s - self._clock_at_start_s) * 1e6))
+        self._write(PACKETS, struct.pack(">Q", stamp_us) + raw)
+
+    def _end_round(self) -> None:
+        ended, self._round = self._round, None
+        if ended is not None:
+            self._write(ROUNDS, ended.packed())
+
+    def _write(self, name: str, data: bytes) -> None:
+        if name not in self._files:
+            return
+        try:
+            self._files[name].write(data)
+        except OSError as error:
+            self._end_early(error)
+            return
+        size, crc = self._sums[name]
+        self._sums[name] = (size + len(data), zlib.crc32(data, crc))
+
+    def _flush(self, time_s: float) -> None:
+        self._flushed_s = time_s
+        try:
+            for file in self._files.values():
+                file.flush()
+        except OSError as error:
+            self._end_early(error)
+
+    def _end_early(self, error: OSError) -> None:
+        self.problem = self._ended(error)
+        self.close()
+
+    def _ended(self, error: OSError) -> str:
+        return f"{self.directory}: the record has ended: {error.strerror or error}"
+
+    def _write_meta(self, end: dict[str, dict[str, int]] | None) -> None:
+        meta = {**self._meta, "end": end}
+        replaced(self.directory / META, json.dumps(meta, indent=2).encode() + b"\n")
+
+
+def decision_line(time_s: float, target: str, decision: Decision) -> str:
+    """A decision as one line of JSON."""
+    return json.dumps(
+        {
             "time_s": time_s,
             "target": target,
             "action": decision.action.value,
@@ -94,67 +221,34 @@ class Recorder:
             "new_path": decision.new_path is not None,
             "path": [[cell.x, cell.y] for cell in decision.path],
         }
-        self._write(self._decisions, json.dumps(entry).encode() + b"\n", time_s)
+    )
 
-    def close(self) -> None:
-        """Write what is left; more than once is fine."""
-        for file in self._files:
-            try:
-                file.close()
-            except OSError as error:
-                self.problem = self.problem or self._ended(error)
-        self._files = []
 
-    def _open(self, name: str) -> IO[bytes]:
-        file = (self.directory / name).open("wb")
-        self._files.append(file)
-        return file
-
-    def _write(self, file: IO[bytes], data: bytes, time_s: float) -> None:
-        if not self._files:
-            return
-        try:
-            if self._clock_at_start_s is None:
-                self._clock_at_start_s = self._flushed_s = time_s
-                self._write_meta()
-            file.write(data)
-            if time_s - self._flushed_s >= FLUSH_S:
-                self._flushed_s = time_s
-                for each in self._files:
-                    each.flush()
-        except OSError as error:
-            self.problem = self._ended(error)
-            self.close()
-
-    def _ended(self, error: OSError) -> str:
-        return f"{self.directory}: the record has ended: {error.strerror or error}"
-
-    def _unix_us(self, time_s: float) -> int:
-        first_s = time_s if self._clock_at_start_s is None else self._clock_at_start_s
-        return max(0, self._start_us + round((time_s - first_s) * 1e6))
-
-    def _write_meta(self) -> None:
-        meta = {**self._meta, "clock_at_start_s": self._clock_at_start_s}
-        (self.directory / "meta.json").write_text(json.dumps(meta, indent=2) + "\n", encoding="utf-8")
+def settings_sum(settings: Settings) -> str:
+    """SHA-256 of all settings."""
+    return hashlib.sha256(json.dumps(settings.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()
 
 
 def unused(directory: Path) -> Path:
     """The directory itself, or with the first number from 2 on that has no record in it yet."""
     candidate, number = directory, 2
-    while (candidate / "meta.json").exists():
+    while (candidate / META).exists():
         candidate = directory.with_name(f"{directory.name}-{number}")
         number += 1
     return candidate
 
 
-def _meta(mission_file: Path | None, settings: Settings, seed: int, start_us: int) -> dict[str, object]:
-    values = settings.model_dump(mode="json")
-    canonical = json.dumps(values, sort_keys=True).encode()
+def _meta(
+    mission: Mission | None, settings: Settings, seed: int, arm: bool, start_us: int, inputs: list[Copied]
+) -> dict[str, object]:
     return {
-        "mission": None if mission_file is None else str(mission_file),
+        "format": FORMAT,
+        "mission": None if mission is None else mission.name,
         "seed": seed,
-        "settings": values,
-        "settings_sha256": hashlib.sha256(canonical).hexdigest(),
+        "arm": arm,
+        "settings": settings.model_dump(mode="json"),
+        "settings_sha256": settings_sum(settings),
         "start_unix_us": start_us,
         "versions": versions(),
+        "inputs": [entry._asdict() for entry in inputs],
     }

@@ -60,6 +60,38 @@ class InlineRunner:
         """Nothing to end."""
 
 
+class NotedRunner:
+    """Another runner, whose answers are noted when they are taken: of a thread it cannot be foretold."""
+
+    def __init__(self, runner: StepRunner, note: Callable[[], None]) -> None:
+        self._runner = runner
+        self._note = note
+
+    @property
+    def busy(self) -> bool:
+        """See ``StepRunner``."""
+        return self._runner.busy
+
+    def start(self, call: StepCall) -> None:
+        """See ``StepRunner``."""
+        self._runner.start(call)
+
+    def take(self) -> tuple[NavState, Decision] | None:
+        """See ``StepRunner``; an error is an answer too."""
+        try:
+            result = self._runner.take()
+        except Exception:
+            self._note()
+            raise
+        if result is not None:
+            self._note()
+        return result
+
+    def close(self) -> None:
+        """See ``StepRunner``."""
+        self._runner.close()
+
+
 class ThreadRunner:
     """Computes beside the loop; the compiled kernels release the interpreter lock. The thread never keeps the program from ending."""
 

@@ -9,6 +9,7 @@ import typer
 from companion.cli import mission
 from companion.cli.bench import bench
 from companion.cli.plan import plan
+from companion.cli.replay import replay
 from companion.cli.run import run
 from companion.cli.version import version_option
 
@@ -21,6 +22,7 @@ app = typer.Typer(
 
 app.command()(run)
 app.command()(plan)
+app.command()(replay)
 app.command()(bench)
 app.add_typer(mission.app)
 

@@ -42,6 +42,11 @@ class Keeping:
         return self.kept is not None and self.kept.state.ended
 
     @property
+    def file(self) -> Path | None:
+        """Where the state is kept; None if it is not."""
+        return None if self._place is None else self._place.file
+
+    @property
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """What became of the targets of a mission that has ended."""
         if self.kept is None:

@@ -27,7 +27,7 @@ from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError, open_link
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
-from companion.recorder import NullRecorder, Recorder, RecordError
+from companion.recorder import STATE, NullRecorder, Recorder, RecordError
 from companion.settings import Settings, SettingsError
 from companion.state.place import StatePlaceError
 from companion.stepping import ThreadRunner
@@ -88,7 +88,8 @@ def run(
             ends.callback(keeping.close)
             if keeping.ended:
                 raise typer.Exit(_told(keeping.statuses))
-            recorder = Recorder(record, mission_file, settings, seed) if record else NullRecorder()
+            given = {"settings": settings_file, STATE: keeping.file if keeping.kept else None}
+            recorder = Recorder(record, mission, settings, seed, arm=arm, files=given) if record else NullRecorder()
             link = open_link(connect)
             with console.status("compiling the planner (once a machine) ..."):
                 warm_up(settings, mission.rover.turning_radius_m)

@@ -31,15 +31,22 @@ TWIN_S = 3.5
 
 
 class PacketLog(Protocol):
-    """Takes every packet of both directions."""
+    """Takes every packet of both directions; ``time_s`` is the companion's clock."""
 
-    def packet(self, time_s: float, raw: bytes) -> None:
-        """One whole packet; ``time_s`` is the companion's clock."""
+    def heard(self, time_s: float, packets: list[bytes]) -> None:
+        """The companion has listened; what came, packet by packet."""
+        ...
+
+    def said(self, time_s: float, raw: bytes) -> None:
+        """One whole packet of the companion."""
         ...
 
 
 class _NoLog:
-    def packet(self, time_s: float, raw: bytes) -> None:
+    def heard(self, time_s: float, packets: list[bytes]) -> None:
+        """Nobody listens."""
+
+    def said(self, time_s: float, raw: bytes) -> None:
         """Nobody listens."""
 
 
@@ -107,10 +114,9 @@ class AutopilotLink:
     def poll(self, now_s: float) -> list[Event]:
         """What has come in since the last call."""
         events: list[Event] = []
-        for packet in self._codec.packets(self._link.read()):
-            if not self._codec.accepts(packet):
-                continue
-            self._log.packet(now_s, packet.raw)
+        packets = [packet for packet in self._codec.packets(self._link.read()) if self._codec.accepts(packet)]
+        self._log.heard(now_s, [packet.raw for packet in packets])
+        for packet in packets:
             if self._codec.is_own_heartbeat(packet) and packet.raw not in self._own:  # some networks send all back
                 self._twin_s = now_s
             for event in self._codec.decode_packet(packet, now_s):
@@ -190,7 +196,7 @@ class AutopilotLink:
 
     def _write(self, command: Command, now_s: float, repetition: int = 0) -> None:
         for raw in self._codec.encode_packets(command, repetition):
-            self._log.packet(now_s, raw)
+            self._log.said(now_s, raw)
             self._link.write(raw)
             if isinstance(command, Heartbeat):
                 self._own.append(raw)

@@ -67,6 +67,13 @@ class Framer:
         return packets
 
 
+def first_packet(buffer: bytes) -> bytes | None:
+    """The valid packet that these bytes begin with; None if there is none, or not the whole of it."""
+    end = _end(buffer, 0) if buffer[:1] in (b"\xfe", b"\xfd") else None
+    packet = _packet(buffer, 0, end) if end is not None and end <= len(buffer) else None
+    return None if packet is None else packet.raw
+
+
 def _packet(buffer: bytes, at: int, end: int) -> Packet | None:
     """The packet in these bytes, or None when it is unknown or damaged."""
     version_2 = buffer[at] == MAGIC_V2

@@ -136,7 +136,8 @@ class SitlSpec:
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """Everything that a mission file says. ``notes`` tells people what was understood beyond the targets.
+    """Everything that a mission file says. ``notes`` tells people what was understood beyond the targets; ``also_read`` are the files,
+    beside ``source`` and those named below, that it was made of.
 
     ``prior_map`` is a known map, its field size where the file has none (None: the grid's), and where its outer south-west
     corner lies from home (None: as the file says, or on the grid). ``in_auto``: the autopilot drives this mission itself, in AUTO, and
@@ -158,3 +159,4 @@ class Mission:
     source: Path | None = None
     in_auto: bool = False
     notes: tuple[str, ...] = ()
+    also_read: tuple[Path, ...] = ()

@@ -242,7 +242,15 @@ def _mission(table: MissionTable, path: Path) -> Mission:
         sitl=None if table.sitl is None else _sitl(table.sitl, path),
         source=path,
         notes=(f"fences taken from {table.fence}; its targets, if any, are not used",) if fences else (),
+        also_read=tuple(folder / name for name in _also_read(table)),
     )
+
+
+def _also_read(table: MissionTable) -> tuple[str, ...]:
+    """The files whose content is in the mission itself."""
+    sensors = table.sitl.sensors if table.sitl is not None else None
+    names = (table.fence, sensors if isinstance(sensors, str) and sensors.endswith(".toml") else None)
+    return tuple(name for name in names if name is not None)
 
 
 def _sitl(table: SitlTable, path: Path) -> SitlSpec:

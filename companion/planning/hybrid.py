@@ -10,7 +10,7 @@ from numpy.random import Generator
 
 from companion.planning.astar import Astar
 from companion.planning.bspline_ga import BsplineGa
-from companion.planning.planner import Capabilities
+from companion.planning.planner import Capabilities, Planner
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult
 from companion.planning.raster import cells_cost, plain
 from companion.planning.smoothing import curve_cost, fields_under, smooth
@@ -31,20 +31,20 @@ class Hybrid:
     capabilities = Capabilities(proves_no_path=True, random=True, smooth_curve=True, turning_radius=True)
 
     def __init__(self, settings: PlannerSettings) -> None:
-        self._genetic = BsplineGa(settings.model_copy(update={"length_fitness": True}))
-        self._graph = Astar(settings)
+        self.genetic: Planner = BsplineGa(settings.model_copy(update={"length_fitness": True}))
+        self.graph: Planner = Astar(settings)
         self._tolerance = settings.hybrid_tolerance
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
         """See ``Planner.plan``. FOUND or NO_PATH. Raises ValueError for a budget without sense."""
         # A look of a few epochs finds the easy paths, and often they cannot be better: then the graph is not searched.
         look = replace(budget, control_points=budget.control_points[:1], max_epochs=budget.min_epochs)
-        genetic = self._genetic.plan(problem, look, rng)
+        genetic = self.genetic.plan(problem, look, rng)
         turning = _turning_cost(problem)
         genetic_cost = _driving_cost(problem, genetic.path)
         if genetic_cost <= self._tolerance * _least_cost(problem) + turning:
             return replace(genetic, planner=self.name)
-        graph = self._graph.plan(problem, budget, rng)
+        graph = self.graph.plan(problem, budget, rng)
         spent = replace(graph, planner=self.name, evaluations=genetic.evaluations, epochs=genetic.epochs)
         if graph.path is None:
             return spent
@@ -60,7 +60,7 @@ class Hybrid:
         self, problem: PlanningProblem, budget: Budget, rng: Generator, spent: PlanResult, good_cost: float
     ) -> PlanResult:
         """To a vehicle that cannot turn on the spot a path that it can drive is worth more trouble."""
-        genetic = self._genetic.plan(problem, budget, rng)
+        genetic = self.genetic.plan(problem, budget, rng)
         evaluations, epochs = spent.evaluations + genetic.evaluations, spent.epochs + genetic.epochs
         if _driving_cost(problem, genetic.path) > good_cost:
             return replace(spent, evaluations=evaluations, epochs=epochs)

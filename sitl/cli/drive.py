@@ -89,7 +89,8 @@ def drive(
         for note in scenario.notes:
             typer.echo(note, err=True)
         if record is not None:
-            recorder = Recorder(record, mission_file, settings, seed)
+            files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
+            recorder = Recorder(record, mission, settings, seed, arm=True, files=files)
         picture(image)
         writable(json_file)
         map_stem = map_stem.with_suffix("") if map_stem and map_stem.suffix in (".yaml", ".pgm") else map_stem
@@ -109,6 +110,10 @@ def drive(
     raise typer.Exit(report.exit_code)
 
 
+def _file(sensors: str | None) -> Path | None:
+    return Path(sensors) if sensors is not None and sensors.endswith(".toml") else None
+
+
 def _put_out(
     run: Drive,
     recorder: Recorder | NullRecorder,
@@ -125,6 +130,7 @@ def _put_out(
         run.companion.save_map(map_stem)
         console.print(f"map:     {map_stem}.yaml", soft_wrap=True)
     if isinstance(recorder, Recorder):
+        run.companion.save_map(recorder.directory / "map")
         console.print(f"record:  {recorder.directory}", soft_wrap=True)
     if json_file is not None:
         json_file.write_text(

@@ -34,7 +34,12 @@ class HashingRecorder(NullRecorder):
         self.digest = hashlib.sha256()
         self.packets = 0
 
-    def packet(self, time_s: float, raw: bytes) -> None:
+    def heard(self, time_s: float, packets: list[bytes]) -> None:
+        """The packets of a round."""
+        for raw in packets:
+            self.said(time_s, raw)
+
+    def said(self, time_s: float, raw: bytes) -> None:
         """One packet of either direction."""
         self.packets += 1
         self.digest.update(repr(time_s).encode() + raw)

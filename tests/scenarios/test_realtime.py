@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 
 from companion.mapfiles import load_map
+from companion.record import load_record
+from companion.replay import replay
 from tests.rig import yard
 from tests.served import finished, mission_path, process
 from tests.unit.test_sitl_server import free_port
@@ -37,5 +39,7 @@ def test_companion_and_simulator_as_two_processes(tmp_path: Path, kind: str, spe
         assert said in err
     assert "Traceback" not in err
     assert (record / "link.tlog").stat().st_size > 10_000
+    again = replay(load_record(record))
+    assert again.differences == [] and again.decisions > 10
     known = load_map(record / "map.yaml")
     assert known.weights[7, 8] >= 1.0, "the wall"

@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 from companion.cli.commands import app
 from companion.mapfiles import load_map
 from companion.mission.load import load_mission
+from companion.record import load_record
+from companion.replay import replay
 from tests.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard
 from tests.served import finished, mission_path, process, served, wait_until
 
@@ -117,13 +119,15 @@ def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.S
     assert code == 130
     assert "gate: pending" in out and "Traceback" not in err
     assert load_map(record / "map.yaml").width == 24
+    again = replay(load_record(record))
+    assert again.differences == [] and again.companion is not None and again.companion.done
 
 
 def test_a_companion_that_is_killed_leaves_the_rover_on_ground_it_had_seen(tmp_path: Path) -> None:
-    mission = yard(tmp_path)
+    mission, record = yard(tmp_path), tmp_path / "record"
     with (
         served(mission) as world,
-        process("companion", "run", mission_path(mission), "--connect", world.url, "--arm") as run,
+        process("companion", "run", mission_path(mission), "--connect", world.url, "--arm", "--record", record) as run,
     ):
         wait_until(lambda: world.simulator.driven_m > 2.0, 40.0)
         run.kill()
@@ -133,6 +137,10 @@ def test_a_companion_that_is_killed_leaves_the_rover_on_ground_it_had_seen(tmp_p
         time.sleep(1.0)
         assert world.simulator.truth.speed_m_s < 0.05
         assert world.simulator.collisions == ()
+    cut = load_record(record)
+    again = replay(cut)
+    assert again.differences == [] and again.decisions > 0
+    assert len(cut.notes) == 1 and "was not closed" in cut.notes[0]
 
 
 def test_the_pilot_wins_and_the_autopilot_is_quoted(tmp_path: Path) -> None:

@@ -1,0 +1,76 @@
+"""``rover-companion replay``: run a recorded companion again, and compare."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from companion.cli.inputs import OutputError, picture
+from companion.cli.why_image import save_why
+from companion.mapfiles import MapError
+from companion.record import Record, load_record
+from companion.recorded_files import RecordError
+from companion.replay import Replayed
+from companion.replay import replay as run_again
+from companion.why import Watcher, in_words
+
+EXIT_SAME, EXIT_DIFFERENT, EXIT_BAD_INPUT = 0, 1, 2
+SHOWN = 20
+
+
+def replay(
+    directory: Annotated[Path, typer.Argument(metavar="DIR", help="What run or drive wrote with --record.")],
+    why: Annotated[
+        int | None, typer.Option(min=1, metavar="STEP", help="Show why this decision was made; the first is 1.")
+    ] = None,
+    image: Annotated[
+        Path | None, typer.Option(help="With --why: where the picture goes; default: why-STEP.png in DIR.")
+    ] = None,
+) -> None:
+    """Run the decisions of a record again and print the differences. Exit code 0: none; 1: some; 2: not to be replayed."""
+    try:
+        record = load_record(directory)
+        if image is not None and why is None:
+            raise OutputError("--image goes with --why: it shows one decision")
+        watcher = None
+        if why is not None:
+            if why > len(record.decisions):
+                raise RecordError(f"{directory}: there is no decision {why}, the last one is {len(record.decisions)}")
+            image = image or directory / f"why-{why}.png"
+            picture(image)
+            watcher = Watcher(why, record.settings, record.mission.rover.turning_radius_m)
+        result = run_again(record, watcher)
+        if watcher is not None and image is not None:
+            _explain(watcher, image)
+    except (RecordError, MapError, OutputError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+    _print(record, result)
+    raise typer.Exit(EXIT_DIFFERENT if result.differences else EXIT_SAME)
+
+
+def _explain(watcher: Watcher, image: Path) -> None:
+    if watcher.explanation is None:
+        return  # the replay did not come so far, and says so
+    for line in in_words(watcher.explanation):
+        typer.echo(line)
+    save_why(image, watcher.explanation)
+    typer.echo(f"picture: {image}")
+
+
+def _print(record: Record, result: Replayed) -> None:
+    for note in record.notes:
+        typer.echo(note, err=True)
+    for name, status in result.targets:
+        typer.echo(f"{name}: {status}")
+    typer.echo(
+        f"{record.mission.name}: {result.seconds:.1f} s, {result.rounds} rounds, {result.heard} packets heard, "
+        f"{result.said} said, {result.decisions} decisions"
+    )
+    for line in result.differences[:SHOWN]:
+        typer.echo(line)
+    if len(result.differences) > SHOWN:
+        typer.echo(f"... and {len(result.differences) - SHOWN} more")
+    typer.echo(f"differences: {len(result.differences) or 'none'}")

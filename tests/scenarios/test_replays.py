@@ -1,0 +1,328 @@
+"""Records are run again: nothing differs, whatever happened in the run; and a record that is not whole is named in one line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from PIL import Image
+from pymavlink import mavutil
+from typer.testing import CliRunner
+
+from companion.app import Companion
+from companion.cli.commands import app
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.codec import Codec
+from companion.mavlink.transport import MemoryLink
+from companion.mission.load import load_mission
+from companion.mission.mission import Mission
+from companion.navigator import Decision, NavState
+from companion.record import Record, load_record
+from companion.recorded_files import RecordError
+from companion.recorder import Recorder
+from companion.replay import replay
+from companion.rounds import CHECKED, Mark, unpacked
+from companion.settings import Settings
+from companion.stepping import InlineRunner, StepCall
+from sitl.cli.commands import app as sitl_app
+from sitl.fault_file import load_faults
+from sitl.lockstep import Drive
+from sitl.scenario import scenario_from_mission, with_faults
+from tests.rig import Rig, kept_in, yard
+
+MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+FILES = ("link.tlog", "rounds.bin", "decisions.jsonl")
+
+
+def recorded(folder: Path, mission: Mission, faults: str | None = None, limit_s: float = 200.0) -> Path:
+    """A drive in lock-step with a record."""
+    plan = load_faults(MISSIONS / "faults" / f"{faults}.toml") if faults else None
+    recorder = Recorder(folder, mission, Settings(), 0, arm=True)
+    Drive(mission, with_faults(scenario_from_mission(mission), plan), Settings(), 0, recorder, limit_s).run()
+    recorder.close()
+    return folder
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("yard")
+    path = recorded(folder / "record", yard(folder))
+    for name in ("yard.toml", "yard.png"):
+        (folder / name).unlink()  # a record needs nothing beside itself
+    return path
+
+
+@pytest.fixture
+def copy(record: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(record, tmp_path / "copy"))
+
+
+def assert_same(record: Path) -> Record:
+    loaded = load_record(record)
+    result = replay(loaded)
+    assert result.differences == []
+    assert result.heard > 100 and result.said > 10
+    return loaded
+
+
+def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) -> None:
+    code = (
+        "import sys\n"
+        "def hook(event, arguments):\n"
+        "    if event.startswith('socket.') and event != 'socket.gethostname':\n"
+        "        raise SystemExit(f'{event} {arguments}')\n"
+        "sys.addaudithook(hook)\n"
+        "from companion.cli.main import main\n"
+        "main()\n"
+    )
+    command = [sys.executable, "-c", code, "replay", str(record)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("gate: reached\n") and done.stdout.endswith("differences: none\n")
+
+
+@pytest.mark.parametrize(
+    ("name", "faults", "limit_s"), [("one-obstacle.toml", "interrupted", 90.0), ("crossing.toml", "radio", 75.0)]
+)
+def test_nothing_differs_under_faults_and_among_moving_things(
+    tmp_path: Path, name: str, faults: str, limit_s: float
+) -> None:
+    loaded = assert_same(recorded(tmp_path / "record", load_mission(MISSIONS / name), faults, limit_s))
+    assert len(loaded.decisions) > 10 and loaded.notes == []
+
+
+class LateRunner(InlineRunner):
+    """An imitation of a thread: each answer comes later than the one before."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._asked = self._count = 0
+
+    def start(self, call: StepCall) -> None:
+        self._asked, self._count = 0, self._count + 1
+        super().start(call)
+
+    def take(self) -> tuple[NavState, Decision] | None:
+        self._asked += 1 if self.busy else 0
+        return super().take() if self._asked > self._count % 7 else None
+
+
+class Recorded(Rig):
+    """A run of the rig with a record and answers that come late."""
+
+    def __init__(self, folder: Path, mission: Mission) -> None:
+        self.place = folder / "record"
+        super().__init__(mission, state=folder / "state")
+
+    def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
+        assert self._state is not None
+        memory = kept_in(self._state, mission, resume=resume)
+        files = {"state": self.state_file if resume else None}
+        self.recorder = Recorder(self.place, mission, self.settings, 0, arm=True, files=files)
+        near, self._far = MemoryLink.pair()
+        self.link = AutopilotLink(near, Codec(self.settings.link), self.settings.link, self.recorder)
+        self.companion = Companion(
+            self.link, self, mission, self.settings, LateRunner(), self.recorder, seed=0, arm=True, memory=memory
+        )
+
+
+def test_answers_of_a_thread_are_handed_over_when_the_run_had_them(tmp_path: Path) -> None:
+    rig = Recorded(tmp_path, yard(tmp_path))
+    rig.finish()
+    rig.recorder.close()
+    assert_same(rig.place)
+    # Without the marks of the answers no decision is made: they are what tells when.
+    rounds, _ = unpacked((rig.place / "rounds.bin").read_bytes())
+    assert sum(bool(entry.marks & Mark.ANSWER) for entry in rounds) > 5
+    unmarked = b"".join(entry._replace(marks=entry.marks & ~Mark.ANSWER).packed() for entry in rounds)
+    (rig.place / "rounds.bin").write_bytes(unmarked)
+    reopened(rig.place)
+    result = replay(load_record(rig.place))
+    assert result.decisions <= 1, "nothing but: we are there"
+    assert any("recorded decisions are missing" in line for line in result.differences)
+
+
+def test_a_run_that_took_up_another_is_replayed_from_the_copy_of_its_state(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    rig = Recorded(tmp_path, mission)
+    rig.until_driven(6.0)
+    rig.recorder.close()
+    rig.restart_companion(mission, resume=True)
+    rig.finish()
+    rig.recorder.close()
+    shutil.rmtree(tmp_path / "state")
+    assert rig.recorder.directory.name == "record-2"
+    assert_same(rig.place)
+    loaded = assert_same(rig.recorder.directory)
+    assert json.loads(loaded.decisions[0])["path"][0][0] > 4, "it went on where it was"
+
+
+def reopened(record: Path) -> None:
+    """As if it had never been closed: there are no check sums of whole files."""
+    meta = json.loads((record / "meta.json").read_text())
+    (record / "meta.json").write_text(json.dumps(meta | {"end": None}))
+
+
+@pytest.mark.parametrize("way_out", ["stop", "error"])
+def test_the_way_out_is_replayed_too(tmp_path: Path, way_out: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Recorded(tmp_path, yard(tmp_path))
+    rig.until_driven(2.0)
+    if way_out == "stop":
+        rig.companion.stop()
+        rig.finish()
+    else:
+        rig.companion.close()
+    rig.recorder.close()
+    result = replay(load_record(rig.place))
+    wanted = [] if way_out == "stop" else ["the run was broken off by an error that the replay does not have"]
+    assert [line.partition(": ")[2] for line in result.differences] == wanted
+    assert result.companion is not None and result.companion.done
+
+
+def changed(what: str, value: object) -> Callable[[Path], None]:
+    def change(record: Path) -> None:
+        meta = json.loads((record / "meta.json").read_text())
+        (record / "meta.json").write_text(json.dumps(meta | {what: value}))
+
+    return change
+
+
+def test_a_run_that_was_otherwise_differs(copy: Path) -> None:
+    changed("arm", False)(copy)
+    result = CliRunner().invoke(app, ["replay", str(copy)])
+    assert result.exit_code == 1
+    assert "COMMAND_LONG 400 was said in the run, not in the replay" in result.output
+    assert "COMMAND_LONG: seq" not in result.output and "... and " in result.output
+    assert "differences: none" not in result.output
+
+
+def overwritten(name: str, data: bytes) -> Callable[[Path], None]:
+    def change(record: Path) -> None:
+        (record / name).write_bytes(data)
+
+    return change
+
+
+def flipped(name: str, at: int) -> Callable[[Path], None]:
+    def change(record: Path) -> None:
+        data = bytearray((record / name).read_bytes())
+        data[at] ^= 1
+        (record / name).write_bytes(data)
+
+    return change
+
+
+REFUSED: dict[str, tuple[Callable[[Path], None], list[str]]] = {
+    "mission changed": (flipped("inputs/mission/yard.toml", 3), ["yard.toml", "changed since the run"]),
+    "mission as understood changed": (flipped("mission.json", 30), ["mission.json", "changed since the run"]),
+    "map gone": (lambda record: (record / "inputs/mission/yard.png").unlink(), ["yard.png", "cannot be read"]),
+    "settings changed": (changed("settings", {"safety": {"stale_s": 2.0}}), ["meta.json", "settings changed"]),
+    "older": (changed("format", 1), ["meta.json", "format 1", "format 2", "version it was made with"]),
+    "newer": (changed("format", 99), ["format 99"]),
+    "no json": (overwritten("meta.json", b"{"), ["meta.json", "damaged"]),
+    "no object": (overwritten("meta.json", b"[]"), ["meta.json", "format None"]),
+    "half": (overwritten("meta.json", b'{"format": 2}'), ["meta.json", "seed"]),
+    "outside": (changed("inputs", [{"kind": "x", "name": "../x", "source": "", "sha256": ""}]), ["outside"]),
+    "packets damaged": (flipped("link.tlog", 5000), ["link.tlog", "damaged"]),
+    "rounds damaged": (flipped("rounds.bin", 500), ["rounds.bin", "damaged"]),
+    "decisions damaged": (flipped("decisions.jsonl", 500), ["decisions.jsonl", "damaged"]),
+    "nothing there": (shutil.rmtree, ["meta.json", "cannot be read"]),
+    "no packets": (lambda record: (record / "link.tlog").unlink(), ["link.tlog", "cannot be read"]),
+    "no rounds": (overwritten("rounds.bin", b""), ["rounds.bin", "no rounds"]),
+}
+
+
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_cannot_be_replayed_is_one_line(copy: Path, what: str) -> None:
+    change, words = REFUSED[what]
+    change(copy)
+    result = CliRunner().invoke(app, ["replay", str(copy)])
+    assert result.exit_code == 2, result.output
+    assert len(result.output.strip().splitlines()) == 1
+    assert all(word in result.output for word in words), result.output
+
+
+@pytest.mark.parametrize(("name", "at"), [("link.tlog", 5000), ("rounds.bin", 500)])
+def test_damage_is_found_in_a_record_that_was_never_closed(copy: Path, name: str, at: int) -> None:
+    reopened(copy)
+    flipped(name, at)(copy)
+    with pytest.raises(RecordError, match="damaged at byte"):
+        replay(load_record(copy))
+
+
+@settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(data=st.data())
+def test_a_record_that_is_cut_anywhere_is_replayed_as_far_as_it_goes(
+    record: Path, tmp_path: Path, data: st.DataObject
+) -> None:
+    copy = tmp_path / "cut"
+    shutil.rmtree(copy, ignore_errors=True)
+    shutil.copytree(record, copy)
+    if data.draw(st.booleans(), "killed"):
+        reopened(copy)
+    lengths = {}
+    for name in FILES:
+        size = (copy / name).stat().st_size
+        lengths[name] = data.draw(st.integers(CHECKED.size if name == "rounds.bin" else 0, size - 1), name)
+        with (copy / name).open("r+b") as file:
+            file.truncate(lengths[name])
+    loaded = load_record(copy)
+    result = replay(loaded)
+    assert result.differences == []
+    assert loaded.notes and all("\n" not in note for note in loaded.notes)
+    assert result.rounds <= lengths["rounds.bin"] // CHECKED.size
+
+
+def test_the_packets_are_a_log_that_ground_stations_open(record: Path) -> None:
+    log = mavutil.mavlink_connection(str(record / "link.tlog"))
+    kinds = {}
+    while (message := log.recv_match()) is not None:
+        kinds[message.get_srcComponent(), message.get_type()] = message._timestamp
+    log.close()
+    assert {(1, "HEARTBEAT"), (191, "HEARTBEAT"), (191, "SET_POSITION_TARGET_LOCAL_NED")} <= kinds.keys()
+    assert (0, "BAD_DATA") not in kinds
+    dump = [sys.executable, "-m", "pymavlink.tools.mavlogdump", "--types", "HEARTBEAT", str(record / "link.tlog")]
+    done = subprocess.run(dump, capture_output=True, text=True, timeout=60, check=True)
+    assert "srcComponent" in done.stdout or "HEARTBEAT" in done.stdout
+
+
+def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
+    lines = load_record(record).decisions
+    number = 1 + next(i for i, line in enumerate(lines) if i and json.loads(line)["searches"])
+    picture = tmp_path / "why.png"
+    result = CliRunner().invoke(app, ["replay", str(record), "--why", str(number), "--image", str(picture)])
+    assert result.exit_code == 0, result.output
+    decision = json.loads(lines[number - 1])
+    assert result.output.startswith(f"decision {number} at {decision['time_s']:.2f} s, heading for gate")
+    for words in (decision["reason"], "what is left of the current path", "search by hybrid", "proposed by", "taken: "):
+        assert words in result.output
+    with Image.open(picture) as image:
+        assert image.width >= 900
+        colours = {colour for _, colour in image.convert("RGB").getcolors(1 << 20) or []}
+    assert {(214, 60, 50), (40, 110, 200), (150, 120, 90)} <= colours
+    late = CliRunner().invoke(app, ["replay", str(record), "--why", "100000"])
+    assert late.exit_code == 2 and "the last one is" in late.output
+
+
+def test_drive_records_what_it_was_given(tmp_path: Path) -> None:
+    given = ["--settings", str(tmp_path / "s.toml"), "--sensors", str(MISSIONS / "sensors" / "weathered.toml")]
+    (tmp_path / "s.toml").write_text("[guidance]\nhorizon_m = 6.0\n")
+    command = ["drive", str(MISSIONS / "depot.toml"), "--record", str(tmp_path / "r"), "--time-limit-s", "46", *given]
+    assert CliRunner().invoke(sitl_app, command).exit_code == 3
+    loaded = assert_same(tmp_path / "r")
+    assert loaded.settings.guidance.horizon_m == 6.0
+    assert {entry.name for entry in loaded.meta.inputs} >= {
+        "inputs/mission/depot.toml",
+        "inputs/mission/worlds/depot.toml",
+        "inputs/settings/s.toml",
+        "inputs/sensors/weathered.toml",
+        "mission.json",
+    }
+    assert (loaded.input("settings") or tmp_path).name == "s.toml"
