@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
-from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
+from companion.events_plan import BatterySeen, FenceStatusSeen, PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.events_targets import TargetAsked
 from companion.frames import GeoPoint, Pose
 from companion.latency import BACK_S, Latency, TimeAnswered, answered, reported
@@ -193,6 +193,8 @@ Event = (
     | PlanChangedSeen
     | TargetAsked
     | SticksSeen
+    | FenceStatusSeen
+    | BatterySeen
 )
 
 
