@@ -65,7 +65,7 @@ class Fencing:
             case PlanChangedSeen() if event.kind in self._asked_s:
                 self._asked_s[PlanKind(event.kind)] = -math.inf
             case ParameterSeen() if event.name in TOTALS:
-                if self._totals.get(event.name, event.value) != event.value:
+                if self._totals.get(event.name) != event.value:
                     self._asked_s[TOTALS[event.name]] = -math.inf
                 self._totals[event.name] = event.value
             case _:
