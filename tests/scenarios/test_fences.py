@@ -138,7 +138,7 @@ def test_a_target_that_comes_to_lie_outside_is_given_up_and_the_next_one_driven(
         yard(tmp_path, two), prepare=stored(box(KEEP_IN, -6.0, -2.4, 7.0, 21.4), **POLYGONS, FENCE_MARGIN=0.0)
     )
     rig.until_driven(2.0)
-    Person(rig).upload(box(KEEP_IN, -6.0, -2.4, 7.0, 12.0) + [(CIRCLE_IN, 0.0, 0.0, 90.0)])
+    Person(rig).upload([*box(KEEP_IN, -6.0, -2.4, 7.0, 12.0), (CIRCLE_IN, 0.0, 0.0, 90.0)])
     rig.finish()
     assert [str(status) for _, status in rig.companion.statuses()] == ["unreachable", "reached"]
     assert any(text.startswith("Refused: target 1 'far': lies outside") for text in rig.texts())
