@@ -26,6 +26,7 @@ from companion.memory import Memory
 from companion.mission.mission import Mission
 from companion.outbox import Outbox
 from companion.output_check import OutputCheck
+from companion.oversight import Oversight
 from companion.pursuit import Pursuit
 from companion.recorder import DecisionLog
 from companion.reporting import Outcome, Reporter, Status
@@ -82,6 +83,7 @@ class Companion:
         self._outbox = Outbox(settings.guidance)
         self.output_check = OutputCheck(self._tell)
         self._reporter = Reporter(self.outcome.said)
+        self.oversight = Oversight(autopilot, settings, self._tell)
         self._next_tick_s = now_s = clock.now_s()
         log.begin(now_s, Mark.BEGIN)
         self._watchdogs = Watchdogs()
@@ -149,6 +151,7 @@ class Companion:
             self._attendant.take(event)
             self._take_in(event)
         self._settings = self._attendant.attend(self._pursuit, now_s)
+        self.oversight.service(self.vehicle, now_s)
         if self._stop_asked and not self._handover.begun:
             self._log.mark(Mark.STOP)
             self._hand_over(now_s, "stopped by the user")
@@ -217,6 +220,7 @@ class Companion:
             self._autopilot.ask_places()
         before = self.watch.control
         doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason(now_s)
+        doubt = doubt or self.oversight.doubt(self._pursuit, self.vehicle.pose_at(now_s), now_s)
         self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, doubt)
         if verdict.reaction is Reaction.DRIVE:
             if self._stopped or before is not Control.COMPANION:
@@ -248,7 +252,8 @@ class Companion:
             return None
         taken = overruled(self._autopilot.last_ack(SetMode(RoverMode.GUIDED)), self.vehicle.heartbeat)
         control = Control.PERSON if taken else self.watch.control
-        laid, command = self._start_up.step(self.vehicle, control, now_s)
+        hindrance, fence = self.oversight.hindrance(now_s), self.oversight.fence
+        laid, command = self._start_up.step(self.vehicle, control, now_s, fence, hindrance)
         if command is not None:
             self._send(command, now_s)
         refused = self._autopilot.last_ack(Arm())
@@ -280,6 +285,7 @@ class Companion:
         if isinstance(event, TextSeen) and event.severity <= WARNING:
             self._reporter.note(f"autopilot: {event.text}", event.severity)
         self._watchdogs.take_in(event, self.vehicle)
+        self.oversight.take_in(event)
         if isinstance(event, TargetAsked):
             idle = self._pursuit is None or self._stopped or self._handover.begun
             self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
@@ -299,6 +305,9 @@ class Companion:
         """One tick on the way."""
         pose = self.vehicle.pose_at(now_s)
         assert pose is not None
+        if reason := self.oversight.broken_off(pursuit, pose, now_s):
+            self._hand_over(now_s, reason)
+            return
         others = announced(self.vehicle, pose, self._mission.rover.radius_m, self._settings.traffic)
         guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s, others)
         self._reporter.doing = pursuit.doing

@@ -23,7 +23,18 @@ from companion.guidance import (
 )
 from companion.mapping import EvidenceMap, doubt
 from companion.mission.resolve import ResolvedTarget
-from companion.navigator import Action, Decision, NavState, Part, SearchKind, abandon_path, begin, is_clear, step
+from companion.navigator import (
+    Action,
+    Decision,
+    NavState,
+    Part,
+    SearchKind,
+    abandon_path,
+    begin,
+    is_clear,
+    retrace,
+    step,
+)
 from companion.planning import problem
 from companion.planning.problem import PlanResult
 from companion.recovery import Recovery
@@ -84,13 +95,15 @@ class Driver:
         self._yielding_s: float | None = None
         self._aside_rad: float | None = None
 
-    def head_for(self, goal: ResolvedTarget, pose: Pose) -> None:
-        """Begin a leg from here."""
+    def head_for(self, goal: ResolvedTarget, pose: Pose, way: tuple[Cell, ...] = ()) -> None:
+        """Begin a leg from here, if there is one along a way that was driven before."""
         self._goal = goal
         self._epoch += 1
         cell = self.evidence.base.cell_at(pose.point)
         seed = (self.seed + self._epoch) % 2**63
         self._state = begin(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
+        if way:
+            self._state = retrace(self._state, way)
         self.route = None
         self.decision = None
         self._doubts_left = self._settings.navigator.doubts

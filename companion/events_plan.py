@@ -1,4 +1,4 @@
-"""What the autopilot has stored of mission, fence and rally points, as it tells it piece by piece (MAVLink's mission protocol)."""
+"""What the autopilot tells of the lists it has stored (MAVLink's mission protocol), of its fence, and of its batteries."""
 
 from __future__ import annotations
 
@@ -44,3 +44,25 @@ class PlanChangedSeen:
 
     time_s: float
     kind: int
+
+
+@dataclass(frozen=True, slots=True)
+class FenceStatusSeen:
+    """FENCE_STATUS, which comes only while a fence is switched on: whether the rover is beyond it."""
+
+    time_s: float
+    breached: bool
+
+
+@dataclass(frozen=True, slots=True)
+class BatterySeen:
+    """One battery by BATTERY_STATUS; from SYS_STATUS ``number`` is -1. What is not known is None.
+
+    ``charge_state``: MAV_BATTERY_CHARGE_STATE, how far the autopilot's own failsafe has gone (0 undefined, 1 ok, 2 low, 3 critical).
+    """
+
+    time_s: float
+    number: int
+    volts: float | None
+    percent: int | None
+    charge_state: int = 0

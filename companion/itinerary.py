@@ -130,6 +130,11 @@ def on_unreachable(itinerary: Itinerary, now_s: float, retry_s: float, wait_limi
             return replace(_skipped_rest(itinerary), leg=Leg.HOLD)
 
 
+def returning(itinerary: Itinerary, place: ResolvedTarget) -> Itinerary:
+    """Nothing but back to a place: the targets not reached yet are skipped."""
+    return replace(_skipped_rest(itinerary), leg=Leg.HOME, home=place)
+
+
 def on_time(itinerary: Itinerary, now_s: float) -> Itinerary:
     """A stay that is over leads to the next target, a wait that is over to another try."""
     if itinerary.leg is Leg.STAY and now_s >= itinerary.until_s:

@@ -21,6 +21,7 @@ from companion.planning.problem import Path, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, cells_cost, plain
 
 BACKTRACK_TRIES = 8
+NEVER = 2**62
 
 
 class Part(StrEnum):
@@ -101,6 +102,11 @@ def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavSt
     if state.current is not None and is_clear(grid, state.current.cell_array[state.index :]):
         return _explore(state, grid, search, entered=entered)
     return _search(state, grid, search)
+
+
+def retrace(state: NavState, way: tuple[Cell, ...]) -> NavState:
+    """Follow fields that lead from here to the target and were driven before, as long as they stay clear; no better path is looked for."""
+    return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER)
 
 
 def abandon_path(state: NavState) -> NavState:
@@ -227,7 +233,7 @@ def _arrive(state: NavState, cell: Cell) -> NavState:
         return state
     if state.returning:
         return replace(state, past=_retraced(state.past, cell))
-    past = state.past + _fields_between(state.past[-1], cell) + (cell,)
+    past = state.past + fields_between(state.past[-1], cell) + (cell,)
     if state.current is None:
         return replace(state, past=past)
     index = _place_on(state.current.cell_array, state.index, cell)
@@ -239,10 +245,10 @@ def _retraced(past: tuple[Cell, ...], cell: Cell) -> tuple[Cell, ...]:
     gaps = [max(abs(p.x - cell.x), abs(p.y - cell.y)) for p in past[:-1]]
     nearest = min(range(len(gaps)), key=lambda i: (gaps[i], -i), default=0)
     if not gaps:
-        return (*past, *_fields_between(past[-1], cell), cell)
+        return (*past, *fields_between(past[-1], cell), cell)
     if gaps[nearest] == 0:
         return past[: nearest + 1]
-    return (*past[: nearest + 1], *_fields_between(past[nearest], cell), cell)
+    return (*past[: nearest + 1], *fields_between(past[nearest], cell), cell)
 
 
 def _place_on(cells: CellArray, index: int, cell: Cell) -> int:
@@ -255,7 +261,7 @@ def _place_on(cells: CellArray, index: int, cell: Cell) -> int:
     return -1
 
 
-def _fields_between(a: Cell, b: Cell) -> tuple[Cell, ...]:
+def fields_between(a: Cell, b: Cell) -> tuple[Cell, ...]:
     """The fields strictly between two, 8-connected along the straight line (none when they are neighbours)."""
     n = max(abs(b.x - a.x), abs(b.y - a.y))
     return tuple(Cell(a.x + round((b.x - a.x) * i / n), a.y + round((b.y - a.y) * i / n)) for i in range(1, n))

@@ -10,15 +10,16 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from companion.commands import GuidedPosition, GuidedVelocity, Setpoint
-from companion.frames import Pose
+from companion.frames import NedPoint, Pose
 from companion.guidance import STOP, Guide, Motion, RoverLimits, braking_distance_m, farthest_m
 from companion.manoeuvre import ground_of, in_cells
 from companion.mapping import EvidenceMap, look_along
+from companion.mission.bounds import Bounds
 from companion.settings import Settings
 from companion.swept import BLOCKED, arc_clear, kept_room
 
@@ -26,6 +27,8 @@ SLACK_M = 0.1
 """Guidance looks in steps, and lets a line end a few centimetres before something."""
 NEARER_M = 0.05
 """The rover's disc may overlap evidence by so much: evidence has an error, and who stands at a wall must get away from it."""
+ARC_PIECES = 8
+"""Straight pieces that an arc is made of where borders are concerned."""
 WARNING = 4
 
 Tell = Callable[[str, int], None]
@@ -48,6 +51,7 @@ class Surroundings:
     evidence: EvidenceMap
     rover: RoverLimits
     settings: Settings
+    bounds: Bounds = field(default_factory=Bounds)
 
 
 Rule = Callable[[Output, Surroundings], str]
@@ -95,7 +99,33 @@ def velocity_stops_in_time(output: Output, known: Surroundings) -> str:
     return ""
 
 
-RULES: tuple[Rule, ...] = (position_in_sight, velocity_stops_in_time)
+def inside_borders(output: Output, known: Surroundings) -> str:
+    """The straight way to a guided position, and the way on which a rover with a guided velocity comes to stand, cross no border."""
+    setpoint, pose = output.setpoint, output.pose
+    if len(known.bounds) == 0:
+        return ""
+    if isinstance(setpoint, GuidedPosition):
+        name = known.bounds.fault((pose.point, setpoint.point))
+    elif isinstance(setpoint, GuidedVelocity) and setpoint.forward_m_s != 0.0:
+        name = known.bounds.fault(_way_of(setpoint, output, known))
+    else:
+        return ""
+    return f"setpoint leads over the border of {name}" if name else ""
+
+
+def _way_of(velocity: GuidedVelocity, output: Output, known: Surroundings) -> list[NedPoint]:
+    """The arc on which the rover comes to stand, were the velocity ended now: its stopping way, in straight pieces."""
+    point, course_rad = output.pose.point, output.pose.heading_rad + (math.pi if velocity.forward_m_s < 0.0 else 0.0)
+    fastest_m_s = max(abs(velocity.forward_m_s), output.speed_m_s)
+    piece_m = braking_distance_m(fastest_m_s, known.settings.guidance) / ARC_PIECES
+    turn_rad = velocity.yaw_rate_rad_s / max(output.speed_m_s, known.settings.steering.scale_base_m_s) * piece_m
+    way = [point]
+    for i in range(ARC_PIECES):
+        way.append(way[-1].moved(course_rad + (i + 0.5) * turn_rad, piece_m))
+    return way
+
+
+RULES: tuple[Rule, ...] = (position_in_sight, velocity_stops_in_time, inside_borders)
 
 
 def fault_of(output: Output, known: Surroundings, rules: tuple[Rule, ...] = RULES) -> str:

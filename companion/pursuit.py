@@ -8,23 +8,36 @@ from collections.abc import Callable
 import numpy as np
 
 from companion.driver import Driver
-from companion.frames import GeoPoint, Pose
+from companion.frames import GeoPoint, NedPoint, Pose
+from companion.grid import Cell
 from companion.guidance import Guide, RoverLimits
-from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable, with_errand
-from companion.laying import Laid, apart_m, lay_again
+from companion.itinerary import (
+    Itinerary,
+    Leg,
+    TargetStatus,
+    on_reached,
+    on_time,
+    on_unreachable,
+    returning,
+    with_errand,
+)
+from companion.laying import Laid, apart_m, fenced_again, lay_again
 from companion.mapping import EvidenceMap, forget, integrate
+from companion.mission.fence import AutopilotFence
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Action, Decision
 from companion.output_check import Surroundings
 from companion.planning.registry import make_planner
 from companion.recorder import DecisionLog
+from companion.refuge import Refuge, refuges
 from companion.scan import RangeScan
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.stepping import StepRunner
 from companion.tracking import Tracker
 from companion.traffic import Moving, merged
+from companion.trail import Trail
 
 INFO, WARNING = 6, 4
 ORIGIN_MOVED_M = 0.2
@@ -59,6 +72,9 @@ class Pursuit:
         self._log = log
         self._tell = tell
         self._scans = 0
+        self.trail = Trail()
+        """The way back to where the mission began."""
+        self._refuges: list[Refuge] = []
         rover = mission.rover
         margin_m = settings.guidance.narrow_margin_m if scan.is_narrow else 0.0
         self._limits = RoverLimits(
@@ -83,12 +99,17 @@ class Pursuit:
     @property
     def surroundings(self) -> Surroundings:
         """What is known of the ground, and the rover on it."""
-        return Surroundings(self.evidence, self._limits, self._settings)
+        return Surroundings(self.evidence, self._limits, self._settings, self.laid.bounds)
 
     @property
     def reached(self) -> int:
         """How many targets have been reached."""
         return sum(status is TargetStatus.REACHED for status in self.itinerary.statuses)
+
+    @property
+    def returning(self) -> bool:
+        """Whether the rover is on its way back for good."""
+        return bool(self._refuges) or self.itinerary.ended
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
@@ -123,12 +144,41 @@ class Pursuit:
         self.driver = Driver(self.evidence, self._limits, self._settings, searcher, self._runner, seed)
         self.driver.tally = before.tally
         self._tracker = Tracker(self.evidence, self._settings.traffic)
+        self.trail, self._refuges = Trail(), self._refuges[-1:]
         return True
 
     def run_errand(self, errand: ResolvedTarget) -> None:
         """Drive there first; then the mission goes on."""
         self.itinerary = with_errand(self.itinerary, errand)
         self.driver.leave()
+
+    def heed_fence(self, fence: AutopilotFence) -> None:
+        """The autopilot's fence as it is now; a new one closes and opens ground at once."""
+        if fence is self.laid.fence or fence == self.laid.fence:
+            return
+        self.laid = fenced_again(self.laid, self.itinerary, self._mission, fence)
+        self.driver.leave()
+        self._tell(f"The autopilot's fence has changed: {len(self.laid.bounds)} borders now", WARNING)
+
+    def outside(self, point: NedPoint) -> str:
+        """In words, that the rover is beyond a border; empty when it is not."""
+        name = self.laid.bounds.outside(point)
+        return f"the rover is beyond the border of {name}" if name else ""
+
+    def go_back(self, reason: str, rally: list[NedPoint], pose: Pose) -> None:
+        """Give the mission up: to the nearest of the rally points, or back the way the rover came. ``reason`` is told."""
+        planner = make_planner("dijkstra", self._settings.planner)
+        self._refuges = refuges(self.itinerary.home, self.trail, rally, pose.point, self.evidence, planner)
+        missed = [name for name, status in self.statuses() if status is not TargetStatus.REACHED]
+        self._tell(f"Returning: {reason}. Missed: {', '.join(missed) or 'nothing'}", WARNING)
+        self._seek_refuge()
+
+    def _seek_refuge(self) -> None:
+        """The next place to try."""
+        refuge = self._refuges[0]
+        self.itinerary = returning(self.itinerary, refuge.place)
+        along = " along the way it came" if refuge.way else ""
+        self._tell(f"Back to {refuge.place.name}, {refuge.length_m:.0f} m{along}", WARNING)
 
     def forget_map(self) -> None:
         """What has been seen lies elsewhere now."""
@@ -140,6 +190,7 @@ class Pursuit:
     def drive(self, pose: Pose, speed_m_s: float, now_s: float, announced: tuple[Moving, ...] = ()) -> Guide | None:
         """What to do for the mission now; None when it has ended. ``announced``: who has told of itself and may come near."""
         moving = merged(announced, self._tracker.moving(now_s), now_s)
+        self.trail.enter(self.evidence.base.cell_at(pose.point))
         self.itinerary = on_time(self.itinerary, now_s)
         if self.itinerary.ended:
             return None
@@ -148,13 +199,32 @@ class Pursuit:
             self.driver.pause()
             return self.driver.standing(pose, speed_m_s, moving)
         if self.driver.goal is not self.itinerary.goal:
+            if self._is_refused(now_s):
+                return self.driver.standing(pose, speed_m_s, moving)
             self._tell(f"Heading for {self.itinerary.goal.name}", INFO)
-            self.driver.head_for(self.itinerary.goal, pose)
+            self.driver.head_for(self.itinerary.goal, pose, self._way_back(pose))
         self.doing = "driving"
         guide, decision = self.driver.update(pose, speed_m_s, moving)
         if decision is not None:
             self._take_decision(decision, now_s)
         return guide
+
+    def _is_refused(self, now_s: float) -> bool:
+        """Whether the target that is next lies behind the autopilot's fence: it is not even tried, and the mission goes on after it."""
+        reason = self.laid.refused.get(self.itinerary.index)
+        if self.itinerary.leg is not Leg.TRAVEL or reason is None:
+            return False
+        self._tell(f"Refused: {reason}", WARNING)
+        navigator = self._settings.navigator
+        self.itinerary = on_unreachable(self.itinerary, now_s, navigator.wait_retry_s, navigator.wait_limit_s)
+        return True
+
+    def _way_back(self, pose: Pose) -> tuple[Cell, ...]:
+        """The fields to follow to a refuge, where they are known: as long as nothing has taken the rover off that way."""
+        if not self._refuges or not self._refuges[0].way:
+            return ()
+        way, here = self.trail.back(), self.evidence.base.cell_at(pose.point)
+        return way if way[0] == here and way[-1] == self._refuges[0].place.cell else ()
 
     def _take_decision(self, decision: Decision, now_s: float) -> None:
         goal = self.itinerary.goal
@@ -165,8 +235,12 @@ class Pursuit:
         elif decision.action is Action.UNREACHABLE:
             self._tell(f"Unreachable: {goal.name} ({decision.reason})", WARNING)
             navigator = self._settings.navigator
-            # How long a leg of AUTO may take is the autopilot's to say (DO_GUIDED_LIMITS).
-            limit_s = math.inf if self._mission.in_auto else navigator.wait_limit_s
-            self.itinerary = on_unreachable(self.itinerary, now_s, navigator.wait_retry_s, limit_s)
+            if len(self._refuges) > 1:
+                self._refuges.pop(0)
+                self._seek_refuge()
+            else:
+                # How long a leg of AUTO may take is the autopilot's to say (DO_GUIDED_LIMITS).
+                limit_s = math.inf if self._mission.in_auto else navigator.wait_limit_s
+                self.itinerary = on_unreachable(self.itinerary, now_s, navigator.wait_retry_s, limit_s)
         if decision.action in (Action.REACHED, Action.UNREACHABLE):
             self.driver.leave()

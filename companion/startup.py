@@ -7,8 +7,11 @@ from dataclasses import dataclass
 
 from companion.commands import Arm, Command, SetMode
 from companion.guidance import STANDSTILL
+from companion.itinerary import TargetStatus
 from companion.laying import Laid, lay
-from companion.mission.mission import Mission
+from companion.mission.bounds import Bounds
+from companion.mission.fence import NO_FENCE, AutopilotFence
+from companion.mission.mission import Mission, MissionError
 from companion.resuming import Kept, Ownership, lay_resumed, ownership, same_boot
 from companion.safety import Control, data_reason
 from companion.settings import SafetySettings, Settings
@@ -37,8 +40,9 @@ def start_step(
     *,
     arm: bool,
     control: Control = Control.NOBODY,
+    hindrance: str = "",
 ) -> StartStep:
-    """What stands between now and driving.
+    """What stands between now and driving. ``hindrance``: anything else that must be out of the way before GUIDED is set.
 
     GUIDED is set only on a rover that nobody drives (disarmed, or in HOLD), and never on one that a person has just taken
     out of GUIDED (``control``); arming only if told to (``arm``).
@@ -50,6 +54,8 @@ def start_step(
     reason = data_reason(vehicle, now_s, settings)
     if reason:
         return StartStep(f"good data ({reason})")
+    if hindrance:
+        return StartStep(hindrance)
     if vehicle.in_auto:
         ready = vehicle.heartbeat.mode == RoverMode.AUTO and vehicle.heartbeat.armed
         return StartStep("" if ready else "a person to arm and to set AUTO (the autopilot drives this mission)")
@@ -86,29 +92,38 @@ class StartUp:
         self._arm = arm
         self._asked_s = -math.inf
         self._look_again_s = -math.inf
-        self._checked = False
+        self._checked: tuple[object, ...] = ()
+        self._bounds: Bounds | None = None
 
     def retune(self, settings: Settings) -> None:
         """Other settings from now on."""
         self._settings = settings
 
-    def step(self, vehicle: VehicleState, control: Control, now_s: float) -> tuple[Laid | None, Command | None]:
+    def step(
+        self,
+        vehicle: VehicleState,
+        control: Control,
+        now_s: float,
+        fence: AutopilotFence = NO_FENCE,
+        hindrance: str = "",
+    ) -> tuple[Laid | None, Command | None]:
         """The mission on the ground once the rover may be driven; until then the command to give now, if any.
 
-        Raises MissionError as soon as it is known that the mission cannot be laid out, before anybody arms.
+        ``fence``: the autopilot's own. ``hindrance``: see ``start_step``. Raises MissionError as soon as it is known that the mission
+        cannot be laid out, or has a target behind a fence, before anybody arms.
         """
         if now_s < self._look_again_s:
             return None, None
-        if not self._checked and self._lay(vehicle, now_s) is not None:
-            self._checked = True
+        self._check(vehicle, now_s, fence)
+        hindrance = hindrance or self._stands_too_near(vehicle, now_s)
         control = self._whose(vehicle, control)
         # Whoever disarms the rover does not want it armed again by itself.
         self._arm = self._arm and not (vehicle.heartbeat is not None and vehicle.heartbeat.armed)
-        step = start_step(vehicle, now_s, self._settings.safety, arm=self._arm, control=control)
+        step = start_step(vehicle, now_s, self._settings.safety, arm=self._arm, control=control, hindrance=hindrance)
         self.missing = step.missing
         if step.missing:
             return None, self._due(step.command or self._standstill(vehicle), now_s)
-        laid, pose = self._lay(vehicle, now_s), vehicle.pose_at(now_s)
+        laid, pose = self._lay(vehicle, now_s, fence), vehicle.pose_at(now_s)
         if (
             laid is not None
             and pose is not None
@@ -140,13 +155,31 @@ class StartUp:
             self._arm = self._arm and (self._owner is None or self._owner.may_arm)
         return self._owner.control if self._owner is not None and control is Control.NOBODY else control
 
-    def _lay(self, vehicle: VehicleState, now_s: float) -> Laid | None:
+    def _check(self, vehicle: VehicleState, now_s: float, fence: AutopilotFence) -> None:
+        """Lay the mission out to see whether it can be: once, and again when origin, home or fence are others."""
+        ground = (vehicle.origin and vehicle.origin.point, vehicle.home and vehicle.home.point, fence)
+        if ground == self._checked:
+            return
+        laid = self._lay(vehicle, now_s, fence)
+        if laid is None:
+            return
+        for number, reason in laid.refused.items():
+            if laid.itinerary.statuses[number] is TargetStatus.PENDING:
+                raise MissionError(f"{self._mission.source or self._mission.name}: {reason}")
+        self._checked, self._bounds = ground, laid.bounds
+
+    def _stands_too_near(self, vehicle: VehicleState, now_s: float) -> str:
+        pose = vehicle.pose_at(now_s)
+        near = self._bounds.too_near(pose.point) if self._bounds is not None and pose is not None else ""
+        return f"the rover to stand {near}" if near else ""
+
+    def _lay(self, vehicle: VehicleState, now_s: float, fence: AutopilotFence) -> Laid | None:
         pose = vehicle.pose_at(now_s)
         if vehicle.origin is None or vehicle.home is None or pose is None:
             return None
         origin, mapping = vehicle.origin.point, self._settings.mapping
         if self._kept is None or vehicle.position is None:
-            return lay(self._mission, mapping, origin, vehicle.home.point, pose)
+            return lay(self._mission, mapping, origin, vehicle.home.point, pose, fence)
         same = same_boot(self._kept.state, vehicle.position)
-        laid, self.found = lay_resumed(self._kept, self._mission, mapping, origin, now_s, same=same)
+        laid, self.found = lay_resumed(self._kept, self._mission, mapping, origin, now_s, same=same, fence=fence)
         return laid

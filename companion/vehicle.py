@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 from companion.events_parameters import ParameterRequest
-from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
+from companion.events_plan import BatterySeen, FenceStatusSeen, PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.events_targets import (
     GuidedLeg,
     ItemCurrentSeen,
@@ -207,6 +207,8 @@ Event = (
     | LegSeen
     | ItemReachedSeen
     | ItemCurrentSeen
+    | FenceStatusSeen
+    | BatterySeen
 )
 
 

@@ -33,6 +33,7 @@ from companion.state.writer import InlineWriter, StateFile
 from companion.stepping import InlineRunner
 from companion.warmup import warm_up
 from sitl.scenario import scenario_from_mission
+from sitl.simulator import Simulator
 
 MANUAL, HOLD, AUTO, RTL, GUIDED = 0, 4, 10, 11, 15
 SET_MODE, ARM, SPEED, REPOSITION, REBOOT = 176, 400, 178, 192, 246
@@ -119,14 +120,16 @@ class Rig:
         state: Path | None = None,
         port: int = 0,
         signer: Signer | None = None,
+        prepare: Callable[[Simulator], None] = lambda simulator: None,
     ) -> None:
         """``late_s``: how long the vehicle has been switched on when the companion comes; ``state``: the directory where it keeps its
-        state; ``port``: the vehicle's serial port it is on."""
+        state; ``port``: the vehicle's serial port it is on; ``prepare``: what others did with the vehicle by then."""
         settings = settings or Settings()
         warm_up(settings, mission.rover.turning_radius_m)
         self.settings = settings
         self.simulator = scenario_from_mission(mission).simulator(seed)
         self.simulator.advance_to_s(late_s)
+        prepare(self.simulator)
         self.change: Change | None = None
         self.garble: Callable[[bytes], bytes] | None = None
         self.lose: Callable[[], bool] | None = None

@@ -165,7 +165,7 @@ def _drive(
         runner.close()
         link.close()
         recorder.close()
-    code = _told(companion.statuses())
+    code = _told(companion.statuses(), companion.oversight.ended_by)
     with contextlib.suppress(OSError):  # nobody reads on: the exit code still tells
         for line in (files.close(), str(autopilot.codec.counters.refused)):
             if line:
@@ -177,11 +177,12 @@ def _drive(
     return code
 
 
-def _told(statuses: list[tuple[str, TargetStatus]]) -> int:
-    """Print what became of each target; the exit code that says so too."""
+def _told(statuses: list[tuple[str, TargetStatus]], broken_off: str = "") -> int:
+    """Print what became of each target, and why it was not even tried if the mission was broken off; the exit code that says so too."""
     with contextlib.suppress(OSError):
         for name, status in statuses:
-            typer.echo(f"{name}: {status}")
+            untried = status in (TargetStatus.SKIPPED, TargetStatus.PENDING)
+            typer.echo(f"{name}: {status}{f' ({broken_off})' if broken_off and untried else ''}")
     return EXIT_REACHED if all(status is TargetStatus.REACHED for _, status in statuses) else EXIT_MISSED
 
 

@@ -8,11 +8,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events_plan import PlanChangedSeen, PlanCountSeen, PlanItemSeen
+from companion.events_plan import FenceStatusSeen, PlanChangedSeen, PlanCountSeen, PlanItemSeen
 from companion.events_targets import ItemCurrentSeen, ItemReachedSeen, LegSeen
 from companion.frames import GeoPoint
 from companion.latency import TimeAnswered
-from companion.mavlink import others, parameter_requests, ranges, requests
+from companion.mavlink import batteries, others, parameter_requests, ranges, requests
 from companion.mavlink.framing import Packet
 from companion.mavlink.places import point_of
 from companion.mavlink.texts import TextAssembler
@@ -69,7 +69,8 @@ class Decoder:
         self._other_range_s = -math.inf
         self._beam_s: dict[int, float] = {}
         self._readers: dict[int, Callable[[Any, float], Event | None]] = {
-            mavlink.MAVLINK_MSG_ID_SYS_STATUS: _prearm,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: batteries.battery_status,
+            mavlink.MAVLINK_MSG_ID_FENCE_STATUS: _fence_status,
             mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
@@ -150,6 +151,9 @@ class Decoder:
         if packet.message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
             message = self._message(packet)
             return [*self._texts.add(TextSeen(time_s, message.severity, message.text), message.id, message.chunk_seq)]
+        if packet.message_id == mavlink.MAVLINK_MSG_ID_SYS_STATUS:
+            message = self._message(packet)
+            return [_prearm(message, time_s), batteries.sys_status(message, time_s)]
         if packet.message_id in others.RECEIVED:
             return self._of_others(packet, time_s)
         reader = self._readers.get(packet.message_id)
@@ -315,3 +319,7 @@ def _parameter(message: Any, time_s: float) -> Event:
 
 def _prearm(message: Any, time_s: float) -> Event:
     return PrearmSeen(time_s, bool(message.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK))
+
+
+def _fence_status(message: Any, time_s: float) -> Event:
+    return FenceStatusSeen(time_s, message.breach_status != 0)

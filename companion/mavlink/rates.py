@@ -19,6 +19,7 @@ EKF_HZ = 5.0
 """Silence for a second stops the rover: on a bad line several in a row may be lost before that."""
 SLOW_HZ = 2.0
 STICKS_HZ = 5.0
+POWER_HZ = 1.0
 HEARTBEAT_HZ = 5.0
 """Mode and arming are known only from it: at the 1 Hz that comes unasked, a pilot could be overlooked for a second."""
 
@@ -55,7 +56,8 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
     """What the companion needs of ArduRover, which sends everything at 1 Hz unasked.
 
     OBSTACLE_DISTANCE is not asked for: ArduRover refuses to stream it, it comes from the lidar's own driver. The read-back of the
-    target comes only while there is one (not while it turns or brakes), DISTANCE_SENSOR and RANGEFINDER only with a rangefinder.
+    target comes only while there is one (not while it turns or brakes), DISTANCE_SENSOR and RANGEFINDER only with a rangefinder,
+    BATTERY_STATUS only with a battery monitor, FENCE_STATUS only while a fence is switched on.
     """
     return (
         WantedRate(mavlink.MAVLINK_MSG_ID_HEARTBEAT, HEARTBEAT_HZ, told=False),
@@ -67,6 +69,9 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
         WantedRate(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_RANGEFINDER, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, SLOW_HZ, always=False, told=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_SYS_STATUS, POWER_HZ, told=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, POWER_HZ, always=False, told=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, POWER_HZ, always=False, told=False),
     )
 
 

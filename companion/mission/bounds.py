@@ -56,9 +56,9 @@ class Bound:
 class Bounds:
     """All borders together. ``fault`` and ``outside`` are asked often: what is well inside costs a few microseconds a border."""
 
-    def __init__(self, bounds: Sequence[Bound], grid: Grid) -> None:
-        """``grid`` widens what was drawn in fields to whole fields."""
-        self._bounds = tuple(_widened(bound, grid.resolution_m) for bound in bounds)
+    def __init__(self, bounds: Sequence[Bound] = (), resolution_m: float = 1.0) -> None:
+        """``resolution_m``: side of the fields in which some of them were drawn."""
+        self._bounds = tuple(_widened(bound, resolution_m) for bound in bounds)
         self._roomy = tuple(_roomy(bound) for bound in self._bounds)
 
     def __len__(self) -> int:

@@ -118,7 +118,9 @@ def _resolved(mission: Mission, frame: LocalFrame, home: NedPoint, fence: Autopi
             weights[one.fields] = OBSTACLE
         else:
             closed |= one.fields
-    return ResolvedMission(grid.with_weights(weights), closed, Bounds(bounds, grid), tuple(targets), home_cell, refused)
+    return ResolvedMission(
+        grid.with_weights(weights), closed, Bounds(bounds, grid.resolution_m), tuple(targets), home_cell, refused
+    )
 
 
 def _no_fields(cell: Cell) -> NedPoint:

@@ -3,10 +3,12 @@
 from companion.settings.planners import PlannerSettings
 from companion.settings.section import Section, SettingsError, alike
 from companion.settings.settings import (
+    FenceSettings,
     GuidanceSettings,
     LinkSettings,
     MappingSettings,
     NavigatorSettings,
+    PowerSettings,
     SafetySettings,
     SearchSettings,
     Settings,
@@ -18,11 +20,13 @@ from companion.settings.settings import (
 )
 
 __all__ = [
+    "FenceSettings",
     "GuidanceSettings",
     "LinkSettings",
     "MappingSettings",
     "NavigatorSettings",
     "PlannerSettings",
+    "PowerSettings",
     "SafetySettings",
     "SearchSettings",
     "Section",

@@ -203,6 +203,35 @@ class SafetySettings(Section):
     )
 
 
+class FenceSettings(Section):
+    """The autopilot's own fence and rally points; the mission's fences always count."""
+
+    heed: Literal["enabled", "stored", "never"] = Field(
+        "enabled",
+        description="`enabled`: while the autopilot enforces it; `stored`: also while FENCE_ENABLE is 0; `never`: not even asked for",
+    )
+    again_s: float = Field(
+        15.0, ge=1.0, description="fence, rally points and the parameters of the fence are read again so often"
+    )
+
+
+class PowerSettings(Section):
+    """When the battery ends the mission. 0 switches a threshold off."""
+
+    return_percent: float = Field(20.0, ge=0.0, lt=100.0, description="less charge left than this: return")
+    return_volts: float = Field(0.0, ge=0.0, description="a lower voltage than this: return")
+    hold_percent: float = Field(10.0, ge=0.0, lt=100.0, description="less charge left than this: stop and HOLD")
+    hold_volts: float = Field(0.0, ge=0.0, description="a lower voltage than this: stop and HOLD")
+    after_s: float = Field(
+        5.0, ge=0.0, description="below a threshold for so long without a break: a voltage sags when the rover sets off"
+    )
+    heed_autopilot: bool = Field(
+        True,
+        description="the autopilot's own battery failsafe counts too: low means return, critical HOLD (BATT_LOW_..., BATT_CRT_...)",
+    )
+    to_rally: bool = Field(True, description="return to a rally point if the way there is shorter than the way back")
+
+
 class TrafficSettings(Section):
     """Things that move: other vehicles that announce themselves, and what the range sensors see moving."""
 
@@ -261,6 +290,8 @@ class Settings(Section):
     guidance: GuidanceSettings = GuidanceSettings()
     steering: SteeringSettings = SteeringSettings()
     safety: SafetySettings = SafetySettings()
+    fence: FenceSettings = FenceSettings()
+    power: PowerSettings = PowerSettings()
     traffic: TrafficSettings = TrafficSettings()
     link: LinkSettings = LinkSettings()
 

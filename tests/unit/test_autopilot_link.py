@@ -84,6 +84,7 @@ def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, f
         30: lambda ms: bench.rover.pack(mavlink.MAVLink_attitude_message(ms, 0, 0, 0.5, 0, 0, 0)),
         32: bench.rover.local_position,
         33: lambda ms: bench.rover.pack(mavlink.MAVLink_global_position_int_message(ms, 1, 1, 0, 0, 0, 0, 0, 0)),
+        1: lambda ms: bench.rover.pack(mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 12600, -1, -1, *[0] * 6)),
         193: lambda ms: bench.rover.pack(mavlink.MAVLink_ekf_status_report_message(831, 0, 0, 0, 0, 0)),
         132: lambda ms: bench.rover.distance(300 + ms % 7),
     }
@@ -99,13 +100,13 @@ def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, f
 
 def test_rates_that_arrive_are_not_asked_for_again() -> None:
     bench = Bench()
-    assert feed_rates(bench, 0.05, 20.0, {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0}) == []
+    assert feed_rates(bench, 0.05, 20.0, {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0}) == []
     assert bench.link.rate_faults == ()
 
 
 def test_a_rate_that_falls_is_asked_for_again_with_growing_pauses() -> None:
     bench = Bench()
-    asked = feed_rates(bench, 0.05, 90.0, {0: 5.0, 30: 20.0, 32: 1.0, 33: 2.0, 193: 5.0})
+    asked = feed_rates(bench, 0.05, 90.0, {0: 5.0, 30: 20.0, 32: 1.0, 33: 2.0, 193: 5.0, 1: 1.0})
     times = [time_s for time_s, message_id in asked if message_id == 32]
     assert {message_id for _, message_id in asked} == {32}
     pauses = [later - earlier for earlier, later in pairwise(times)]
@@ -117,7 +118,7 @@ def test_a_rate_that_falls_is_asked_for_again_with_growing_pauses() -> None:
 
 def test_missing_range_data_is_no_fault_but_slow_range_data_is() -> None:
     bench = Bench()
-    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0}
+    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0}
     assert feed_rates(bench, 0.05, 10.0, steady) == []
     asked = feed_rates(bench, 10.0, 20.0, {**steady, 132: 1.0})
     assert {message_id for _, message_id in asked} == {132}
@@ -125,7 +126,7 @@ def test_missing_range_data_is_no_fault_but_slow_range_data_is() -> None:
 
 def test_seldom_heartbeats_are_asked_for_again_but_nobody_is_told() -> None:
     bench = Bench()
-    asked = feed_rates(bench, 0.05, 20.0, {0: 1.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0})
+    asked = feed_rates(bench, 0.05, 20.0, {0: 1.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0})
     assert {message_id for _, message_id in asked} == {0} and bench.link.rate_faults == ()
 
 

@@ -50,7 +50,7 @@ def laid(fence: AutopilotFence, *targets: HomePoint, **fields: object) -> Resolv
 
 
 def ground_bounds(fence: AutopilotFence, body_m: float = 0.35) -> Bounds:
-    return Bounds(autopilot_bounds(fence, FRAME, body_m), laid(NO_FENCE).ground)
+    return Bounds(autopilot_bounds(fence, FRAME, body_m))
 
 
 # --- what is in force ------------------------------------------------------------------------------------------------
@@ -219,7 +219,7 @@ def test_no_way_that_passes_leaves_the_open_ground(
     shape = shapely.Polygon(corners)
     if not shape.is_valid or shape.area < 1.0:
         return
-    bounds = Bounds([Bound("b", shape, keeps_in, 2.0, 0.35)], laid(NO_FENCE).ground)
+    bounds = Bounds([Bound("b", shape, keeps_in, 2.0, 0.35)])
     way = [NedPoint(start[1], start[0]), NedPoint(end[1], end[0])]
     if bounds.fault(way):
         return

@@ -5,6 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.events_plan import BatterySeen, FenceStatusSeen
 from companion.frames import GeoPoint
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
@@ -90,8 +91,38 @@ def test_prearm_bit() -> None:
     def status(health: int) -> bytes:
         return rover.pack(mavlink.MAVLink_sys_status_message(health, health, health, *[0] * 10))
 
-    assert codec.decode(status(1 << 28), 1.0) == [PrearmSeen(1.0, True)]
-    assert codec.decode(status(~(1 << 28) & 0xFFFFFFFF), 2.0) == [PrearmSeen(2.0, False)]
+    assert codec.decode(status(1 << 28), 1.0)[0] == PrearmSeen(1.0, True)
+    assert codec.decode(status(~(1 << 28) & 0xFFFFFFFF), 2.0)[0] == PrearmSeen(2.0, False)
+
+
+@pytest.mark.parametrize(
+    ("voltage_mv", "remaining", "volts", "percent"),
+    [(12600, 87, 12.6, 87), (0, -1, None, None), (65535, -1, None, None), (0, 0, None, None), (11100, 0, 11.1, 0)],
+)
+def test_what_is_known_of_the_battery(
+    voltage_mv: int, remaining: int, volts: float | None, percent: int | None
+) -> None:
+    codec, rover = listening()
+    short = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, voltage_mv, -1, remaining, *[0] * 6)
+    assert codec.decode(rover.pack(short), 1.0)[1] == BatterySeen(1.0, -1, volts, percent)
+    cells = [voltage_mv or 65535, *[65535] * 9]
+    long = mavlink.MAVLink_battery_status_message(2, 0, 0, 32767, cells, -1, -1, -1, remaining, 0, 3)
+    assert codec.decode(rover.pack(long), 1.0) == [BatterySeen(1.0, 2, volts, percent, 3)]
+
+
+def test_a_battery_told_in_cells_or_in_pieces_has_their_sum() -> None:
+    codec, rover = listening()
+    cells = [4100, 4000, 3900, *[65535] * 7]
+    raw = rover.pack(mavlink.MAVLink_battery_status_message(0, 0, 0, 32767, cells, -1, -1, -1, -1))
+    (seen,) = codec.decode(raw, 1.0)
+    assert isinstance(seen, BatterySeen) and seen.volts == pytest.approx(12.0) and seen.percent is None
+
+
+@pytest.mark.parametrize("status", [0, 1])
+def test_whether_the_fence_is_breached(status: int) -> None:
+    codec, rover = listening()
+    raw = rover.pack(mavlink.MAVLink_fence_status_message(status, 3, 3, 5000))
+    assert codec.decode(raw, 1.0) == [FenceStatusSeen(1.0, bool(status))]
 
 
 def test_long_texts_are_put_together() -> None:

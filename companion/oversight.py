@@ -1,0 +1,65 @@
+"""What the autopilot knows that ends or bounds a mission: its own fence, and its batteries."""
+
+from __future__ import annotations
+
+from companion.fencing import Fencing
+from companion.frames import LocalFrame, Pose
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mission.fence import NO_FENCE, AutopilotFence
+from companion.power import Level, Power
+from companion.pursuit import Pursuit, Tell
+from companion.settings import Settings
+from companion.vehicle import Event, VehicleState
+
+
+class Oversight:
+    """Listens before and during the mission. ``ended_by``: why it was broken off, in words; empty while it was not."""
+
+    def __init__(self, autopilot: AutopilotLink, settings: Settings, tell: Tell) -> None:
+        self.ended_by = ""
+        self._fencing = Fencing(autopilot, settings.fence, tell)
+        self._power = Power(settings.power)
+        self._to_rally = settings.power.to_rally
+        self._breached = False
+        self._tell = tell
+
+    @property
+    def fence(self) -> AutopilotFence:
+        """The autopilot's fence as known now."""
+        return self._fencing.fence or NO_FENCE
+
+    def take_in(self, event: Event) -> None:
+        """One more event."""
+        self._fencing.take_in(event)
+        self._power.take_in(event)
+
+    def service(self, vehicle: VehicleState, now_s: float) -> None:
+        """To be called every tick."""
+        self._fencing.service(vehicle, now_s)
+        breach = self._fencing.breached(now_s)
+        if breach and not self._breached:
+            self._tell(breach[0].upper() + breach[1:], 4)
+        self._breached = bool(breach)
+
+    def hindrance(self, now_s: float) -> str:
+        """What is awaited before the rover may be driven at all; empty when nothing is."""
+        return self._fencing.missing or self._power.hindrance(now_s)
+
+    def doubt(self, pursuit: Pursuit, pose: Pose | None, now_s: float) -> str:
+        """Why the rover must not be driven now; empty when it may. A fence that has changed is in force from here on."""
+        pursuit.heed_fence(self.fence)
+        return self._fencing.breached(now_s) or ("" if pose is None else pursuit.outside(pose.point))
+
+    def broken_off(self, pursuit: Pursuit, pose: Pose, now_s: float) -> str:
+        """Why the rover must stop for good here, in words; empty to go on, though perhaps only back."""
+        level = self._power.level(now_s)
+        if level is Level.FINE:
+            return ""
+        self.ended_by = self._power.reason
+        if level is Level.HOLD:
+            return self.ended_by
+        if not pursuit.returning:
+            frame = LocalFrame(pursuit.laid.origin)
+            rally = [frame.to_ned(point) for point in self._fencing.rally] if self._to_rally else []
+            pursuit.go_back(self.ended_by, rally, pose)
+        return ""

@@ -1,0 +1,206 @@
+"""The autopilot's own fence, over MAVLink's mission protocol in lock-step: planned round, heeded at once when it changes, never crossed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from companion.mission.mission import MissionError
+from companion.settings import Settings, parse_settings
+from tests.rig import ARM, GUIDED, HOLD, SET_MODE, Rig, yard
+from tests.stored import CIRCLE_IN, CIRCLE_OUT, KEEP_IN, KEEP_OUT, POLYGONS, Person, box, stored
+
+ALL = box(KEEP_IN, -6.0, -2.4, 7.0, 20.0)
+"""Round the whole yard: the rover begins at 0, 0, a wall stands across its way at 6 m east, the target is at 13 m east."""
+NORTH = box(KEEP_OUT, 1.5, 3.0, 7.0, 10.0)
+"""Nobody goes round the wall on this side."""
+FENCE_ENABLE = 207
+
+
+class Watched(Rig):
+    """Keeps where the rover really was, metres north and east of where it began, and how often the autopilot saw a breach."""
+
+    track: list[tuple[float, float]]
+
+    def sleep_until_s(self, time_s: float) -> None:
+        super().sleep_until_s(time_s)
+        truth, start = self.simulator.truth, self.simulator._start
+        self.__dict__.setdefault("track", []).append((truth.north_m - start.north_m, truth.east_m - start.east_m))
+
+    @property
+    def breaches(self) -> int:
+        return self.simulator._vehicle.plan.fence.count
+
+    def nearest_m(self, south_m: float, west_m: float, north_m: float, east_m: float) -> float:
+        """How near the rover's middle came to a rectangle."""
+        way = shapely.MultiPoint([(east, north) for north, east in self.track])
+        return float(shapely.distance(shapely.box(west_m, south_m, east_m, north_m), way))
+
+
+def driven(tmp_path: Path, prepare: object, settings: Settings | None = None, **more: object) -> Watched:
+    return Watched(yard(tmp_path), settings, prepare=prepare, **more)  # type: ignore[arg-type]
+
+
+def changes(rig: Rig) -> list[int]:
+    return [one.command for one in rig.sent if one.command in (SET_MODE, ARM)]
+
+
+@pytest.mark.parametrize("margin_m", [0.0, 1.0])
+def test_it_goes_round_what_the_autopilot_keeps_out(tmp_path: Path, margin_m: float) -> None:
+    rig = driven(tmp_path, stored([*ALL, *NORTH], **POLYGONS, FENCE_MARGIN=margin_m))
+    rig.finish()
+    assert rig.companion.outcome.complete
+    assert rig.breaches == 0 and rig.simulator.collisions == ()
+    assert min(north for north, _ in rig.track) < -2.5, "round the other end of the wall"
+    assert rig.nearest_m(1.5, 3.0, 7.0, 10.0) >= max(margin_m, 0.35) - 0.15
+
+
+def test_without_the_fence_it_would_have_gone_there(tmp_path: Path) -> None:
+    """The same ground, the fence not enabled: so the tests above can fail."""
+    rig = driven(tmp_path, stored([*ALL, *box(KEEP_OUT, -7.0, 3.0, -1.5, 10.0)], FENCE_ENABLE=0.0))
+    rig.finish()
+    south = rig.nearest_m(-7.0, 3.0, -1.5, 10.0)
+    other = driven(tmp_path, stored([*ALL, *NORTH], FENCE_ENABLE=0.0))
+    other.finish()
+    assert min(south, other.nearest_m(1.5, 3.0, 7.0, 10.0)) < 0.35
+
+
+def test_the_stored_fence_counts_without_being_enabled_if_so_set(tmp_path: Path) -> None:
+    settings = parse_settings({"fence": {"heed": "stored"}}, "test")
+    rig = driven(tmp_path, stored([*ALL, *NORTH], FENCE_ENABLE=0.0, FENCE_TYPE=4.0, FENCE_MARGIN=0.0), settings)
+    rig.finish()
+    assert rig.companion.outcome.complete
+    assert rig.nearest_m(1.5, 3.0, 7.0, 10.0) >= 0.2
+
+
+def test_never_means_that_nothing_is_asked_for(tmp_path: Path) -> None:
+    settings = parse_settings({"fence": {"heed": "never"}}, "test")
+    rig = driven(tmp_path, stored([], FENCE_ENABLE=0.0), settings)
+    rig.until_driven(1.0)
+    assert not any(one.kind.startswith("MISSION_REQUEST") for one in rig.sent)
+
+
+def test_a_target_outside_is_refused_before_anything_moves(tmp_path: Path) -> None:
+    rig = driven(tmp_path, stored(box(KEEP_IN, -6.0, -2.4, 7.0, 10.0), **POLYGONS))
+    with pytest.raises(MissionError, match=r"yard\.toml: target 1 'gate': lies outside .* \(inclusion area 1\), 2 m"):
+        rig.finish()
+    assert changes(rig) == []
+
+
+def test_outside_the_circle_round_home_is_refused_too(tmp_path: Path) -> None:
+    rig = driven(tmp_path, stored(FENCE_ENABLE=1.0, FENCE_TYPE=2.0, FENCE_RADIUS=14.0))
+    with pytest.raises(MissionError, match="circle of 14 m round home"):
+        rig.finish()
+
+
+def test_a_rover_that_starts_outside_is_told_so_and_not_even_armed(tmp_path: Path) -> None:
+    rig = driven(tmp_path, stored(box(KEEP_IN, -6.0, 4.0, 7.0, 20.0), **POLYGONS, FENCE_MARGIN=1.0))
+    rig.run_for(50.0)
+    doing = rig.companion.status().doing
+    assert doing == "waiting for the rover to stand 1 m or more inside the autopilot's fence (inclusion area 1)"
+    assert changes(rig) == []
+    person = Person(rig)
+    person.upload([*ALL, *NORTH])
+    rig.finish()
+    assert rig.companion.outcome.complete, "once the fence is another one"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_fence_that_changes_on_the_way_is_heeded_at_once(tmp_path: Path, seed: int) -> None:
+    rig = driven(tmp_path, stored(ALL, **POLYGONS, FENCE_MARGIN=0.0), seed=seed)
+    rig.until_driven(0.5)
+    # Across the end of the wall that the rover is making for, as the run without a fence shows.
+    across = (1.0, 6.0, 7.0, 9.0)
+    Person(rig).upload([*ALL, *box(KEEP_OUT, *across)])
+    changed_s = rig.now_s()
+    rig.until(lambda: any("fence has changed" in text for text in rig.texts()), 1.0)
+    assert rig.now_s() - changed_s < 1.0, "the longer list is told by FENCE_TOTAL"
+    rig.finish()
+    assert rig.companion.outcome.complete
+    assert rig.breaches == 0 and rig.simulator.collisions == ()
+    assert rig.nearest_m(*across) > 0.2
+
+
+def test_a_fence_of_the_same_length_is_noticed_when_it_is_read_again(tmp_path: Path) -> None:
+    rig = driven(tmp_path, stored(ALL, **POLYGONS), parse_settings({"fence": {"again_s": 3.0}}, "test"))
+    rig.until_driven(1.0)
+    Person(rig).upload(box(KEEP_IN, -6.5, -2.4, 7.0, 20.0))
+    rig.until(lambda: any("fence has changed" in text for text in rig.texts()), 4.0)
+
+
+def test_a_target_that_comes_to_lie_outside_is_given_up_and_the_next_one_driven(tmp_path: Path) -> None:
+    two = '[[target]]\nname = "far"\nfield = [19, 7]\n[[target]]\nname = "near"\nfield = [4, 7]\n'
+    rig = Watched(
+        yard(tmp_path, two), prepare=stored(box(KEEP_IN, -6.0, -2.4, 7.0, 21.4), **POLYGONS, FENCE_MARGIN=0.0)
+    )
+    rig.until_driven(2.0)
+    Person(rig).upload([*box(KEEP_IN, -6.0, -2.4, 7.0, 12.0), (CIRCLE_IN, 0.0, 0.0, 90.0)])
+    rig.finish()
+    assert [str(status) for _, status in rig.companion.statuses()] == ["unreachable", "reached"]
+    assert any(text.startswith("Refused: target 1 'far': lies outside") for text in rig.texts())
+    assert max(east for _, east in rig.track) < 12.0 and rig.breaches == 0
+
+
+def test_a_fence_that_leaves_the_rover_outside_stops_it(tmp_path: Path) -> None:
+    rig = driven(tmp_path, stored(ALL, **POLYGONS, FENCE_ACTION=0.0))
+    rig.until_driven(3.0)
+    Person(rig).upload([*ALL, (CIRCLE_OUT, 0.0, 5.0, 6.0)])
+    at_s = rig.now_s()
+    rig.until(lambda: rig.mode == HOLD, 5.0)
+    assert any("HOLD: the " in text for text in rig.texts())
+    setpoints = [one for one in rig.sent_since(at_s + 0.5) if one.is_setpoint]
+    assert setpoints and all(one.is_standstill for one in setpoints)
+    assert rig.speed_m_s == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.parametrize("action", [1, 2], ids=["RTL", "HOLD"])
+def test_a_breach_that_the_autopilot_acts_on_silences_the_companion(tmp_path: Path, action: int) -> None:
+    rig = driven(tmp_path, stored(ALL, **POLYGONS, FENCE_ACTION=float(action)))
+    rig.until_driven(3.0)
+    # No time to hear of it: the fence is put under the rover, and the autopilot acts first.
+    vehicle = rig.simulator._vehicle
+    keep, corners = list(vehicle.plan.storage.fence), vehicle.plan.storage.fence
+    corners[:] = [corner.__class__(KEEP_OUT, *_tail(corner)) for corner in keep]
+    rig.until(lambda: rig.mode != GUIDED, 3.0)
+    since_s = rig.now_s()
+    rig.run_for(3.0)
+    assert [one for one in rig.sent_since(since_s) if one.moves_or_changes] == []
+    assert any(text == "The autopilot's fence is breached" for text in rig.texts())
+    assert any(text.startswith("Companion silent: mode is not GUIDED") for text in rig.texts())
+
+
+def _tail(item: object) -> tuple[object, ...]:
+    return (item.frame, item.params, item.x, item.y, item.z)  # type: ignore[attr-defined]
+
+
+def test_a_fence_that_is_switched_on_by_command_is_heeded(tmp_path: Path) -> None:
+    rig = driven(tmp_path, stored([*ALL, *NORTH], FENCE_ENABLE=0.0, FENCE_TYPE=4.0, FENCE_MARGIN=0.0))
+    rig.until(lambda: rig.mode == GUIDED)
+    rig.pilot(FENCE_ENABLE, 1)
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.breaches == 0
+    assert rig.nearest_m(1.5, 3.0, 7.0, 10.0) > 0.2
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_over_a_bad_line_it_does_not_begin_before_it_knows_the_fence(tmp_path: Path, seed: int) -> None:
+    rig, rng = driven(tmp_path, stored([*ALL, *NORTH], **POLYGONS, FENCE_MARGIN=0.0)), np.random.default_rng(seed)
+    rig.lose = lambda: bool(rng.random() < 0.3)
+    rig.change = lambda message: None if rng.random() < 0.3 and "MISSION" in message.get_type() else message
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.breaches == 0
+    assert rig.nearest_m(1.5, 3.0, 7.0, 10.0) > 0.2
+
+
+def test_an_autopilot_that_does_not_tell_its_fence_is_waited_for(tmp_path: Path) -> None:
+    rig = driven(tmp_path, stored(ALL, **POLYGONS))
+    rig.change = lambda message: None if message.get_type() in ("MISSION_COUNT", "MISSION_ACK") else message
+    rig.run_for(50.0)
+    doing = rig.companion.status().doing
+    assert doing == "waiting for the autopilot's fence and rally points (no answer to 5 requests)"
+    assert changes(rig) == []
+    assert math.isclose(rig.simulator.driven_m, 0.0)
