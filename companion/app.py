@@ -27,6 +27,7 @@ from companion.mission.mission import Mission
 from companion.outbox import Outbox
 from companion.output_check import OutputCheck
 from companion.oversight import Oversight
+from companion.plan_watch import PlanWatch
 from companion.pursuit import Pursuit
 from companion.recorder import DecisionLog
 from companion.reporting import Outcome, Reporter, Status
@@ -90,6 +91,7 @@ class Companion:
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
         self._errands = Errands(mission, settings.safety, self._send, self._tell)
         self._legs = AutoLegs(self._tell)
+        self._plan_watch = PlanWatch(mission.stored, autopilot.downloads, self._tell)
         self._followed_s = now_s
         self._stopped = False
         self._stop_asked = False
@@ -286,6 +288,7 @@ class Companion:
             self._reporter.note(f"autopilot: {event.text}", event.severity)
         self._watchdogs.take_in(event, self.vehicle)
         self.oversight.take_in(event)
+        self._plan_watch.take_in(event)
         if isinstance(event, TargetAsked):
             idle = self._pursuit is None or self._stopped or self._handover.begun
             self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")

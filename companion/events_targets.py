@@ -75,10 +75,11 @@ class ItemReachedSeen:
 
 @dataclass(frozen=True, slots=True)
 class ItemCurrentSeen:
-    """MISSION_CURRENT: the navigation item under way."""
+    """MISSION_CURRENT: the navigation item under way, and how many items there are (None: not told)."""
 
     time_s: float
     index: int
+    total: int | None = None
 
 
 LEG_KEPT_S = 2.5

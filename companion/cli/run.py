@@ -17,6 +17,7 @@ from companion.cli.keeping import Keeping
 from companion.cli.levels import ERROR, INFO, Reader, levelled, reader_of
 from companion.cli.live import Live, LiveConsole
 from companion.cli.service import Service
+from companion.cli.source import Source, Stoppable, refuse_arming
 from companion.cli.state import StateFiles
 from companion.clock import WallClock
 from companion.itinerary import TargetStatus
@@ -24,8 +25,7 @@ from companion.mapfiles import MapError
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import SigningKeyError
-from companion.mavlink.transport import ByteLink, LinkError, open_link
-from companion.mission.load import load_mission
+from companion.mavlink.transport import ByteLink, LinkError
 from companion.mission.mission import Mission, MissionError
 from companion.recorder import STATE, NullRecorder, Recorder, RecordError
 from companion.settings import Settings, SettingsError
@@ -49,13 +49,18 @@ EXIT_REACHED, EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED = 0, 2, 3, 130
 
 
 def run(
-    mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.")],
     connect: Annotated[
         str,
         typer.Option(
             help="The autopilot: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or serial:DEVICE:BAUD."
         ),
     ],
+    mission_file: Annotated[
+        Path | None, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.", show_default=False)
+    ] = None,
+    from_autopilot: Annotated[
+        bool, typer.Option("--from-autopilot", help="Drive the mission that the autopilot has stored.")
+    ] = False,
     arm: Annotated[bool, typer.Option("--arm", help="Arm the motors; otherwise wait for a person to do it.")] = False,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
@@ -82,15 +87,18 @@ def run(
             ends.callback(files.close)
             settings = files.settings(usable_settings(settings_file), say)
             signer = files.signer(signing_key)
-            mission = load_mission(mission_file)
-            _refuse_arming(mission, arm=arm)
+            source = Source(mission_file, connect, from_autopilot=from_autopilot)
+            mission = source.mission(settings, signer, stop, say)
+            if mission is None:
+                raise SystemExit(EXIT_STOPPED)
+            refuse_arming(mission, arm=arm)
             keeping = Keeping(mission, state, resume=resume, say=say)
             ends.callback(keeping.close)
             if keeping.ended:
                 raise typer.Exit(_told(keeping.statuses))
             given = {"settings": settings_file, STATE: keeping.file if keeping.kept else None}
             recorder = Recorder(record, mission, settings, seed, arm=arm, files=given) if record else NullRecorder()
-            link = open_link(connect)
+            link = source.link()
             with console.status("compiling the planner (once a machine) ..."):
                 warm_up(settings, mission.rover.turning_radius_m)
             link.read()  # what piled up meanwhile is old
@@ -109,13 +117,6 @@ def run(
     if stop.asked:
         raise SystemExit(EXIT_STOPPED)  # it has said so itself
     raise typer.Exit(code)
-
-
-def _refuse_arming(mission: Mission, *, arm: bool) -> None:
-    if mission.in_auto and arm:
-        raise MissionError(
-            f"{mission.source or mission.name}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE), so a person arms; leave out --arm"
-        )
 
 
 def _drive(
@@ -203,7 +204,7 @@ class _StopSignals:
 
     def __init__(self) -> None:
         self.asked = False
-        self.listener: Companion | None = None
+        self.listener: Stoppable | None = None
 
     def __enter__(self) -> _StopSignals:
         """Take the signals over."""

@@ -44,6 +44,8 @@ ECHO_S = 2.0
 REBOOT_MS = 5000
 """A boot time that goes back further than packets overtake each other means that the autopilot has restarted."""
 MISSION_ACK_COMMAND = -1
+NOT_TOLD = 0xFFFF
+"""``total`` of MISSION_CURRENT."""
 
 
 class Decoder:
@@ -287,7 +289,7 @@ def _item_reached(message: Any, time_s: float) -> Event:
 
 
 def _item_current(message: Any, time_s: float) -> Event:
-    return ItemCurrentSeen(time_s, message.seq)
+    return ItemCurrentSeen(time_s, message.seq, None if message.total == NOT_TOLD else message.total)
 
 
 def _home(message: Any, time_s: float) -> Event | None:

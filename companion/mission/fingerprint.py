@@ -13,7 +13,7 @@ def fingerprint(mission: Mission) -> str:
 
     A known map counts with its contents. Raises MissionError when that cannot be read.
     """
-    plain = replace(mission, source=None, notes=(), sitl=None, prior_map=None)
+    plain = replace(mission, source=None, notes=(), sitl=None, prior_map=None, stored="")
     digest = hashlib.sha256(repr(plain).encode())
     if mission.prior_map is not None:
         try:

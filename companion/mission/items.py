@@ -19,6 +19,7 @@ from companion.mission.mission import Area, HomePoint, Mission, OnBlocked, Place
 
 MAX_ITEMS = 100_000
 MAX_TARGETS = 10_000
+FOR_EVER_S = 1e9
 GROUND_M = 1.0
 """Ground beside the ways that the autopilot drives by itself."""
 
@@ -76,7 +77,7 @@ class _Fences:
     notes: list[str] = field(default_factory=list)
 
 
-def understand(items: Sequence[Item], path: Path, name: str, planned_home: GeoPoint | None) -> Mission:
+def understand(items: Sequence[Item], path: Path | None, name: str, planned_home: GeoPoint | None) -> Mission:
     """The mission that the items are. Raises ItemError with the item's index and its command."""
     fences = _fences([item for item in items if _is_fence(item)])
     walk = _walked([item for item in items if not _is_fence(item)])
@@ -228,7 +229,7 @@ def _drive_or_pass(item: Item, walk: _Walk) -> None:
         turn = walk.visits[item.index]
         name = f"guided item {item.index}" if turn == 1 else f"guided item {item.index} pass {turn}"
         assert place is not None
-        walk.targets.append(Target(name, place, hold_s=math.inf, on_blocked=OnBlocked.WAIT, speed_m_s=None))
+        walk.targets.append(Target(name, place, hold_s=FOR_EVER_S, on_blocked=OnBlocked.WAIT, speed_m_s=None))
         walk.note("the autopilot drives this mission itself, in AUTO; the companion drives what it hands over")
     elif (
         item.command <= mav.NAV_LAST and item.frame in mav.GLOBAL_FRAMES and (item.lat_deg, item.lon_deg) != (0.0, 0.0)

@@ -141,7 +141,7 @@ class Mission:
 
     ``prior_map`` is a known map, its field size where the file has none (None: the grid's), and where its outer south-west
     corner lies from home (None: as the file says, or on the grid). ``in_auto``: the autopilot drives this mission itself, in AUTO, and
-    hands its targets over to the companion, in an order of its own (NAV_GUIDED_ENABLE). Ground is passable inside all of ``keep_in`` and outside each of ``keep_out``.
+    hands its targets over to the companion, in an order of its own (NAV_GUIDED_ENABLE). ``stored``: the digest of what the autopilot had stored when this mission was read from it, else empty. Ground is passable inside all of ``keep_in`` and outside each of ``keep_out``.
     """
 
     name: str
@@ -158,5 +158,6 @@ class Mission:
     sitl: SitlSpec | None = None
     source: Path | None = None
     in_auto: bool = False
+    stored: str = ""
     notes: tuple[str, ...] = ()
     also_read: tuple[Path, ...] = ()

@@ -39,7 +39,7 @@ def load(path: Path) -> Mission:
     if not items:
         raise MissionError(f"{path}: holds no items")
     try:
-        home, items = _home(items)
+        home, items = home_of(items)
         return understand(items, path, path.stem, home)
     except ItemError as error:
         raise MissionError(f"{path}: {error}") from None
@@ -79,7 +79,7 @@ def _item(words: list[str], position: int) -> Item:
     return Item(index, command, frame, (p1, p2, p3, p4), lat_deg, lon_deg, autocontinue)
 
 
-def _home(items: list[Item]) -> tuple[GeoPoint | None, list[Item]]:
+def home_of(items: list[Item]) -> tuple[GeoPoint | None, list[Item]]:
     """Item 0 is home unless it is anything but a waypoint (fence files begin with a fence)."""
     first = items[0]
     if first.command != mav.NAV_WAYPOINT:

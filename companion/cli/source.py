@@ -1,0 +1,81 @@
+"""Where the mission of a run comes from: a file, or the autopilot itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol
+
+from companion.clock import WallClock
+from companion.fetching import Fetching
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.codec import Codec
+from companion.mavlink.signing import Signer
+from companion.mavlink.transport import ByteLink, open_link
+from companion.mission.load import load_mission
+from companion.mission.mission import Mission, MissionError
+from companion.mission.stored import mission_of
+from companion.settings import Settings
+
+
+class Stoppable(Protocol):
+    """What a signal ends."""
+
+    def stop(self) -> None:
+        """Safe in a signal handler."""
+        ...
+
+
+class Stopper(Protocol):
+    """Who passes signals on."""
+
+    listener: Stoppable | None
+
+
+class Source:
+    """One of the two, and the link, which is opened once. Raises MissionError when neither was given, or both."""
+
+    def __init__(self, mission_file: Path | None, connect: str, *, from_autopilot: bool) -> None:
+        if (mission_file is not None) == from_autopilot:
+            given = "both were given" if from_autopilot else "neither was given"
+            raise MissionError(f"run: give a MISSION file or --from-autopilot: {given}")
+        self._file = mission_file
+        self._connect = connect
+        self._link: ByteLink | None = None
+
+    def mission(
+        self, settings: Settings, signer: Signer | None, stop: Stopper, say: Callable[[str], None]
+    ) -> Mission | None:
+        """The mission; None when a signal came while it was being fetched. Raises MissionError, LinkError."""
+        if self._file is not None:
+            return load_mission(self._file)
+        autopilot = AutopilotLink(self.link(), Codec(settings.link, signer=signer), settings.link)
+        fetching = Fetching(autopilot, WallClock(), settings.link.tick_hz)
+        stop.listener, shown = fetching, ""
+
+        def show(text: str) -> None:
+            nonlocal shown
+            if text != shown:
+                shown = text
+                say(text)
+
+        try:
+            items = fetching.fetch(show)
+        finally:
+            stop.listener = None
+        return None if items is None else mission_of(items)
+
+    def link(self) -> ByteLink:
+        """The line to the autopilot. Raises LinkError."""
+        if self._link is None:
+            self._link = open_link(self._connect)
+        return self._link
+
+
+def refuse_arming(mission: Mission, *, arm: bool) -> None:
+    """A mission of which the autopilot hands over legs is not begun by the companion. Raises MissionError."""
+    if mission.in_auto and arm:
+        raise MissionError(
+            f"{mission.source or mission.name}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE), so a person arms; "
+            "leave out --arm"
+        )
