@@ -254,7 +254,7 @@ class Companion:
             return None
         taken = overruled(self._autopilot.last_ack(SetMode(RoverMode.GUIDED)), self.vehicle.heartbeat)
         control = Control.PERSON if taken else self.watch.control
-        hindrance, fence = self.oversight.hindrance(now_s), self.oversight.fence
+        fence, hindrance = self.oversight.before_driving(now_s)
         laid, command = self._start_up.step(self.vehicle, control, now_s, fence, hindrance)
         if command is not None:
             self._send(command, now_s)

@@ -20,8 +20,9 @@ PARAMETER_S, PARAMETER_TRIES = 1.0, 8
 """A parameter of the fence is asked for so often; one that has not been told by then is one that this firmware has not."""
 FAILED_S = 2.0
 """A list that could not be fetched is asked for again after so long."""
-STATUS_S = 5.0
-"""FENCE_STATUS comes once a second while a fence is switched on, by whatever means; one older than this says nothing."""
+STATUS_S, ON_S = 5.0, 30.0
+"""FENCE_STATUS comes once a second while a fence is switched on, by whatever means: one older than the first says nothing of a breach, but on
+a bad line the fence counts as on until the second."""
 TOTALS = {"FENCE_TOTAL": PlanKind.FENCE, "RALLY_TOTAL": PlanKind.RALLY}
 """ArduPilot tells everybody these parameters when a list has got another length."""
 
@@ -83,8 +84,8 @@ class Fencing:
             self._take_rally(rally)
         self._put_together(vehicle, now_s)
 
-    def _is_on(self, now_s: float) -> bool:
-        return self._status is not None and now_s - self._status.time_s <= STATUS_S
+    def _told_within(self, seconds: float, now_s: float) -> bool:
+        return self._status is not None and now_s - self._status.time_s <= seconds
 
     def _read_parameters(self, vehicle: VehicleState, now_s: float) -> None:
         """All of them every ``again_s``, and those that are missing every second for a while."""
@@ -126,7 +127,7 @@ class Fencing:
         if stored.failure:
             self._fault = stored.failure
             return
-        on = self._settings.heed == "stored" or self._is_on(now_s)
+        on = self._settings.heed == "stored" or self._told_within(ON_S, now_s)
         values = tuple(vehicle.parameters.get(name) for name in PARAMETERS)
         known = (stored, values, vehicle.home.point, on)
         same, self._known = known == self._known, known

@@ -131,8 +131,8 @@ def on_unreachable(itinerary: Itinerary, now_s: float, retry_s: float, wait_limi
 
 
 def returning(itinerary: Itinerary, place: ResolvedTarget) -> Itinerary:
-    """Nothing but back to a place: the targets not reached yet are skipped."""
-    return replace(_skipped_rest(itinerary), leg=Leg.HOME, home=place)
+    """Nothing but back to a place: the targets not reached yet are skipped, an errand is dropped."""
+    return replace(_skipped_rest(itinerary), leg=Leg.HOME, home=place, errand=None)
 
 
 def on_time(itinerary: Itinerary, now_s: float) -> Itinerary:

@@ -23,11 +23,6 @@ class Oversight:
         self._breached = False
         self._tell = tell
 
-    @property
-    def fence(self) -> AutopilotFence:
-        """The autopilot's fence as known now."""
-        return self._fencing.fence or NO_FENCE
-
     def take_in(self, event: Event) -> None:
         """One more event."""
         self._fencing.take_in(event)
@@ -41,13 +36,13 @@ class Oversight:
             self._tell(breach[0].upper() + breach[1:], 4)
         self._breached = bool(breach)
 
-    def hindrance(self, now_s: float) -> str:
-        """What is awaited before the rover may be driven at all; empty when nothing is."""
-        return self._fencing.missing or self._power.hindrance(now_s)
+    def before_driving(self, now_s: float) -> tuple[AutopilotFence, str]:
+        """The autopilot's fence as known now, and what is awaited before the rover may be driven at all; empty when nothing is."""
+        return self._fence, self._fencing.missing or self._power.hindrance(now_s)
 
     def doubt(self, pursuit: Pursuit, pose: Pose | None, now_s: float) -> str:
         """Why the rover must not be driven now; empty when it may. A fence that has changed is in force from here on."""
-        pursuit.heed_fence(self.fence)
+        pursuit.heed_fence(self._fence)
         return self._fencing.breached(now_s) or ("" if pose is None else pursuit.outside(pose.point))
 
     def broken_off(self, pursuit: Pursuit, pose: Pose, now_s: float) -> str:
@@ -63,3 +58,7 @@ class Oversight:
             rally = [frame.to_ned(point) for point in self._fencing.rally] if self._to_rally else []
             pursuit.go_back(self.ended_by, rally, pose)
         return ""
+
+    @property
+    def _fence(self) -> AutopilotFence:
+        return self._fencing.fence or NO_FENCE

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import shapely
 from hypothesis import given
 from hypothesis import settings as runs
 from hypothesis import strategies as st
@@ -16,9 +17,11 @@ from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
 from companion.guidance import STOP, Guide, Motion, RoverLimits, farthest_m
 from companion.mapping import EvidenceMap, new_map
+from companion.mission.bounds import Bound, Bounds
 from companion.output_check import Output, OutputCheck, Surroundings, fault_of
 from companion.settings import Settings
 from tests.rig import Rig, yard
+from tests.stored import KEEP_IN, POLYGONS, box, stored
 
 SETTINGS = Settings()
 RADIUS_M = 0.35
@@ -188,3 +191,74 @@ def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None
     assert rig.speed_m_s < 0.05 and rig.simulator.collisions == ()
     assert rig.companion.output_check.refused.total() > 100
     assert "Stopping: target behind something" in rig.texts()
+
+
+# --- borders ---------------------------------------------------------------------------------------------------------
+
+
+def bordered(*bounds: Bound) -> Surroundings:
+    return Surroundings(open_ground(), RoverLimits(RADIUS_M, 2.0, 8.0), SETTINGS, Bounds(bounds))
+
+
+def inner(side_m: float) -> Bound:
+    """A square in the middle of the ground that the rover must not leave."""
+    corner = MIDDLE - side_m / 2.0
+    square = shapely.box(corner, corner, corner + side_m, corner + side_m)
+    return Bound("the yard", square, True, RADIUS_M, RADIUS_M)
+
+
+@runs(max_examples=400, deadline=None)
+@given(st.one_of(POSITIONS, VELOCITIES), st.floats(5.0, 12.0))
+def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, side_m: float) -> None:
+    bound = inner(side_m)
+    if fault_of(output, bordered(bound)):
+        return
+    here, setpoint = output.pose, output.setpoint
+    if isinstance(setpoint, GuidedPosition):
+        way = shapely.LineString([(here.east_m, here.north_m), (setpoint.point.east_m, setpoint.point.north_m)])
+    else:
+        assert isinstance(setpoint, GuidedVelocity)
+        fastest_m_s = max(abs(setpoint.forward_m_s), output.speed_m_s)
+        if setpoint.forward_m_s == 0.0:
+            return
+        course_rad = here.heading_rad + (math.pi if setpoint.forward_m_s < 0.0 else 0.0)
+        curvature_m = setpoint.yaw_rate_rad_s / max(output.speed_m_s, SETTINGS.steering.scale_base_m_s)
+        north_m, east_m, points = here.north_m, here.east_m, []
+        for _ in np.arange(0.0, fastest_m_s * 0.25 + fastest_m_s**2 / 1.6, 0.02):
+            points.append((east_m, north_m))
+            north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
+            course_rad += 0.02 * curvature_m
+        way = shapely.LineString([*points, (east_m, north_m)])
+    assert bound.shape.buffer(0.02).covers(way)
+
+
+@pytest.mark.parametrize(
+    ("setpoint", "heading_rad", "fault"),
+    [
+        (GuidedPosition(NedPoint(MIDDLE + 2.0, MIDDLE)), 0.0, False),
+        (GuidedPosition(NedPoint(MIDDLE + 3.5, MIDDLE)), 0.0, True),
+        (GuidedVelocity(1.5, 0.0), 0.0, False),
+        (GuidedVelocity(2.0, 0.0), 0.0, True),
+        (GuidedVelocity(-2.0, 0.0), math.pi, True),
+        (GuidedVelocity(-1.5, 0.0), math.pi, False),
+        (GuidedVelocity(0.0, 0.0), 0.0, False),
+        (GuidedHeading(0.0), 0.0, False),
+    ],
+)
+def test_positions_and_velocities_before_a_border(setpoint: Setpoint, heading_rad: float, fault: bool) -> None:
+    """3 m from the middle: from 2 m/s the rover needs 3 m, from 1.5 m/s 1.8 m, and its body is 0.35 m."""
+    found = fault_of(Output(setpoint, Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 0.0), bordered(inner(6.0)))
+    assert found == ("setpoint leads over the border of the yard" if fault else "")
+
+
+def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path) -> None:
+    """Open ground that was seen free, but beyond the autopilot's fence: the rover stops inside, and says why."""
+    rig = Rig(yard(tmp_path), prepare=stored(box(KEEP_IN, -6.0, -2.4, 7.0, 20.0), **POLYGONS, FENCE_MARGIN=0.0))
+    rig.until_driven(1.0)
+    driver, bounds = rig.companion.driver, rig.companion._pursuit.laid.bounds  # type: ignore[union-attr]
+    assert driver is not None and len(bounds) == 1
+    out = Guide(Motion.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
+    driver.update = lambda *_: (out, None)  # type: ignore[method-assign]
+    rig.run_for(15.0)
+    assert rig.companion.output_check.refused.total() > 20
+    assert rig.simulator._vehicle.plan.fence.count == 0 and rig.speed_m_s < 0.05
