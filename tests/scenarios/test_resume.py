@@ -19,7 +19,7 @@ from companion.state.format import decoded
 from companion.state.model import SavedState
 from tests.rig import ARM, GATE, GUIDED, HOLD, MANUAL, Rig, Sent, yard
 
-TWO = GATE + 'hold_s = 2.0\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
+TWO = GATE + 'hold_s = 1.0\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
 UP_S = 45.0
 RESUMED_S = 2.0
 
