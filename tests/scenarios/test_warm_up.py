@@ -1,6 +1,7 @@
 """After the warm-up nothing is compiled any more: a compiler at work in the middle of a drive would be a stall of seconds."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -116,3 +117,22 @@ def test_a_vehicle_that_is_served_compiles_nothing(mission: str, sensors: str) -
     assert any("Mission: 4" in text for text in found["said"]), "the circle was begun"
     assert found["kernels"] >= 5
     assert found["new"] == []
+
+
+WARM = """
+import sys
+from companion.settings import Settings
+from companion.warmup import kernels_warm, warm_up
+if sys.argv[1] == "warm":
+    warm_up(Settings())
+print(kernels_warm(Settings()))
+"""
+
+
+def test_it_is_known_whether_the_kernels_are_warm_and_asking_compiles_nothing(tmp_path: Path) -> None:
+    for place, told in ((tmp_path / "new", "False"), (None, "True")):
+        command = [sys.executable, "-c", WARM, "cold" if place else "warm"]
+        environment = {**os.environ, **({"NUMBA_CACHE_DIR": str(place)} if place else {})}
+        done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False, env=environment)
+        assert (done.returncode, done.stdout.strip()) == (0, told), done.stderr
+    assert not list(tmp_path.rglob("*.nbc"))

@@ -6,6 +6,7 @@ import configparser
 import re
 import runpy
 import shutil
+import subprocess
 import tomllib
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from typer.testing import CliRunner
 
 import companion.cli.commands
 import sitl.cli.commands
+from companion.cli.run import EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED
+from companion.cli.service import ALIVE_S
 from companion.mission.sensor_tables import BeamTable, LidarTable, ProximityTable, SensorsTable, SunTable
 from companion.settings import parse_settings
 from sitl.fault_file import load_faults
@@ -237,3 +240,26 @@ def test_the_design_page_names_every_module_and_has_the_layers_that_are_checked(
     layers = config["importlinter:contract:companion"]["layers"].strip().splitlines()
     block = text.partition("## Who may know whom")[2].partition("```text\n")[2].partition("```")[0]
     assert [line.split() for line in block.splitlines()] == [line.replace("|", " ").split() for line in layers]
+
+
+def test_the_service_is_one_that_systemd_takes_and_the_program_understands(tmp_path: Path) -> None:
+    (_, text), *more = blocks("ini")
+    assert not more
+    unit = configparser.ConfigParser(strict=True)
+    unit.optionxform = str  # type: ignore[assignment,method-assign]
+    unit.read_string(text)
+    service = unit["Service"]
+    program, command, _, *options = service["ExecStart"].split()
+    assert program.endswith("/bin/rover-companion")
+    commands = typer.main.get_command(APPS["rover-companion"]).commands  # type: ignore[attr-defined]
+    known = {name for parameter in commands[command].params for name in parameter.opts}
+    assert {option for option in options if option.startswith("--")} <= known
+    assert service["RestartPreventExitStatus"].split() == [str(EXIT_BAD_INPUT), str(EXIT_MISSED)]
+    assert service["SuccessExitStatus"] == str(EXIT_STOPPED)
+    assert float(service["WatchdogSec"]) > 5 * ALIVE_S and float(service["TimeoutStopSec"]) > 2.0
+    analyze = shutil.which("systemd-analyze")
+    if analyze is not None:
+        path = tmp_path / "rover-companion.service"
+        path.write_text(text.replace(program, "/bin/true"))
+        done = subprocess.run([analyze, "verify", path], capture_output=True, text=True, timeout=60, check=False)
+        assert str(path) not in done.stderr and "rover-companion.service:" not in done.stderr, done.stderr
