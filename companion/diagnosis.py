@@ -54,7 +54,20 @@ def diagnose(seen: Examined) -> list[Finding]:
     """Everything that is worth saying, the gravest first."""
     if not seen.rover_heard:
         return [*_nobody(seen), *_others(seen)]
-    parts = (_others, _identity, _firmware, _mode, _position, _arming, _rates, _ranges, _avoidance, _guided, _stations, _fence)
+    parts = (
+        _others,
+        _identity,
+        _firmware,
+        _mode,
+        _position,
+        _arming,
+        _rates,
+        _ranges,
+        _avoidance,
+        _guided,
+        _stations,
+        _fence,
+    )
     findings = [finding for part in parts for finding in part(seen)]
     order = list(Level)
     return sorted(findings, key=lambda finding: order.index(finding.level))
@@ -85,7 +98,9 @@ def _nobody(seen: Examined) -> Iterator[Finding]:
         yield Finding("not-a-rover", Level.STOP, says, "connect to the rover")
     elif seen.packets:
         says = f"MAVLink is heard on {seen.place}, but no autopilot."
-        yield Finding("no-autopilot", Level.STOP, says, "look which of the autopilot's ports this is, and whether it sends there")
+        yield Finding(
+            "no-autopilot", Level.STOP, says, "look which of the autopilot's ports this is, and whether it sends there"
+        )
     else:
         says = f"Nothing is heard on {seen.place}."
         remedy = "look at power, cable, port and baud rate, and that SERIALn_PROTOCOL of that port is 2"
@@ -115,12 +130,16 @@ def _identity(seen: Examined) -> Iterator[Finding]:
         yield Finding("no-parameters", Level.WARN, says, "look whether it is asked through a radio that drops much")
     elif seen.packets and seen.lost > LOST_SHARE * seen.packets:
         says = f"{seen.lost} packets of the autopilot were lost, {seen.packets} came."
-        yield Finding("packets-lost", Level.WARN, says, "a faster baud rate, a better cable, or fewer messages on this line")
+        yield Finding(
+            "packets-lost", Level.WARN, says, "a faster baud rate, a better cable, or fewer messages on this line"
+        )
 
 
 def _firmware(seen: Examined) -> Iterator[Finding]:
     if seen.version is None:
-        yield Finding("firmware", Level.NOTE, "The autopilot does not tell its version.", "this was written for ArduRover 4.7")
+        yield Finding(
+            "firmware", Level.NOTE, "The autopilot does not tell its version.", "this was written for ArduRover 4.7"
+        )
     elif seen.version[:2] < FIRMWARE:
         told = ".".join(map(str, seen.version))
         says = f"ArduRover {told}; this was written for 4.7, and some parameters had other names before."
@@ -135,7 +154,9 @@ def _mode(seen: Examined) -> Iterator[Finding]:
     if beat is None or not beat.armed:
         return
     if beat.mode in (RoverMode.GUIDED, RoverMode.HOLD):
-        yield Finding("armed", Level.NOTE, "The rover is armed: a run would drive off at once.", "disarm it if it should not")
+        yield Finding(
+            "armed", Level.NOTE, "The rover is armed: a run would drive off at once.", "disarm it if it should not"
+        )
     else:
         mode = RoverMode(beat.mode).name if beat.mode in list(RoverMode) else str(beat.mode)
         says = f"The rover is armed in mode {mode}: somebody is driving, and a run waits."
@@ -150,10 +171,16 @@ def _position(seen: Examined) -> Iterator[Finding]:
     elif not vehicle.ekf_ok:
         flags = vehicle.ekf.flags
         why = "it only knows where it began" if flags & EKF_CONST_POSITION else "it has none"
-        why = "it has just been switched on" if flags & EKF_UNINITIALISED or not flags & (EKF_POSITION | EKF_CONST_POSITION) else why
+        why = (
+            "it has just been switched on"
+            if flags & EKF_UNINITIALISED or not flags & (EKF_POSITION | EKF_CONST_POSITION)
+            else why
+        )
         why = "GPS jumps" if flags & EKF_GPS_GLITCH else why
         says = f"The EKF has no position: {why}."
-        yield Finding("ekf", Level.STOP, says, "wait for GPS under open sky (about 45 s), or set up another source of position")
+        yield Finding(
+            "ekf", Level.STOP, says, "wait for GPS under open sky (about 45 s), or set up another source of position"
+        )
     if vehicle.origin is None or vehicle.home is None:
         what = " and ".join(name for name, one in (("origin", vehicle.origin), ("home", vehicle.home)) if one is None)
         says = f"The autopilot has no {what} yet."
@@ -165,9 +192,11 @@ def _position(seen: Examined) -> Iterator[Finding]:
 def _arming(seen: Examined) -> Iterator[Finding]:
     beat, prearm = seen.vehicle.heartbeat, seen.vehicle.prearm
     reasons = [text.partition(": ")[2] for text in seen.texts if text.startswith(("PreArm:", "Arm:"))]
-    if (prearm is not None and not prearm.ok or reasons) and not (beat is not None and beat.armed):
+    if ((prearm is not None and not prearm.ok) or reasons) and not (beat is not None and beat.armed):
         says = f"The autopilot would not arm: {'; '.join(reasons) or 'it does not say why'}."
-        yield Finding("pre-arm", Level.STOP, says, "do as the message says; ARMING_REQUIRE and the checks stay as they are")
+        yield Finding(
+            "pre-arm", Level.STOP, says, "do as the message says; ARMING_REQUIRE and the checks stay as they are"
+        )
     for text in seen.texts:
         if not text.startswith(("PreArm:", "Arm:")):
             yield Finding("text", Level.NOTE, f"The autopilot says: {text}", "")
@@ -205,7 +234,9 @@ def _ranges(seen: Examined) -> Iterator[Finding]:
         name = f"{one.message} {one.sensor} of component {one.component}"
         yield from _limits(name, one.min_m, one.max_m)
         if one.blind:
-            yield Finding("range-unknown", Level.WARN, f"{name} knows nothing: all readings are invalid.", "look at the sensor")
+            yield Finding(
+                "range-unknown", Level.WARN, f"{name} knows nothing: all readings are invalid.", "look at the sensor"
+            )
         elif one.rate_hz < SLOW_HZ:
             says = f"{name} comes at {one.rate_hz:.1f} Hz; after a second without, the rover stops."
             yield Finding("range-slow", Level.WARN, says, "have it send at 5 to 15 Hz")
@@ -214,13 +245,24 @@ def _ranges(seen: Examined) -> Iterator[Finding]:
 def _limits(name: str, min_m: float, max_m: float) -> Iterator[Finding]:
     told = f"{name} says that it sees from {min_m:g} m to {max_m:g} m"
     if max_m <= min_m:
-        yield Finding("range-limits", Level.STOP, f"{told}: it is not used.", "set RNGFNDn_MIN and RNGFNDn_MAX as in its data sheet")
+        yield Finding(
+            "range-limits",
+            Level.STOP,
+            f"{told}: it is not used.",
+            "set RNGFNDn_MIN and RNGFNDn_MAX as in its data sheet",
+        )
     elif max_m < SHORT_M:
-        yield Finding("range-limits", Level.WARN, f"{told}: the rover will creep.", "set RNGFNDn_MAX as in its data sheet")
+        yield Finding(
+            "range-limits", Level.WARN, f"{told}: the rover will creep.", "set RNGFNDn_MAX as in its data sheet"
+        )
     elif max_m > FAR_M:
-        yield Finding("range-limits", Level.WARN, f"{told}: more than such sensors do.", "set RNGFNDn_MAX as in its data sheet")
+        yield Finding(
+            "range-limits", Level.WARN, f"{told}: more than such sensors do.", "set RNGFNDn_MAX as in its data sheet"
+        )
     elif min_m > NEAR_M:
-        yield Finding("range-limits", Level.WARN, f"{told}: blind for what is near.", "set RNGFNDn_MIN as in its data sheet")
+        yield Finding(
+            "range-limits", Level.WARN, f"{told}: blind for what is near.", "set RNGFNDn_MIN as in its data sheet"
+        )
 
 
 # Parameters ---------------------------------------------------------------------------------------------------------
@@ -254,11 +296,17 @@ def _guided(seen: Examined) -> Iterator[Finding]:
 
 
 def _stations(seen: Examined) -> Iterator[Finding]:
-    watching, station = seen.parameters.get("FS_GCS_ENABLE", 0.0), _station(seen)
+    watching, station = seen.parameters.get("FS_GCS_ENABLE"), _station(seen)
     if watching and station is not None and int(station[1]) not in seen.systems:
         says = f"The autopilot watches ground station {station[1]:g}, which is not heard here: if it falls silent, the rover goes into HOLD."
-        yield Finding("gcs-failsafe", Level.WARN, says, f"keep that ground station on, or set {station[0]} to its system id", *station)
-    elif not watching:
+        yield Finding(
+            "gcs-failsafe",
+            Level.WARN,
+            says,
+            f"keep that ground station on, or set {station[0]} to its system id",
+            *station,
+        )
+    elif watching == 0.0:
         says = "The autopilot does not watch the ground station: nobody notices when the people lose their link."
         yield _set("gcs-failsafe", Level.NOTE, says, "FS_GCS_ENABLE", watching, 1.0)
 
@@ -270,7 +318,14 @@ def _fence(seen: Examined) -> Iterator[Finding]:
         yield Finding("fence-breached", Level.STOP, says, remedy, "FENCE_ENABLE", seen.parameters.get("FENCE_ENABLE"))
     elif seen.parameters.get("FENCE_ENABLE"):
         says = "The autopilot's fence is on: targets beyond it are not reached."
-        yield Finding("fence", Level.NOTE, says, "look that all targets lie inside", "FENCE_ENABLE", seen.parameters["FENCE_ENABLE"])
+        yield Finding(
+            "fence",
+            Level.NOTE,
+            says,
+            "look that all targets lie inside",
+            "FENCE_ENABLE",
+            seen.parameters["FENCE_ENABLE"],
+        )
 
 
 def _station(seen: Examined) -> tuple[str, float] | None:

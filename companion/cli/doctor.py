@@ -40,7 +40,7 @@ def doctor(
     """Say what would stop a mission. Exit code 0: nothing; 3: something would; 4: no rover heard; 2: bad input."""
     try:
         files = StateFiles(state)
-        settings = files.settings(usable_settings(settings_file), lambda text: None)
+        settings = usable_settings(settings_file)
         signer = files.signer(signing_key)
         link = open_link(connect)
     except (SettingsError, LinkError, OutputError, SigningKeyError) as error:
@@ -54,10 +54,10 @@ def doctor(
             examination.step(now_s)
             clock.sleep_until_s(now_s + STEP_S)
             now_s = clock.now_s()
+        seen = examination.result()
     finally:
         link.close()
         files.close()
-    seen = examination.result()
     findings = [*diagnose(seen), *kernels(cold=not kernels_warm(settings))]
     if as_json:
         typer.echo(json.dumps({"heard": _summary(seen), "findings": [asdict(one) for one in findings]}, indent=2))

@@ -167,9 +167,9 @@ class Examination:
 
     def _heartbeat(self, packet: Packet) -> None:
         message = self._message(packet)
-        if packet.component_id == AUTOPILOT and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID:
-            if len(self._autopilots) < MOST_SYSTEMS:
-                self._autopilots[packet.system_id] = Autopilot(packet.system_id, message.type, message.autopilot)
+        is_autopilot = packet.component_id == AUTOPILOT and message.autopilot != mavlink.MAV_AUTOPILOT_INVALID
+        if is_autopilot and len(self._autopilots) < MOST_SYSTEMS:
+            self._autopilots[packet.system_id] = Autopilot(packet.system_id, message.type, message.autopilot)
         self._companion_heard |= packet.component_id == self._companion and packet.system_id == self._codec.system_id
 
     def _range(self, packet: Packet) -> None:
