@@ -74,6 +74,11 @@ class RequestMessage:
 
 
 @dataclass(frozen=True, slots=True)
+class AskPrearm:
+    """Have the autopilot check whether it could be armed, and say what is in the way. Nothing moves."""
+
+
+@dataclass(frozen=True, slots=True)
 class AskTime:
     """TIMESYNC: the answer brings ``asked_ns`` back, nanoseconds of our own clock."""
 
@@ -158,6 +163,7 @@ Command = (
     | RequestRate
     | RequestMessage
     | AskTime
+    | AskPrearm
     | ReadParameter
     | RequestList
     | RequestItem
@@ -171,6 +177,7 @@ Command = (
 __all__ = [
     "AnswerTarget",
     "Arm",
+    "AskPrearm",
     "AskTime",
     "ChangeSpeed",
     "Command",

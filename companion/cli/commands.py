@@ -8,6 +8,7 @@ import typer
 
 from companion.cli import mission
 from companion.cli.bench import bench
+from companion.cli.doctor import doctor
 from companion.cli.plan import plan
 from companion.cli.replay import replay
 from companion.cli.run import run
@@ -21,6 +22,7 @@ app = typer.Typer(
 )
 
 app.command()(run)
+app.command()(doctor)
 app.command()(plan)
 app.command()(replay)
 app.command()(bench)

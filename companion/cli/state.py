@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from companion.mavlink.signing import Signer, load_key
 from companion.mavlink.signing_time import TimeFile
 from companion.saving import Saver
 from companion.settings import Settings
+from companion.state.place import default_directory
 from companion.tuning import as_toml, differences, with_tuned
 
 TUNED = "tuned.toml"
@@ -19,21 +21,19 @@ SIGNING_TIME = "signing-time"
 
 
 class StateFiles:
-    """The files of a state directory; without one nothing is kept."""
+    """The small files of a state directory; the default one, if none is named."""
 
-    def __init__(self, directory: Path | None) -> None:
-        """Raises OutputError if nothing can be written there."""
-        self._directory = directory
+    def __init__(self, named: Path | None) -> None:
+        """Raises OutputError if nothing can be written in a directory that was named."""
+        self._directory = named or default_directory(os.environ)
         self._saver = Saver()
         self._base = Settings()
-        if directory is not None:
-            writable(directory / TUNED)
+        if named is not None:
+            writable(named / TUNED)
 
     def settings(self, base: Settings, tell: Callable[[str], None]) -> Settings:
         """The settings with what ground stations have changed in earlier runs. Raises SettingsError."""
         self._base = base
-        if self._directory is None:
-            return base
         settings = with_tuned(base, self._directory / TUNED)
         if tuned := differences(base, settings):
             tell(f"tuned from a ground station: {', '.join(tuned)}")
@@ -41,15 +41,13 @@ class StateFiles:
 
     def keep(self, tuned: Settings) -> None:
         """Keep them for the next run; returns at once."""
-        if self._directory is not None:
-            self._saver.save(self._directory / TUNED, as_toml(self._base, tuned).encode())
+        self._saver.save(self._directory / TUNED, as_toml(self._base, tuned).encode())
 
     def signer(self, key_file: Path | None) -> Signer | None:
         """Signs with the key of a file, None without one. Raises SigningKeyError."""
         if key_file is None:
             return None
-        saved = None if self._directory is None else TimeFile(self._directory / SIGNING_TIME, self._saver)
-        return Signer(load_key(key_file), saved=saved)
+        return Signer(load_key(key_file), saved=TimeFile(self._directory / SIGNING_TIME, self._saver))
 
     def close(self) -> str:
         """Write what is left; why something could not be written, or nothing."""

@@ -10,6 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.commands import (
     AnswerTarget,
     Arm,
+    AskPrearm,
     AskTime,
     ChangeSpeed,
     Command,
@@ -43,6 +44,10 @@ KEEP_THROTTLE = -1.0
 KEEP_SPEED = -1.0
 GUIDED_ITEM = 2
 """``current`` of a mission item that is not part of a mission but a guided target."""
+
+
+Spoken = SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage | AskPrearm
+"""What is said as COMMAND_LONG."""
 
 
 class EncodeError(Exception):
@@ -110,7 +115,7 @@ class Encoder:
             case _:
                 return [self._command_long(command, confirmation)]
 
-    def _command_long(self, command: SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage, again: int) -> Any:
+    def _command_long(self, command: Spoken, again: int) -> Any:
         first, second, third = _parameters(command)
         number = command_number(command)
         return mavlink.MAVLink_command_long_message(
@@ -216,15 +221,19 @@ def command_number(command: Command) -> int | None:
             return int(mavlink.MAV_CMD_DO_CHANGE_SPEED)
         case RequestRate():
             return int(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
+        case AskPrearm():
+            return int(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
         case RequestMessage():
             return int(mavlink.MAV_CMD_REQUEST_MESSAGE)
         case _:
             return None
 
 
-def _parameters(command: SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage) -> tuple[float, float, float]:
+def _parameters(command: Spoken) -> tuple[float, float, float]:
     """The first three parameters of COMMAND_LONG."""
     match command:
+        case AskPrearm():
+            return 0.0, 0.0, 0.0
         case SetMode():
             return float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(command.mode), 0.0
         case Arm():

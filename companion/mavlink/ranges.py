@@ -61,7 +61,8 @@ def distance_sensor(message: Any, time_s: float, *, sector: bool) -> RangeScan |
 def obstacle_distance(message: Any, time_s: float) -> RangeScan | None:
     """OBSTACLE_DISTANCE: up to 72 cells; None if all are unknown or the message makes no sense."""
     step_deg = message.increment_f if message.increment_f else float(message.increment)
-    if not math.isfinite(step_deg) or step_deg == 0.0 or not math.isfinite(message.angle_offset):
+    # A field of any width would be laid out in as many beams as it takes: more than a full turn is no width.
+    if not (0.0 < abs(step_deg) <= 360.0 and abs(message.angle_offset) <= 360.0):
         return None
     # More cells than make a full turn would speak of the same place twice.
     cells = min(len(message.distances), max(1, round(360.0 / abs(step_deg))))

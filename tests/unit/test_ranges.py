@@ -158,3 +158,14 @@ def test_the_nearest_of_all_sensors_is_the_last_resort(listener: Listener) -> No
 def test_range_data_of_another_system_is_ignored(listener: Listener) -> None:
     assert listener.scans(Station(2, 196).cells([200] * 72)) == []
     assert listener.codec.counters.other_systems == 1
+
+
+@pytest.mark.parametrize("step_deg", [math.inf, -math.inf, 3e38, -1e9, 360.1])
+def test_a_field_wider_than_a_turn_is_no_scan_and_takes_no_memory(listener: Listener, step_deg: float) -> None:
+    assert listener.scans(listener.lidar.cells([200] * 72, increment_f=step_deg)) == []
+    assert len(listener.scans(listener.lidar.cells([200] * 72, increment_f=360.0))) == 1
+
+
+@pytest.mark.parametrize("offset_deg", [math.inf, math.nan, 1e30, -361.0])
+def test_an_offset_of_more_than_a_turn_is_no_scan(listener: Listener, offset_deg: float) -> None:
+    assert listener.scans(listener.lidar.cells([200] * 72, offset_deg=offset_deg)) == []

@@ -1,0 +1,100 @@
+"""``rover-companion doctor``: what would stop a mission. It moves nothing."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from companion.cli.inputs import OutputError, usable_settings
+from companion.cli.state import StateFiles
+from companion.clock import WallClock
+from companion.diagnosis import PARAMETERS, Finding, Level, diagnose, kernels
+from companion.examined import Examined
+from companion.mavlink.examination import Examination
+from companion.mavlink.signing import SigningKeyError
+from companion.mavlink.transport import LinkError, open_link
+from companion.settings import SettingsError
+from companion.warmup import kernels_warm
+
+STEP_S = 0.05
+EXIT_FINE, EXIT_BAD_INPUT, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 2, 3, 4
+COLOURS = {Level.STOP: "red", Level.WARN: "yellow", Level.NOTE: "cyan"}
+
+
+def doctor(
+    connect: Annotated[str, typer.Option(help="The autopilot, as for `run`.")],
+    seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Listen no longer than this.")] = 15.0,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
+    settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
+    state: Annotated[Path | None, typer.Option(help="Directory where this rover's state is kept.")] = None,
+    signing_key: Annotated[
+        Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
+    ] = None,
+) -> None:
+    """Say what would stop a mission. Exit code 0: nothing; 3: something would; 4: no rover heard; 2: bad input."""
+    try:
+        files = StateFiles(state)
+        settings = usable_settings(settings_file)
+        signer = files.signer(signing_key)
+        link = open_link(connect)
+    except (SettingsError, LinkError, OutputError, SigningKeyError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+    clock = WallClock()
+    examination = Examination(link, settings.link, PARAMETERS, signer)
+    now_s = began_s = clock.now_s()
+    try:
+        while not examination.done and now_s - began_s < seconds:
+            examination.step(now_s)
+            clock.sleep_until_s(now_s + STEP_S)
+            now_s = clock.now_s()
+        seen = examination.result()
+    finally:
+        link.close()
+        files.close()
+    findings = [*diagnose(seen), *kernels(cold=not kernels_warm(settings))]
+    if as_json:
+        typer.echo(json.dumps({"heard": _summary(seen), "findings": [asdict(one) for one in findings]}, indent=2))
+    else:
+        _show(seen, findings)
+    if not seen.rover_heard:
+        raise typer.Exit(EXIT_NOBODY)
+    raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
+
+
+def _summary(seen: Examined) -> dict[str, object]:
+    """Who was heard, for programs."""
+    return {
+        "place": seen.place,
+        "rover": seen.rover_heard,
+        "system": seen.system if seen.rover_heard else None,
+        "version": None if seen.version is None else ".".join(map(str, seen.version)),
+        "parameters": dict(seen.parameters),
+        "sensors": [asdict(one) for one in seen.sources],
+    }
+
+
+def _show(seen: Examined, findings: list[Finding]) -> None:
+    console = Console()
+    if seen.rover_heard:
+        version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"
+        console.print(f"rover: system {seen.system}{version}, on {seen.place}", soft_wrap=True, markup=False)
+    table = Table("", "finding", "what to do", show_lines=True)
+    for one in findings:
+        value = "" if one.value is None or not one.parameter else f" ({one.parameter} is {one.value:g})"
+        table.add_row(f"[{COLOURS[one.level]}]{one.level}[/]", _plain(f"{one.says}{value}"), _plain(one.remedy))
+    if findings:
+        console.print(table)
+    stopping = sum(one.level is Level.STOP for one in findings)
+    console.print(f"{stopping} would stop a mission" if stopping else "nothing found that would stop a mission")
+
+
+def _plain(text: str) -> str:
+    """Texts of others may hold what rich takes for markup."""
+    return text.replace("[", "\\[")

@@ -1,0 +1,274 @@
+"""The doctor at the simulated autopilot: each fault made and found; and nothing ever sent that could move a rover."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from typer.testing import CliRunner
+
+from companion.cli.commands import app
+from companion.diagnosis import PARAMETERS, Level, diagnose
+from companion.mavlink.byte_link import MemoryLink
+from companion.mavlink.examination import Examination
+from companion.mavlink.signing import Signer
+from companion.settings import Settings
+from sitl.scenario import scenario_from_mission
+from tests.mavlink_vehicle import Station
+from tests.party import KEY, TIME
+from tests.rig import yard
+from tests.served import finished, mission_path, process
+from tests.unit.test_sitl_server import free_port
+
+READY_S = 50.0
+HARMLESS = {511, 512, 401}
+"""SET_MESSAGE_INTERVAL, REQUEST_MESSAGE, RUN_PREARM_CHECKS."""
+MANUAL, GUIDED = 0, 15
+
+
+@dataclass
+class Case:
+    """A simulated rover and the doctor's line to it."""
+
+    folder: Path
+    values: Mapping[str, float] = field(default_factory=dict)
+    sensors: str | None = None
+    on_s: float = READY_S
+    port: int = 0
+    signer: Signer | None = None
+    before: Callable[[Any, Any], None] = lambda simulator, pilot: None
+    change: Callable[[Any], bool] = lambda message: True
+    also: Callable[[int], bytes] = lambda tick: b""
+    seconds: float = 12.0
+    sent: list[Any] = field(default_factory=list)
+
+    def findings(self) -> dict[str, Level]:
+        scenario = scenario_from_mission(yard(self.folder))
+        parameters = {**scenario.parameters, "FS_GCS_ENABLE": 0.0, **self.values}
+        scenario = replace(scenario, parameters=parameters, sensors=self.sensors or scenario.sensors)
+        simulator = scenario.simulator(0)
+        simulator.advance_to_s(self.on_s)
+        near, far = MemoryLink.pair()
+        vehicle, pilot = simulator.connect(self.port), simulator.connect()
+        self.before(simulator, pilot)
+        simulator.advance_to_s(self.on_s + 0.2)
+        modes = {(simulator.time_s, int(m.custom_mode), m.base_mode) for m in heartbeats(pilot.take())}
+        vehicle.take()
+        examination = Examination(near, Settings().link, PARAMETERS, self.signer)
+        parser, listener = mavlink.MAVLink(None), mavlink.MAVLink(None)
+        start_s = simulator.time_s
+        while not examination.done and simulator.time_s - start_s < self.seconds:
+            examination.step(simulator.time_s)
+            said = far.read()
+            self.sent += parser.parse_buffer(said) or []
+            vehicle.receive(said)
+            simulator.advance_to_s(simulator.time_s + 0.05)
+            heard = listener.parse_buffer(vehicle.take()) or []
+            far.write(b"".join(bytes(m.get_msgbuf()) for m in heard if self.change(m)) + self.also(len(self.sent)))
+        after = heartbeats(pilot.take())
+        assert len({(m.custom_mode, m.base_mode) for m in after} | {(mode, base) for _, mode, base in modes}) <= 1
+        self.untouched(simulator)
+        self.result = examination.result()
+        return {finding.name: finding.level for finding in reversed(diagnose(self.result))}
+
+    def untouched(self, simulator: Any) -> None:
+        """Nothing went out that could move the rover, and it has not moved."""
+        for message in self.sent:
+            kind = message.get_type()
+            assert kind in ("PARAM_REQUEST_READ", "COMMAND_LONG"), kind
+            assert kind != "COMMAND_LONG" or message.command in HARMLESS
+            assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 192)
+        assert simulator.driven_m < 0.01
+
+
+def heartbeats(data: bytes) -> list[Any]:
+    heard = mavlink.MAVLink(None).parse_buffer(data) or []
+    return [m for m in heard if m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 1]
+
+
+def said(*commands: Any) -> Callable[[Any, Any], None]:
+    """A person does this before the doctor comes."""
+
+    def before(simulator: Any, pilot: Any) -> None:
+        mav = mavlink.MAVLink(None, 255, 190)
+        for command in commands:
+            if not isinstance(command, tuple):
+                pilot.receive(command.pack(mav))
+            else:
+                values = [*command[1:], *[0.0] * (8 - len(command))]
+                pilot.receive(mavlink.MAVLink_command_long_message(1, 1, command[0], 0, *values).pack(mav))
+
+    return before
+
+
+def test_a_rover_that_is_well(tmp_path: Path) -> None:
+    case = Case(tmp_path)
+    assert case.findings() == {"gcs-failsafe": Level.NOTE}
+    assert case.result.version == (4, 7, 0)
+    assert set(case.result.parameters) == set(PARAMETERS) - {"SYSID_MYGCS"}
+    assert {m.command for m in case.sent if m.get_type() == "COMMAND_LONG"} == HARMLESS
+
+
+S, W, N = Level.STOP, Level.WARN, Level.NOTE
+
+
+@pytest.mark.parametrize(
+    ("values", "finding", "level"),
+    [
+        ({"OA_TYPE": 1}, "oa-type", S),
+        ({"AVOID_ENABLE": 7}, "avoid-enable", S),
+        ({"GUID_OPTIONS": 64}, "guid-options", S),
+        ({"GUID_TIMEOUT": 10}, "guid-timeout", W),
+        ({"WP_RADIUS": 3}, "wp-radius", W),
+        ({"WP_SPEED": 0}, "wp-speed", W),
+        ({"PRX1_TYPE": 2}, "echo", N),
+        ({"FS_GCS_ENABLE": 1}, "gcs-failsafe", W),
+        ({"FS_GCS_ENABLE": 1, "MAV_GCS_SYSID": 1}, "system-ids", S),
+        ({"FENCE_ENABLE": 1}, "fence", N),
+    ],
+)  # fmt: skip
+def test_a_parameter_that_is_set_wrong(tmp_path: Path, values: dict[str, float], finding: str, level: Level) -> None:
+    assert Case(tmp_path, values).findings()[finding] is level
+
+
+def test_just_switched_on(tmp_path: Path) -> None:
+    findings = Case(tmp_path, on_s=3.0, seconds=5.0).findings()
+    assert {"ekf", "origin", "pre-arm"} <= findings.keys()
+    assert set(findings.values()) >= {S}
+
+
+def test_no_range_sensor(tmp_path: Path) -> None:
+    assert Case(tmp_path, sensors="none").findings()["no-range-sensor"] is S
+
+
+def test_somebody_is_driving(tmp_path: Path) -> None:
+    assert Case(tmp_path, before=said((400, 1))).findings()["mode"] is S
+
+
+def test_armed_in_guided(tmp_path: Path) -> None:
+    findings = Case(tmp_path, before=said((176, 1, GUIDED), (400, 1))).findings()
+    assert findings["armed"] is N and "mode" not in findings
+
+
+def test_rates_that_do_not_arrive(tmp_path: Path) -> None:
+    count = [0]
+
+    def slow(message: Any) -> bool:
+        if message.get_type() != "ATTITUDE":
+            return True
+        count[0] += 1
+        return count[0] % 40 == 0
+
+    assert Case(tmp_path, change=slow).findings()["rate"] is S
+
+
+def test_another_companion(tmp_path: Path) -> None:
+    station = Station(1, 191)
+    beat = mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3)
+    assert Case(tmp_path, also=lambda tick: station.pack(beat)).findings()["two-companions"] is S
+
+
+def test_another_rover(tmp_path: Path) -> None:
+    station = Station(7, 1)
+    assert (
+        Case(tmp_path, also=lambda tick: station.heartbeat() if tick > 10 else b"").findings()["several-autopilots"]
+        is W
+    )
+
+
+def test_a_key_that_is_missing_or_another_one(tmp_path: Path) -> None:
+    setup = said(mavlink.MAVLink_setup_signing_message(1, 1, list(KEY), TIME))
+    assert Case(tmp_path, before=setup, port=1).findings()["signing"] is W
+    other = Signer(b"o" * 32, lambda: TIME)
+    assert Case(tmp_path, before=setup, port=1, signer=other).findings() == {"signing": S}
+    right = Case(tmp_path, before=setup, port=1, signer=Signer(KEY, lambda: TIME + 2 * 6_000_000))
+    assert right.findings() == {"gcs-failsafe": N}
+
+
+def test_no_rover_but_a_copter_or_nobody() -> None:
+    for data, finding in ((Station(1, 1).heartbeat(kind=2), "not-a-rover"), (b"", "no-autopilot")):
+        near, far = MemoryLink.pair()
+        examination = Examination(near, Settings().link, PARAMETERS)
+        far.write(data)
+        for tick in range(100):
+            examination.step(0.05 * tick)
+        assert [one.name for one in diagnose(examination.result())] == [finding]
+        sent = mavlink.MAVLink(None).parse_buffer(far.read()) or []
+        assert {(m.get_type(), m.command) for m in sent} == {("COMMAND_LONG", 512)}
+        assert 4 <= len(sent) <= 6
+
+
+@given(st.lists(st.binary(max_size=300), max_size=6))
+def test_any_bytes_are_survived(pieces: list[bytes]) -> None:
+    near, far = MemoryLink.pair()
+    examination = Examination(near, Settings().link, PARAMETERS)
+    far.write(Station().heartbeat())
+    for tick, piece in enumerate(pieces):
+        far.write(piece)
+        examination.step(float(tick))
+    diagnose(examination.result())
+
+
+@given(st.data())
+def test_any_values_in_what_it_looks_at_are_survived(data: st.DataObject) -> None:
+    """Whole packets with any bytes for their fields, of anybody."""
+    near, far = MemoryLink.pair()
+    examination = Examination(near, Settings().link, PARAMETERS)
+    far.write(Station().heartbeat())
+    for tick in range(4):
+        number = data.draw(st.sampled_from([0, 1, 22, 132, 148, 173, 193, 242, 253, 330]))
+        kind = mavlink.mavlink_map[number]
+        payload = data.draw(st.binary(min_size=kind.unpacker.size, max_size=kind.unpacker.size))
+        who = data.draw(st.sampled_from([1, 2, 255])), data.draw(st.sampled_from([1, 191, 196]))
+        head = bytes([len(payload), 0, 0, tick, *who]) + number.to_bytes(3, "little")
+        check = int(mavlink.x25crc(head + payload + bytes([kind.crc_extra])).crc)
+        far.write(b"\xfd" + head + payload + check.to_bytes(2, "little"))
+        examination.step(float(tick))
+    for finding in diagnose(examination.result()):
+        assert finding.says
+
+
+# Processes ----------------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def simulator(folder: Path, *options: object) -> Iterator[str]:
+    url = f"tcp:127.0.0.1:{free_port()}"
+    with process("sitl", "serve", mission_path(yard(folder)), "--listen", url, "--speedup", 10, *options) as serve:
+        assert serve.stdout is not None
+        yield url
+
+
+@pytest.mark.slow
+def test_a_parameter_file_with_faults_as_people_see_them(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.param"
+    wrong.write_text("OA_TYPE,1\nAVOID_ENABLE,7\nWP_RADIUS,3\n")
+    with (
+        simulator(tmp_path, "--params", wrong) as url,
+        process("companion", "doctor", "--connect", url, "--json", "--seconds", 40) as child,
+    ):
+        code, out, err = finished(child, 90.0)
+    assert code == 3, err
+    findings = {one["name"]: one for one in json.loads(out)["findings"]}
+    assert (findings["oa-type"]["parameter"], findings["oa-type"]["wanted"]) == ("OA_TYPE", 0.0)
+    assert {"avoid-enable", "wp-radius"} <= findings.keys()
+
+
+def test_nobody_there(tmp_path: Path) -> None:
+    url = f"udpin:127.0.0.1:{free_port()}"
+    answer = CliRunner().invoke(app, ["doctor", "--connect", url, "--seconds", "1"])
+    assert answer.exit_code == 4
+    assert "Nothing is heard" in answer.output
+
+
+def test_a_link_that_is_none() -> None:
+    answer = CliRunner().invoke(app, ["doctor", "--connect", "bluetooth:1"])
+    assert answer.exit_code == 2 and "udpin:HOST:PORT" in answer.output
