@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from companion.cli.inputs import OutputError, writable
+from companion.cli.inputs import OutputError, writable, written
 from companion.clock import WallClock
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
@@ -52,7 +52,8 @@ def physics(
         if write_params is not None:
             steered = scenario.turning_radius_m > 0.0
             text = parameter_file(firmware_parameters(scenario.parameters, behind.suite, steered=steered))
-            write_params.write_text(text, encoding="ascii")
+            with written(write_params):
+                write_params.write_text(text, encoding="ascii")
         link = open_link(mavlink) if mavlink else None
         # Compiles what is not compiled yet before the firmware waits for answers.
         behind.rehearse()
