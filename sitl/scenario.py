@@ -139,7 +139,12 @@ def _fitting_radius_m(radius_m: float, spec: SitlSpec, file: ParameterFile) -> f
                 f"{file.path}: SERVOn_FUNCTION are of a rover with steered wheels, the mission says steering "
                 "skid; take that out, or another file"
             )
-        return file.values.get("TURN_RADIUS", DEFAULTS["TURN_RADIUS"][0])
+        turning_m = file.values.get("TURN_RADIUS", DEFAULTS["TURN_RADIUS"][0])
+        if turning_m <= 0.0:
+            raise ScenarioError(
+                f"{file.path}: TURN_RADIUS {turning_m:g}: a rover with steered wheels needs the radius of its tightest turn, in metres"
+            )
+        return turning_m
     return radius_m
 
 
