@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -71,17 +71,34 @@ class ParameterFile:
             if self.values.get(f"SERVO{n}_FUNCTION", function) != function
         ]
         odd += [f"SERVO{n}_REVERSED 1" for n in wired if self.values.get(f"SERVO{n}_REVERSED", 0.0)]
-        limits = outside(self.values)
-        notes = [self.note()]
-        if self.repeated:
-            notes.append(f"{self.path}: {_some(self.repeated)}: there more than once; the last value counts")
-        if limits:
-            notes.append(
-                f"{self.path}: outside of the range that ArduRover documents: {_some(limits)}; see if they are meant"
-            )
         motors = f"{wired[1]} on output 1 and {wired[3]} on output 3"
         wrong = f"{self.path}: {', '.join(odd)}: the simulated motors are wired as {motors}, not reversed; it will drive wrongly"
-        return tuple(text for text in (*notes, wrong if odd else "") if text)
+        return (*(text for text in (self.note(),) if text), *self.slips, *((wrong,) if odd else ()))
+
+    def firmware_notes(self, told: Mapping[str, float] | None) -> tuple[str, ...]:
+        """What a person should know before this file drives the real firmware, a line each.
+
+        ``told``: everything that is written for the firmware; None if nothing is.
+        """
+        if told is None:
+            only = "says here only what kind of steering the rover has; --write-params FILE writes the rest for the firmware"
+            return (f"{self.path}: {only}", *self.slips)
+        changed = tuple(
+            f"{self.path}: {name} {value:g} becomes {told[name]:g}, as our rover is built"
+            for name, value in self.values.items()
+            if told.get(name, value) != value
+        )
+        unknown = list(self.unknown)
+        passed = f"{self.path}: {len(unknown)} parameters that are not known here are passed on as they are: {_some(unknown)}"
+        return (*self.slips, *changed, *((passed,) if unknown else ()))
+
+    @property
+    def slips(self) -> tuple[str, ...]:
+        """What is most likely not meant, whoever drives; a line each."""
+        limits = outside(self.values)
+        twice = f"{self.path}: {_some(self.repeated)}: there more than once; the last value counts"
+        odd = f"{self.path}: outside of the range that ArduRover documents: {_some(limits)}; see if they are meant"
+        return (*((twice,) if self.repeated else ()), *((odd,) if limits else ()))
 
     def note(self) -> str:
         """One line about what is kept but has no effect; empty when there is nothing of it."""
