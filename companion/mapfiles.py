@@ -96,7 +96,9 @@ def save_ros_map(grid: Grid, path_without_suffix: Path, known: NDArray[np.bool_]
         image.write_bytes(f"P5\n{grid.width} {grid.height}\n255\n".encode() + grey[::-1].tobytes())
         image.with_suffix(".yaml").write_text(text, encoding="utf-8")
     except OSError as error:
-        raise MapError(f"{error.filename or image}: cannot be written: {error.strerror}") from error
+        raise MapError(
+            f"{error.filename or image}: cannot be written: {error.strerror}; choose another place"
+        ) from error
 
 
 def _read_bytes(path: Path, limit: int) -> bytes:

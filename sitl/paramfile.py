@@ -7,11 +7,13 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from sitl.autopilot.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT, functions_of, is_skid
 from sitl.autopilot.params import DEFAULTS, INT8, INT16, INT32, REAL32
+from sitl.parameter_ranges import outside
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")
 AUTOPILOT = 1
@@ -19,6 +21,8 @@ AUTOPILOT = 1
 TYPES = (INT8, INT16, INT32, REAL32)
 MOST_BYTES = 1_000_000
 NAMES_TOLD = 5
+LARGEST = 3.4e38
+"""Of a 32-bit float."""
 COUNTS = frozenset({"FENCE_TOTAL", "MIS_TOTAL", "RALLY_TOTAL"})
 """The autopilot sets these itself; what a file says of them is passed over."""
 
@@ -35,6 +39,8 @@ class ParameterFile:
     values: dict[str, float]
     types: dict[str, int]
     others: int = 0
+    repeated: tuple[str, ...] = ()
+    """Names that stand there more than once with different values."""
 
     @property
     def known(self) -> dict[str, float]:
@@ -67,16 +73,45 @@ class ParameterFile:
         odd += [f"SERVO{n}_REVERSED 1" for n in wired if self.values.get(f"SERVO{n}_REVERSED", 0.0)]
         motors = f"{wired[1]} on output 1 and {wired[3]} on output 3"
         wrong = f"{self.path}: {', '.join(odd)}: the simulated motors are wired as {motors}, not reversed; it will drive wrongly"
-        return tuple(text for text in (self.note(), wrong if odd else "") if text)
+        return (*(text for text in (self.note(),) if text), *self.slips, *((wrong,) if odd else ()))
+
+    def firmware_notes(self, told: Mapping[str, float] | None) -> tuple[str, ...]:
+        """What a person should know before this file drives the real firmware, a line each.
+
+        ``told``: everything that is written for the firmware; None if nothing is.
+        """
+        if told is None:
+            only = "says here only what kind of steering the rover has; --write-params FILE writes the rest for the firmware"
+            return (f"{self.path}: {only}", *self.slips)
+        changed = tuple(
+            f"{self.path}: {name} {value:g} becomes {told[name]:g}, as our rover is built"
+            for name, value in self.values.items()
+            if told.get(name, value) != value
+        )
+        unknown = list(self.unknown)
+        passed = f"{self.path}: {len(unknown)} parameters that are not known here are passed on as they are: {_some(unknown)}"
+        return (*self.slips, *changed, *((passed,) if unknown else ()))
+
+    @property
+    def slips(self) -> tuple[str, ...]:
+        """What is most likely not meant, whoever drives; a line each."""
+        limits = outside(self.values)
+        twice = f"{self.path}: {_some(self.repeated)}: there more than once; the last value counts"
+        odd = f"{self.path}: outside of the range that ArduRover documents: {_some(limits)}; see if they are meant"
+        return (*((twice,) if self.repeated else ()), *((odd,) if limits else ()))
 
     def note(self) -> str:
         """One line about what is kept but has no effect; empty when there is nothing of it."""
         names = list(self.unknown)
         if not names:
             return ""
-        first = ", ".join(names[:NAMES_TOLD]) + (", ..." if len(names) > NAMES_TOLD else "")
         count = f"{len(names)} of {len(self.values)} parameters are not simulated and only kept to be read back"
-        return f"{self.path}: {count}: {first}"
+        return f"{self.path}: {count}: {_some(names)}"
+
+
+def _some(names: Sequence[str]) -> str:
+    """The first few of a list."""
+    return ", ".join(names[:NAMES_TOLD]) + (", ..." if len(names) > NAMES_TOLD else "")
 
 
 def load_parameters(path: Path) -> ParameterFile:
@@ -98,6 +133,7 @@ def _read(path: Path, text: str) -> ParameterFile:
     values: dict[str, float] = {}
     types: dict[str, int] = {}
     others = 0
+    repeated: dict[str, None] = {}
     for number, line in enumerate(text.splitlines(), 1):
         words = re.split(r"\s*,\s*|\s+", line.partition("#")[0].strip())
         if words == [""]:
@@ -109,12 +145,14 @@ def _read(path: Path, text: str) -> ParameterFile:
         if component != AUTOPILOT:
             others += 1
             continue
+        if values.get(name, value) != value:
+            repeated[name] = None
         values[name] = value
         if kind is not None:
             types[name] = kind
     if not values:
         raise ParameterFileError(f"{path}: no parameters in it; lines are NAME,VALUE or NAME VALUE")
-    return ParameterFile(path, values, types, others)
+    return ParameterFile(path, values, types, others, tuple(repeated))
 
 
 def _entry(words: list[str]) -> tuple[str, float, int | None, int]:
@@ -136,6 +174,10 @@ def _entry(words: list[str]) -> tuple[str, float, int | None, int]:
         value = float(words[1])
     except ValueError:
         value = math.nan
-    if not math.isfinite(value) or abs(value) > 3.4e38:
-        raise ValueError(f"{words[0]}: {words[1][:40]!r} is no number")
+    if not math.isfinite(value) or abs(value) > LARGEST:
+        raise ValueError(
+            f"{words[0]}: {words[1][:40]!r} is no number that a parameter can hold; write one such as 1.5, or put # before the line"
+        )
+    if words[0] == "MAV_SYSID" and not 1 <= value <= 255:
+        raise ValueError(f"{words[0]}: {value:g}: a MAVLink system has a number from 1 to 255; choose one")
     return words[0], value, kind, component

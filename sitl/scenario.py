@@ -47,8 +47,13 @@ class Scenario:
     faults: FaultPlan | None = None
     kept: dict[str, int] = field(default_factory=dict)
     """Types of those parameters that are not simulated, only kept."""
-    notes: tuple[str, ...] = ()
-    """What people should know about it, a line each."""
+    parameter_file: ParameterFile | None = None
+    """Where some of the parameters come from."""
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What people should know about it before the simulated autopilot drives, a line each."""
+        return () if self.parameter_file is None else self.parameter_file.notes(self.turning_radius_m > 0.0)
 
     def simulator(self, seed: int, noise: bool | NoiseSettings = True) -> Simulator:
         """A rover that has just been switched on."""
@@ -113,7 +118,7 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     scenario = _steered(scenario, _fitting_radius_m(turning_radius_m, spec, file))
     kept = {name: file.types.get(name, REAL32) for name in file.unknown}
     parameters = {**scenario.parameters, **file.known, **file.unknown}
-    return replace(scenario, parameters=parameters, kept=kept, notes=file.notes(scenario.turning_radius_m > 0.0))
+    return replace(scenario, parameters=parameters, kept=kept, parameter_file=file)
 
 
 def _steered(scenario: Scenario, turning_radius_m: float) -> Scenario:
@@ -139,7 +144,12 @@ def _fitting_radius_m(radius_m: float, spec: SitlSpec, file: ParameterFile) -> f
                 f"{file.path}: SERVOn_FUNCTION are of a rover with steered wheels, the mission says steering "
                 "skid; take that out, or another file"
             )
-        return file.values.get("TURN_RADIUS", DEFAULTS["TURN_RADIUS"][0])
+        turning_m = file.values.get("TURN_RADIUS", DEFAULTS["TURN_RADIUS"][0])
+        if turning_m <= 0.0:
+            raise ScenarioError(
+                f"{file.path}: TURN_RADIUS {turning_m:g}: a rover with steered wheels needs the radius of its tightest turn, in metres"
+            )
+        return turning_m
     return radius_m
 
 

@@ -19,7 +19,7 @@ from companion.bench.movingai import ScenarioFileError
 from companion.bench.page import write_page
 from companion.bench.peers import installed_peers
 from companion.bench.report import as_json, head, rows, runs_explained
-from companion.cli.inputs import OutputError, usable_settings, writable
+from companion.cli.inputs import OutputError, usable_settings, writable, written
 from companion.mapfiles import MapError
 from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
 from companion.searching import budget_of
@@ -72,12 +72,28 @@ def bench(
         console.print(table)
     console.print("\n" + " ".join(runs_explained(limits)).replace("*", "").replace("`", ""), highlight=False)
     if json_file is not None:
-        json_file.write_text(json.dumps(as_json(entries, cases, limits, settings), indent=2) + "\n", encoding="utf-8")
+        try:
+            with written(json_file):
+                json_file.write_text(
+                    json.dumps(as_json(entries, cases, limits, settings), indent=2) + "\n", encoding="utf-8"
+                )
+        except OutputError as error:
+            typer.echo(str(error), err=True)
+            raise typer.Exit(EXIT_BAD_INPUT) from error
     if docs is not None:
         names = "".join(f"{file.name} " for file in map_files or [])
         command = f"rover-companion bench {names}--sizes {sizes} --seeds {seeds} --seed {seed} --cell-s {cell_s:g} --docs docs"
         for file in write_page(docs, command, entries, contestants, cases, limits):
             console.print(f"written: {file}")
+
+
+def _write_figures(file: Path, figures: dict[str, object]) -> None:
+    try:
+        with written(file):
+            file.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+    except OutputError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
 
 
 def _cases(files: list[Path], sizes: str, maps: Path | None, problems: int) -> list[Case]:

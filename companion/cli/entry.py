@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import cast
 from companion.cli.kernels import VARIABLE, choose_place
 
 EXIT_USAGE, EXIT_STOPPED = 2, 130
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 HERE = Path(__file__).parents[1]
 """The package ``companion``; ``sitl`` is installed beside it."""
 
@@ -55,6 +57,7 @@ def _run(name: str, commands: Callable[..., object]) -> int:
     usage_error = cast(type[typer.BadParameter], typer.BadParameter.__base__)
     try:
         code = commands(prog_name=name, standalone_mode=False)
+        _let_go_of_output()  # a command that goes on when nobody reads has its own exit code
     except typer.Abort:  # what older typers make of an interrupt
         raise KeyboardInterrupt from None
     except StoppedError as stopped:
@@ -64,10 +67,24 @@ def _run(name: str, commands: Callable[..., object]) -> int:
         where = error.ctx.command_path if error.ctx is not None else name
         print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)
         return EXIT_USAGE
-    except BrokenPipeError:
-        # The reader has what it wanted (`... | head`). Python would complain once more when it flushes at the end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # the reader has what it wanted (`... | head`)
+        _let_go_of_output()
         return 1
+    except OSError as error:
+        if error.errno not in FULL or error.filename is not None:  # the commands tell of their own files themselves
+            raise
+        _let_go_of_output()
+        print(f"{name}: standard output cannot be written: {error.strerror}", file=sys.stderr)
+        return EXIT_USAGE
     if code == EXIT_STOPPED:  # what newer ones make of it, without a word
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
+
+
+def _let_go_of_output() -> None:
+    """What standard output does not take any more is thrown away: Python would complain once more when it flushes at the end."""
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from companion.planning.registry import UnknownPlannerError, make_planner
@@ -36,13 +38,23 @@ def writable(path: Path | None, suffix: str = "") -> None:
     """Make the directory of an output file and try the file itself, before hours are driven. Raises OutputError."""
     if path is None:
         return
+    if path.name in ("", ".."):
+        raise OutputError(f"{path}: is a folder, not a file; add a file's name")
     path = path.with_name(path.name + suffix)
-    try:
+    with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         existed = path.exists()
         with path.open("ab"):
             pass
         if not existed:
             path.unlink()
+
+
+@contextlib.contextmanager
+def written(path: Path) -> Iterator[None]:
+    """Whatever goes wrong in here went wrong while ``path`` (a file, or the folder of several) was written: raises OutputError."""
+    try:
+        yield
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {error.strerror or error}; choose another place") from error
+        place = error.filename if path.is_dir() and error.filename else path
+        raise OutputError(f"{place}: cannot be written: {error.strerror or error}; choose another place") from error

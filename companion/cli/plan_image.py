@@ -7,7 +7,7 @@ from pathlib import Path as FilePath
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from companion.cli.inputs import OutputError
+from companion.cli.inputs import written
 from companion.grid import OBSTACLE, Cell, Grid
 from companion.planning.problem import Path
 
@@ -22,10 +22,8 @@ START_COLOUR, TARGET_COLOUR = (30, 150, 80), (240, 140, 20)
 def save_image(file: FilePath, grid: Grid, start: Cell, target: Cell, path: Path | None) -> None:
     """Draw and write a picture; the suffix tells the format. Raises OutputError."""
     picture = draw(grid, start, target, path)
-    try:
+    with written(file):
         picture.save(file)
-    except OSError as error:
-        raise OutputError(f"{file}: cannot be written: {error.strerror or error}") from error
 
 
 def draw(grid: Grid, start: Cell, target: Cell, path: Path | None) -> Image.Image:

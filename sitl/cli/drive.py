@@ -2,31 +2,28 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-from rich.table import Table
 
 from companion.app import Status
 from companion.cli.entry import StoppedError
-from companion.cli.inputs import OutputError, picture, usable_settings, writable
+from companion.cli.inputs import OutputError, usable_settings
 from companion.itinerary import TargetStatus
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
-from companion.provenance import made_with
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
+from sitl.cli.drive_outputs import outputs, print_summary
 from sitl.cli.drive_view import run_with_view
 from sitl.cli.viewer import ViewError, terminal
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
-from sitl.picture import save_picture
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
 from sitl.worldfile import ground_grid
 
@@ -72,7 +69,7 @@ def drive(
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
     4: collision; 2: bad input; 130: stopped by Ctrl-C.
     """
-    console = Console()
+    console, wanted = Console(), outputs(image, map_stem, json_file)
     recorder: Recorder | NullRecorder = NullRecorder()
     run: Drive | None = None
     try:
@@ -91,10 +88,7 @@ def drive(
         if record is not None:
             files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
             recorder = Recorder(record, mission, settings, seed, arm=True, files=files)
-        picture(image)
-        writable(json_file)
-        map_stem = map_stem.with_suffix("") if map_stem and map_stem.suffix in (".yaml", ".pgm") else map_stem
-        writable(map_stem, ".yaml")
+        wanted.check()
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
         report = _run_with_progress(run, console) if screen is None else run_with_view(run, screen)
@@ -105,38 +99,17 @@ def drive(
         recorder.close()
         raise StoppedError(_stopped(run, recorder)) from None
     recorder.close()
-    _print_summary(report, console)
-    _put_out(run, recorder, console, image, map_stem, json_file)
+    print_summary(report, console)
+    try:
+        wanted.write(run, recorder, console)
+    except OutputError as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
     raise typer.Exit(report.exit_code)
 
 
 def _file(sensors: str | None) -> Path | None:
     return Path(sensors) if sensors is not None and sensors.endswith(".toml") else None
-
-
-def _put_out(
-    run: Drive,
-    recorder: Recorder | NullRecorder,
-    console: Console,
-    image: Path | None,
-    map_stem: Path | None,
-    json_file: Path | None,
-) -> None:
-    """Write what was asked for, and say where it is."""
-    if image is not None:
-        save_picture(run, image)
-        console.print(f"picture: {image}", soft_wrap=True)
-    if map_stem is not None:
-        run.companion.save_map(map_stem)
-        console.print(f"map:     {map_stem}.yaml", soft_wrap=True)
-    if isinstance(recorder, Recorder):
-        run.companion.save_map(recorder.directory / "map")
-        console.print(f"record:  {recorder.directory}", soft_wrap=True)
-    if json_file is not None:
-        json_file.write_text(
-            json.dumps({**run.report.as_json(), **made_with(run.settings)}, indent=2) + "\n", encoding="utf-8"
-        )
-        console.print(f"figures: {json_file}", soft_wrap=True)
 
 
 def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
@@ -229,27 +202,6 @@ def _state(run: Drive, status: Status) -> str:
     if goal is not None and status.pose is not None:
         state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
     return state
-
-
-def _print_summary(report: Report, console: Console) -> None:
-    table = Table(title=f"outcome: {report.outcome}", show_header=False)
-    for name, status in report.targets:
-        table.add_row(f"target {name}", status)
-    speed = report.distance_m / report.driving_time_s if report.driving_time_s else 0.0
-    rows = {
-        "collisions": f"{report.collisions}",
-        "driven": f"{report.distance_m:.1f} m in {report.driving_time_s:.0f} s ({speed:.2f} m/s)",
-        "steps": f"{report.steps} fields, {report.return_steps} of them going back, {report.searches} searches",
-        "stuck": "never" if report.stuck == 0 else f"{report.stuck} x",
-        "planning": f"{1e3 * report.planning_time_s:.1f} ms in all; 99 % of rounds (20 a second) within {report.tick_p99_ms:.2f} ms",
-        "time": f"{report.sim_time_s:.0f} s simulated in {report.wall_time_s:.1f} s "
-        f"({report.sim_time_s / max(report.wall_time_s, 1e-9):.0f} times real time)",
-        "compilation": f"{report.compile_time_s:.1f} s (kept for the next run)",
-        "seed": f"{report.seed}",
-    }
-    for key, value in rows.items():
-        table.add_row(key, value)
-    console.print(table)
 
 
 def _driven_here(mission: Mission) -> Mission:

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from companion.cli.inputs import OutputError, writable
+from companion.cli.inputs import OutputError, writable, written
 from companion.mapfiles import MapError
 from companion.provenance import made_with
 from companion.settings import Settings
@@ -85,9 +85,6 @@ def experiment(
     except (ExperimentError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    except OSError as error:
-        typer.echo(f"{error.filename}: cannot be written: {error.strerror}", err=True)
-        raise typer.Exit(EXIT_BAD_INPUT) from error
 
 
 def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: Path | None) -> None:
@@ -117,10 +114,12 @@ def _put_out(report: Report, console: Console, json_file: Path | None, docs: Pat
     for table in report.tables():
         console.print(table)
     if json_file is not None:
-        json_file.write_text(
-            json.dumps({**made_with(Settings()), **report.as_json()}, indent=2) + "\n", encoding="utf-8"
-        )
+        text = json.dumps({**made_with(Settings()), **report.as_json()}, indent=2) + "\n"
+        with written(json_file):
+            json_file.write_text(text, encoding="utf-8")
         typer.echo(f"figures: {json_file}")
     if docs is not None:
-        for file in report.write_docs(docs):
+        with written(docs):
+            files = report.write_docs(docs)
+        for file in files:
             typer.echo(f"written: {file}")

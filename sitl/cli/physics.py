@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from companion.cli.inputs import OutputError, writable
+from companion.cli.inputs import OutputError, writable, written
 from companion.clock import WallClock
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
@@ -21,7 +21,7 @@ from sitl.paramfile import ParameterFileError
 from sitl.physics import Physics
 from sitl.physics_news import PhysicsNews, summary
 from sitl.physics_server import open_port, run
-from sitl.scenario import ScenarioError, scenario_from_mission, with_parameter_file, with_sensors
+from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_parameter_file, with_sensors
 
 
 def physics(
@@ -48,11 +48,7 @@ def physics(
         mission = mission if params is None else with_parameter_file(mission, params)
         scenario = scenario_from_mission(mission)
         behind = scenario.physics(seed, scans=mavlink is not None)
-        writable(write_params)
-        if write_params is not None:
-            steered = scenario.turning_radius_m > 0.0
-            text = parameter_file(firmware_parameters(scenario.parameters, behind.suite, steered=steered))
-            write_params.write_text(text, encoding="ascii")
+        _write_parameters(scenario, behind, write_params)
         link = open_link(mavlink) if mavlink else None
         # Compiles what is not compiled yet before the firmware waits for answers.
         behind.rehearse()
@@ -73,6 +69,19 @@ def physics(
         if link is not None:
             link.close()
     tell(summary(behind))
+
+
+def _write_parameters(scenario: Scenario, behind: Physics, file: Path | None) -> None:
+    """Write what the firmware needs, if it is wanted; what becomes of a person's own parameters is said."""
+    told: dict[str, float] | None = None
+    if file is not None:
+        writable(file)
+        told = firmware_parameters(scenario.parameters, behind.suite, steered=scenario.turning_radius_m > 0.0)
+        with written(file):
+            file.write_text(parameter_file(told), encoding="ascii")
+    if scenario.parameter_file is not None:
+        for note in scenario.parameter_file.firmware_notes(told):
+            typer.echo(note, err=True)
 
 
 def _greeting(behind: Physics, host: str, port: int, mavlink: str | None, parameters: Path | None) -> list[str]:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
+
 import pytest
 
 from sitl.autopilot.params import DEFAULTS, steered_wheels
 from sitl.firmware_parameters import firmware_parameters, parameter_file
+from sitl.paramfile import ParameterFile
 from sitl.physics import servo_output
 from sitl.sensors import SUITES
 
@@ -44,6 +48,30 @@ def test_a_users_own_parameters_count_but_where_the_plant_is_wired() -> None:
     told = firmware_parameters(own, SUITES["beams"], steered=False)
     wired = ("SERVO1_FUNCTION", "SERVO3_FUNCTION", "SERVO1_REVERSED", "CRUISE_SPEED", "RNGFND1_TYPE")
     assert [told[name] for name in wired] == [73.0, 74.0, 0.0, 1.5, 100.0]
+
+
+def test_what_becomes_of_a_users_own_parameters_is_told() -> None:
+    own = {"SERVO1_FUNCTION": 74.0, "SERVO3_FUNCTION": 74.0, "FOO": 3.0, "CRUISE_SPEED": 200.0, "RNGFND1_TYPE": 10.0}
+    file = ParameterFile(Path("x.parm"), own, {})
+    told = firmware_parameters(own, SUITES["beams"], steered=False)
+    assert file.firmware_notes(told) == (
+        "x.parm: outside of the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); see if they are meant",
+        "x.parm: SERVO1_FUNCTION 74 becomes 73, as our rover is built",
+        "x.parm: RNGFND1_TYPE 10 becomes 100, as our rover is built",
+        "x.parm: 1 parameters that are not known here are passed on as they are: FOO",
+    )
+    (note,) = ParameterFile(Path("x.parm"), {"FOO": 3.0}, {}).firmware_notes(None)
+    assert "--write-params FILE writes the rest" in note
+
+
+def test_every_parameter_that_is_written_is_in_the_manual() -> None:
+    """As its own row, or with others by their common beginning."""
+    manual = (Path(__file__).parents[2] / "docs" / "sitl.md").read_text(encoding="utf-8")
+    table = manual[manual.index("| parameter | value | why |") : manual.index("How it answers:")]
+    for name in firmware_parameters(MISSION, SUITES["beams"], steered=False):
+        row = re.sub(r"RNGFND\d", "RNGFNDn", name)
+        end = re.sub(r"SERVO[13]", "", name)
+        assert f"`{row}`" in table or f"`{end}`" in table or f"`{name.replace('3', '1')}`" in table, name
 
 
 @pytest.mark.parametrize("servo", [1, 3])

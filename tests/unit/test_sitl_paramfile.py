@@ -10,7 +10,9 @@ from typer.testing import CliRunner
 
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from sitl.autopilot.params import DEFAULTS
 from sitl.cli.commands import app
+from sitl.parameter_ranges import RANGES, outside
 from sitl.paramfile import ParameterFile, ParameterFileError, load_parameters
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_parameter_file
 from tests.sitl_client import Client
@@ -53,6 +55,9 @@ def test_types_are_taken_and_other_components_left_out(tmp_path: Path) -> None:
         ("\n# x\nWP_SPEED,fast\n", ":3:", "WP_SPEED: 'fast' is no number"),
         ("WP_SPEED nan\n", ":1:", "is no number"),
         ("WP_SPEED,1e39\n", ":1:", "is no number"),
+        ("WP_SPEED inf\n", ":1:", "write one such as 1.5"),
+        ("MAV_SYSID 300\n", ":1:", "MAV_SYSID: 300: a MAVLink system has a number from 1 to 255; choose one"),
+        ("WP_SPEED 1\nMAV_SYSID,0\n", ":2:", "MAV_SYSID: 0: a MAVLink system"),
         ("wp_speed 1\n", ":1:", "'wp_speed' is no parameter's name"),
         ("A_NAME_THAT_IS_TOO_LONG 1\n", ":1:", "no parameter's name"),
         ("<html>,1\n", ":1:", "no parameter's name"),
@@ -117,6 +122,34 @@ def test_only_the_first_unknown_names_are_told() -> None:
     )
 
 
+def test_values_that_are_most_likely_slips_are_told_in_one_line(tmp_path: Path) -> None:
+    odd = "WP_SPEED -3\nATC_DECEL_MAX -5\nTURN_RADIUS -1\nSCHED_LOOP_RATE 0\nWP_RADIUS 1e38\nCRUISE_SPEED 101\n"
+    (note,) = scenario(tmp_path, odd).notes
+    assert note == (
+        f"{tmp_path / 'rover.param'}: outside of the range that ArduRover documents: ATC_DECEL_MAX -5 (0 to 10), "
+        "CRUISE_SPEED 101 (0 to 100), SCHED_LOOP_RATE 0 (50 to 400), TURN_RADIUS -1 (0 to 10), "
+        "WP_RADIUS 1e+38 (0 to 100), ...; see if they are meant"
+    )
+    client = Client(scenario(tmp_path, odd).simulator(0))
+    client.run_for(1.0)
+    assert value_of(client, "WP_SPEED") == (-3.0, 9)
+
+
+def test_values_that_contradict_each_other_are_told(tmp_path: Path) -> None:
+    (note,) = scenario(tmp_path, "WP_SPEED 1\nWP_RADIUS 2\nWP_SPEED 1.5\nWP_RADIUS 2\n").notes
+    assert note == f"{tmp_path / 'rover.param'}: WP_SPEED: there more than once; the last value counts"
+
+
+def test_nothing_that_the_simulator_starts_with_lies_outside_of_its_range() -> None:
+    assert outside({name: value for name, (value, _) in DEFAULTS.items()}) == []
+    assert RANGES.keys() <= DEFAULTS.keys()
+
+
+def test_steered_wheels_without_a_turning_radius_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=r"rover\.param: TURN_RADIUS -1: a rover with steered wheels needs"):
+        scenario(tmp_path, "SERVO1_FUNCTION 26\nSERVO3_FUNCTION 70\nTURN_RADIUS -1\n")
+
+
 def test_the_file_says_what_kind_of_rover_it_is_for(tmp_path: Path) -> None:
     wheels = "SERVO1_FUNCTION 26\nSERVO3_FUNCTION 70\nTURN_RADIUS 1.4\nATC_STR_RAT_FF 1.1\n"
     loaded = scenario(tmp_path, wheels)
@@ -147,7 +180,9 @@ def test_a_mission_may_name_its_parameters(tmp_path: Path) -> None:
 def test_a_bad_file_gets_one_line(tmp_path: Path, command: str) -> None:
     mission, bad = written(tmp_path, MISSION, "mission.toml"), written(tmp_path, "WP_SPEED fast\n", "bad.param")
     result = CliRunner().invoke(app, [command, str(mission), "--params", str(bad)])
-    assert result.exit_code == 2 and result.output == f"{bad}:1: WP_SPEED: 'fast' is no number\n"
+    assert result.exit_code == 2 and result.output == (
+        f"{bad}:1: WP_SPEED: 'fast' is no number that a parameter can hold; write one such as 1.5, or put # before the line\n"
+    )
     result = CliRunner().invoke(app, [command, str(mission), "--params", str(tmp_path / "none.param")])
     assert result.exit_code == 2 and result.output.count("\n") == 1 and "cannot be read" in result.output
 

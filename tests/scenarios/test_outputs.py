@@ -1,0 +1,60 @@
+"""Files that cannot be written after the work is done: a full disk, a path that names no file. /dev/full is a disk that is always full."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from sitl.cli.commands import app
+
+YARD = "[grid]\nsize = [20, 20]\nhome = [3, 3]\n[sitl]\nsensors = 'lidar-360'\n[[target]]\nfield = [6, 3]\n"
+FULL = "cannot be written: No space left on device; choose another place"
+
+
+@pytest.fixture
+def mission(tmp_path: Path) -> Path:
+    path = tmp_path / "yard.toml"
+    path.write_text(YARD)
+    return path
+
+
+def test_a_full_disk_is_one_line_for_each_file_and_keeps_the_others(mission: Path, tmp_path: Path) -> None:
+    for name in ("run.png", "seen.pgm"):
+        (tmp_path / name).symlink_to("/dev/full")
+    image, stem, figures = tmp_path / "run.png", tmp_path / "seen", tmp_path / "run.json"
+    arguments = ["drive", mission, "--image", image, "--map", stem, "--json", figures]
+    result = CliRunner().invoke(app, [str(each) for each in arguments])
+    assert result.exit_code == 2
+    assert result.stderr.splitlines() == [f"{image}: {FULL}", f"{stem}.pgm: {FULL}"]
+    assert "outcome: reached" in result.stdout
+    assert json.loads(figures.read_text())["outcome"] == "reached"
+
+
+@pytest.mark.parametrize("command", [["drive", "--json"], ["physics", "--port", "1", "--write-params"]])
+def test_a_full_disk_is_one_line(mission: Path, command: list[str]) -> None:
+    result = CliRunner().invoke(app, [*command, "/dev/full", str(mission)])
+    assert (result.exit_code, result.stderr) == (2, f"/dev/full: {FULL}\n")
+
+
+@pytest.mark.parametrize("option", ["--json", "--map", "--write-params"])
+@pytest.mark.parametrize("path", ["/", ".", ".."])
+def test_a_path_that_names_no_file_is_one_line(mission: Path, option: str, path: str) -> None:
+    command = "physics" if option == "--write-params" else "drive"
+    result = CliRunner().invoke(app, [command, str(mission), option, path])
+    assert (result.exit_code, result.stderr) == (2, f"{path}: is a folder, not a file; add a file's name\n")
+
+
+def test_a_standard_output_that_is_full_is_one_line(mission: Path) -> None:
+    code = "from sitl.cli.main import main; main()"
+    with Path("/dev/full").open("wb") as full:
+        done = subprocess.run(
+            [sys.executable, "-c", code, "drive", str(mission)],
+            stdout=full, stderr=subprocess.PIPE, text=True, timeout=100, check=False,
+        )  # fmt: skip
+    assert done.stderr == "rover-sitl: standard output cannot be written: No space left on device\n"
+    assert done.returncode == 2
