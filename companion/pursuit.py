@@ -8,7 +8,7 @@ import numpy as np
 
 from companion.driver import Driver
 from companion.frames import GeoPoint, Pose
-from companion.guidance import Guide, RoverLimits
+from companion.guidance import Guide
 from companion.itinerary import Itinerary, Leg, TargetStatus, on_reached, on_time, on_unreachable, with_errand
 from companion.laying import Laid, apart_m, lay_again
 from companion.mapping import EvidenceMap, forget, integrate
@@ -17,6 +17,7 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Action, Decision
 from companion.output_check import Surroundings
 from companion.planning.registry import make_planner
+from companion.reach import RoverLimits
 from companion.recorder import DecisionLog
 from companion.scan import RangeScan
 from companion.searching import Searcher
