@@ -291,6 +291,7 @@ class Companion:
         pose = self.vehicle.pose_at(now_s)
         assert pose is not None
         others = announced(self.vehicle, pose, self._mission.rover.radius_m, self._settings.traffic)
+        pursuit.heed_latency(self.vehicle.latency_s)
         guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s, others)
         self._reporter.doing = pursuit.doing
         if guide is not None:

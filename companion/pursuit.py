@@ -23,6 +23,7 @@ from companion.scan import RangeScan
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.stepping import StepRunner
+from companion.stopping import counted_s, for_link
 from companion.tracking import Tracker
 from companion.traffic import Moving, merged
 
@@ -54,7 +55,8 @@ class Pursuit:
         self.maps_begun = 0
         """Grows whenever what had been mapped is worth nothing any more."""
         self._mission = mission
-        self._settings = settings
+        self._given = self._settings = settings
+        self._link_s = 0.0
         self._runner = runner
         self._log = log
         self._tell = tell
@@ -96,9 +98,16 @@ class Pursuit:
 
     def retune(self, settings: Settings) -> None:
         """Other settings from the next tick on; those of the map itself and the planner stay."""
-        self._settings = settings
+        self._given = settings
+        self._settings = for_link(settings, self._link_s)
         self._tracker.retune(settings.traffic)
-        self.driver.retune(settings)
+        self.driver.retune(self._settings)
+
+    def heed_latency(self, link_s: float) -> None:
+        """Drive from now on so that a link that takes so long, there and back, does no harm."""
+        if counted_s(link_s) != self._link_s:
+            self._link_s = counted_s(link_s)
+            self.retune(self._given)
 
     def map_scan(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
         """Take a scan into the map, unless it is smeared by turning."""

@@ -1,10 +1,34 @@
-"""How far the rover goes before it stands, and how fast it may go to stand in time. A settings' worth of mechanics, nothing else."""
+"""How far the rover goes before it stands, and how fast it may go to stand in time.
+
+Something v m/s fast that sees ``sight`` metres must keep v * latency + v² / (2 * deceleration) + margin <= sight.
+"""
 
 from __future__ import annotations
 
 import math
 
-from companion.settings import GuidanceSettings
+from companion.settings import GuidanceSettings, Settings
+
+LINK_STEP_S = 0.05
+"""The link's latency counts in steps of this, rounded up."""
+
+
+def loop_latency_s(settings: Settings) -> float:
+    """From something coming into sight to braking, without the link: the wait for a scan, for a tick, and for the brakes."""
+    return 1.0 / settings.link.range_rate_hz + 1.0 / settings.link.tick_hz + settings.guidance.brake_delay_s
+
+
+def counted_s(link_s: float) -> float:
+    """The link's latency in whole steps."""
+    return math.ceil(link_s / LINK_STEP_S - 1e-6) * LINK_STEP_S
+
+
+def for_link(settings: Settings, link_s: float) -> Settings:
+    """The settings to drive with while the link takes so long, there and back: latency and braking delay grow by that."""
+    late_s, own = counted_s(link_s), settings.guidance
+    latency_s = max(own.latency_s, loop_latency_s(settings) + late_s)
+    guidance = own.model_copy(update={"latency_s": latency_s, "brake_delay_s": own.brake_delay_s + late_s})
+    return settings.model_copy(update={"guidance": guidance})
 
 
 def braking_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
