@@ -312,6 +312,7 @@ class Companion:
             self._hand_over(now_s, reason)
             return
         others = announced(self.vehicle, pose, self._mission.rover.radius_m, self._settings.traffic)
+        pursuit.heed_latency(self.vehicle.latency_s)
         guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s, others)
         self._reporter.doing = pursuit.doing
         guide = self._legs.guide(guide, pursuit, self._settings.guidance.min_speed_m_s)

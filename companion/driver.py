@@ -8,19 +8,7 @@ from dataclasses import dataclass, replace
 from companion.commands import GuidedHeading
 from companion.frames import NedPoint, Pose, wrap_pi_rad
 from companion.grid import Cell
-from companion.guidance import (
-    STANDSTILL,
-    Guide,
-    Motion,
-    Route,
-    RoverLimits,
-    advanced,
-    guide,
-    route_along_cells,
-    route_along_curve,
-    route_is_clear,
-    with_planned_speeds,
-)
+from companion.guidance import STANDSTILL, Guide, Motion, guide
 from companion.mapping import EvidenceMap, doubt
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import (
@@ -37,7 +25,9 @@ from companion.navigator import (
 )
 from companion.planning import problem
 from companion.planning.problem import PlanResult
+from companion.reach import RoverLimits
 from companion.recovery import Recovery
+from companion.route import Route, advanced, route_along_cells, route_along_curve, route_is_clear, with_planned_speeds
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.steering import Helm

@@ -55,7 +55,9 @@ class Fencing:
     def breached(self, now_s: float) -> str:
         """In words, that the autopilot sees its fence breached; empty when it does not."""
         return (
-            "the autopilot's fence is breached" if self._is_on(now_s) and self._status and self._status.breached else ""
+            "the autopilot's fence is breached"
+            if self._told_within(STATUS_S, now_s) and self._status and self._status.breached
+            else ""
         )
 
     def take_in(self, event: Event) -> None:

@@ -9,9 +9,10 @@ from itertools import pairwise
 import numpy as np
 
 from companion.frames import NedPoint, Pose
-from companion.guidance import STEP_M, Points, Route, RoverLimits
 from companion.manoeuvre_search import HEADINGS, Means, Poses, Wish, find
-from companion.mapping import EvidenceMap
+from companion.mapping import EvidenceMap, ground_of, in_cells
+from companion.reach import RoverLimits
+from companion.route import STEP_M, Points, Route
 from companion.settings import SteeringSettings
 from companion.swept import Ground, kept_room
 
@@ -67,21 +68,6 @@ class Manoeuvre:
         """All that is left as one line."""
         points = np.vstack([leg.points for leg in self.legs])
         return Route(points, min(self.progress, len(points) - 1))
-
-
-def ground_of(evidence: EvidenceMap, pose: Pose) -> Ground:
-    """The map for the compiled loops."""
-    cell = evidence.base.cell_at(pose.point)
-    weights, settings = evidence.base.weights, evidence.settings
-    return Ground(
-        evidence.log_odds, weights, evidence.penalty, evidence.subdivisions, settings.occupied_at, cell.x, cell.y
-    )
-
-
-def in_cells(points: Points, evidence: EvidenceMap) -> Points:
-    """North and east in metres as x and y in evidence cells."""
-    corner, scale = evidence.base.south_west, 1.0 / evidence.evidence_m
-    return np.column_stack(((points[:, 1] - corner.east_m) * scale, (points[:, 0] - corner.north_m) * scale))
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,6 +18,7 @@ from companion.frames import NedPoint, Pose
 from companion.grid import Cell, Grid
 from companion.scan import RangeScan
 from companion.settings import MappingSettings
+from companion.swept import Ground
 
 MAX_EVIDENCE_CELLS = 16_000_000
 MAX_SOFT_WEIGHT = 0.9
@@ -208,6 +209,21 @@ def clearance_m(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> float
         evidence.settings.occupied_at,
     )
     return float(distance) / scale
+
+
+def ground_of(evidence: EvidenceMap, pose: Pose) -> Ground:
+    """The map for the compiled loops."""
+    cell = evidence.base.cell_at(pose.point)
+    weights, settings = evidence.base.weights, evidence.settings
+    return Ground(
+        evidence.log_odds, weights, evidence.penalty, evidence.subdivisions, settings.occupied_at, cell.x, cell.y
+    )
+
+
+def in_cells(points: NDArray[np.float64], evidence: EvidenceMap) -> NDArray[np.float64]:
+    """North and east in metres as x and y in evidence cells."""
+    corner, scale = evidence.base.south_west, 1.0 / evidence.evidence_m
+    return np.column_stack(((points[:, 1] - corner.east_m) * scale, (points[:, 0] - corner.north_m) * scale))
 
 
 def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:

@@ -16,11 +16,12 @@ import numpy as np
 
 from companion.commands import GuidedPosition, GuidedVelocity, Setpoint
 from companion.frames import NedPoint, Pose
-from companion.guidance import STOP, Guide, Motion, RoverLimits, braking_distance_m, farthest_m
-from companion.manoeuvre import ground_of, in_cells
-from companion.mapping import EvidenceMap, look_along
+from companion.guidance import STOP, Guide, Motion
+from companion.mapping import EvidenceMap, ground_of, in_cells, look_along
 from companion.mission.bounds import Bounds
+from companion.reach import RoverLimits
 from companion.settings import Settings
+from companion.stopping import braking_distance_m, farthest_m
 from companion.swept import BLOCKED, arc_clear, kept_room
 
 SLACK_M = 0.1

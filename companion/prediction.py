@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from companion.frames import Pose
-from companion.guidance import STEP_M
+from companion.route import STEP_M
 from companion.settings import GuidanceSettings
 
 Points = NDArray[np.float64]

@@ -10,7 +10,7 @@ import numpy as np
 from companion.driver import Driver
 from companion.frames import GeoPoint, NedPoint, Pose
 from companion.grid import Cell
-from companion.guidance import Guide, RoverLimits
+from companion.guidance import Guide
 from companion.itinerary import (
     Itinerary,
     Leg,
@@ -29,12 +29,14 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Action, Decision
 from companion.output_check import Surroundings
 from companion.planning.registry import make_planner
+from companion.reach import RoverLimits
 from companion.recorder import DecisionLog
 from companion.refuge import Refuge, refuges
 from companion.scan import RangeScan
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.stepping import StepRunner
+from companion.stopping import counted_s, for_link
 from companion.tracking import Tracker
 from companion.traffic import Moving, merged
 from companion.trail import Trail
@@ -67,7 +69,8 @@ class Pursuit:
         self.maps_begun = 0
         """Grows whenever what had been mapped is worth nothing any more."""
         self._mission = mission
-        self._settings = settings
+        self._given = self._settings = settings
+        self._link_s = 0.0
         self._runner = runner
         self._log = log
         self._tell = tell
@@ -117,9 +120,16 @@ class Pursuit:
 
     def retune(self, settings: Settings) -> None:
         """Other settings from the next tick on; those of the map itself and the planner stay."""
-        self._settings = settings
+        self._given = settings
+        self._settings = for_link(settings, self._link_s)
         self._tracker.retune(settings.traffic)
-        self.driver.retune(settings)
+        self.driver.retune(self._settings)
+
+    def heed_latency(self, link_s: float) -> None:
+        """Drive from now on so that a link that takes so long, there and back, does no harm."""
+        if counted_s(link_s) != self._link_s:
+            self._link_s = counted_s(link_s)
+            self.retune(self._given)
 
     def map_scan(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
         """Take a scan into the map, unless it is smeared by turning."""

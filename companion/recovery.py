@@ -9,7 +9,8 @@ from companion.commands import GuidedVelocity
 from companion.frames import NedPoint, Pose, wrap_pi_rad
 from companion.grid import Cell
 from companion.guidance import STANDSTILL, Guide, Motion
-from companion.mapping import EvidenceMap, look_along, penalise
+from companion.mapping import EvidenceMap, penalise
+from companion.reach import BACK_LEAST_M_S, backing_speed_m_s
 from companion.settings import GuidanceSettings
 
 MOVED_M = 0.3
@@ -17,7 +18,6 @@ TURNED_RAD = math.radians(15.0)
 FRESH_PENALTY = 0.15
 FINAL_PENALTY = 1.0
 TRIES_AT_ONE_PLACE = 3
-BACK_ROOM_M = 0.4
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,10 +79,8 @@ class Recovery:
         if pose.time_s >= self._back_until_s:
             return None
         self._progress = None
-        speed_m_s = self._settings.back_out_speed_m_s
-        behind = pose.point.moved(pose.heading_rad + math.pi, BACK_ROOM_M)
-        line = look_along(self._evidence, pose.point, behind, self._radius_m + self._settings.clearance_m)
-        if min(line.clear_m, line.seen_m) < BACK_ROOM_M - 1e-6:
+        speed_m_s = backing_speed_m_s(pose, self._evidence, self._radius_m, self._settings)
+        if speed_m_s < BACK_LEAST_M_S:
             self._back_until_s = pose.time_s
             return STANDSTILL
         return Guide(Motion.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)

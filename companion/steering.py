@@ -15,21 +15,14 @@ import numpy as np
 
 from companion.commands import GuidedVelocity
 from companion.frames import Pose, wrap_pi_rad
-from companion.guidance import (
-    STEP_M,
-    STOP,
-    Guide,
-    Motion,
-    Route,
-    RoverLimits,
-    braking_distance_m,
-    fastest_within_m,
-    speed_limit_m_s,
-)
-from companion.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, ground_of, in_cells, tries
-from companion.mapping import EvidenceMap, clearance_m
+from companion.guidance import STOP, Guide, Motion, speed_limit_m_s
+from companion.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, tries
+from companion.mapping import EvidenceMap, clearance_m, ground_of, in_cells
+from companion.reach import RoverLimits
+from companion.route import STEP_M, Route
 from companion.settings import Settings
-from companion.swept import BLOCKED, Drive, Ground, Points, arc_clear, follow, kept_room, steered
+from companion.stopping import blind_distance_m, braking_distance_m, fastest_blind_m_s, fastest_within_m
+from companion.swept import BLOCKED, UNSEEN, Drive, Ground, Points, arc_clear, follow, kept_room, steered
 
 MEMORY_S = 0.3
 """Speed and curvature are those of the last moments."""
@@ -38,6 +31,8 @@ LEAST_M = 0.3
 TOUCH_M = 0.05
 """Room beside the rover's radius that is kept in any case."""
 LEG_ENDS_M = 0.15
+LEFT_ALONE_M_S = 0.15
+"""A rover that may be left alone only with less than this is not driven."""
 GOES_ON_M = 1.5
 """With less than this left of a manoeuvre that ends tail first the next one is looked for."""
 OFF_ROUTE_RADII = 1.0
@@ -300,9 +295,33 @@ class _View:
         speed_m_s = max(min(limit_m_s, bend_m_s, beside_m_s), slowest_m_s)
         if backwards:
             speed_m_s = min(speed_m_s, 2.0 * slowest_m_s)
+        speed_m_s = self._left_alone_m_s(speed_m_s, ahead.curvature_m, backwards=backwards)
+        if speed_m_s <= 0.0:
+            return self.brake()
         self.told_m = ahead.curvature_m
         setpoint = GuidedVelocity(round(-speed_m_s if backwards else speed_m_s, 1), self._turn_rate(ahead.curvature_m))
         return Guide(Motion.DRIVE, setpoint, speed_m_s)
+
+    def _left_alone_m_s(self, wanted_m_s: float, curvature_m: float, *, backwards: bool) -> float:
+        """As fast as wanted, or so fast as the rover may be left alone with; 0 where that is too slow to drive at all.
+
+        It would go on with the turn rate that it is told, gathering speed, until it has forgotten that: on an arc as wide as the speed
+        makes it.
+        """
+        guidance = self._settings.guidance
+        course_rad = self.pose.heading_rad + (math.pi if backwards else 0.0)
+        rate, now_m_s = self._turn_rate(curvature_m), abs(self.rolling.speed_m_s)
+        room, speed_m_s = self._room(0.0), wanted_m_s
+        while speed_m_s > LEFT_ALONE_M_S:
+            reach = blind_distance_m(max(speed_m_s, now_m_s), guidance) * self._scale
+            free = math.inf
+            for arc_m_s in (now_m_s, speed_m_s):
+                arc = rate / max(arc_m_s, self._settings.steering.scale_base_m_s) / self._scale
+                free = min(free, arc_clear(self._ground, self._x, self._y, course_rad, arc, room, reach, UNSEEN))
+            if free >= reach - 1e-6:
+                return speed_m_s
+            speed_m_s = min(speed_m_s - 0.1, fastest_blind_m_s(free / self._scale, guidance))
+        return 0.0
 
     def _turn_rate(self, curvature_m: float) -> float:
         """What to tell the autopilot for an arc: below MOT_SPD_SCA_BASE it steers for a turn rate as if it drove that fast."""

@@ -9,10 +9,11 @@ from numba.core import event
 
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
-from companion.guidance import Route, RoverLimits
 from companion.mapping import clearance_m, integrate, look_along, new_map, penalise, unseen_beside
 from companion.planning import registry
 from companion.prediction import steered
+from companion.reach import RoverLimits
+from companion.route import Route
 from companion.scan import RangeScan
 from companion.settings import Settings
 from companion.steering import Helm

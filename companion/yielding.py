@@ -16,10 +16,9 @@ import numpy as np
 from numba import njit
 
 from companion.commands import GuidedPosition, GuidedVelocity
-from companion.frames import Pose, wrap_pi_rad
-from companion.guidance import STOP, Guide, Motion, Route, RoverLimits, turn_to
-from companion.manoeuvre import ground_of, in_cells
-from companion.mapping import EvidenceMap, look_along
+from companion.frames import NedPoint, Pose, wrap_pi_rad
+from companion.guidance import STOP, Guide, Motion, turn_to
+from companion.mapping import EvidenceMap, ground_of, in_cells, look_along
 from companion.prediction import (
     PERIOD_S,
     TURN_RAD_S,
@@ -31,12 +30,15 @@ from companion.prediction import (
     moved_on_arc,
     steered_along,
 )
+from companion.reach import BACK_LEAST_M_S, RoverLimits, backing_speed_m_s
+from companion.route import Route
 from companion.settings import GuidanceSettings, Settings
+from companion.stopping import blind_distance_m
 from companion.swept import UNSEEN, arc_clear, kept_room
 from companion.traffic import Moving
 
-GO_ON_S = (math.inf, 0.4, 1.5, 3.0)
-"""How long the rover might go on before it stops: 0.4 s is a little more than until it is asked again, the others get it past something."""
+GO_ON_S = (math.inf, 3.0, 1.5, 0.4)
+"""How long the rover might go on before it stops, the longest first: 0.4 s is a little more than until it is asked again."""
 MARGIN_SHARES = (1.0, 0.5)
 """Rather less of the margin than out of the way altogether."""
 STRAIGHT_S = 1.0
@@ -50,7 +52,7 @@ ASIDE_RAD = (0.5 * math.pi, -0.5 * math.pi, 0.25 * math.pi, -0.25 * math.pi)
 ASIDE_M_S = 1.2
 OFF_M = 1.5
 """How far it backs off at most."""
-ARC_M, ARC_SHARES = 2.5, (0.0, -1.0, 1.0)
+ARC_M, ARC_M_S, ARC_SHARES = 2.5, 0.7, (0.0, -1.0, 1.0)
 """How far, and with which shares of the sharpest curvature, who cannot turn on the spot makes off."""
 
 
@@ -188,10 +190,21 @@ def _on_the_way(
         course_rad = pose.heading_rad + (math.pi if backwards else 0.0)
         for goes_s in GO_ON_S:
             along_m = driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
-            yield Choice(now, steered_along(way, course_rad, along_m, rover.turning_radius_m))
+            yield Choice(_nearer(now, pose, along_m), steered_along(way, course_rad, along_m, rover.turning_radius_m))
     else:
         yield Choice(now, halt.places, TURNING_S)
     yield halt
+
+
+def _nearer(now: Guide, pose: Pose, along_m: Points) -> Guide:
+    """The same, but told no farther than where the rover is to come to stand: it must stop there also if it is told nothing more."""
+    if not isinstance(now.setpoint, GuidedPosition):
+        return now
+    stands_m, there = float(along_m[-1]), now.setpoint.point
+    if stands_m >= pose.point.distance_m(there):
+        return now
+    nearer = pose.point.moved(pose.point.bearing_rad(there), stands_m)
+    return Guide(now.motion, GuidedPosition(nearer), now.speed_m_s)
 
 
 def _out_of_the_way(
@@ -228,10 +241,19 @@ def _straight_on(
     along_m = driven_m(speed_m_s, speed_m_s, STRAIGHT_S, times_s, settings)
     length_m = float(along_m[-1])
     there = pose.point.moved(pose.heading_rad, length_m)
-    line = look_along(evidence, pose.point, there, rover.radius_m + settings.clearance_m)
-    if speed_m_s <= settings.roll_out_m_s or min(line.clear_m, line.seen_m) < length_m - 0.05:
+    if speed_m_s <= settings.roll_out_m_s or not _may_stand(there, pose, evidence, rover, settings):
         return []
-    return [Choice(Guide(Motion.LOOK, GuidedVelocity(speed_m_s, 0.0), speed_m_s), ahead(pose, along_m))]
+    return [Choice(Guide(Motion.LOOK, GuidedPosition(there), speed_m_s), ahead(pose, along_m))]
+
+
+def _may_stand(
+    there: NedPoint, pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
+) -> bool:
+    """Whether the way to a place, and a little farther, is clear and seen."""
+    reach_m = pose.point.distance_m(there) + settings.overshoot_m
+    beyond = pose.point.moved(pose.point.bearing_rad(there), reach_m)
+    line = look_along(evidence, pose.point, beyond, rover.radius_m + settings.clearance_m)
+    return min(line.clear_m, line.seen_m) >= reach_m - 0.05
 
 
 def _aside(
@@ -248,8 +270,7 @@ def _aside(
     turns_s = error_rad / TURN_RAD_S + speed_m_s / settings.deceleration_m_s2
     for aside_m in ASIDE_M:
         there = pose.point.moved(bearing_rad, aside_m)
-        line = look_along(evidence, pose.point, there, rover.radius_m + settings.clearance_m)
-        if min(line.clear_m, line.seen_m) < aside_m - 0.05:
+        if not _may_stand(there, pose, evidence, rover, settings):
             continue
         after_s = np.maximum(times_s - turns_s, 0.0)
         along_m = np.minimum(0.5 * settings.deceleration_m_s2 * after_s**2, aside_m)
@@ -258,7 +279,7 @@ def _aside(
         if error_rad > math.radians(settings.turn_until_close_deg):
             return [Choice(turn_to(bearing_rad, speed_m_s, settings), places, aside_rad=bearing_rad)]
         going_m_s = min(rover.cruise_speed_m_s, ASIDE_M_S)
-        going = Guide(Motion.LOOK, GuidedVelocity(going_m_s, 0.0), going_m_s)
+        going = Guide(Motion.LOOK, GuidedPosition(there), going_m_s)
         return [Choice(going, places, aside_rad=bearing_rad)]
     return []
 
@@ -272,14 +293,12 @@ def _off(
     times_s: Points,
 ) -> list[Choice]:
     """Straight back over ground that is known to be free."""
-    behind = pose.point.moved(pose.heading_rad + math.pi, OFF_M)
-    line = look_along(evidence, pose.point, behind, rover.radius_m + settings.clearance_m)
-    free_m = min(line.clear_m, line.seen_m)
-    if free_m < 0.3 or speed_m_s > settings.roll_out_m_s + settings.back_out_speed_m_s:
+    back_m_s = backing_speed_m_s(pose, evidence, rover.radius_m, settings)
+    if back_m_s < BACK_LEAST_M_S or speed_m_s > settings.roll_out_m_s + settings.back_out_speed_m_s:
         return []
     stands_s = settings.brake_delay_s + speed_m_s / settings.deceleration_m_s2
-    back_m = np.minimum(np.maximum(times_s - stands_s, 0.0) * settings.back_out_speed_m_s, free_m)
-    guide = Guide(Motion.LOOK, GuidedVelocity(-settings.back_out_speed_m_s, 0.0), settings.back_out_speed_m_s)
+    back_m = np.minimum(np.maximum(times_s - stands_s, 0.0) * back_m_s, OFF_M)
+    guide = Guide(Motion.LOOK, GuidedVelocity(-back_m_s, 0.0), back_m_s)
     return [Choice(guide, ahead(pose, braked_m(speed_m_s, times_s, settings) - back_m))]
 
 
@@ -299,11 +318,11 @@ def _on_arcs(
     room = kept_room(ground, x, y, (rover.radius_m + guidance.clearance_m) * scale, (rover.radius_m - 0.05) * scale)
     sharpest_m = 1.0 / (rover.turning_radius_m * settings.steering.planned_radius)
     for tail_first in (backwards,) if rolls else (False, True):
-        going_m_s = 2.0 * guidance.back_out_speed_m_s if tail_first else min(rover.cruise_speed_m_s, ASIDE_M_S)
+        going_m_s = min(guidance.back_out_speed_m_s if tail_first else rover.cruise_speed_m_s, ARC_M_S)
         course_rad = pose.heading_rad + (math.pi if tail_first else 0.0)
         for share in ARC_SHARES:
             curvature_m = share * sharpest_m
-            reach = ARC_M * scale
+            reach = max(ARC_M, blind_distance_m(going_m_s, guidance)) * scale
             if arc_clear(ground, x, y, course_rad, curvature_m / scale, room, reach, UNSEEN) < reach - 1e-6:
                 continue
             along_m = np.minimum(driven_m(speed_m_s, going_m_s, math.inf, times_s, guidance), ARC_M)

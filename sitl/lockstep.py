@@ -39,11 +39,15 @@ class LockstepClock:
         """Simulated seconds since the autopilot booted."""
         return self._now_s
 
+    def deliver(self) -> None:
+        """Bring what the companion has written to the vehicle."""
+        self._vehicle_end.receive(self._companion_end.read())
+
     def sleep_until_s(self, time_s: float) -> None:
         """Deliver what was written, let the world move on, and bring back what the vehicle sent."""
         if time_s <= self._now_s:
             return
-        self._vehicle_end.receive(self._companion_end.read())
+        self.deliver()
         self._simulator.advance_to_s(time_s)
         self._companion_end.write(self._vehicle_end.take())
         if self._vehicle_end.dropped:
@@ -119,11 +123,11 @@ class Drive:
         self.simulator = self.scenario.simulator(self.seed)
         self.report.compile_time_s = stopwatch_s() - began_s
         near, far = MemoryLink.pair()
-        clock = LockstepClock(self.simulator, self.simulator.connect(name="companion"), far)
+        self.clock = LockstepClock(self.simulator, self.simulator.connect(name="companion"), far)
         codec = Codec(self.settings.link)
         autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder)
         self.companion = Companion(
-            autopilot, clock, self.mission, self.settings, InlineRunner(), self.recorder, seed=self.seed, arm=True
+            autopilot, self.clock, self.mission, self.settings, InlineRunner(), self.recorder, seed=self.seed, arm=True
         )
 
     def run(self, observe: Callable[[Status], None] = lambda status: None) -> Report:

@@ -121,6 +121,14 @@ class GuidanceSettings(Section):
         0.7, ge=0.0, description="braking goes on until the way is clear so far beyond the braking distance"
     )
     latency_s: float = Field(0.4, ge=0.0, description="from seeing to braking")
+    velocity_lasts_s: float = Field(
+        3.0,
+        gt=0.0,
+        description="the autopilot stops a rover so long after the last velocity it was told (ArduRover: 3 s)",
+    )
+    overshoot_m: float = Field(
+        0.25, ge=0.0, description="so far beyond a guided position the rover may come to stand (ArduRover: 0.23 m)"
+    )
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
     change_after_s: float = Field(
         0.4, ge=0.0, description="a target that moved is sent not sooner than this after the last"

@@ -17,6 +17,7 @@ from companion.settings import Settings
 from sitl.experiments import (
     achour_table1,
     adaptive_control_points,
+    dead_companion,
     driving,
     kwasniewski_maps,
     kwasniewski_table1,
@@ -32,6 +33,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     kwasniewski_table1.NAME: kwasniewski_table1.run,
     navigation.NAME: navigation.run,
     driving.NAME: driving.run,
+    dead_companion.NAME: dead_companion.run,
     wang_table4.NAME: wang_table4.run,
     sedighi_table1.NAME: sedighi_table1.run,
     achour_table1.NAME: achour_table1.run,

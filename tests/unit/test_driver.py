@@ -8,12 +8,12 @@ from companion.commands import GuidedPosition, GuidedVelocity
 from companion.driver import Driver
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
-from companion.guidance import RoverLimits
 from companion.mapping import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import Decision, NavState
 from companion.planning.registry import make_planner
+from companion.reach import RoverLimits
 from companion.scan import RangeScan
 from companion.searching import Searcher
 from companion.settings import Settings

@@ -12,22 +12,12 @@ from hypothesis import strategies as st
 from companion.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.frames import NedPoint, Pose, wrap_pi_rad
 from companion.grid import Cell, empty_grid
-from companion.guidance import (
-    STEP_M,
-    Guide,
-    Motion,
-    Route,
-    RoverLimits,
-    advanced,
-    fastest_within_m,
-    guide,
-    route_along_cells,
-    route_along_curve,
-    route_is_clear,
-    stopping_distance_m,
-)
+from companion.guidance import Guide, Motion, guide
 from companion.mapping import look_along
+from companion.reach import RoverLimits
+from companion.route import STEP_M, Route, advanced, route_along_cells, route_along_curve, route_is_clear
 from companion.settings import GuidanceSettings
+from companion.stopping import fastest_within_m, stopping_distance_m
 from tests.unit.test_mapping import HERE, Ground, Post
 
 SETTINGS = GuidanceSettings()

@@ -15,11 +15,13 @@ from hypothesis import strategies as st
 from companion.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
-from companion.guidance import STOP, Guide, Motion, RoverLimits, farthest_m
+from companion.guidance import STOP, Guide, Motion
 from companion.mapping import EvidenceMap, new_map
 from companion.mission.bounds import Bound, Bounds
 from companion.output_check import Output, OutputCheck, Surroundings, fault_of
+from companion.reach import RoverLimits
 from companion.settings import Settings
+from companion.stopping import farthest_m
 from tests.rig import Rig, yard
 from tests.stored import KEEP_IN, POLYGONS, box, stored
 

@@ -10,13 +10,14 @@ from companion.commands import ChangeSpeed
 from companion.driver import Driver
 from companion.frames import NedPoint, Pose
 from companion.grid import Cell, empty_grid
-from companion.guidance import Motion, RoverLimits
+from companion.guidance import Motion
 from companion.mapping import integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.outbox import Outbox
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
+from companion.reach import RoverLimits
 from companion.scan import RangeScan
 from companion.searching import Searcher
 from companion.settings import Settings

@@ -11,18 +11,21 @@ from companion.commands import GuidedVelocity
 from companion.driver import Driver
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
-from companion.guidance import Guide, Motion, Route, RoverLimits, braking_distance_m
+from companion.guidance import Guide, Motion
 from companion.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, tries
 from companion.mapping import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.planning.problem import PlanningProblem
 from companion.planning.registry import make_planner
+from companion.reach import RoverLimits
+from companion.route import Route
 from companion.scan import RangeScan
 from companion.searching import Searcher
 from companion.settings import Settings
 from companion.steering import Helm
 from companion.stepping import InlineRunner
+from companion.stopping import braking_distance_m
 from companion.traffic import Moving
 from companion.yielding import yielded
 

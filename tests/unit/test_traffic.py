@@ -9,9 +9,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.grid import empty_grid
-from companion.guidance import Route, with_planned_speeds
 from companion.mavlink.codec import Codec
 from companion.planning.problem import Path
+from companion.route import Route, with_planned_speeds
 from companion.settings import LinkSettings, TrafficSettings
 from companion.traffic import Moving, announced, merged, motion_changed, planners_movers
 from companion.vehicle import OTHERS_KEPT, GlobalPositionSeen, OriginSeen, OtherSeen, VehicleState, fold

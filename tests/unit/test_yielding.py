@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 from companion.commands import GuidedPosition, GuidedVelocity
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
-from companion.guidance import Guide, Motion, Route, RoverLimits
+from companion.guidance import Guide, Motion
 from companion.mapping import EvidenceMap, integrate, new_map
+from companion.reach import RoverLimits
+from companion.route import Route
 from companion.scan import RangeScan
 from companion.settings import Settings
 from companion.traffic import Moving

@@ -1,0 +1,68 @@
+"""How far the rover goes before it stands, and how fast it may go to stand in time.
+
+Something v m/s fast that sees ``sight`` metres must keep v * latency + v² / (2 * deceleration) + margin <= sight.
+"""
+
+from __future__ import annotations
+
+import math
+
+from companion.settings import GuidanceSettings, Settings
+
+LINK_STEP_S = 0.05
+"""The link's latency counts in steps of this, rounded up."""
+
+
+def loop_latency_s(settings: Settings) -> float:
+    """From something coming into sight to braking, without the link: the wait for a scan, for a tick, and for the brakes."""
+    return 1.0 / settings.link.range_rate_hz + 1.0 / settings.link.tick_hz + settings.guidance.brake_delay_s
+
+
+def counted_s(link_s: float) -> float:
+    """The link's latency in whole steps."""
+    return math.ceil(link_s / LINK_STEP_S - 1e-6) * LINK_STEP_S
+
+
+def for_link(settings: Settings, link_s: float) -> Settings:
+    """The settings to drive with while the link takes so long, there and back: latency and braking delay grow by that."""
+    late_s, own = counted_s(link_s), settings.guidance
+    latency_s = max(own.latency_s, loop_latency_s(settings) + late_s)
+    guidance = own.model_copy(update={"latency_s": latency_s, "brake_delay_s": own.brake_delay_s + late_s})
+    return settings.model_copy(update={"guidance": guidance})
+
+
+def braking_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
+    """Distance from the stop command to standing still."""
+    return speed_m_s * settings.brake_delay_s + speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
+
+
+def stopping_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
+    """Distance from something coming into sight to standing still."""
+    return speed_m_s * settings.latency_s + speed_m_s**2 / (2.0 * settings.deceleration_m_s2)
+
+
+def blind_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
+    """How far a rover drives that was told a velocity and is then told nothing more: until that is forgotten, and to standing."""
+    return speed_m_s * settings.velocity_lasts_s + braking_distance_m(speed_m_s, settings)
+
+
+def fastest_blind_m_s(distance_m: float, settings: GuidanceSettings) -> float:
+    """The velocity that may be told with so much clear way ahead: the inverse of ``blind_distance_m``."""
+    a, t = settings.deceleration_m_s2, settings.velocity_lasts_s + settings.brake_delay_s
+    return a * (math.sqrt(t * t + 2.0 * max(distance_m, 0.0) / a) - t)
+
+
+def farthest_m(speed_m_s: float, settings: GuidanceSettings) -> float:
+    """How far away a guided target may lie, straight."""
+    return settings.horizon_m + stopping_distance_m(speed_m_s, settings)
+
+
+def fastest_within_m(distance_m: float, settings: GuidanceSettings) -> float:
+    """The speed from which the rover can stop within a distance: the inverse of ``stopping_distance_m``."""
+    a, t = settings.deceleration_m_s2, settings.latency_s
+    return a * (math.sqrt(t * t + 2.0 * max(distance_m, 0.0) / a) - t)
+
+
+def overshoot_m(distance_m: float, settings: GuidanceSettings) -> float:
+    """How far beyond a guided position at this distance the rover may come to stand."""
+    return min(settings.overshoot_m, 0.1 * distance_m)
