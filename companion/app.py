@@ -79,7 +79,7 @@ class Companion:
         self.output_check = OutputCheck(self._tell)
         self._reporter = Reporter(self.outcome.said)
         self._next_tick_s = clock.now_s()
-        self._watchdogs = Watchdogs()
+        self._watchdogs = Watchdogs(settings.safety)
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
         self._errands = Errands(mission, settings.safety, self._send, self._tell)
         self._followed_s = clock.now_s()
@@ -130,6 +130,7 @@ class Companion:
         self._next_tick_s += 1.0 / self._settings.link.tick_hz
         self._clock.sleep_until_s(self._next_tick_s)
         now_s = self._clock.now_s()
+        self._watchdogs.tick(now_s, now_s - self._next_tick_s, planner_works=self._runner.working)
         if now_s - self._next_tick_s > 1.0:
             # After a stall (a suspended computer) do not catch up tick by tick, and do not believe what piled up meanwhile.
             self._next_tick_s = now_s
@@ -201,7 +202,7 @@ class Companion:
         if self._whereabouts.must_ask(now_s):
             self._autopilot.ask_places()
         before = self.watch.control
-        doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason(now_s)
+        doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason
         self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, doubt)
         if verdict.reaction is Reaction.DRIVE:
             if self._stopped or before is not Control.COMPANION:
