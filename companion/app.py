@@ -87,7 +87,7 @@ class Companion:
         self.oversight = Oversight(autopilot, settings, self._tell)
         self._next_tick_s = now_s = clock.now_s()
         log.begin(now_s, Mark.BEGIN)
-        self._watchdogs = Watchdogs()
+        self._watchdogs = Watchdogs(settings.safety)
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
         self._errands = Errands(mission, settings.safety, self._send, self._tell)
         self._legs = AutoLegs(self._tell)
@@ -142,6 +142,7 @@ class Companion:
         self._next_tick_s += 1.0 / self._settings.link.tick_hz
         self._clock.sleep_until_s(self._next_tick_s)
         now_s = self._clock.now_s()
+        self._watchdogs.tick(now_s, now_s - self._next_tick_s, planner_works=self._runner.working)
         if now_s - self._next_tick_s > 1.0:
             # After a stall (a suspended computer) do not catch up tick by tick, and do not believe what piled up meanwhile.
             self._next_tick_s = now_s
@@ -221,7 +222,7 @@ class Companion:
         if self._whereabouts.must_ask(now_s):
             self._autopilot.ask_places()
         before = self.watch.control
-        doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason(now_s)
+        doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason
         doubt = doubt or self.oversight.doubt(self._pursuit, self.vehicle.pose_at(now_s), now_s)
         self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, doubt)
         if verdict.reaction is Reaction.DRIVE:

@@ -1,4 +1,8 @@
-"""Where the velocity has led, beside where the position says that the rover is: jumps, and a position that stands still."""
+"""Where the velocity has led, beside where the position says that the rover is.
+
+So are noticed: jumps, a position that stands still, and one that wanders: a bad GPS that the EKF follows slowly, so that none of
+its own checks strikes.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +15,10 @@ FROZEN_SHARE = 0.2
 """Where the velocity says that the rover has gone so far, its position must have moved by more than this share of it."""
 RECKONED_S = 10.0
 """Slower than this nothing is concluded: the position wanders."""
+
+WANDERED_M = 1.0
+"""So far may the position leave the way on which the velocity has led, within WANDER_S."""
+WANDER_S, MARK_S = 5.0, 0.5
 
 
 class Report(Protocol):
@@ -62,6 +70,36 @@ def reckoned(sofar: Reckoned | None, before: Report | None, now: Report) -> tupl
         return Reckoned(sofar.since, north_m, east_m), False
     moved_m = math.hypot(now.north_m - sofar.since.north_m, now.east_m - sofar.since.east_m)
     return Reckoned(now), moved_m < FROZEN_SHARE * led_m
+
+
+@dataclass(frozen=True, slots=True)
+class Wander:
+    """How far the position lies from where the velocity has led, metres north and east, now and every MARK_S before."""
+
+    north_m: float = 0.0
+    east_m: float = 0.0
+    marks: tuple[tuple[float, float, float], ...] = ()
+    """Boot time and distance then, not older than WANDER_S."""
+    off_m: float = 0.0
+    """How far it has wandered; once more than WANDERED_M, it begins anew from there."""
+
+    @property
+    def noticed(self) -> bool:
+        """Whether it is too far."""
+        return self.off_m > WANDERED_M
+
+
+def wandered(wander: Wander, before: Report | None, now: Report) -> Wander:
+    """After one more report; a pause in the reports, or a clock that jumps, begins it anew."""
+    if before is None or wander.noticed or not 0.0 < now.boot_s - before.boot_s < 1.0:
+        return Wander()
+    elapsed_s = now.boot_s - before.boot_s
+    north_m = wander.north_m + now.north_m - before.north_m - (before.north_m_s + now.north_m_s) / 2.0 * elapsed_s
+    east_m = wander.east_m + now.east_m - before.east_m - (before.east_m_s + now.east_m_s) / 2.0 * elapsed_s
+    marks = wander.marks
+    if not marks or now.boot_s - marks[-1][0] >= MARK_S:
+        marks = (*(mark for mark in marks if now.boot_s - mark[0] <= WANDER_S), (now.boot_s, north_m, east_m))
+    return Wander(north_m, east_m, marks, max(math.hypot(north_m - mark[1], east_m - mark[2]) for mark in marks))
 
 
 def jump_m(before: Report | None, now: Report, *, clock_jumped: bool = False) -> float:

@@ -23,6 +23,11 @@ class StepRunner(Protocol):
         """Whether a step has been started and its result not been taken."""
         ...
 
+    @property
+    def working(self) -> bool:
+        """Whether a step is being computed at this moment."""
+        ...
+
     def start(self, call: StepCall) -> None:
         """Begin; only when not busy."""
         ...
@@ -46,6 +51,11 @@ class InlineRunner:
     def busy(self) -> bool:
         """Whether a result waits to be taken."""
         return self._result is not None
+
+    @property
+    def working(self) -> bool:
+        """Never between two calls."""
+        return False
 
     def start(self, call: StepCall) -> None:
         """Compute now."""
@@ -105,6 +115,11 @@ class ThreadRunner:
     def busy(self) -> bool:
         """Whether a step runs or its result waits."""
         return self._busy
+
+    @property
+    def working(self) -> bool:
+        """Whether the thread has not finished yet."""
+        return self._future is not None and not self._future.done()
 
     def start(self, call: StepCall) -> None:
         """Hand the step to the thread."""

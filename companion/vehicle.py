@@ -23,7 +23,7 @@ from companion.events_targets import (
 )
 from companion.frames import GeoPoint, Pose
 from companion.latency import BACK_S, Latency, TimeAnswered, answered, reported
-from companion.reckoning import Reckoned, jump_m, reckoned
+from companion.reckoning import Reckoned, Wander, jump_m, reckoned, wandered
 from companion.scan import RangeScan
 from companion.sticks import Sticks, SticksSeen, followed
 
@@ -234,6 +234,8 @@ class VehicleState:
     """The velocity says that the rover moves and the position does not: kept until a person sets GUIDED again."""
     reckoned: Reckoned | None = None
     """The check for that, under way."""
+    wander: Wander = field(default_factory=Wander)
+    """How far the position has wandered from where the velocity has led."""
     restarted: bool = False
     """The autopilot's boot time has run back: kept until a person sets GUIDED again."""
     latency: Latency = field(default_factory=Latency)
@@ -362,4 +364,5 @@ def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:
     so_far, frozen = reckoned(None if clock_jumped else state.reckoned, before, now)
     off_m = jump_m(before, now, clock_jumped=clock_jumped)
     frozen = state.frozen or frozen
-    return replace(state, position=now, jump_m=off_m, reckoned=so_far, frozen=frozen, latency=latency)
+    wander = wandered(state.wander, before, now)
+    return replace(state, position=now, jump_m=off_m, reckoned=so_far, frozen=frozen, latency=latency, wander=wander)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from companion.loop_watch import LoopWatch
 from companion.scan_watch import ScanWatch
+from companion.settings import SafetySettings
 from companion.vehicle import Event, RangeSeen, VehicleState
 
 
 class Watchdogs:
     """Takes events already folded into the vehicle's state, and says what is in doubt."""
 
-    def __init__(self) -> None:
+    def __init__(self, settings: SafetySettings) -> None:
+        self._loop = LoopWatch(settings.planner_s)
         self._scans = ScanWatch()
         self._fits = True
 
@@ -23,6 +26,11 @@ class Watchdogs:
         if isinstance(event, RangeSeen):
             self._fits = self._scans.take(event.scan, vehicle)
 
-    def reason(self, now_s: float) -> str:
+    def tick(self, now_s: float, late_s: float, *, planner_works: bool) -> None:
+        """A tick begins, ``late_s`` after its time."""
+        self._loop.tick(now_s, late_s, planner_works=planner_works)
+
+    @property
+    def reason(self) -> str:
         """Why the rover must not move now; empty when it may."""
-        return self._scans.reason
+        return self._loop.reason or self._scans.reason

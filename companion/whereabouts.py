@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 
 from companion.laying import apart_m
@@ -16,6 +17,13 @@ ASK_PLACES_S = 0.5
 """While it is doubtful where the rover is, the origin is asked for this often,"""
 SETTLED_S = 0.4
 """and an answer counts that comes so long after the doubt arose: position and origin then speak of the same frame."""
+
+WANDERINGS, WANDERINGS_S = 3, 20.0
+"""A position that wanders so often within so long is no position to drive by,"""
+ONCE_S = 3.0
+"""(what lasts no longer than this is once)"""
+CALM_S = 10.0
+"""until it has been calm for so long."""
 
 
 class Whereabouts:
@@ -32,6 +40,8 @@ class Whereabouts:
         self._doubt_s = 0.0
         self._asked_s = self._settled_s = -math.inf
         self._home_told = False
+        self._wandered_s: deque[float] = deque(maxlen=WANDERINGS)
+        self._unsure_until_s = -math.inf
 
     def retune(self, settings: Settings) -> None:
         """Other settings from now on."""
@@ -44,6 +54,8 @@ class Whereabouts:
 
     def reason(self, now_s: float) -> str:
         """Why the rover must not move now; empty when it may."""
+        if now_s < self._unsure_until_s:
+            return "position wanders"
         return self._doubt or ("the companion stood still" if now_s < self._settled_s else "")
 
     def stalled(self, now_s: float) -> None:
@@ -64,6 +76,8 @@ class Whereabouts:
                 if not self._doubt:
                     self._tell(f"Position jumped {vehicle.jump_m:.1f} m: map forgotten", WARNING)
                 self._doubt, self._doubt_s = "position jumped", event.time_s
+            case LocalPositionSeen() if vehicle.wander.noticed:
+                self._note_wandering(vehicle.wander.off_m, event.time_s)
             case OriginSeen():
                 self._find_ground(event, pursuit)
             case HomeSeen() if not self._home_told and apart_m(event.point, pursuit.laid.home) > HOME_MOVED_M:
@@ -71,6 +85,16 @@ class Whereabouts:
                 self._tell("Home has moved; the mission stays where it began", WARNING)
             case _:
                 pass
+
+    def _note_wandering(self, off_m: float, now_s: float) -> None:
+        """Once in a while the map begins anew; again and again, nothing that is mapped is true for long."""
+        if not self._doubt:
+            self._tell(f"Position wandered {off_m:.1f} m: map forgotten", WARNING)
+        self._doubt, self._doubt_s = "position wandered", now_s
+        if not self._wandered_s or now_s - self._wandered_s[-1] > ONCE_S:
+            self._wandered_s.append(now_s)
+        if len(self._wandered_s) == WANDERINGS and now_s - self._wandered_s[0] <= WANDERINGS_S:
+            self._unsure_until_s = now_s + CALM_S
 
     def _find_ground(self, event: OriginSeen, pursuit: Pursuit) -> None:
         """The origin as it is now: after a jump this tells whether the frame has moved or only the rover's place in it."""

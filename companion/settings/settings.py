@@ -205,6 +205,7 @@ class SafetySettings(Section):
     heartbeat_s: float = Field(3.0, gt=0.0, description="autopilot silent for so long: stop")
     jump_m: float = Field(2.0, gt=0.0, description="a position jump larger than this is noticed")
     latency_s: float = Field(1.0, gt=0.0, description="from the autopilot and back in more than this: stop")
+    planner_s: float = Field(30.0, gt=0.0, description="one step of the navigator in work for so long: stop")
     settle_s: float = Field(0.5, ge=0.0, description="after the autopilot's clock has jumped the rover stands so long")
     errand_reach_m: float = Field(
         300.0, gt=0.0, description="a place asked for on the way that lies farther away than this is refused"

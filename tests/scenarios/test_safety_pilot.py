@@ -215,18 +215,6 @@ def test_a_speed_whose_answer_was_lost_is_not_said_again_to_a_rover_that_a_perso
     assert_silent_from_here(rig)
 
 
-def test_a_mode_asked_for_before_a_long_silence_is_not_asked_for_again_after_it(tmp_path: Path) -> None:
-    rig = Rig(yard(tmp_path), late_s=ON_FOR_S)
-    rig.until_driven(2.0)
-    rig.change = without("COMMAND_ACK")
-    rig.companion.stop()
-    rig.companion.tick()
-    rig.cut = True
-    rig.simulator.advance_to_s(rig.now_s() + 0.1)
-    rig.finish(3.0)
-    assert [one.message.param2 for one in rig.sent if one.command == SET_MODE] == [GUIDED, HOLD]
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_at_any_moment_whatever_the_pilot_does_wins(tmp_path: Path, seed: int) -> None:
     """Lock-step, at random ticks from arming on: mode switch, arming switch, sticks; then it is given back."""

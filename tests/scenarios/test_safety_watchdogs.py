@@ -9,6 +9,8 @@ from typing import Any
 
 import pytest
 
+from companion.settings import parse_settings
+from companion.stepping import InlineRunner
 from tests.rig import HOLD, SET_MODE, Rig, yard
 
 TICK_S = 0.05
@@ -150,3 +152,91 @@ def test_an_autopilots_clock_that_runs_back_though_it_is_armed_and_in_guided_wai
     rig.pilot_mode(15)
     rig.finish()
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+# --- the companion's own work ---------------------------------------------------------------------------------------
+
+
+def test_a_companion_that_is_too_slow_stops_the_rover_and_ends_in_hold(rig: Rig) -> None:
+    since_s = rig.now_s()
+    while rig.mode != HOLD:
+        assert rig.now_s() < since_s + 6.0, rig.texts()
+        rig.stall_s = 0.15
+        rig.companion.tick()
+    assert first_stop_s(rig, since_s) - since_s <= 2.7
+    assert "HOLD: the companion is too slow" in rig.texts()
+    rig.run_for(5.0)
+    assert modes_asked_for(rig, since_s) == [HOLD], "it does not go on by itself"
+    rig.pilot_mode(15)
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+class SlowRunner(InlineRunner):
+    """Says that it still works until told otherwise."""
+
+    slow = True
+
+    @property
+    def working(self) -> bool:
+        return self.slow
+
+
+@pytest.mark.parametrize(("done_after_s", "held"), [(1.0, False), (3.0, True)])
+def test_a_step_that_does_not_end_stops_the_rover(tmp_path: Path, done_after_s: float, held: bool) -> None:
+    rig = Rig(yard(tmp_path), parse_settings({"safety": {"planner_s": 2.0}}, "test"))
+    rig.until_driven(3.0)
+    runner, since_s = SlowRunner(), rig.now_s()
+    rig.companion._runner = runner
+    rig.until(lambda: "Stopping: planning has taken over 2 s" in rig.texts(), 2.2)
+    assert first_stop_s(rig, since_s) - since_s <= 2.0 + 2 * TICK_S
+    rig.run_for(done_after_s)
+    runner.slow = False
+    rig.run_for(2.0)
+    assert (rig.mode == HOLD) is held
+    if held:
+        rig.pilot_mode(15)
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+# --- a position that wanders ----------------------------------------------------------------------------------------
+
+
+class Wandering:
+    """The position goes astray by so much a second, to and fro, and the velocity knows nothing of it."""
+
+    def __init__(self, rig: Rig, rate_m_s: float, turn_back_s: float) -> None:
+        self._rig, self._rate_m_s, self._turn_back_s, self._since_s = rig, rate_m_s, turn_back_s, rig.now_s()
+
+    def __call__(self, message: Any) -> Any:
+        if message.get_type() == "LOCAL_POSITION_NED":
+            at_s = (self._rig.now_s() - self._since_s) % (2.0 * self._turn_back_s)
+            message.x += self._rate_m_s * min(at_s, 2.0 * self._turn_back_s - at_s)
+        return message
+
+
+def test_a_position_that_slides_away_once_makes_the_map_begin_anew(rig: Rig) -> None:
+    rig.change, since_s = Wandering(rig, 0.8, 2.5), rig.now_s()
+    rig.until(lambda: any("Position wandered 1." in text for text in rig.texts()), 3.0)
+    assert rig.now_s() - since_s <= 1.1 / 0.8 + 0.1 + 2 * TICK_S
+    rig.change = None
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+def test_a_position_that_wanders_on_and_on_ends_in_hold(rig: Rig) -> None:
+    rig.change, since_s = Wandering(rig, 0.6, 4.0), rig.now_s()
+    rig.until(lambda: "HOLD: position wanders" in rig.texts(), 25.0)
+    rig.until(lambda: rig.mode == HOLD, 1.0)
+    assert rig.simulator.collisions == () and modes_asked_for(rig, since_s) == [HOLD]
+    rig.change = None
+    rig.run_for(15.0)
+    assert rig.mode == HOLD
+
+
+def test_a_position_that_drifts_as_slowly_as_they_all_do_is_driven_by(rig: Rig) -> None:
+    rig.change = Wandering(rig, 0.04, 8.0)
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+    assert not any("wander" in text for text in rig.texts())

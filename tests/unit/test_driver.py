@@ -33,6 +33,10 @@ class LateRunner:
     def busy(self) -> bool:
         return self.call is not None
 
+    @property
+    def working(self) -> bool:
+        return self.call is not None and not self.ready
+
     def start(self, call: StepCall) -> None:
         self.call = call
 

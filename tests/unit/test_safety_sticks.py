@@ -1,13 +1,16 @@
-"""Sticks in RC_CHANNELS: what counts as taking hold of them."""
+"""Sticks in RC_CHANNELS, and commands that a person may have overtaken: the pilot wins."""
 
 from __future__ import annotations
 
 import pytest
 
+from companion.commands import ChangeSpeed, SetMode
+from companion.mavlink.acks import AckKeeper
 from companion.safety import Control, Reaction, Watch, check
 from companion.settings import SafetySettings
+from companion.startup import overruled
 from companion.sticks import Sticks, SticksSeen, followed
-from companion.vehicle import fold
+from companion.vehicle import AckSeen, HeartbeatSeen, fold
 from tests.unit.test_safety import HOLD, vehicle
 
 
@@ -55,3 +58,40 @@ def test_moved_sticks_are_a_hold_at_once_and_then_silence_until_guided_is_set_an
         watch, verdict = check(watch, fresh, seen.heartbeat.time_s, SafetySettings())
         assert verdict.reaction is reaction
     assert not state.sticks.moved
+
+
+@pytest.mark.parametrize(("silent_s", "repeated"), [(1.5, 1), (30.0, 0)])
+def test_a_mode_is_not_asked_for_again_after_a_silence_in_which_a_person_may_have_chosen(
+    silent_s: float, repeated: int
+):
+    """The vehicle is as it was, but what was between nobody knows."""
+    acks, command = AckKeeper(), SetMode(15)
+    acks.heard(HeartbeatSeen(10.0, HOLD, True, 1))
+    acks.sent(command, 10.1)
+    acks.due(10.1 + 0.9 * silent_s)
+    acks.heard(HeartbeatSeen(10.1 + silent_s, HOLD, True, 1))
+    assert len(acks.due(10.2 + silent_s)) == repeated
+
+
+def test_a_speed_is_not_said_again_to_a_rover_in_another_mode():
+    acks = AckKeeper()
+    acks.heard(HeartbeatSeen(10.0, 15, True, 1))
+    acks.sent(ChangeSpeed(1.0), 10.1)
+    assert len(acks.due(11.2)) == 1
+    acks.heard(HeartbeatSeen(11.3, 0, True, 1))
+    assert acks.due(12.5) == []
+
+
+@pytest.mark.parametrize(
+    ("ack", "heartbeat", "taken"),
+    [
+        (None, HeartbeatSeen(12.0, HOLD, True, 1), False),
+        (AckSeen(10.0, 176, 0), None, False),
+        (AckSeen(10.0, 176, 0), HeartbeatSeen(10.2, HOLD, True, 1), False),  # on its way before the change
+        (AckSeen(10.0, 176, 0), HeartbeatSeen(11.0, HOLD, True, 1), True),
+        (AckSeen(10.0, 176, 0), HeartbeatSeen(11.0, 15, True, 1), False),
+        (AckSeen(10.0, 176, 4), HeartbeatSeen(11.0, HOLD, True, 1), False),  # refused
+    ],
+)
+def test_a_mode_that_was_taken_and_is_not_there_has_been_changed_by_a_person(ack, heartbeat, taken):
+    assert overruled(ack, heartbeat) is taken

@@ -48,7 +48,18 @@ SCAN = RangeScan(1.0, np.full(1, np.pi), np.ones(1), 0.2, 8.0, 0.1, "behind")
 def test_the_newest_is_kept(event: Event, name: str) -> None:
     state = fold(VehicleState(), event)
     assert getattr(state, name) is event
-    made = ("parameters", "jump_m", "others", "frozen", "reckoned", "restarted", "latency", "sticks", "in_auto")
+    made = (
+        "parameters",
+        "jump_m",
+        "others",
+        "frozen",
+        "reckoned",
+        "restarted",
+        "latency",
+        "sticks",
+        "in_auto",
+        "wander",
+    )
     others = {field for field in VehicleState.__slots__ if field not in (name, *made)}
     assert all(getattr(state, other) is None for other in others)
 
