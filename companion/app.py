@@ -76,7 +76,7 @@ class Companion:
         self._clock = clock
         self._mission = mission
         self._settings = settings
-        self._runner = NotedRunner(runner, lambda: log.mark(Mark.ANSWER))
+        self._runner = NotedRunner(runner, log.mark)
         self._log = log
         self._rng = np.random.default_rng(seed)
         self._memory = memory
@@ -142,8 +142,8 @@ class Companion:
         self._next_tick_s += 1.0 / self._settings.link.tick_hz
         self._clock.sleep_until_s(self._next_tick_s)
         now_s = self._clock.now_s()
-        self._watchdogs.tick(now_s, now_s - self._next_tick_s, planner_works=self._runner.working)
-        if now_s - self._next_tick_s > 1.0:
+        late_s = now_s - self._next_tick_s
+        if late_s > 1.0:
             # After a stall (a suspended computer) do not catch up tick by tick, and do not believe what piled up meanwhile.
             self._next_tick_s = now_s
             self._whereabouts.stalled(now_s)
@@ -153,6 +153,7 @@ class Companion:
             self.vehicle = fold(self.vehicle, event)
             self._attendant.take(event)
             self._take_in(event)
+        self._watchdogs.tick(now_s, late_s, planner_works=self._runner.working)
         self._settings = self._attendant.attend(self._pursuit, now_s)
         self.oversight.service(self.vehicle, now_s)
         if self._stop_asked and not self._handover.begun:

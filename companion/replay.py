@@ -179,6 +179,11 @@ class TapeRunner:
         """Whether the answer has not been taken."""
         return self._answer is not None
 
+    @property
+    def working(self) -> bool:
+        """Whether the run's thread was computing in this round."""
+        return bool(self._tape.round.marks & Mark.WORKING)
+
     def start(self, call: StepCall) -> None:
         """Compute now."""
         self._on_start()

@@ -26,6 +26,8 @@ class Mark(IntFlag):
     """A person's wish to end the run was heeded."""
     CLOSE = 8
     """The run was broken off by an error, and the way out began; nothing was heard."""
+    WORKING = 16
+    """The thread was still computing a step."""
 
 
 class Round(NamedTuple):

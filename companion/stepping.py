@@ -11,6 +11,7 @@ from threading import Thread
 from typing import Protocol
 
 from companion.navigator import Decision, NavState
+from companion.rounds import Mark
 
 StepCall = Callable[[], tuple[NavState, Decision]]
 
@@ -71,9 +72,9 @@ class InlineRunner:
 
 
 class NotedRunner:
-    """Another runner, whose answers are noted when they are taken: of a thread it cannot be foretold."""
+    """Another runner, of which is noted what cannot be foretold of a thread: that it works, and when its answers are taken."""
 
-    def __init__(self, runner: StepRunner, note: Callable[[], None]) -> None:
+    def __init__(self, runner: StepRunner, note: Callable[[Mark], None]) -> None:
         self._runner = runner
         self._note = note
 
@@ -81,6 +82,14 @@ class NotedRunner:
     def busy(self) -> bool:
         """See ``StepRunner``."""
         return self._runner.busy
+
+    @property
+    def working(self) -> bool:
+        """See ``StepRunner``."""
+        works = self._runner.working
+        if works:
+            self._note(Mark.WORKING)
+        return works
 
     def start(self, call: StepCall) -> None:
         """See ``StepRunner``."""
@@ -91,10 +100,10 @@ class NotedRunner:
         try:
             result = self._runner.take()
         except Exception:
-            self._note()
+            self._note(Mark.ANSWER)
             raise
         if result is not None:
-            self._note()
+            self._note(Mark.ANSWER)
         return result
 
     def close(self) -> None:
@@ -119,7 +128,7 @@ class ThreadRunner:
     @property
     def working(self) -> bool:
         """Whether the thread has not finished yet."""
-        return self._future is not None and not self._future.done()
+        return self._busy and self._results.empty()
 
     def start(self, call: StepCall) -> None:
         """Hand the step to the thread."""
