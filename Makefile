@@ -8,7 +8,7 @@ SOURCES := $(shell find companion sitl -name '*.py')
 NAVIGATORS := hybrid,bspline-ga,astar,theta-star,dstar-lite,dijkstra,achour,prm,vertex++
 CANDIDATES := python3.11 python3.12 python3.13 python3.14 python3 python
 
-.PHONY: demo test lint bench results clean
+.PHONY: demo test lint bench results soak clean
 
 demo: $(KERNELS)
 	@$(BIN)/rover-sitl drive missions/rooms.toml --image out/rooms.png --map out/rooms-map
@@ -35,6 +35,9 @@ results: $(KERNELS)
 	$(BIN)/rover-sitl experiment navigation --runs 10 --planners $(NAVIGATORS) --docs docs
 	$(BIN)/rover-sitl experiment driving --runs 5 --docs docs
 	$(BIN)/rover-companion bench $(wildcard ../shared/data/movingai/dao/arena.map ../shared/data/movingai/dao/lak104d.map) --cell-s 2 --docs docs
+
+soak: $(KERNELS)
+	$(BIN)/rover-sitl experiment soak --runs 100 --json out/soak.json --docs docs
 
 # A virtual environment with the versions of constraints.txt, made once and from then on used without a network.
 # PYTHON=... chooses the interpreter; otherwise the first one that works is taken.

@@ -23,6 +23,7 @@ from sitl.experiments import (
     kwasniewski_table1,
     navigation,
     sedighi_table1,
+    soak,
     wang_table4,
 )
 from sitl.experiments.experiment import Experiment, ExperimentError, Options, Report
@@ -37,6 +38,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     wang_table4.NAME: wang_table4.run,
     sedighi_table1.NAME: sedighi_table1.run,
     achour_table1.NAME: achour_table1.run,
+    soak.NAME: soak.run,
 }
 EXIT_BAD_INPUT = 2
 

@@ -15,9 +15,9 @@ all); nothing is entered by hand.
 """
 
 
-def write_section(folder: Path, name: str, text: str) -> Path:
-    """Put a section into ``folder``/results.md, in place of its former self or at the end."""
-    page = folder / "results.md"
+def write_section(folder: Path, name: str, text: str, file: str = "results.md") -> Path:
+    """Put a section into ``folder``/``file``, in place of its former self or at the end."""
+    page = folder / file
     folder.mkdir(parents=True, exist_ok=True)
     before = page.read_text(encoding="utf-8") if page.exists() else HEAD
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"

@@ -1,0 +1,238 @@
+"""Many missions on random ground with random faults, one after the other in one process: does anything touch, fail, or grow?
+
+A person stands by, as the safety page asks for: where the companion says that it waits for one, the person looks for a while, arms if need
+be, and sets GUIDED again.
+"""
+
+from __future__ import annotations
+
+import gc
+import os
+import traceback
+from collections import Counter
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from joblib import Parallel, delayed
+from rich.table import Table
+
+from companion.recorder import NullRecorder
+from companion.settings import Settings
+from sitl.autopilot.modes import arm, set_mode
+from sitl.autopilot.vehicle import Mode
+from sitl.experiments import soak_faults, soak_worlds
+from sitl.experiments.experiment import Advance, Options, where_measured
+from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.lockstep import Drive
+from sitl.scenario import SOMEWHERE, Scenario
+from sitl.truth import SimStart
+
+NAME = "soak"
+PAGE = "safety.md"
+SUITES = ("lidar-90", "lidar-360")
+TIME_LIMIT_S = 1800.0
+PERSON_S = 8.0
+"""So long the person looks before doing what the companion waits for."""
+WARM_UP = 10
+"""Memory is compared from this run on: until then caches fill."""
+POLICIES = ("Returning: ", "HOLD: battery")
+"""Texts of the companion after which targets are missed on purpose: see the safety page."""
+HEAD = ("ground", "runs", "faults", "reached", "policy", "left", "coll.", "errors", "person", "metres")
+
+
+@dataclass(frozen=True, slots=True)
+class Soaked:
+    """One mission. ``ended``: reached, policy (see ``policy``) or unfinished."""
+
+    seed: int
+    ground: str
+    suite: str
+    faults: tuple[str, ...] = ()
+    ended: str = "unfinished"
+    policy: str = ""
+    last_text: str = ""
+    collisions: int = 0
+    refused: int = 0
+    error: str = ""
+    person: int = 0
+    """How often the person had to help."""
+    driven_m: float = 0.0
+    time_s: float = 0.0
+    memory_mb: float = 0.0
+    """Of the process, after it."""
+
+
+class Person:
+    """Looks on; helps when asked to for long enough."""
+
+    def __init__(self) -> None:
+        self.helped = 0
+        self._asked_s: float | None = None
+
+    def look(self, drive: Drive, doing: str) -> None:
+        """To be called often."""
+        now_s = drive.simulator.time_s
+        if "waiting for a person" not in doing:
+            self._asked_s = None
+            return
+        self._asked_s = now_s if self._asked_s is None else self._asked_s
+        if now_s - self._asked_s < PERSON_S:
+            return
+        vehicle = drive.simulator.vehicle
+        self._asked_s = None
+        self.helped += 1
+        if set_mode(vehicle, Mode.GUIDED):
+            arm(vehicle)
+
+
+def soaked(seed: int) -> Soaked:
+    """Draw a ground, a mission, a suite of sensors and a plan of faults, and drive."""
+    rng = np.random.default_rng([seed, 5])
+    ground = soak_worlds.drawn(rng)
+    suite = SUITES[int(rng.integers(len(SUITES)))]
+    mission = soak_worlds.mission_on(ground, suite, f"soak {seed}", rng)
+    plan = soak_faults.plan_of(rng)
+    assert mission.sitl is not None
+    start = SimStart(*ground.start_m, np.radians(mission.sitl.heading_deg), SOMEWHERE)
+    parameters = {"WP_SPEED": 2.0, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0, "BATT_LOW_VOLT": 10.5}
+    scenario = Scenario(ground.world, start, suite, parameters=parameters, faults=plan)
+    result = Soaked(seed, ground.kind, suite, tuple(type(fault).__name__ for fault in plan.faults))
+    try:
+        return _driven(Drive(mission, scenario, Settings(), seed, NullRecorder(), TIME_LIMIT_S), result)
+    except Exception:  # whatever it is, it is a finding, and the other runs go on
+        return replace(result, error=traceback.format_exc(limit=-1).strip().splitlines()[-1], memory_mb=memory_mb())
+
+
+def _driven(drive: Drive, result: Soaked) -> Soaked:
+    person = Person()
+    report = drive.run(lambda status: person.look(drive, status.doing))
+    missed = [name for name, status in report.targets if status != "reached"]
+    policy = next((text for text in report.said if text.startswith(POLICIES)), "")
+    ended = "reached" if missed in ([], ["sealed"]) else "policy" if policy else "unfinished"
+    if not drive.companion.done:
+        ended, policy = "unfinished", ""
+    return replace(
+        result,
+        ended=ended,
+        policy=policy,
+        last_text=report.said[-1] if report.said else "",
+        collisions=report.collisions,
+        refused=report.refused,
+        person=person.helped,
+        driven_m=report.distance_m,
+        time_s=report.sim_time_s,
+        memory_mb=memory_mb(),
+    )
+
+
+def memory_mb() -> float:
+    """What this process has in memory now."""
+    gc.collect()
+    pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+@dataclass(frozen=True)
+class SoakReport:
+    """See ``experiment.Report``."""
+
+    options: Options
+    runs: tuple[Soaked, ...]
+
+    def tables(self) -> list[Table]:
+        """A row for each kind of ground, and one line for each run that is worth a look."""
+        odd = [[str(run.seed), run.ground, ", ".join(run.faults), _trouble(run)] for run in self.runs if _trouble(run)]
+        summary = terminal_table(f"{NAME}: {self._memory()}", HEAD, self._rows())
+        return (
+            [summary, terminal_table(f"{NAME}: worth a look", ("seed", "ground", "faults", "what"), odd)]
+            if odd
+            else [summary]
+        )
+
+    def as_json(self) -> dict[str, object]:
+        """Every run."""
+        return {
+            "experiment": NAME,
+            "seed": self.options.seed,
+            "runs": self.options.runs,
+            "growth_mb": self.growth_mb,
+            "results": [asdict(run) for run in self.runs],
+        }
+
+    def write_docs(self, folder: Path) -> list[Path]:
+        """The section of the safety page."""
+        return [write_section(folder, NAME, self._section(), PAGE)]
+
+    @property
+    def growth_mb(self) -> float | None:
+        """By how much the memory of the last runs is more than that of the first after the caches have filled; None: too few runs, or
+        more than one process."""
+        after = [run.memory_mb for run in self.runs[WARM_UP:]]
+        if self.options.jobs > 1 or len(after) < 2 * WARM_UP:
+            return None
+        return float(np.median(after[-WARM_UP:]) - np.median(after[:WARM_UP]))
+
+    def _memory(self) -> str:
+        growth_mb = self.growth_mb
+        if growth_mb is None:
+            return "memory not compared (fewer than 30 runs, or several processes)"
+        return f"memory {self.runs[-1].memory_mb:.0f} MB, {growth_mb:+.1f} MB since run {WARM_UP}"
+
+    def _rows(self) -> list[list[str]]:
+        kinds = sorted({run.ground for run in self.runs})
+        return [_row(kind, [r for r in self.runs if r.ground == kind]) for kind in kinds] + [_row("all", self.runs)]
+
+    def _section(self) -> str:
+        met = Counter(fault for run in self.runs for fault in run.faults)
+        policies = Counter(run.policy.partition(".")[0] for run in self.runs if run.ended == "policy")
+        by_policy = "; ".join(f"{text} ({count})" for text, count in sorted(policies.items())) or "none"
+        return f"""## Soak
+
+`{self.options.command(NAME)}` (`make soak`)
+
+{len(self.runs)} missions on random ground ({", ".join(sorted({run.ground for run in self.runs}))}; rough and slippery patches), with two or three targets that can be
+reached, in a quarter of them one that cannot, a lidar of 90 or 360 degrees, and none to {soak_faults.MOST} faults each at random times: {_named(met)}. A person stands by
+who sets GUIDED again, and arms, {PERSON_S:g} s after the companion has asked for one. *reached*: every target that can be reached; *policy*:
+targets missed as this page says ({by_policy}); *left*: missed without such a reason, or not at the end after {TIME_LIMIT_S:g} s; *coll.*: contacts; *errors*: exceptions that nobody caught; *person*: how often the person helped.
+The process's {self._memory()}. {where_measured()}.
+
+{markdown_table(HEAD, self._rows())}
+"""
+
+
+def _named(met: Counter[str]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in sorted(met.items()))
+
+
+def _trouble(run: Soaked) -> str:
+    if run.error:
+        return run.error
+    if run.collisions:
+        return f"{run.collisions} collisions"
+    return f"unfinished: {run.last_text}" if run.ended == "unfinished" else ""
+
+
+def _row(name: str, runs: Iterable[Soaked]) -> list[str]:
+    own = list(runs)
+    return [
+        name,
+        f"{len(own)}",
+        f"{sum(len(run.faults) for run in own)}",
+        *(f"{sum(run.ended == ended for run in own)}" for ended in ("reached", "policy", "unfinished")),
+        f"{sum(run.collisions for run in own)}",
+        f"{sum(run.error != '' for run in own)}",
+        f"{sum(run.person for run in own)}",
+        f"{sum(run.driven_m for run in own):.0f}",
+    ]
+
+
+def run(options: Options, advance: Advance) -> SoakReport:
+    """One mission a seed."""
+    done: list[Soaked] = []
+    with Parallel(n_jobs=options.jobs, return_as="generator") as pool:
+        for result in pool(delayed(soaked)(options.seed + number) for number in range(options.runs)):
+            done.append(result)
+            advance(len(done), options.runs)
+    return SoakReport(options, tuple(done))
