@@ -215,6 +215,7 @@ def test_modules_and_tests_that_pages_name_exist() -> None:
 
 def test_every_table_of_hazards_has_its_five_columns_and_names_a_test() -> None:
     text = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
+    text = re.sub(r"<!-- begin .*?<!-- end [^\n]*\n", "", text, flags=re.DOTALL)  # tables that experiments write
     rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
     heads = [row for row in rows if row[0] == "hazard"]
     assert heads and all(row == ["hazard", "detection", "reaction", "time to reaction", "test"] for row in heads)
