@@ -11,7 +11,8 @@ import pytest
 
 from companion.settings import parse_settings
 from companion.stepping import InlineRunner
-from tests.rig import HOLD, SET_MODE, Rig, yard
+from tests.rig import HOLD, SET_MODE, Rig, without, yard
+from tests.served import finished, mission_path, process, served, wait_until
 
 TICK_S = 0.05
 
@@ -45,6 +46,22 @@ class Repeated:
             self._cells = self._cells or list(message.distances)
             message.distances = self._cells
         return message
+
+
+# --- heartbeats -----------------------------------------------------------------------------------------------------
+
+
+def test_an_autopilot_whose_heartbeats_alone_are_missing(rig: Rig) -> None:
+    rig.change, since_s = without("HEARTBEAT"), rig.now_s()
+    rig.until(lambda: "HOLD: autopilot heartbeat silent for over 3 s" in rig.texts(), 6.0)
+    rig.companion.tick()
+    stop_s = first_stop_s(rig, since_s)
+    assert 2.7 <= stop_s - since_s <= 3.0 + 2 * TICK_S
+    assert rig.now_s() - stop_s == pytest.approx(2.0, abs=3 * TICK_S)
+    rig.change = None
+    rig.until(lambda: rig.mode == HOLD, 1.0)
+    rig.run_for(3.0)
+    assert modes_asked_for(rig, since_s) == [HOLD] and rig.simulator.collisions == ()
 
 
 # --- range data that repeats itself ---------------------------------------------------------------------------------
@@ -240,3 +257,21 @@ def test_a_position_that_drifts_as_slowly_as_they_all_do_is_driven_by(rig: Rig) 
     rig.finish()
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
     assert not any("wander" in text for text in rig.texts())
+
+
+def test_companion_and_simulator_as_two_processes_a_lidar_stuck_for_a_while(tmp_path: Path) -> None:
+    """Over TCP, in real time: it stops, says why, drives on, and arrives."""
+    mission = yard(tmp_path)
+    with (
+        served(mission) as world,
+        process("companion", "run", mission_path(mission), "--connect", world.url, "--arm") as run,
+    ):
+        assert run.stderr is not None
+        lines = iter(run.stderr.readline, "")
+        wait_until(lambda: world.simulator.driven_m > 2.0, 40.0)
+        world.simulator._sensing.lidar_fault = "stuck"
+        assert any("Stopping: obstacle distance repeats itself" in line for line in lines)
+        world.simulator._sensing.lidar_fault = ""
+        code, out, _ = finished(run, 60.0)
+        assert world.simulator.collisions == ()
+    assert (code, out) == (0, "gate: reached\n")
