@@ -20,6 +20,8 @@ from companion.settings import GuidanceSettings
 from companion.stopping import braking_distance_m, fastest_within_m, stopping_distance_m
 
 STOP = GuidedVelocity(0.0, 0.0)
+STRAIGHT_RAD = math.radians(2.0)
+"""A target that is no farther aside is reached straight."""
 ROLL_SHARES = (0.25, 0.5, 0.75, 1.0)
 """Directions, as shares of a turn, that are looked along before a rolling rover begins to turn."""
 
@@ -84,7 +86,7 @@ def guide(
     if error > _turn_first_rad(close, looking_rad is not None, settings) and pose.point.distance_m(target) > 0.5:
         close = close or _would_touch_turning(pose, speed_m_s, bearing, evidence, rover, settings)
         return turn_to(bearing, speed_m_s if close else 0.0, settings)
-    if error > math.radians(settings.turned_deg) and not arc_is_free(pose, target, evidence, rover):
+    if error > STRAIGHT_RAD and not arc_is_free(pose, target, evidence, rover):
         return turn_to(bearing, speed_m_s, settings)
     limit_m_s = speed_limit_m_s(min(beside_m, room_m), error, rover, settings)
     if not at_end:

@@ -140,7 +140,7 @@ def arc_is_free(pose: Pose, target: NedPoint, evidence: EvidenceMap, rover: Rove
     aside_rad = wrap_pi_rad(pose.point.bearing_rad(target) - pose.heading_rad)
     curvature = 2.0 * math.sin(aside_rad) / distance
     length = distance * aside_rad / math.sin(aside_rad)
-    room = kept_room(ground, x, y, rover.radius_m * scale, (rover.radius_m - 0.05) * scale)
+    room = kept_room(ground, x, y, (rover.radius_m + 0.05) * scale, (rover.radius_m - 0.05) * scale)
     return bool(arc_clear(ground, x, y, pose.heading_rad, curvature, room, length, UNSEEN) >= length - 1e-6)
 
 

@@ -311,16 +311,16 @@ class _View:
         guidance = self._settings.guidance
         course_rad = self.pose.heading_rad + (math.pi if backwards else 0.0)
         rate, now_m_s = self._turn_rate(curvature_m), abs(self.rolling.speed_m_s)
-        room, speed_m_s = self._room(0.0), wanted_m_s
+        room, speed_m_s = self._room(TOUCH_M), wanted_m_s
         while speed_m_s > LEFT_ALONE_M_S:
-            reach = blind_distance_m(max(speed_m_s, now_m_s), guidance) * self._scale
+            reach = (blind_distance_m(max(speed_m_s, now_m_s), guidance) + TOUCH_M) * self._scale
             free = math.inf
             for arc_m_s in (now_m_s, speed_m_s):
                 arc = rate / max(arc_m_s, self._settings.steering.scale_base_m_s) / self._scale
                 free = min(free, arc_clear(self._ground, self._x, self._y, course_rad, arc, room, reach, UNSEEN))
             if free >= reach - 1e-6:
                 return speed_m_s
-            speed_m_s = min(speed_m_s - 0.1, fastest_blind_m_s(free / self._scale, guidance))
+            speed_m_s = min(speed_m_s - 0.1, fastest_blind_m_s(free / self._scale - TOUCH_M, guidance))
         return 0.0
 
     def _turn_rate(self, curvature_m: float) -> float:

@@ -190,7 +190,8 @@ def _on_the_way(
         course_rad = pose.heading_rad + (math.pi if backwards else 0.0)
         for goes_s in GO_ON_S:
             along_m = driven_m(speed_m_s, now.speed_m_s, goes_s, times_s, settings)
-            yield Choice(_nearer(now, pose, along_m), steered_along(way, course_rad, along_m, rover.turning_radius_m))
+            places = steered_along(way, course_rad, along_m, rover.turning_radius_m)
+            yield Choice(_nearer(now, pose, along_m), places)
     else:
         yield Choice(now, halt.places, TURNING_S)
     yield halt

@@ -34,20 +34,21 @@ class LockstepClock:
         self._vehicle_end = vehicle_end
         self._companion_end = companion_end
         self._now_s = simulator.time_s
+        self.overhear: Callable[[float, bytes], None] | None = None
+        """Told what the companion has written, and until when the world moves on with that."""
 
     def now_s(self) -> float:
         """Simulated seconds since the autopilot booted."""
         return self._now_s
 
-    def deliver(self) -> None:
-        """Bring what the companion has written to the vehicle."""
-        self._vehicle_end.receive(self._companion_end.read())
-
     def sleep_until_s(self, time_s: float) -> None:
         """Deliver what was written, let the world move on, and bring back what the vehicle sent."""
         if time_s <= self._now_s:
             return
-        self.deliver()
+        said = self._companion_end.read()
+        if self.overhear is not None:
+            self.overhear(time_s, said)
+        self._vehicle_end.receive(said)
         self._simulator.advance_to_s(time_s)
         self._companion_end.write(self._vehicle_end.take())
         if self._vehicle_end.dropped:

@@ -6,7 +6,6 @@ may be one that the rover cannot be left alone with.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -35,57 +34,81 @@ HEAD = ("mission", "runs", "moving", "touched", "run into", "m/s", "metres", "s"
 TIME_LIMIT_S = 1800.0
 STANDS_S, STANDS_M_S, STANDS_RAD_S = 4.0, 0.02, 0.02
 """A rover stands that has neither moved nor turned for longer than a velocity is remembered."""
+STOOD_M_S = 0.1
+"""What moves runs into a rover that is slower than this, not the rover into it."""
 WATCHED_S = 120.0
 STEP_S = 0.25
 
 
 @dataclass(frozen=True, slots=True)
 class Death:
-    """One run. ``share``: the moment, as a share of the time that the first seed takes; nan ``time_s``: the mission ended first."""
+    """One run, and when its companion fell silent."""
 
     mission: str
     suite: str
     seed: int
-    time_s: float = math.nan
-    speed_m_s: float = 0.0
-    touched: int = 0
+    time_s: float
+    speed_m_s: float
+    touched: int
     """Contacts of the rover while it moved on."""
-    run_into: int = 0
+    run_into: int
     """It stood, and something that moves came along."""
-    went_m: float = 0.0
-    went_s: float = 0.0
+    went_m: float
+    went_s: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Told:
+    """A whole drive, as what its companion said: until when the world moved on, and the bytes it got before that."""
+
+    mission: Mission
+    seed: int
+    words: tuple[tuple[float, bytes], ...]
+    begin_s: float
+    """When the rover first moved."""
+    end_s: float
 
     @property
-    def died(self) -> bool:
-        """Whether it came to that."""
-        return not math.isnan(self.time_s)
+    def suite(self) -> str:
+        """The rover's sensors."""
+        return str(self.mission.sitl.sensors) if self.mission.sitl is not None else ""
 
 
-def die(mission: Mission, seed: int, time_s: float, *, last_words: bool = True) -> Death:
-    """Drive with a companion that is not heard of any more after ``time_s``; ``last_words``: what it said in its last tick arrives."""
-    suite = mission.sitl.sensors if mission.sitl is not None else ""
-    death = Death(mission.name, str(suite), seed)
+def overheard(mission: Mission, seed: int) -> Told:
+    """Drive the mission with its companion alive, and keep what it says."""
     drive = Drive(mission, scenario_from_mission(mission), Settings(), seed, NullRecorder(), TIME_LIMIT_S)
-    while drive.simulator.time_s < time_s:
-        if drive.companion.done:
-            return death
-        drive.companion.tick()
-    simulator = drive.simulator
-    if last_words:
-        drive.clock.deliver()
+    words: list[tuple[float, bytes]] = []
+    drive.clock.overhear = lambda time_s, said: words.append((time_s, said))
+    report = drive.run()
+    began_s = report.sim_time_s - report.driving_time_s
+    return Told(mission, seed, tuple(words), began_s, report.sim_time_s)
+
+
+def die(told: Told, time_s: float) -> Death:
+    """The same drive, but nothing more is said from a moment on. The simulator does the same on hearing the same."""
+    simulator = scenario_from_mission(told.mission).simulator(told.seed)
+    link = simulator.connect(name="companion")
+    for until_s, said in told.words:
+        if until_s > time_s:
+            break
+        link.receive(said)
+        simulator.advance_to_s(until_s)
+        link.take()
     speed_m_s, since_m = abs(simulator.truth.speed_m_s), simulator.driven_m
     before = len(simulator.collisions)
     went_s = watch_until_it_stands(simulator)
     hits = simulator.collisions[before:]
-    standing = [one for one in hits if one.mover and abs(one.speed_m_s) < STANDS_M_S]
-    return replace(
-        death,
-        time_s=time_s,
-        speed_m_s=speed_m_s,
-        touched=len(hits) - len(standing),
-        run_into=len(standing),
-        went_m=simulator.driven_m - since_m,
-        went_s=went_s,
+    standing = [one for one in hits if one.mover and abs(one.speed_m_s) < STOOD_M_S]
+    return Death(
+        told.mission.name,
+        told.suite,
+        told.seed,
+        time_s,
+        speed_m_s,
+        len(hits) - len(standing),
+        len(standing),
+        simulator.driven_m - since_m,
+        went_s,
     )
 
 
@@ -113,7 +136,7 @@ class DeadReport:
 
     def as_json(self) -> dict[str, object]:
         """Every run."""
-        runs = [{name: getattr(death, name) for name in Death.__slots__} for death in self.deaths if death.died]
+        runs = [{name: getattr(death, name) for name in Death.__slots__} for death in self.deaths]
         return {"experiment": NAME, "seed": self.options.seed, "runs": self.options.runs, "deaths": runs}
 
     def write_docs(self, folder: Path) -> list[Path]:
@@ -124,22 +147,21 @@ class DeadReport:
         return list(dict.fromkeys(death.suite for death in self.deaths))
 
     def _rows(self, suite: str) -> list[list[str]]:
-        own = [death for death in self.deaths if death.suite == suite and death.died]
+        own = [death for death in self.deaths if death.suite == suite]
         names = dict.fromkeys(death.mission for death in own)
         return [_row(name, [d for d in own if d.mission == name]) for name in names] + [_row("all", own)]
 
     def _section(self) -> str:
-        died = [death for death in self.deaths if death.died]
         tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in self._suites())
-        touched, run_into = sum(d.touched for d in died), sum(d.run_into for d in died)
+        touched, run_into = sum(d.touched for d in self.deaths), sum(d.run_into for d in self.deaths)
         return f"""## A companion that falls dead
 
 `{self.options.command(NAME)}`
 
-{len(died)} runs: {self.options.runs} of each mission with each suite of sensors, cut off at a moment drawn from the whole drive, half of them before
-what was said last has gone out; then watched until the rover has stood for {STANDS_S:g} s. *moving* counts the runs in which it moved when that happened;
-*touched* counts contacts while it moved on: **{touched}**; *run into*: it stood already, and something that moves came along: {run_into}. *m/s*: the
-fastest it was, *metres*, *s*: the farthest and longest it went on.
+{len(self.deaths)} runs: each mission driven with each suite of sensors, and the companion silent for ever at {self.options.runs} moments drawn evenly from that
+drive; then watched until the rover had stood for {STANDS_S:g} s. *moving* counts the runs in which it moved when that happened; *touched* the contacts while it
+moved on: **{touched}**; *run into*: it stood already (slower than {STOOD_M_S:g} m/s), and something that moves came along: {run_into}. *m/s*: the fastest it was; *metres*, *s*:
+how far and how long it went on at most.
 
 {tables}
 """
@@ -162,32 +184,24 @@ def _row(name: str, deaths: list[Death]) -> list[str]:
 
 
 def run(options: Options, advance: Advance) -> DeadReport:
-    """First a whole drive of each mission, to know how long it takes; then the others. Does not depend on ``jobs``."""
+    """Each mission driven once with each suite, and from each drive as many deaths as there are runs. Does not depend on ``jobs``."""
     missions = [with_suite(mission, suite) for mission in shipped(options) for suite in SUITES]
-    total, done = len(missions) * (1 + options.runs), 0
-    lengths: list[tuple[float, float]] = []
-    with Parallel(n_jobs=options.jobs, return_as="generator") as pool:
-        for span in pool(delayed(driven_span_s)(mission, options.seed) for mission in missions):
-            lengths.append(span)
-            advance(done := done + 1, total)
-        calls = []
-        for number, (mission, (begin_s, end_s)) in enumerate(zip(missions, lengths, strict=True)):
-            for i in range(options.runs):
-                rng = np.random.default_rng((options.seed + i, number))
-                time_s = float(rng.uniform(begin_s, end_s))
-                calls.append(delayed(die)(mission, options.seed + i, time_s, last_words=bool(rng.integers(2))))
-        deaths: list[Death] = []
-        for death in pool(calls):
-            deaths.append(death)
-            advance(done := done + 1, total)
+    deaths: list[Death] = []
+    calls = (
+        delayed(deaths_of)(mission, options.seed + number, options.runs) for number, mission in enumerate(missions)
+    )
+    made: Iterable[list[Death]] = Parallel(n_jobs=options.jobs, return_as="generator")(calls)
+    for done, some in enumerate(made, start=1):
+        deaths += some
+        advance(done, len(missions))
     return DeadReport(options, tuple(deaths))
 
 
-def driven_span_s(mission: Mission, seed: int) -> tuple[float, float]:
-    """When the rover first and last moved in a whole drive."""
-    drive = Drive(mission, scenario_from_mission(mission), Settings(), seed, NullRecorder(), TIME_LIMIT_S)
-    report = drive.run()
-    return report.sim_time_s - report.driving_time_s, report.sim_time_s
+def deaths_of(mission: Mission, seed: int, count: int) -> list[Death]:
+    """One drive, cut off at so many moments, drawn evenly from it."""
+    told = overheard(mission, seed)
+    moments_s = np.random.default_rng((seed, count)).uniform(told.begin_s, told.end_s, count)
+    return [die(told, float(moment_s)) for moment_s in moments_s]
 
 
 def with_suite(mission: Mission, suite: str) -> Mission:
