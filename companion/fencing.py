@@ -54,11 +54,8 @@ class Fencing:
 
     def breached(self, now_s: float) -> str:
         """In words, that the autopilot sees its fence breached; empty when it does not."""
-        return (
-            "the autopilot's fence is breached"
-            if self._told_within(STATUS_S, now_s) and self._status and self._status.breached
-            else ""
-        )
+        told = self._told_within(STATUS_S, now_s) and self._status is not None and self._status.breached
+        return "the autopilot's fence is breached" if told else ""
 
     def take_in(self, event: Event) -> None:
         """One more event: whatever tells that a list may have changed has it fetched anew."""
