@@ -310,7 +310,8 @@ class Companion:
         """One tick on the way."""
         pose = self.vehicle.pose_at(now_s)
         assert pose is not None
-        if reason := self.oversight.broken_off(pursuit, pose, now_s):
+        # Within AUTO the battery is for the autopilot's own failsafe: there is no way back inside a leg.
+        if not self.vehicle.in_auto and (reason := self.oversight.broken_off(pursuit, pose, now_s)):
             self._hand_over(now_s, reason)
             return
         others = announced(self.vehicle, pose, self._mission.rover.radius_m, self._settings.traffic)

@@ -109,6 +109,21 @@ def tuned(ground: Program, here: Scene, folder: Path) -> None:
     assert here.witness.wait(lambda m: m.get_type() == "PARAM_VALUE" and m.param_id == "CMP_HORIZON").param_value == 6.0
 
 
+def errand(ground: Program, here: Scene) -> None:
+    """A place for the companion, which it drives to first; one that is too far away; both as a person types them."""
+    place = PLACES[0]
+    ground.tell("set target_component 191")
+    ground.says(r"Received \d+ parameters")
+    ground.told(f"guided {place[0] + 0.1} {place[1]} 0", "DO_REPOSITION: DENIED")
+    ground.says("AP: Errand refused: .* m away, farther than 300 m")
+    ground.told(f"guided {place[0]} {place[1]} 0", "DO_REPOSITION: ACCEPTED")
+    ground.says("AP: Errand 1: .* m away, then the mission goes on")
+    ground.tell("set target_component 1")
+    here.companion.says("Reached errand 1")
+    assert math.dist(metres_from_home(*here.witness.truth_deg), metres_from_home(*place)) < 5.0
+    here.driving()
+
+
 @pytest.mark.slow
 def test_mavproxy_beside_the_companion(tmp_path: Path) -> None:
     with scene(tmp_path, companion_on="udp") as here, mavproxy(tmp_path, here.tcp) as ground:
@@ -134,6 +149,7 @@ def test_mavproxy_beside_the_companion(tmp_path: Path) -> None:
         here.companion.says("mode is not GUIDED")
         ground.told("mode guided", "Mode GUIDED")
         here.driving()
+        errand(ground, here)
         here.arrived()
 
         # Nobody else drives any more: MAVProxy does.

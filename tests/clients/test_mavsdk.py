@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import math
 from collections.abc import AsyncIterator, Callable
 from pathlib import Path
@@ -99,6 +100,25 @@ async def drive(ground: Ground, here: Scene) -> None:
     assert math.dist(here.witness.place_m(), goal_m) < 2.0
 
 
+async def errand(system: Any, here: Scene) -> None:
+    """A place for the companion itself: MAVSDK's own targets go to the autopilot, so the message is written out."""
+    from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
+
+    direct = MavlinkDirectAsync(system)
+    answers = direct.subscribe_message("COMMAND_ACK")
+    fields = {
+        "target_system": 1, "target_component": 191, "frame": 6, "command": 192, "current": 0, "autocontinue": 0,
+        "param1": -1.0, "param2": 0.0, "param3": 0.0, "param4": 0.0,
+        "x": round(PLACES[0][0] * 1e7), "y": round(PLACES[0][1] * 1e7), "z": 0.0,
+    }  # fmt: skip
+    heard = asyncio.ensure_future(first(answers, lambda m: m.component_id == 191))
+    await asyncio.sleep(0.5)
+    await direct.send_message(MavlinkMessage("COMMAND_INT", 0, 0, 1, 191, json.dumps(fields)))
+    answer = json.loads((await heard).fields_json)
+    assert (answer["command"], answer["result"]) == (192, 0)
+    here.companion.says("Reached errand 1")
+
+
 async def session(here: Scene) -> None:
     from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
 
@@ -116,6 +136,7 @@ async def session(here: Scene) -> None:
         # A place to go to is overruled by the companion's next target, as the companion drives.
         await ground.action.goto_location(*PLACES[0], 120.0, 0.0)
         here.driving()
+        await errand(system, here)
         here.arrived()
         await drive(ground, here)
         here.untouched()

@@ -13,6 +13,7 @@ from companion.mission.mission import Mission
 from tests.asker import Asker
 from tests.clients.scene import HOME_DEG
 from tests.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, SET_MODE, without, yard
+from tests.scenarios.test_errands import low_battery
 
 WAYPOINT, GUIDED_ENABLE, LIMITS, DELAY = 16, 92, 222, 93
 ON = (1.0, 0.0, 0.0, 0.0)
@@ -282,3 +283,12 @@ def test_a_companion_that_is_killed_in_a_leg_takes_it_up_again(tmp_path: Path) -
     rig.finish(120.0)
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
     assert_steered_only_in_the_leg(rig)
+
+
+def test_a_battery_that_runs_low_in_a_leg_is_the_autopilots_affair(tmp_path: Path) -> None:
+    """The companion never turns back inside a leg of AUTO."""
+    rig = in_leg(tmp_path)
+    rig.change = low_battery
+    rig.finish(120.0)
+    assert rig.companion.outcome.complete
+    assert not any(text.startswith("Returning") for text in rig.texts())

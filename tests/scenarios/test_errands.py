@@ -225,3 +225,30 @@ def test_an_errand_keeps_its_place_when_the_origin_moves(tmp_path: Path) -> None
     assert rig.passed_m(5, 12) < 1.5
     rig.finish()
     assert rig.companion.outcome.complete
+
+
+def low_battery(message: Any) -> Any:
+    if message.get_type() == "BATTERY_STATUS":
+        message.battery_remaining = 15
+    return message
+
+
+def test_a_battery_that_runs_low_ends_an_errand(driving: Asker) -> None:
+    driving.reposition(driving.field(20, 12))
+    assert driving.answered() == ACCEPTED
+    driving.run_for(2.0)
+    driving.change = low_battery
+    driving.finish()
+    assert any(text.startswith("Returning: ") for text in driving.texts())
+    assert "Reached errand 1" not in driving.texts()
+    assert driving.passed_m(2, 7) < 1.5, "back where it began"
+    driving.change = None
+
+
+def test_a_rover_on_its_way_back_takes_no_errand(driving: Asker) -> None:
+    driving.until_driven(6.0)
+    driving.change = low_battery
+    driving.until(lambda: any(text.startswith("Returning: ") for text in driving.texts()), 12.0)
+    driving.reposition(driving.field(20, 12))
+    assert driving.answered() == NOT_NOW
+    assert any("on its way back" in text for text in driving.texts())
