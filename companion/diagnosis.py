@@ -190,15 +190,16 @@ def _position(seen: Examined) -> Iterator[Finding]:
 
 
 def _arming(seen: Examined) -> Iterator[Finding]:
+    """Its last word counts: complaints from before are over when its own checks pass."""
     beat, prearm = seen.vehicle.heartbeat, seen.vehicle.prearm
-    reasons = [text.partition(": ")[2] for text in seen.texts if text.startswith(("PreArm:", "Arm:"))]
-    if ((prearm is not None and not prearm.ok) or reasons) and not (beat is not None and beat.armed):
-        says = f"The autopilot would not arm: {'; '.join(reasons) or 'it does not say why'}."
-        yield Finding(
-            "pre-arm", Level.STOP, says, "do as the message says; ARMING_REQUIRE and the checks stay as they are"
-        )
+    complaints = [text for text in seen.texts if text.startswith(("PreArm:", "Arm:"))]
+    refuses = bool(complaints) if prearm is None else not prearm.ok
+    if refuses and not (beat is not None and beat.armed):
+        reasons = "; ".join(text.partition(": ")[2] for text in complaints) or "it does not say why"
+        says = f"The autopilot would not arm: {reasons}."
+        yield Finding("pre-arm", Level.STOP, says, "do as the message says; leave its checks switched on")
     for text in seen.texts:
-        if not text.startswith(("PreArm:", "Arm:")):
+        if text not in complaints:
             yield Finding("text", Level.NOTE, f"The autopilot says: {text}", "")
 
 

@@ -75,6 +75,9 @@ class Driver:
         self._doubts_left = 0
         self.seed = int(searcher.rng.integers(2**63)) if seed is None else seed
         self._epoch = 0
+        self._began_s = 0.0
+        self.step_s = 0.0
+        """From the round in which the last step began to the one that took its answer: a replay has the same rounds."""
         self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
         self._helm = Helm(evidence, settings) if rover.turning_radius_m > 0.0 else None
         self._looking_rad: float | None = None
@@ -230,8 +233,11 @@ class Driver:
                 self.tally.steps += 1
                 self.tally.return_steps += 1 if state.returning else 0
             self._pending = self._epoch
+            self._began_s = pose.time_s
             self._runner.start(lambda: step(state, grid, cell, search))
         result = self._runner.take()
+        if result is not None:
+            self.step_s = pose.time_s - self._began_s
         if result is None or self._pending != self._epoch:
             return None
         if self._is_doubtful(result[1]) and doubt(self.evidence, pose.point, DOUBT_REACH_M):

@@ -54,7 +54,7 @@ class NullRecorder:
 
     problem = ""
 
-    def heard(self, time_s: float, packets: list[bytes]) -> None:
+    def heard(self, time_s: float, packets: list[bytes], mark: Mark = Mark(0)) -> None:  # noqa: B008 - frozen
         """Ignored."""
 
     def said(self, time_s: float, raw: bytes) -> None:

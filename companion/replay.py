@@ -14,6 +14,7 @@ from companion.app import Companion
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.naming import compared, named
+from companion.mavlink.signing import Recorded, without_signature
 from companion.memory import Memory
 from companion.mission.mission import MissionError
 from companion.navigator import Decision, NavState
@@ -55,6 +56,7 @@ class Tape:
 
     def __init__(self, record: Record, on_decision: Callable[[int, float, str, Decision], None]) -> None:
         self.result = Replayed()
+        self.signatures = Recorded()
         self._record = record
         self._rounds: Iterator[Heard] = record.rounds()
         self._next = next(self._rounds, None)
@@ -80,6 +82,7 @@ class Tape:
         if self._next is None:
             raise EndOfRecordError
         self._at, self._next = self._next, next(self._rounds, None)
+        self.signatures.take(self.round.marks)
         self._unread, self._said = list(self._at.heard), []
         self._began_s = self.round.time_s if self._began_s is None else self._began_s
         self.result.rounds += 1
@@ -121,7 +124,7 @@ class Tape:
 
     # The companion's log -----------------------------------------------------------------------------------------
 
-    def heard(self, time_s: float, packets: list[bytes]) -> None:
+    def heard(self, time_s: float, packets: list[bytes], mark: Mark) -> None:
         """Counted."""
         self.result.heard += len(packets)
 
@@ -158,7 +161,7 @@ class Tape:
         self._said = []
         self.result.said += len(now)
         for was, is_now in zip(recorded, now, strict=False):
-            if was != is_now:
+            if without_signature(was) != without_signature(is_now):
                 self.differs(f"said {compared(was, is_now)}")
         for raw in recorded[len(now) :]:
             self.differs(f"{named(raw)} was said in the run, not in the replay")
@@ -222,7 +225,7 @@ def replay(record: Record, observer: Observer | None = None) -> Replayed:
     runner = TapeRunner(tape, lambda: look.step_begins(companion))
     tape.advance()
     link = record.settings.link
-    autopilot = AutopilotLink(tape, Codec(link), link, tape)
+    autopilot = AutopilotLink(tape, Codec(link, recorded=tape.signatures), link, tape)
     companion = Companion(
         autopilot,
         tape,

@@ -28,6 +28,14 @@ class Mark(IntFlag):
     """The run was broken off by an error, and the way out began; nothing was heard."""
     WORKING = 16
     """The thread was still computing a step."""
+    SIGNED = 32
+    """The run believed signed packets only; those that it refused are not recorded."""
+    UNSIGNED = 64
+    """Some were refused by now because they were not signed,"""
+    WRONG = 128
+    """signed with another key,"""
+    OLD = 256
+    """or signed too long ago, or heard again."""
 
 
 class Round(NamedTuple):

@@ -29,16 +29,16 @@ class Telemetry:
 
 
 def figures(pursuit: Pursuit) -> dict[str, float]:
-    """NAV_PART: 1 A (return), 2 B, 3 C, 0 none yet. PATH_COST: of the path decided on, -1 for none. SEARCH_MS: the last search.
+    """NAV_PART: 1 A (return), 2 B, 3 C, 0 none yet. PATH_COST: of the path decided on, -1 for none. SEARCH_MS: the last step with its
+    searches, in whole rounds.
 
     PROGRESS: targets reached, of all, in percent.
     """
     decision: Decision | None = pursuit.driver.decision
-    seconds = pursuit.driver.searcher.seconds
     weights = pursuit.evidence.grid.weights
     return {
         "NAV_PART": 0.0 if decision is None else PARTS[decision.part],
         "PATH_COST": path_cost(weights, decision.path) if decision is not None and decision.path else -1.0,
-        "SEARCH_MS": 1e3 * seconds[-1] if seconds else 0.0,
+        "SEARCH_MS": 1e3 * pursuit.driver.step_s,
         "PROGRESS": 100.0 * pursuit.reached / len(pursuit.itinerary.targets),
     }

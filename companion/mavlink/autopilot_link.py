@@ -16,6 +16,7 @@ from companion.mavlink.codec import Codec
 from companion.mavlink.download import Downloads
 from companion.mavlink.rates import RateFault, RateKeeper, wanted_rates
 from companion.mavlink.readback import ReadBack
+from companion.rounds import Mark
 from companion.settings import LinkSettings
 from companion.vehicle import AckSeen, Event, HeartbeatSeen, HomeSeen, TargetSeen
 
@@ -33,7 +34,7 @@ TWIN_S = 3.5
 class PacketLog(Protocol):
     """Takes every packet of both directions; ``time_s`` is the companion's clock."""
 
-    def heard(self, time_s: float, packets: list[bytes]) -> None:
+    def heard(self, time_s: float, packets: list[bytes], mark: Mark) -> None:
         """The companion has listened; what came, packet by packet."""
         ...
 
@@ -43,7 +44,7 @@ class PacketLog(Protocol):
 
 
 class _NoLog:
-    def heard(self, time_s: float, packets: list[bytes]) -> None:
+    def heard(self, time_s: float, packets: list[bytes], mark: Mark) -> None:
         """Nobody listens."""
 
     def said(self, time_s: float, raw: bytes) -> None:
@@ -115,7 +116,7 @@ class AutopilotLink:
         """What has come in since the last call."""
         events: list[Event] = []
         packets = [packet for packet in self._codec.packets(self._link.read()) if self._codec.accepts(packet)]
-        self._log.heard(now_s, [packet.raw for packet in packets])
+        self._log.heard(now_s, [packet.raw for packet in packets], self._codec.marks)
         for packet in packets:
             if self._codec.is_own_heartbeat(packet) and packet.raw not in self._own:  # some networks send all back
                 self._twin_s = now_s

@@ -10,7 +10,8 @@ from companion.frames import GeoPoint
 from companion.mavlink.decode import AUTOPILOT, MISSION_ACK_COMMAND, Decoder
 from companion.mavlink.encode import EncodeError, Encoder, command_number
 from companion.mavlink.framing import MAGIC_V2, SIGNED, Framer, Packet
-from companion.mavlink.signing import Refused, Signer, trouble
+from companion.mavlink.signing import Recorded, Refused, Signer, trouble
+from companion.rounds import Mark
 from companion.settings import LinkSettings
 from companion.vehicle import Event
 
@@ -40,11 +41,14 @@ class Codec:
     The companion speaks under the vehicle's system id. Any bytes may be fed; none make it fail.
     """
 
-    def __init__(self, settings: LinkSettings, system_id: int = 1, signer: Signer | None = None) -> None:
+    def __init__(
+        self, settings: LinkSettings, system_id: int = 1, signer: Signer | None = None, recorded: Recorded | None = None
+    ) -> None:
         self._framer = Framer()
         self._decoder = Decoder(system_id, settings.component_id)
         self._encoder = Encoder(settings.setpoint, settings.component_id, signer)
         self._signer = signer
+        self._recorded = recorded
         self._signed_heard = False
 
     @property
@@ -92,11 +96,18 @@ class Codec:
     @property
     def signing_trouble(self) -> str:
         """What is wrong with signatures, in words; empty for nothing."""
+        if self._recorded is not None and self._recorded.signed:
+            return trouble(self._recorded.refused, self.vehicle_known)
         if self._signer is None:
             if not self._signed_heard:
                 return ""
             return "The autopilot signs: without --signing-key it ignores us, but on its first port"
         return trouble(self._signer.refused, self.vehicle_known)
+
+    @property
+    def marks(self) -> Mark:
+        """What a record must know of signatures."""
+        return Mark(0) if self._signer is None else Mark.SIGNED | self._signer.refused.marks
 
     def accepts(self, packet: Packet) -> bool:
         """Whether to believe a packet: with a key, only if it is signed with it, and newer than those before."""

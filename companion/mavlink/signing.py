@@ -15,7 +15,8 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.clock import unix_time_us
-from companion.mavlink.framing import MAGIC_V2, SIGNATURE, SIGNED, Packet
+from companion.mavlink.framing import CHECKSUM, MAGIC_V2, SIGNATURE, SIGNED, Packet
+from companion.rounds import Mark
 
 TICKS_PER_S = 100_000
 """Signing timestamps count 10 microseconds since the beginning of 2015 (UTC)."""
@@ -65,6 +66,14 @@ def load_key(path: Path) -> bytes:
     if not any(key):
         raise SigningKeyError(f"{path}: a key of zeros means no signing; choose another one")
     return key
+
+
+def without_signature(raw: bytes) -> bytes:
+    """Header and payload of a packet as if it had not been signed (its check sum counts the header's flag)."""
+    if raw[0] != MAGIC_V2:
+        return raw
+    end = len(raw) - CHECKSUM - (SIGNATURE if raw[2] & SIGNED else 0)
+    return raw[:2] + bytes([raw[2] & ~SIGNED]) + raw[3:end]
 
 
 def ticks_now() -> int:
@@ -125,6 +134,28 @@ class Refused:
         self.unsigned += why is Refusal.UNSIGNED
         self.wrong += why is Refusal.WRONG
         self.old += why is Refusal.OLD
+
+    @property
+    def marks(self) -> Mark:
+        """The same for a record, which has no counts."""
+        return (
+            (Mark.UNSIGNED if self.unsigned else Mark(0))
+            | (Mark.WRONG if self.wrong else Mark(0))
+            | (Mark.OLD if self.old else Mark(0))
+        )
+
+
+class Recorded:
+    """What a record says of signatures, which it does not have the key to check."""
+
+    def __init__(self) -> None:
+        self.signed = False
+        self.refused = Refused()
+
+    def take(self, marks: int) -> None:
+        """What was so in the next round."""
+        self.signed |= bool(marks & Mark.SIGNED)
+        self.refused = Refused(bool(marks & Mark.UNSIGNED), bool(marks & Mark.WRONG), bool(marks & Mark.OLD))
 
 
 class Signer:

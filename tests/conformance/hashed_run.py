@@ -16,6 +16,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.navigator import Decision
 from companion.recorder import NullRecorder
+from companion.rounds import Mark
 from companion.settings import Settings
 from sitl.fault_file import load_faults
 from sitl.faults import FaultPlan
@@ -34,7 +35,7 @@ class HashingRecorder(NullRecorder):
         self.digest = hashlib.sha256()
         self.packets = 0
 
-    def heard(self, time_s: float, packets: list[bytes]) -> None:
+    def heard(self, time_s: float, packets: list[bytes], mark: Mark) -> None:
         """The packets of a round."""
         for raw in packets:
             self.said(time_s, raw)

@@ -26,6 +26,8 @@ from tests.mavlink_vehicle import Station
 from tests.party import KEY, TIME
 from tests.rig import yard
 from tests.served import finished, mission_path, process
+from tests.shared_data import SHARED, needs_shared
+from tests.tlog import raw_packets
 from tests.unit.test_sitl_server import free_port
 
 READY_S = 50.0
@@ -193,6 +195,24 @@ def test_a_key_that_is_missing_or_another_one(tmp_path: Path) -> None:
     assert right.findings() == {"gcs-failsafe": N}
 
 
+@needs_shared
+def test_what_real_firmware_said() -> None:
+    """A recording of ArduRover 4.7 with three rangefinders, while another companion drove it."""
+    near, far = MemoryLink.pair()
+    examination = Examination(near, Settings().link, PARAMETERS)
+    for number, raw in enumerate(raw_packets(SHARED / "data" / "ardurover-4.7-transcripts" / "rangefinders.tlog")):
+        far.write(raw)
+        examination.step(0.005 * number)
+        if number == 20_000:
+            break
+    seen = examination.result()
+    ahead = [one for one in seen.sources if one.orientation == 0]
+    assert [(one.message, one.component, one.min_m, one.max_m) for one in ahead] == [("DISTANCE_SENSOR", 1, 0.2, 20.0)]
+    names = {finding.name: finding.level for finding in diagnose(seen)}
+    assert names["two-companions"] is S and names["armed"] is N
+    assert not {"no-range-sensor", "not-ahead", "range-limits", "ekf", "no-position", "not-a-rover"} & names.keys()
+
+
 def test_no_rover_but_a_copter_or_nobody() -> None:
     for data, finding in ((Station(1, 1).heartbeat(kind=2), "not-a-rover"), (b"", "no-autopilot")):
         near, far = MemoryLink.pair()
@@ -267,6 +287,15 @@ def test_nobody_there(tmp_path: Path) -> None:
     answer = CliRunner().invoke(app, ["doctor", "--connect", url, "--seconds", "1"])
     assert answer.exit_code == 4
     assert "Nothing is heard" in answer.output
+
+
+@pytest.mark.parametrize("warm", [True, False])
+def test_kernels_that_are_not_compiled_are_told_of(monkeypatch: pytest.MonkeyPatch, warm: bool) -> None:
+    monkeypatch.setattr("companion.cli.doctor.kernels_warm", lambda settings: warm)
+    url = f"udpin:127.0.0.1:{free_port()}"
+    answer = CliRunner().invoke(app, ["doctor", "--connect", url, "--seconds", "1", "--json"])
+    names = [one["name"] for one in json.loads(answer.output)["findings"]]
+    assert names == ["no-autopilot", *([] if warm else ["kernels-cold"])]
 
 
 def test_a_link_that_is_none() -> None:

@@ -10,6 +10,11 @@ from typer.testing import CliRunner
 
 from companion.cli.commands import app
 from companion.mavlink.signing import MINUTE, TICKS_PER_S, Signer
+from companion.mission.load import load_mission
+from companion.mission.mission import Mission
+from companion.record import load_record
+from companion.recorder import Recorder
+from companion.replay import replay
 from tests.party import KEY, TIME, Party
 from tests.rig import GUIDED, Rig, yard
 from tests.served import mission_path
@@ -26,11 +31,17 @@ def signing_rig(folder: Path, vehicle_key: bytes | None = KEY, our_key: bytes | 
         return TIME + round(holder[0].now_s() * TICKS_PER_S) if holder else TIME
 
     signer = None if our_key is None else Signer(our_key, clock)
+    folder.mkdir(exist_ok=True)
     rig = Rig(yard(folder), late_s=45.0, port=RADIO_PORT, signer=signer)
     holder.append(rig)
     if vehicle_key is not None:
         rig.station(mavlink.MAVLink_setup_signing_message(1, 1, list(vehicle_key), TIME))
     return rig
+
+
+def rig_mission(folder: Path) -> Mission:
+    """The one it drives."""
+    return load_mission(folder / "yard.toml")
 
 
 def refused(rig: Rig) -> tuple[int, int, int]:
@@ -89,6 +100,31 @@ def test_an_autopilot_that_reboots_is_believed_again(tmp_path: Path) -> None:
     rig.run_for(5.0)
     assert rig.companion.vehicle.heartbeat is not None
     assert rig.now_s() - rig.companion.vehicle.heartbeat.time_s < 2.0
+
+
+def test_a_signed_and_tuned_run_is_replayed_without_the_key(tmp_path: Path) -> None:
+    rig = signing_rig(tmp_path / "world")
+    mission = rig_mission(tmp_path / "world")
+    rig.recorder = recorder = Recorder(tmp_path / "record", mission, rig.settings, 0, arm=True)
+    rig.restart_companion(mission)
+    setting: Any = mavlink.MAVLink_param_set_message(1, 191, b"CMP_SPD_MAX", 0.8, 9)
+    owner, forger = Party(rig.simulator, 255, 190, RADIO_PORT), Party(rig.simulator, 253, 190, 0)
+    rig.until_driven(1.0)
+    rig.station(setting)  # unsigned
+    forger.sign(b"z" * 32, TIME + 10**9)
+    forger.send(setting)
+    rig.run_for(0.5)
+    owner.sign(timestamp=TIME + 3 * MINUTE)
+    owner.send(setting)
+    rig.finish()
+    recorder.close()
+    assert "CMP_SPD_MAX 20 -> 0.8" in rig.texts() and refused(rig)[:2] >= (1, 1)
+    record = (tmp_path / "record" / "link.tlog").read_bytes()
+    assert KEY not in record
+    again = replay(load_record(tmp_path / "record"))
+    assert again.differences == []
+    assert again.said > 200
+    assert again.companion is not None and again.companion.outcome.said == rig.texts()
 
 
 def test_keys_that_differ_are_told_of(tmp_path: Path) -> None:

@@ -107,4 +107,5 @@ def test_the_figures_come_once_a_second(tmp_path: Path) -> None:
     assert all(4 <= names.count(name) <= 6 for name in names)
     newest = {message.name: message.value for message in told}
     assert newest["NAV_PART"] in (1.0, 2.0, 3.0)
-    assert newest["PATH_COST"] > 0.0 and newest["SEARCH_MS"] > 0.0 and newest["PROGRESS"] == 0.0
+    assert newest["PATH_COST"] > 0.0 and newest["PROGRESS"] == 0.0
+    assert newest["SEARCH_MS"] == 0.0  # in lock-step a step takes no time

@@ -96,7 +96,7 @@ CASES: list[tuple[str, Level, Examined]] = [
     ("origin", S, with_state(home=None)),
     ("no-position", S, with_state(position=None)),
     ("pre-arm", S, with_state(prearm=PrearmSeen(0.0, False))),
-    ("pre-arm", S, replace(WELL, texts=("PreArm: Radio not calibrated",))),
+    ("pre-arm", S, replace(with_state(prearm=None), texts=("PreArm: Radio not calibrated",))),
     ("text", N, replace(WELL, texts=("Battery 1 low",))),
     ("rate", S, replace(WELL, slow=(SlowMessage("ATTITUDE", 20.0, 1.0),))),
     ("rate", W, replace(WELL, slow=(SlowMessage("ATTITUDE", 20.0, 8.0),))),
@@ -142,6 +142,13 @@ def test_what_is_to_be_set_keeps_the_other_bits() -> None:
 def test_the_gravest_comes_first() -> None:
     levels = [one.level for one in diagnose(replace(with_set(OA_TYPE=2.0, WP_RADIUS=5.0, FENCE_ENABLE=1.0), lost=900))]
     assert levels == [S, W, W, N]
+
+
+def test_why_it_would_not_arm_is_told_and_what_is_over_is_not() -> None:
+    texts = ("PreArm: AHRS: waiting for home", "PreArm: Radio not calibrated")
+    (finding,) = diagnose(replace(with_state(prearm=PrearmSeen(0.0, False)), texts=texts))
+    assert finding.says == "The autopilot would not arm: AHRS: waiting for home; Radio not calibrated."
+    assert diagnose(replace(WELL, texts=texts)) == []
 
 
 def test_cold_kernels() -> None:
