@@ -106,7 +106,10 @@ def test_map_and_past_path_are_there_again(tmp_path: Path, metres: float) -> Non
     seen_before, seen_now = before != 0.0, evidence.log_odds != 0.0
     assert (seen_before & seen_now).sum() > 0.8 * seen_before.sum(), "what had been seen, but for the last seconds"
     state = driver.leg[0]
-    assert state is not None and state.past[0] == Cell(2, 7), "the way back to the start"
+    assert state is not None and state.past[0] == Cell(2, 7), "the way back on this leg"
+    pursuit = rig.companion._pursuit
+    assert pursuit is not None and pursuit.trail.back()[-1] == Cell(2, 7), "the way back to the start"
+    assert metres < 3.0 or len(pursuit.trail.back()) > 5
     assert rig.companion.itinerary is not None and rig.companion.itinerary.home.cell == Cell(2, 7)
     assert any(text.startswith("Resumed with its map, 0 targets reached") for text in rig.texts())
 
