@@ -181,17 +181,6 @@ def test_after_a_loss_of_power_it_arms_and_goes_on_where_it_was(tmp_path: Path) 
     )
 
 
-def test_after_a_loss_of_power_the_ground_must_be_seen_anew(tmp_path: Path) -> None:
-    rig, mission = rig_of(tmp_path)
-    rig.until_driven(9.0)
-    lose_power(rig, mission)
-    rig.until(lambda: rig.companion.evidence is not None, 90.0)
-    evidence = rig.companion.evidence
-    assert evidence is not None and evidence.log_odds.min() == 0.0 < evidence.log_odds.max()
-    rig.finish()
-    assert max(rig.beyond_m) <= 1.5 + 1e-6
-
-
 @pytest.mark.parametrize("alive", [True, False], ids=["before", "while it is dead"])
 @pytest.mark.parametrize("mode", [MANUAL, HOLD])
 def test_a_rover_that_a_person_has_taken_stays_with_that_person(tmp_path: Path, mode: int, alive: bool) -> None:
