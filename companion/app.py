@@ -272,7 +272,7 @@ class Companion:
         assert self.vehicle.scan is not None
         scan = (self.vehicle.scan_ahead or self.vehicle.scan).scan
         pursuit = Pursuit(self._mission, self._settings, laid, scan, self._runner, self._log, self._tell, self._rng)
-        if self._memory is not None and self._memory.take_up(pursuit, self.vehicle.pose_at(now_s)):
+        if self._memory is not None and self._memory.take_up(pursuit, self.vehicle, now_s):
             self._tell(f"Resumed {self._start_up.found}, {pursuit.reached} targets reached before", INFO)
         return pursuit
 

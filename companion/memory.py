@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from companion.driver import Tally
-from companion.frames import NedPoint, Pose
+from companion.frames import NedPoint
+from companion.grid import Cell
 from companion.itinerary import Itinerary, Leg
 from companion.mapping import EvidenceMap
 from companion.mission.fingerprint import fingerprint
@@ -53,7 +54,7 @@ class Memory:
         """Why the state cannot be saved; empty while it can."""
         return self._writer.problem
 
-    def take_up(self, pursuit: Pursuit, pose: Pose | None) -> bool:
+    def take_up(self, pursuit: Pursuit, vehicle: VehicleState, now_s: float) -> bool:
         """Go on in the middle of the leg: once, with a pursuit on the ground of ``lay_resumed``. False: there is nothing to take up."""
         if self.kept is None:
             return False
@@ -62,9 +63,13 @@ class Memory:
         pursuit.driver.go_on(tally, state.tally.epoch)
         if state.draws is not None:
             pursuit.driver.searcher.rng.bit_generator.state = _generator(state.draws)
-        itinerary, leg = pursuit.itinerary, state.leg
+        shift = shift_of(state, pursuit.laid)
+        for x, y in state.trail:
+            pursuit.trail.enter(Cell(x + shift.x, y + shift.y))
+        _look(pursuit, vehicle)
+        itinerary, leg, pose = pursuit.itinerary, state.leg, vehicle.pose_at(now_s)
         if leg is not None and pose is not None and itinerary.leg in (Leg.TRAVEL, Leg.HOME):
-            past = nav_state(leg, shift_of(state, pursuit.laid))
+            past = nav_state(leg, shift)
             if pursuit.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
                 pursuit.driver.take_up(itinerary.goal, past, leg.doubts_left, pose)
         return True
@@ -135,11 +140,20 @@ class Memory:
             itinerary=pursuit.itinerary,
             leg=leg if driver.goal is pursuit.itinerary.goal else None,
             doubts_left=doubts_left,
+            trail=pursuit.trail.back()[::-1],
             base=pursuit.evidence.base,
             subdivisions=pursuit.evidence.subdivisions,
             tally=SavedTally(steps=tally.steps, return_steps=tally.return_steps, stuck=tally.stuck, epoch=epoch),
             draws=self._draws,
         )
+
+
+def _look(pursuit: Pursuit, vehicle: VehicleState) -> None:
+    """A rover that is found driving is beyond what had been seen when the state was written: what it sees now comes before the first target."""
+    seen, attitude = vehicle.scan_ahead, vehicle.attitude
+    pose = None if seen is None else vehicle.pose_at(seen.time_s)
+    if seen is not None and attitude is not None and pose is not None:
+        pursuit.map_scan(pose, attitude.yaw_rate_rad_s, seen.scan)
 
 
 def _rows(evidence: EvidenceMap) -> Iterator[tuple[BandPlace, Raster]]:

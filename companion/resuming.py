@@ -139,6 +139,7 @@ def _progress(laid: Laid, state: SavedState, then: GeoPoint, now_s: float) -> It
         errand = ResolvedTarget(progress.errand.name, point, cell, 0.0, OnBlocked.SKIP, progress.errand.speed_m_s)
     return replace(
         laid.itinerary,
+        home=replace(laid.itinerary.home, name=progress.start.name),
         statuses=progress.statuses,
         index=progress.index,
         leg=progress.leg,

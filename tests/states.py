@@ -69,6 +69,7 @@ def states(draw: st.DrawFn) -> SavedState:
         home=(draw(st.floats(-90.0, 90.0)), draw(st.floats(-180.0, 180.0))),
         progress=draw(progresses()),
         leg=draw(st.none() | leg),
+        trail=draw(st.lists(st.tuples(FIELD, FIELD), max_size=30).map(tuple)),
         ground=SavedGround(
             north_m=draw(METRES),
             east_m=draw(METRES),

@@ -34,6 +34,7 @@ class Part(BaseModel):
 class SavedPlace(Part):
     """A place in the local frame of then: metres from the origin."""
 
+    name: str = "start"
     north_m: Metres
     east_m: Metres
 
@@ -41,12 +42,11 @@ class SavedPlace(Part):
 class SavedErrand(SavedPlace):
     """A place that somebody asked for on the way."""
 
-    name: str
     speed_m_s: Annotated[float, Field(gt=0.0, le=1000.0)] | None
 
 
 class SavedProgress(Part):
-    """The itinerary: where the mission began, what has become of each target. Times are what was left of them."""
+    """The itinerary: where to return to, what has become of each target. Times are what was left of them."""
 
     start: SavedPlace
     statuses: tuple[TargetStatus, ...] = Field(min_length=1, max_length=MAX_TARGETS)
@@ -128,6 +128,8 @@ class SavedState(Part):
     home: Geo
     progress: SavedProgress
     leg: SavedLeg | None
+    trail: tuple[tuple[FieldNumber, FieldNumber], ...] = Field((), max_length=MAX_PAST)
+    """The way from where the mission began to here, without its loops; fields as in ``leg``."""
     ground: SavedGround
     tally: SavedTally
     draws: SavedDraws | None

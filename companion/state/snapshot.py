@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from companion.frames import GeoPoint, LocalFrame
-from companion.grid import Grid
+from companion.grid import Cell, Grid
 from companion.itinerary import Itinerary
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import NavState
@@ -43,6 +43,7 @@ class Snapshot:
     itinerary: Itinerary
     leg: NavState | None
     doubts_left: int
+    trail: tuple[Cell, ...]
     base: Grid
     subdivisions: int
     tally: SavedTally
@@ -73,6 +74,7 @@ def saved_state(now: Snapshot) -> SavedState:
         home=(now.home.lat_deg, now.home.lon_deg),
         progress=_progress(now.itinerary, now.now_s),
         leg=None if now.leg is None else _leg(now.leg, now.doubts_left),
+        trail=now.trail,
         ground=ground,
         tally=now.tally,
         draws=None if now.draws is None else _draws(now.draws),
@@ -82,7 +84,9 @@ def saved_state(now: Snapshot) -> SavedState:
 def _progress(itinerary: Itinerary, now_s: float) -> SavedProgress:
     give_up_s = itinerary.give_up_s
     return SavedProgress(
-        start=SavedPlace(north_m=itinerary.home.point.north_m, east_m=itinerary.home.point.east_m),
+        start=SavedPlace(
+            name=itinerary.home.name, north_m=itinerary.home.point.north_m, east_m=itinerary.home.point.east_m
+        ),
         statuses=itinerary.statuses,
         index=itinerary.index,
         leg=itinerary.leg,
