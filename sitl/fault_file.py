@@ -289,7 +289,9 @@ def load_faults(path: Path) -> FaultPlan:
         raise FaultFileError(f"{path}: not valid TOML: {reason}; docs/faults.md has examples") from error
     except ValidationError as error:
         reason = " ".join(describe_first(error, PlanTable).split())
-        raise FaultFileError(f"{path}: {reason}; write one [[fault]] table for each fault") from error
+        tables = error.errors(include_url=False)[0]["loc"][:1] == ("fault",)
+        remedy = "write one [[fault]] table for each fault" if tables else "docs/faults.md describes the file"
+        raise FaultFileError(f"{path}: {reason}; {remedy}") from error
     if not table.fault:
         raise FaultFileError(f"{path}: fault: there is none; write one [[fault]] table for each fault")
     faults = tuple(_fault(path, number, one) for number, one in enumerate(table.fault, 1))

@@ -176,6 +176,11 @@ class Physics:
         self._port = ScannerPort()
         self._begin()
 
+    @property
+    def system(self) -> int | None:
+        """Id of the autopilot that was heard on the lidar's line, if any."""
+        return self._port.system
+
     def hear(self, data: bytes) -> None:
         """Bytes from the lidar's line."""
         self._port.hear(data)

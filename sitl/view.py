@@ -25,9 +25,12 @@ PANEL_COLUMNS = (32, 44)
 NAME_COLUMNS = 11
 SMALLEST = (60, 16)
 """Columns and rows below which there is no room for a picture."""
+LEGEND_SHARE = 4
+"""Of the map's rows, the legend takes at most one in so many."""
 
 ARROWS = "↑↗→↘↓↙←↖"
 STATE_SIGNS = {"pending": "◎", "reached": "✓", "lost": "✗", "start": "⌂"}
+STATE_NAMES = {"pending": "target", "reached": "reached", "lost": "given up", "start": "start"}
 STATE_STYLES = {"pending": "bold #ff5f5f", "reached": "bold #5fd75f", "lost": "bold #ffaf00", "start": "bold #5fd75f"}
 ROVER_STYLE = "bold #000000 on #ffd700"
 
@@ -102,12 +105,21 @@ def _map_panel(view: View, columns: int, rows: int, *, colour: bool) -> Panel:
     """The map with its legend below, so many characters inside the border."""
     frame = frame_for(view.scene, 2 * rows, columns)
     dots = paint(view.scene, frame)
+    legend = _legend(view.scene, frame, dots, columns, colour=colour)[: max(1, rows // LEGEND_SHARE)]
+    if len(legend) > 1:  # its further lines are taken from the map
+        frame = frame_for(view.scene, 2 * (rows + 1 - len(legend)), columns)
+        dots = paint(view.scene, frame)
     lines = map_lines(view.scene, frame, dots, colour=colour)
-    legend = _legend(dots, colour=colour)
-    legend.truncate(columns, overflow="ellipsis")
-    width_m, height_m = frame.columns * frame.dot_m, frame.rows * frame.dot_m
-    title = Text(f"{view.title}: {width_m:.0f} x {height_m:.0f} m", overflow="ellipsis", no_wrap=True)
-    return Panel(Group(*lines, legend), title=title, title_align="left", border_style="dim", padding=0)
+    title = Text(f"{view.title}{_size(view.scene)}", overflow="ellipsis", no_wrap=True)
+    return Panel(Group(*lines, *legend), title=title, title_align="left", border_style="dim", padding=0)
+
+
+def _size(scene: Scene) -> str:
+    """The world's, whatever part of it is shown; nothing for open ground."""
+    if scene.bounds_m is None:
+        return ""
+    south_m, west_m, north_m, east_m = scene.bounds_m
+    return f": {east_m - west_m:.0f} x {north_m - south_m:.0f} m"
 
 
 def map_lines(scene: Scene, frame: Frame, dots: Dots, *, colour: bool) -> list[Text]:
@@ -156,15 +168,29 @@ def arrow(heading_rad: float) -> str:
     return ARROWS[round(heading_rad / (math.pi / 4.0)) % 8]
 
 
-def _legend(dots: Dots, *, colour: bool) -> Text:
-    """What the kinds are that the map shows, the most important first."""
-    legend = Text(no_wrap=True)
+def _legend(scene: Scene, frame: Frame, dots: Dots, columns: int, *, colour: bool) -> list[Text]:
+    """What the signs and colours mean that the map shows, the most important first, in as many lines as it takes."""
+    entries = [Text(f"{STATE_SIGNS[state]} {name}", no_wrap=True) for state, name in _states_shown(scene, frame)]
     there = set(dots.ravel().tolist())
     for kind, look in sorted(LOOKS.items(), reverse=True):
         if look.name and kind in there:
-            legend.append("■ " if colour else f"{look.sign} ", look.colour if colour else "")
-            legend.append(f"{look.name}  ")
-    return legend
+            half = "▀▄" if kind is Kind.WALL and not colour else ""
+            entry = Text("■ " if colour else f"{look.sign}{half} ", look.colour if colour else "", no_wrap=True)
+            entries.append(entry.append(look.name))
+    lines: list[Text] = []
+    for entry in entries:
+        if lines and len(lines[-1]) + 2 + len(entry) <= columns:
+            lines[-1].append("  ").append_text(entry)
+        else:
+            entry.truncate(columns, overflow="ellipsis")
+            lines.append(entry)
+    return lines or [Text()]
+
+
+def _states_shown(scene: Scene, frame: Frame) -> list[tuple[str, str]]:
+    """The states of places in sight, and what they are called."""
+    there = {one.state for one in scene.places if frame.dot(one.north_m, one.east_m) is not None}
+    return [(state, name) for state, name in STATE_NAMES.items() if state in there]
 
 
 def _facts(view: View, columns: int, rows: int) -> Table:

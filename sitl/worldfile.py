@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -84,6 +85,11 @@ class DoorTable(ObstacleTable):
                 raise ValueError(f"open_s: the span from {begin / 1000:g} s ends at {end / 1000:g} s")
             if self.period_s is not None and end > whole_ms(self.period_s):
                 raise ValueError(f"open_s: the span from {begin / 1000:g} s goes beyond period_s")
+        for (begin, end), (then, _) in pairwise(sorted(spans)):
+            if then < end:
+                raise ValueError(
+                    f"open_s: the spans from {begin / 1000:g} s and from {then / 1000:g} s overlap; make one of them"
+                )
         return spans
 
 
@@ -122,7 +128,7 @@ def load_world(path: Path, resolution_m: float | None = None) -> World:
     if path.suffix.lower() != ".toml":
         grid = load_map(path, resolution_m)
         return World.from_grid(Grid(grid.weights, grid.resolution_m))
-    table = read_table(path, WorldTable, MapError)
+    table = read_table(path, WorldTable, MapError, "docs/worlds.md describes the file")
     drawing = _Drawing(path, *_base(path, table))
     obstacles = drawing.obstacles
     glass, black = np.zeros_like(obstacles), np.zeros_like(obstacles)
@@ -228,7 +234,8 @@ class _Drawing:
         size_m = (width * self.resolution_m, height * self.resolution_m)
         if not shape.intersects(shapely.box(0.0, 0.0, *size_m)):
             raise MapError(
-                f"{self.path}: {kind} {number}: lies outside the world, {size_m[0]:g} m east and {size_m[1]:g} m north"
+                f"{self.path}: {kind} {number}: lies outside the world, {size_m[0]:g} m east and {size_m[1]:g} m north; "
+                "move it inside"
             )
         return shape
 
@@ -244,21 +251,27 @@ def _base(path: Path, table: WorldTable) -> tuple[Mask, float]:
     """The fields to draw on, with the obstacles of the map underneath, and their size."""
     if table.base is None:
         if table.size_m is None or table.base_resolution_m is not None:
-            raise MapError(f"{path}: size_m: [east, north] is needed where there is no base, and no base_resolution_m")
+            raise MapError(
+                f"{path}: size_m: [east, north] is needed where there is no base, and no base_resolution_m; give it, or a base"
+            )
         resolution_m = table.resolution_m or FINE_M
         width, height = (max(1, math.ceil(side_m / resolution_m - 1e-9)) for side_m in table.size_m)
         _check_size(path, width, height)
         return np.zeros((height, width), dtype=np.bool_), resolution_m
     if table.size_m is not None:
-        raise MapError(f"{path}: size_m: the base, {table.base}, says how large the world is")
+        raise MapError(f"{path}: size_m: the base, {table.base}, says how large the world is; leave size_m out")
     if Path(table.base).suffix.lower() == ".toml":
         raise MapError(f"{path}: base: {table.base} is a world file; it must be a map (image, ROS yaml, MovingAI .map)")
-    grid = load_map(path.parent / table.base, table.base_resolution_m)
+    try:
+        grid = load_map(path.parent / table.base, table.base_resolution_m)
+    except MapError as error:
+        raise MapError(f"{path}: base: {error}; name a map that can be read") from error
     resolution_m = table.resolution_m or grid.resolution_m / math.ceil(grid.resolution_m / FINE_M - 1e-9)
     times = round(grid.resolution_m / resolution_m)
     if times < 1 or abs(times * resolution_m - grid.resolution_m) > 1e-9:
         raise MapError(
-            f"{path}: resolution_m: {resolution_m:g} m does not divide the base's fields of {grid.resolution_m:g} m"
+            f"{path}: resolution_m: {resolution_m:g} m does not divide the base's fields of {grid.resolution_m:g} m; "
+            "choose a whole part of that"
         )
     _check_size(path, grid.width * times, grid.height * times)
     return np.repeat(np.repeat(grid.weights >= OBSTACLE, times, axis=0), times, axis=1), grid.resolution_m / times

@@ -117,7 +117,7 @@ def sensors_given(value: object) -> Sensors:
 def sensors_from(value: Sensors, folder: Path, error: type[Exception]) -> Sensors:
     """The same with a file read. Raises ``error`` for a bad one."""
     if isinstance(value, str) and value.endswith(".toml"):
-        sensors = read_table(folder / value, SensorsTable, error)
+        sensors = read_table(folder / value, SensorsTable, error, "docs/worlds.md describes range sensors")
         if str(sensors) == "none":
             raise error(
                 f"{folder / value}: describes no sensor; give a [lidar], [[beam]] or [proximity], or write sensors = 'none'"

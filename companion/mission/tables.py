@@ -35,12 +35,12 @@ class Table(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
-def read_table(path: Path, kind: type[M], error: type[Exception]) -> M:
-    """A whole TOML file as one table. Raises ``error``: one line with file, place and reason."""
+def read_table(path: Path, kind: type[M], error: type[Exception], remedy: str = "") -> M:
+    """A whole TOML file as one table. Raises ``error``: one line with file, place and reason, and where it says what may stand there."""
     try:
         return kind.model_validate(read_toml(path, error))
     except ValidationError as fault:
-        raise error(f"{path}: {_counted(describe_first(fault, kind))}") from fault
+        raise error(f"{path}: {_counted(describe_first(fault, kind))}{remedy and f'; {remedy}'}") from fault
 
 
 def read_toml(path: Path, error: type[Exception]) -> dict[str, object]:

@@ -339,6 +339,10 @@ def describe_first(error: ValidationError, model: type[BaseModel]) -> str:
     """The first fault of a validation as one line: place, reason, and for an unknown key one that is spelt nearly so, else all."""
     fault = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in fault["loc"]) or "file"
+    if fault["type"] == "missing":
+        return f"{place}: field required, it is missing"
+    if fault["type"] == "value_error":
+        return f"{place}: {fault['msg'].removeprefix('Value error, ')}"
     if fault["type"] != "extra_forbidden":
         return f"{place}: {fault['msg'].lower()} (got {fault.get('input')!r:.60})"
     known = _known_keys(model, fault["loc"][:-1])

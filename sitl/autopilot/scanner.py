@@ -67,6 +67,8 @@ class ScannerPort:
         self._codec = new_codec(OBSTACLE_AVOIDANCE)
         self._framer = Framer()
         self._settled = False
+        self.system: int | None = None
+        """The autopilot's id; None until it is heard."""
 
     def begin(self) -> None:
         """The autopilot has started anew; it may have another id."""
@@ -81,7 +83,7 @@ class ScannerPort:
                 continue
             of_autopilot = message.get_type() == "HEARTBEAT" and message.get_srcComponent() == AUTOPILOT
             if of_autopilot and message.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and not self._settled:
-                self._codec.srcSystem = message.get_srcSystem()
+                self._codec.srcSystem = self.system = message.get_srcSystem()
                 self._settled = True
 
     def packed(self, messages: list[Any]) -> bytes:

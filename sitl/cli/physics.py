@@ -16,6 +16,7 @@ from companion.mission.mission import MissionError
 from sitl.cli.serve import BAD_INPUT, say, stop_signals
 from sitl.endpoints import ListenError
 from sitl.endpoints.client import FORMS, ClientLink, open_link
+from sitl.endpoints.told import ToldLink
 from sitl.firmware_parameters import firmware_parameters, parameter_file
 from sitl.paramfile import ParameterFileError
 from sitl.physics import Physics
@@ -59,6 +60,8 @@ def physics(
         typer.echo(str(error), err=True)
         raise typer.Exit(BAD_INPUT) from error
     tell = (lambda line: None) if quiet else say
+    if link is not None and mavlink is not None:
+        link = ToldLink(link, mavlink, tell, lambda: behind.system)
     for line in _greeting(behind, host, port, mavlink, write_params):
         tell(line)
     stop = stop_signals()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 
 from sitl.endpoints.endpoint import Endpoint, ListenError, network_address
 from sitl.endpoints.serial import DEFAULT_BAUD, HIGHEST_BAUD, Device, PseudoTerminal, SerialEndpoint
@@ -35,8 +36,10 @@ def open_endpoint(url: str, simulator: Simulator, news: News | None = None, seri
             return TcpServer(host, port, news, serial_port)
         return UdpEndpoint(host, port, kind == "udpin", simulator, news, serial_port)
     except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        remedy = REMEDIES.get(kind, TAKEN if getattr(error, "errno", None) == errno.EADDRINUSE else ELSEWHERE)
+        number = getattr(error, "errno", None)
+        # pyserial puts the path and the number of the error into its text as well.
+        reason = os.strerror(number) if kind == "serial" and number else getattr(error, "strerror", None) or error
+        remedy = REMEDIES.get(kind, TAKEN if number == errno.EADDRINUSE else ELSEWHERE)
         raise ListenError(f"{url}: cannot be opened: {reason}; {remedy}") from error
 
 

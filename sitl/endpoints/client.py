@@ -7,7 +7,7 @@ import math
 import socket
 from typing import Protocol
 
-from sitl.endpoints.endpoint import READ_BYTES, ListenError, network_address
+from sitl.endpoints.endpoint import READ_BYTES, ListenError, network_address, place_text
 
 RETRY_S = 1.0
 CONNECT_S = 0.2
@@ -19,6 +19,11 @@ FORMS = "tcp:HOST:PORT, udpout:HOST:PORT or udpin:HOST:PORT"
 
 class ClientLink(Protocol):
     """Bytes to and from the network; what cannot be sent is lost."""
+
+    @property
+    def peer(self) -> str:
+        """Who is at the other end; empty for nobody."""
+        ...
 
     def sockets(self) -> list[socket.socket]:
         """What to wait on for input."""
@@ -60,6 +65,11 @@ class UdpLink:
             self._socket.close()
             raise
 
+    @property
+    def peer(self) -> str:
+        """Who is sent to, there or not; empty before anybody has spoken."""
+        return "" if self._partner is None else place_text(self._partner)
+
     def sockets(self) -> list[socket.socket]:
         """The one socket."""
         return [self._socket]
@@ -90,6 +100,11 @@ class TcpLink:
         self._socket: socket.socket | None = None
         self._waiting = bytearray()
         self._next_try_s = -math.inf
+
+    @property
+    def peer(self) -> str:
+        """The other side, while there is a connection."""
+        return place_text(self._place) if self._socket else ""
 
     def sockets(self) -> list[socket.socket]:
         """The one socket, while there is a connection."""

@@ -43,8 +43,10 @@ def network_address(url: str, forms: str) -> tuple[str, int]:
     kind, _, place = url.partition(":")
     host, _, port = place.rpartition(":")
     known = kind in ("tcp", "udpout", "udpin")
-    if not known or not host or not (port.isascii() and port.isdigit()) or not 0 < int(port) < 65536:
+    if not known or not host or not (port.isascii() and port.isdigit()):
         raise ListenError(f"{url}: not an address; write {forms}")
+    if len(port) > 9 or not 0 < int(port) < 65536:
+        raise ListenError(f"{url}: {port:.20} is no port; choose one from 1 to 65535")
     return host, int(port)
 
 

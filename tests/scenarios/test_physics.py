@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import socket
 import subprocess
@@ -117,7 +118,10 @@ class Autopilot:
 
 def test_the_lidar_reaches_the_firmware_over_tcp_again_and_again() -> None:
     line = free_port()
-    with physics("--mavlink", f"tcp:127.0.0.1:{line}", "--sensors", "lidar-360") as (_, port), asking(port) as exchange:
+    with (
+        physics("--mavlink", f"tcp:127.0.0.1:{line}", "--sensors", "lidar-360") as (child, port),
+        asking(port) as exchange,
+    ):
         one = Firmware(exchange, rate_hz=50)
         one.drive(0.5)
         for system in (5, 6):
@@ -143,6 +147,12 @@ def test_the_lidar_reaches_the_firmware_over_tcp_again_and_again() -> None:
             assert autopilot.scans_from(5)[-1].distances[0] == 801
         # A line that comes back belongs to the same firmware; only a new start of it may have brought another id.
         assert not autopilot.scans_from(6)
+        said = [text for text in stopped(child, signal.SIGTERM) if f":{line}" in text]
+    url, peer = f"tcp:127.0.0.1:{line}", f"127.0.0.1:{line}"
+    assert said[0] == f"waiting for {url}"
+    assert said.count(f"scans go to {peer} (system 5)") == 2
+    assert said.count(f"{peer}: link lost; waiting for {url}") == 2
+    assert re.fullmatch(rf"{url}: \d+ packets of the lidar sent, \d+ lost with nobody there", said[-1])
 
 
 def test_the_lidar_reaches_a_ground_network_over_udp() -> None:

@@ -110,6 +110,10 @@ BAD = [
     ('[[fault]]\nkind = "pilot"\nstart_s = 5\nmode = "HOVER"\n', "unknown mode 'HOVER'; modes are MANUAL, "),
     ('[[fault]]\nkind = "pilot"\nstart_s = 5\nmode = "HOLD"\nthrottle = 1\n', 'use mode = "MANUAL" or leave them out'),
     ('[[fault]]\nkind = "packet_loss"\nstart_s = 1\nprobability = 1\nlinks = [0]\n', "links.0"),
+    (
+        "seed = -1\n[[fault]]\nkind = 'gps_loss'\nstart_s = 1\n",
+        "seed: input should be greater than or equal to 0 (got -1); docs/",
+    ),
     ("[[fault]\n", "not valid TOML"),
 ]
 

@@ -222,12 +222,16 @@ def test_an_address_of_another_computer_is_not_taken_for_a_busy_port(bench: Benc
         bench.open("tcp:192.0.2.1:5760")
 
 
-@pytest.mark.parametrize(
-    "url", ["tcp", "serial", "pty:", "usb:/dev/x:57600", "tcp:127.0.0.1", "tcp:127.0.0.1:0", "udpin:x:99999"]
-)
+@pytest.mark.parametrize("url", ["tcp", "serial", "pty:", "usb:/dev/x:57600", "tcp:127.0.0.1", "tcp:127.0.0.1:x"])
 def test_bad_addresses_are_told(bench: Bench, url: str) -> None:
     with pytest.raises(ListenError, match="not an address"):
         bench.open(url)
+
+
+@pytest.mark.parametrize("port", ["0", "65536", "99999", "9" * 5000])
+def test_a_port_that_is_none_is_told(bench: Bench, port: str) -> None:
+    with pytest.raises(ListenError, match=r"is no port; choose one from 1 to 65535"):
+        bench.open(f"udpin:127.0.0.1:{port}")
 
 
 def test_serve_refuses_bad_input_with_one_line_and_exit_code_2(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from sitl.movers import Mover, timed_track
 from sitl.simulator import Simulator
 from sitl.sketch import COARSEST_M, Disc, Kind, Layer, Place, Scene, frame_for, paint
 from sitl.truth import SimStart
-from sitl.view import Fact, Section, View, arrow, render
+from sitl.view import LOOKS, STATE_SIGNS, Fact, Section, View, arrow, render
 from sitl.watching import Rates, Watching
 from sitl.world import World
 from tests.sitl_client import READY_S, Client, open_ground
@@ -66,7 +66,7 @@ def test_the_picture_is_north_up_and_the_rover_points_where_it_goes() -> None:
     dots = paint(one, frame)
     assert dots[2, 4] == Kind.WALL and dots[1, 4] == Kind.NOTHING and dots[2, 5] == Kind.MOVER
     text = "\n".join(screen(a_view(one)))
-    assert "→" in text and "◎" in text and "█ obstacle" in text and "o moving" in text
+    assert "→" in text and "◎" in text and "█▀▄ obstacle" in text and "o moving" in text
 
 
 @pytest.mark.parametrize(
@@ -86,6 +86,31 @@ def test_it_fits_into_any_terminal(columns: int, rows: int, colour: bool) -> Non
         assert max(map(len, lines)) <= columns
     if columns >= 60:
         assert "GUIDED, armed" in "\n".join(lines) and "39 s" in "\n".join(lines)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (120, 40)])
+@pytest.mark.parametrize("colour", [True, False])
+def test_everything_in_sight_is_in_the_legend(columns: int, rows: int, colour: bool) -> None:
+    whole = np.ones((1, 2), dtype=np.bool_)
+    layers = tuple(Layer(kind, whole, 1.0, 2.0 * number, 0.0) for number, kind in enumerate(Kind))
+    places = tuple(
+        Place(state, 5.0, east_m, state) for east_m, state in zip((5.0, 9.0, 13.0, 17.0), STATE_SIGNS, strict=True)
+    )
+    one = Scene(layers, Disc(1.0, 5.0, 0.3), 0.0, np.empty((0, 2)), places=places, bounds_m=(0.0, 0.0, 26.0, 26.0))
+    lines = screen(a_view(one), columns, rows, colour=colour)
+    told = " ".join(line.split("│")[1] for line in lines if line.count("│") > 3) if not colour else "\n".join(lines)
+    for look in LOOKS.values():
+        assert look.name in told
+    for sign, name in zip(STATE_SIGNS.values(), ("target", "reached", "given up", "start"), strict=True):
+        assert f"{sign} {name}" in told
+    assert colour or "█▀▄ obstacle" in told
+    assert len(lines) <= rows
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (140, 30), (70, 50)])
+def test_the_title_gives_the_worlds_size_whatever_the_window(columns: int, rows: int) -> None:
+    assert "Test: 8 x 4 m" in screen(a_view(scene(ROOM)), columns, rows)[0]
+    assert "Test ─" in screen(a_view(scene(ROOM, bounds_m=None)), columns, rows)[0]
 
 
 def test_kinds_can_be_told_apart_without_colours() -> None:
