@@ -77,7 +77,8 @@ class Recorder:
     """Writes the directory that docs/record.md describes.
 
     A directory that has a record keeps it: the new one goes to the same name with a number, see ``directory``. ``files`` are further files that
-    the run follows from, by what they are (None: there is none); they are copied. Raises RecordError if the directory cannot be written. Later a full
+    the run follows from, by what they are (None: there is none); they are copied.
+    ``start_us`` is the beginning in microseconds since 1970, by default now. Raises RecordError if the directory cannot be written. Later a full
     disk ends the record, never the run: see ``problem``.
     """
 
@@ -90,6 +91,7 @@ class Recorder:
         *,
         arm: bool = False,
         files: Mapping[str, Path | None] | None = None,
+        start_us: int | None = None,
     ) -> None:
         self.directory = unused(directory)
         self.problem = ""
@@ -98,7 +100,7 @@ class Recorder:
         self._sums: dict[str, tuple[int, int]] = {}
         self._clock_at_start_s: float | None = None
         self._flushed_s = 0.0
-        self._start_us = unix_time_us()
+        self._start_us = unix_time_us() if start_us is None else start_us
         self._round: Round | None = None
         try:
             self.directory.mkdir(parents=True, exist_ok=True)

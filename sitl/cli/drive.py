@@ -32,6 +32,8 @@ BAD_INPUT = (
     SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
 )  # fmt: skip
 LINE_EVERY_S = 60.0
+RECORD_START_US = 1_577_836_800_000_000
+"""2020-01-01: simulated time begins at no date, and the same run shall give the same record."""
 
 
 def drive(
@@ -87,7 +89,7 @@ def drive(
             typer.echo(note, err=True)
         if record is not None:
             files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
-            recorder = Recorder(record, mission, settings, seed, arm=True, files=files)
+            recorder = Recorder(record, mission, settings, seed, arm=True, files=files, start_us=RECORD_START_US)
         wanted.check()
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
