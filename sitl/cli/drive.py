@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from companion.app import Status
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import OutputError, usable_settings
+from companion.clock import WallClock
 from companion.itinerary import TargetStatus
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
@@ -20,7 +21,8 @@ from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
 from sitl.cli.drive_outputs import outputs, print_summary
 from sitl.cli.drive_view import run_with_view
-from sitl.cli.viewer import ViewError, terminal
+from sitl.cli.pace import Pace
+from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.lockstep import Drive, Report
@@ -32,6 +34,8 @@ BAD_INPUT = (
     SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
 )  # fmt: skip
 LINE_EVERY_S = 60.0
+VIEWED_SPEEDUP = 10.0
+"""Fast enough not to be waited for, slow enough to be followed."""
 RECORD_START_US = 1_577_836_800_000_000
 """2020-01-01: simulated time begins at no date, and the same run shall give the same record."""
 
@@ -64,6 +68,14 @@ def drive(
     params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
     faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
     time_limit_s: Annotated[float, typer.Option(min=1.0, help="Simulated seconds before giving up.")] = 3600.0,
+    speedup: Annotated[
+        float | None,
+        typer.Option(
+            min=0.1,
+            max=10_000.0,
+            help=f"Times real time, at most; default: as fast as it goes, with --view {VIEWED_SPEEDUP:g}.",
+        ),
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show map, rover and decisions on this terminal.")] = False,
 ) -> None:
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
@@ -74,6 +86,8 @@ def drive(
     console, wanted = Console(), outputs(image, map_stem, json_file)
     recorder: Recorder | NullRecorder = NullRecorder()
     run: Drive | None = None
+    viewer: Viewer | None = None
+    pace = Pace(VIEWED_SPEEDUP if view and speedup is None else speedup, WallClock())
     try:
         screen = terminal() if view else None
         settings = usable_settings(settings_file)
@@ -93,7 +107,10 @@ def drive(
         wanted.check()
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
-        report = _run_with_progress(run, console) if screen is None else run_with_view(run, screen)
+        if screen is None:
+            report = _run_with_progress(run, console, pace)
+        else:
+            report, viewer = run_with_view(run, screen, pace.wait)
     except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -102,6 +119,8 @@ def drive(
         raise StoppedError(_stopped(run, recorder)) from None
     recorder.close()
     print_summary(report, console)
+    if viewer is not None:
+        viewer.print_last()
     try:
         wanted.write(run, recorder, console)
     except OutputError as error:
@@ -173,19 +192,24 @@ def _mission(
     return mission_on_map(world, ground, begin, end, prior=prior)
 
 
-def _run_with_progress(run: Drive, console: Console) -> Report:
+def _run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:
     """Show one line that changes; where there is no terminal (a log file, CI), a new line now and then instead."""
     if not console.is_terminal:
-        return _run_with_lines(run, console)
+        return _run_with_lines(run, console, pace)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
     with Progress(*columns, console=console) as progress:
         task = progress.add_task(run.mission.name, total=None, state="")
-        report = run.run(lambda status: progress.update(task, state=_state(run, status)))
+
+        def observe(status: Status) -> None:
+            progress.update(task, state=_state(run, status))
+            pace.wait(status.time_s)
+
+        report = run.run(observe)
         progress.update(task, total=1, completed=1, state=report.outcome)
     return report
 
 
-def _run_with_lines(run: Drive, console: Console) -> Report:
+def _run_with_lines(run: Drive, console: Console, pace: Pace) -> Report:
     next_s = 0.0
 
     def observe(status: Status) -> None:
@@ -193,6 +217,7 @@ def _run_with_lines(run: Drive, console: Console) -> Report:
         if status.time_s >= next_s:
             next_s = status.time_s + LINE_EVERY_S
             console.print(f"{run.mission.name}: {_state(run, status)}", soft_wrap=True, markup=False, highlight=False)
+        pace.wait(status.time_s)
 
     return run.run(observe)
 

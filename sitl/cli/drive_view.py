@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from collections.abc import Callable
 from dataclasses import replace
 
 from rich.console import Console
@@ -28,18 +29,22 @@ STATES = {
 PARTS = {"A": "returning", "B": "exploring", "C": "new path"}
 
 
-def run_with_view(run: Drive, console: Console) -> Report:
-    """Drive to the end while a picture of it is shown; the last one stays on the terminal. SIGTERM counts as Ctrl-C."""
+def run_with_view(run: Drive, console: Console, pace: Callable[[float], None]) -> tuple[Report, Viewer]:
+    """Drive to the end while a picture of it is shown; ``pace`` waits until a simulated time may come. SIGTERM counts as Ctrl-C."""
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         with Viewer(console) as viewer:
             shown = DriveView(run, viewer)
-            report = run.run(shown.observe)
+
+            def observe(status: Status) -> None:
+                shown.observe(status)
+                pace(status.time_s)
+
+            report = run.run(observe)
             shown.finish()
     finally:
         signal.signal(signal.SIGTERM, before)
-    viewer.print_last()
-    return report
+    return report, viewer
 
 
 class DriveView:

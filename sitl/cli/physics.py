@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from companion.cli.inputs import OutputError, writable, written
 from companion.clock import WallClock
@@ -52,7 +53,8 @@ def physics(
         _write_parameters(scenario, behind, write_params)
         link = open_link(mavlink) if mavlink else None
         # Compiles what is not compiled yet before the firmware waits for answers.
-        behind.rehearse()
+        with Console(stderr=True).status("starting ..."):
+            behind.rehearse()
         listening = open_port(host, port)
     except (MissionError, MapError, ScenarioError, ListenError, OutputError, ParameterFileError) as error:
         if link is not None:

@@ -55,7 +55,8 @@ def serve(
         console = terminal() if view else None
         name, scenario = _scenario(mission_file, sensors, params, faults)
         # Compiles what is not compiled yet before anybody connects and time begins to count.
-        scenario.simulator(seed).rehearse()
+        with Console(stderr=True).status("starting ..."):
+            scenario.simulator(seed).rehearse()
         simulator = scenario.simulator(seed)
         watching = Watching(name, simulator)
         tell = watching.tell if view else say

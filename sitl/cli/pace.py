@@ -1,0 +1,21 @@
+"""Simulated time that passes no faster than so many times real time."""
+
+from __future__ import annotations
+
+from companion.clock import Clock
+
+
+class Pace:
+    """``speedup`` None: as fast as it goes. It begins with the first call."""
+
+    def __init__(self, speedup: float | None, clock: Clock) -> None:
+        self._speedup = speedup
+        self._clock = clock
+        self._began: tuple[float, float] | None = None
+
+    def wait(self, time_s: float) -> None:
+        """Until ``time_s``, simulated, may come; at once when it is late already."""
+        if self._speedup is None:
+            return
+        began_s, first_s = self._began = self._began or (self._clock.now_s(), time_s)
+        self._clock.sleep_until_s(began_s + (time_s - first_s) / self._speedup)
