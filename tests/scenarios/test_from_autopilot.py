@@ -14,12 +14,13 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
+from companion.cli.source import refuse_arming
 from companion.fetching import TRIES, Fetching
 from companion.mission.mission import Mission, MissionError, RoverSpec
 from companion.mission.stored import mission_of
 from companion.plan_watch import AGAIN_S
 from tests.asker import Asker
-from tests.rig import yard
+from tests.rig import ARM, AUTO, SET_MODE, yard
 from tests.scenarios.test_auto_legs import GUIDED_ENABLE, NONE, ON, WAYPOINT, Row, place_deg
 from tests.served import finished, process, served, wait_until
 
@@ -160,23 +161,40 @@ def upload(url: str, rows: list[tuple[int, tuple[float, ...], tuple[int, int]]])
 
 
 def test_the_command_itself(tmp_path: Path) -> None:
+    """Real processes: first without a mission in the autopilot, then with one."""
     with served(yard(tmp_path)) as world:
-        upload(world.url, stored([(WAYPOINT, NONE, (5, 10))]))
         arguments = ("--from-autopilot", "--connect", world.url, "--arm", "--state", tmp_path / "state")
+        with process("companion", "run", *arguments) as run:
+            code, _, err = finished(run, 60.0)
+        assert code == 2
+        assert "the autopilot's mission: there is none; upload one" in err and "Traceback" not in err
+        upload(world.url, stored([(WAYPOINT, NONE, (5, 9))]))
         with process("companion", "run", *arguments) as run:
             code, out, err = finished(run, 90.0)
         assert code == 0, err
         assert out == "waypoint 1: reached\n"
         assert "fetching the mission" in err and "Traceback" not in err
-        wait_until(lambda: world.simulator.truth.speed_m_s < 0.05, 5.0)
         assert world.simulator.collisions == ()
 
 
-def test_the_command_without_a_mission_in_the_autopilot(tmp_path: Path) -> None:
-    with (
-        served(yard(tmp_path)) as world,
-        process("companion", "run", "--from-autopilot", "--connect", world.url) as run,
-    ):
-        code, _, err = finished(run, 60.0)
-    assert code == 2
-    assert "the autopilot's mission: there is none; upload one" in err and "Traceback" not in err
+def test_the_command_drives_what_auto_hands_over(tmp_path: Path) -> None:
+    """Real processes: the mission is fetched, a person arms and sets AUTO, the companion drives the leg and ends by itself."""
+    with served(yard(tmp_path)) as world:
+        upload(world.url, stored([(GUIDED_ENABLE, ON, (6, 9)), (WAYPOINT, NONE, (3, 9))]))
+        with process("companion", "run", "--from-autopilot", "--connect", world.url) as run:
+            assert run.stderr is not None
+            assert any("a person to arm and to set AUTO" in line for line in iter(run.stderr.readline, ""))
+            world.pilot(ARM, 1)
+            wait_until(lambda: world.simulator.vehicle.armed, 10.0)
+            world.pilot(SET_MODE, 1, AUTO)
+            code, out, err = finished(run, 60.0)
+        assert (code, out) == (0, "guided item 1: reached\n"), err
+        assert world.simulator.vehicle.mode == AUTO, "the autopilot goes on"
+        assert world.simulator.collisions == ()
+
+
+def test_a_mission_that_hands_over_is_not_armed_for(tmp_path: Path) -> None:
+    mission = fetched(holding(tmp_path, [(GUIDED_ENABLE, ON, (6, 9))]))
+    refuse_arming(mission, arm=False)
+    with pytest.raises(MissionError, match=r"the autopilot's mission: .* leave out --arm"):
+        refuse_arming(mission, arm=True)
