@@ -11,10 +11,24 @@ from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
+from companion.rounds import Mark
 from companion.settings import LinkSettings
 from companion.vehicle import AckSeen, HeartbeatSeen
 from tests.mavlink_vehicle import Station
 from tests.tlog import messages
+
+
+class Log:
+    """Notes all packets of both directions."""
+
+    def __init__(self) -> None:
+        self.packets: list[tuple[float, bytes]] = []
+
+    def heard(self, time_s: float, packets: list[bytes], mark: Mark) -> None:
+        self.packets += [(time_s, raw) for raw in packets]
+
+    def said(self, time_s: float, raw: bytes) -> None:
+        self.packets.append((time_s, raw))
 
 
 class Bench:
@@ -22,16 +36,14 @@ class Bench:
 
     def __init__(self, *, known: bool = True) -> None:
         near, self.far = MemoryLink.pair()
-        self.log: list[tuple[float, bytes]] = []
-        self.link = AutopilotLink(near, Codec(LinkSettings()), LinkSettings(), self)
+        log = Log()
+        self.log = log.packets
+        self.link = AutopilotLink(near, Codec(LinkSettings()), LinkSettings(), log)
         self.rover = Station()
         if known:
             self.hear(0.0, self.rover.heartbeat(4))
             self.link.service(0.0)
             self.said()
-
-    def packet(self, time_s: float, raw: bytes) -> None:
-        self.log.append((time_s, raw))
 
     def hear(self, now_s: float, *raw: bytes) -> list[Any]:
         self.far.write(b"".join(raw))
