@@ -63,6 +63,7 @@ def test_the_arc_to_a_target_aside_is_looked_along() -> None:
     assert arc_is_free(HERE, aside, evidence, ROVER)
     put(evidence, 6.0, 10.2)  # not on the straight line, but where the rover swings out to
     assert not arc_is_free(HERE, aside, evidence, ROVER)
+    assert not arc_is_free(Pose(4.0, 10.0, math.pi, 0.0), aside, ground(), ROVER), "behind"
     assert arc_is_free(Pose(4.0, 10.0, HERE.point.bearing_rad(aside), 0.0), aside, evidence, ROVER)
 
 
