@@ -249,7 +249,7 @@ def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, 
 )
 def test_positions_and_velocities_before_a_border(setpoint: Setpoint, heading_rad: float, fault: bool) -> None:
     """3 m from the middle: from 2 m/s the rover needs 3 m, from 1.5 m/s 1.8 m, and its body is 0.35 m."""
-    found = fault_of(Output(setpoint, Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 0.0), bordered(inner(6.0)))
+    found = inside_borders(Output(setpoint, Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 0.0), bordered(inner(6.0)))
     assert found == ("setpoint leads over the border of the yard" if fault else "")
 
 
