@@ -34,6 +34,7 @@ results: $(KERNELS)
 	$(BIN)/rover-sitl experiment wang-table4 --docs docs
 	$(BIN)/rover-sitl experiment navigation --runs 10 --planners $(NAVIGATORS) --docs docs
 	$(BIN)/rover-sitl experiment driving --runs 5 --docs docs
+	$(BIN)/rover-sitl experiment dead-companion --runs 6 --docs docs
 	$(BIN)/rover-companion bench $(wildcard ../shared/data/movingai/dao/arena.map ../shared/data/movingai/dao/lak104d.map) --cell-s 2 --docs docs
 
 soak: $(KERNELS)

@@ -152,6 +152,17 @@ def doubt(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
     return found
 
 
+def look_again(evidence: EvidenceMap, since_stamp: int) -> None:
+    """Forget obstacles that no scan has touched since then, and all penalties: what stood there may have opened.
+
+    The ground becomes unknown, not free: whoever goes there looks first. What the mission itself closed stays.
+    """
+    old = (evidence.log_odds >= evidence.settings.occupied_at) & (evidence.stamps < since_stamp)
+    evidence.log_odds[old] = 0.0
+    evidence.penalty.fill(0.0)
+    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+
+
 def look_along(evidence: EvidenceMap, start: NedPoint, end: NedPoint, half_width_m: float) -> Line:
     """How far a rover of this half width could drive straight from start towards end (up to its distance).
 

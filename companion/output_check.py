@@ -21,7 +21,7 @@ from companion.mapping import EvidenceMap, ground_of, in_cells, look_along
 from companion.mission.bounds import Bounds
 from companion.reach import RoverLimits
 from companion.settings import Settings
-from companion.stopping import braking_distance_m, farthest_m
+from companion.stopping import blind_distance_m, braking_distance_m, farthest_m
 from companion.swept import BLOCKED, arc_clear, kept_room
 
 SLACK_M = 0.1
@@ -62,7 +62,7 @@ Rule = Callable[[Output, Surroundings], str]
 def position_in_sight(output: Output, known: Surroundings) -> str:
     """A guided position lies within the horizon and stopping distance, and the straight way there is clear and has been seen.
 
-    It may lie beyond seen ground by the braking distance: so far the rover would come in any case.
+    It may lie beyond seen ground by what the slowest rover needs to brake, for that creeps where a look shows nothing.
     """
     if not isinstance(output.setpoint, GuidedPosition):
         return ""
@@ -74,14 +74,14 @@ def position_in_sight(output: Output, known: Surroundings) -> str:
     line = look_along(evidence, here, there, evidence.rover_radius_m)
     if line.clear_m < distance_m - SLACK_M:
         return "target behind something"
-    beyond_m = braking_distance_m(max(output.speed_m_s, settings.min_speed_m_s), settings)
+    beyond_m = braking_distance_m(settings.min_speed_m_s, settings)
     if line.seen_m + beyond_m < distance_m - SLACK_M:
         return "target on ground not seen"
     return ""
 
 
 def velocity_stops_in_time(output: Output, known: Surroundings) -> str:
-    """With a guided velocity the rover can stop, on the arc it is told, before it touches anything that is known."""
+    """A guided velocity that is told no more ends, on the arc it is told, before the rover touches anything that is known."""
     if not isinstance(output.setpoint, GuidedVelocity) or output.setpoint.forward_m_s == 0.0:
         return ""
     forward_m_s, evidence, pose = output.setpoint.forward_m_s, known.evidence, output.pose
@@ -92,7 +92,7 @@ def velocity_stops_in_time(output: Output, known: Surroundings) -> str:
     base_m_s = max(abs(output.speed_m_s), known.settings.steering.scale_base_m_s)
     curvature_m = output.setpoint.yaw_rate_rad_s / base_m_s
     course_rad = pose.heading_rad + (math.pi if forward_m_s < 0.0 else 0.0)
-    reach = braking_distance_m(abs(forward_m_s), known.settings.guidance) * scale
+    reach = blind_distance_m(abs(forward_m_s), known.settings.guidance) * scale
     radius = (evidence.rover_radius_m - NEARER_M) * scale
     room = kept_room(ground, x, y, radius, 0.0)
     if arc_clear(ground, x, y, course_rad, curvature_m / scale, room, reach, BLOCKED) < reach - SLACK_M * scale:

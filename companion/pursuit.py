@@ -22,7 +22,7 @@ from companion.itinerary import (
     with_errand,
 )
 from companion.laying import Laid, apart_m, fenced_again, lay_again
-from companion.mapping import EvidenceMap, forget, integrate
+from companion.mapping import EvidenceMap, forget, integrate, look_again
 from companion.mission.fence import AutopilotFence
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
@@ -44,6 +44,9 @@ from companion.trail import Trail
 INFO, WARNING = 6, 4
 ORIGIN_MOVED_M = 0.2
 """The autopilot tells its origin in whole 1e-7 degrees (1 cm): more than this is another origin."""
+
+WATCHED_SCANS = 20
+"""Before another try after waiting, obstacles that are not in the newest scans are forgotten: a door may have opened."""
 
 Tell = Callable[[str, int], None]
 """Says a text with its severity to the people."""
@@ -201,7 +204,10 @@ class Pursuit:
         """What to do for the mission now; None when it has ended. ``announced``: who has told of itself and may come near."""
         moving = merged(announced, self._tracker.moving(now_s), now_s)
         self.trail.enter(self.evidence.base.cell_at(pose.point))
+        waited = self.itinerary.leg is Leg.WAIT
         self.itinerary = on_time(self.itinerary, now_s)
+        if waited and self.itinerary.leg is Leg.TRAVEL:
+            look_again(self.evidence, self._scans - WATCHED_SCANS)
         if self.itinerary.ended:
             return None
         if self.itinerary.leg in (Leg.STAY, Leg.WAIT):

@@ -132,14 +132,19 @@ def unseen_flank(pose: Pose, point: NedPoint, evidence: EvidenceMap, rover: Rove
 
 
 def arc_is_free(pose: Pose, target: NedPoint, evidence: EvidenceMap, rover: RoverLimits) -> bool:
-    """Whether the arc on which the rover comes to the target, beginning as it points now, is clear and has been seen."""
+    """Whether the arc on which the rover comes to the target, beginning as it points now, is clear and has been seen.
+
+    To a target behind there is none that it would drive.
+    """
     ground = ground_of(evidence, pose)
     scale = 1.0 / evidence.evidence_m
     x, y = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0].tolist()
     distance = pose.point.distance_m(target) * scale
     aside_rad = wrap_pi_rad(pose.point.bearing_rad(target) - pose.heading_rad)
+    if abs(aside_rad) > 0.5 * math.pi:
+        return False
     curvature = 2.0 * math.sin(aside_rad) / distance
-    length = distance * aside_rad / math.sin(aside_rad)
+    length = distance / float(np.sinc(aside_rad / math.pi))
     room = kept_room(ground, x, y, (rover.radius_m + 0.05) * scale, (rover.radius_m - 0.05) * scale)
     return bool(arc_clear(ground, x, y, pose.heading_rad, curvature, room, length, UNSEEN) >= length - 1e-6)
 

@@ -299,7 +299,8 @@ class _View:
         if speed_m_s <= 0.0:
             return self.brake()
         self.told_m = ahead.curvature_m
-        setpoint = GuidedVelocity(round(-speed_m_s if backwards else speed_m_s, 1), self._turn_rate(ahead.curvature_m))
+        told_m_s = math.floor(10.0 * speed_m_s + 1e-6) / 10.0  # never rounded up: that would lead farther
+        setpoint = GuidedVelocity(-told_m_s if backwards else told_m_s, self._turn_rate(ahead.curvature_m))
         return Guide(Motion.DRIVE, setpoint, speed_m_s)
 
     def _left_alone_m_s(self, wanted_m_s: float, curvature_m: float, *, backwards: bool) -> float:

@@ -89,7 +89,7 @@ def test_a_position_that_passes_is_near_and_the_way_there_clear_and_seen(evidenc
         return
     distance_m = pose.point.distance_m(there)
     assert distance_m <= farthest_m(output.speed_m_s, SETTINGS.guidance) + 0.1
-    braking_m = max(output.speed_m_s, 0.5) * 0.25 + max(output.speed_m_s, 0.5) ** 2 / 1.6
+    braking_m = 0.5 * 0.25 + 0.5**2 / 1.6
     for along_m in np.arange(0.0, distance_m - 0.1, 0.05):
         share = along_m / distance_m
         north_m = pose.north_m + share * (there.north_m - pose.north_m)
@@ -111,8 +111,8 @@ def test_a_velocity_that_passes_can_be_stopped_on_its_arc(evidence: EvidenceMap,
     north_m, east_m = pose.north_m, pose.east_m
     course_rad = pose.heading_rad + (math.pi if speed_m_s < 0.0 else 0.0)
     curvature_m = output.setpoint.yaw_rate_rad_s / max(output.speed_m_s, 1.0)
-    braking_m = abs(speed_m_s) * 0.25 + speed_m_s**2 / 1.6
-    for _ in np.arange(0.0, braking_m - 0.1 - evidence.evidence_m, 0.02):
+    alone_m = abs(speed_m_s) * 3.25 + speed_m_s**2 / 1.6
+    for _ in np.arange(0.0, alone_m - 0.1 - evidence.evidence_m, 0.02):
         north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
         course_rad += 0.02 * curvature_m
         assert gap_m(standing, north_m, east_m) > RADIUS_M - 0.05 - evidence.evidence_m
@@ -249,7 +249,7 @@ def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, 
 )
 def test_positions_and_velocities_before_a_border(setpoint: Setpoint, heading_rad: float, fault: bool) -> None:
     """3 m from the middle: from 2 m/s the rover needs 3 m, from 1.5 m/s 1.8 m, and its body is 0.35 m."""
-    found = fault_of(Output(setpoint, Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 0.0), bordered(inner(6.0)))
+    found = inside_borders(Output(setpoint, Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 0.0), bordered(inner(6.0)))
     assert found == ("setpoint leads over the border of the yard" if fault else "")
 
 

@@ -1,0 +1,46 @@
+"""A companion that falls dead at any moment: the rover comes to stand by itself and touches nothing on its way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.mission.load import load_mission
+from sitl.experiments.dead_companion import DeadReport, Death, die, overheard, with_suite
+from sitl.experiments.experiment import Options
+
+MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+
+
+@pytest.mark.parametrize(
+    ("name", "suite"),
+    [("clutter.toml", "lidar-90"), ("complex.toml", "lidar-360"), ("ackermann.toml", "lidar-360")],
+)
+def test_whenever_it_dies_nothing_is_touched(name: str, suite: str) -> None:
+    told = overheard(with_suite(load_mission(MISSIONS / name), suite), 0)
+    moments_s = np.random.default_rng(0).uniform(told.begin_s, told.end_s, 6)
+    deaths = [die(told, float(moment_s)) for moment_s in moments_s]
+    assert sum(death.speed_m_s > 0.1 for death in deaths) >= 2, "some while it drove"
+    assert [death for death in deaths if death.touched] == []
+    assert max(death.went_s for death in deaths) < 30.0
+    assert max(death.went_m for death in deaths) < 9.0
+
+
+def test_what_is_heard_again_is_the_same_drive() -> None:
+    told = overheard(with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "lidar-360"), 3)
+    early, late = die(told, told.begin_s - 1.0), die(told, told.end_s + 1.0)
+    assert (early.speed_m_s, early.went_m) == (0.0, 0.0)
+    assert late.went_m < 0.5 and late.speed_m_s < 1.0, "at its end the rover stops"
+    assert told.end_s - told.begin_s > 40.0
+
+
+def test_the_table_counts_what_it_says() -> None:
+    deaths = tuple(
+        Death("Yard", "beams", 0, 50.0, speed, touched, 1, 3.0, 5.0) for speed, touched in ((1.0, 2), (0.0, 0))
+    )
+    report = DeadReport(Options(runs=2), deaths)
+    (table,) = report.tables()
+    assert [list(column.cells)[-1] for column in table.columns] == ["all", "2", "1", "2", "2", "1.0", "3.0", "5.0"]
+    assert report.as_json()["deaths"] == [{name: getattr(death, name) for name in Death.__slots__} for death in deaths]
