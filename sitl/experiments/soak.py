@@ -20,7 +20,7 @@ from rich.table import Table
 
 from companion.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.autopilot.modes import arm, set_mode
+from sitl.autopilot.modes import arm, arming_faults, set_mode
 from sitl.autopilot.vehicle import Mode
 from sitl.experiments import soak_faults, soak_worlds
 from sitl.experiments.experiment import Advance, Options, where_measured
@@ -35,6 +35,8 @@ SUITES = ("lidar-90", "lidar-360")
 TIME_LIMIT_S = 1800.0
 PERSON_S = 8.0
 """So long the person looks before doing what the companion waits for."""
+PATIENCE = 5
+"""So often in a row the person tries."""
 WARM_UP = 10
 """Memory is compared from this run on: until then caches fill."""
 POLICIES = ("Returning: ", "HOLD: battery")
@@ -65,11 +67,13 @@ class Soaked:
 
 
 class Person:
-    """Looks on; helps when asked to for long enough."""
+    """Looks on; helps when asked to for long enough. ``gave_up``: why the rover was carried home, if it was."""
 
     def __init__(self) -> None:
         self.helped = 0
+        self.gave_up = ""
         self._asked_s: float | None = None
+        self._in_vain = 0
 
     def look(self, drive: Drive, doing: str) -> None:
         """To be called often."""
@@ -83,8 +87,15 @@ class Person:
         vehicle = drive.simulator.vehicle
         self._asked_s = None
         self.helped += 1
-        if set_mode(vehicle, Mode.GUIDED):
-            arm(vehicle)
+        if set_mode(vehicle, Mode.GUIDED) and arm(vehicle):
+            self._in_vain = 0
+            return
+        self._in_vain += 1
+        if self._in_vain == PATIENCE:
+            self.gave_up = (
+                f"The autopilot does not let it be armed: {'; '.join(arming_faults(vehicle)) or 'GUIDED refused'}"
+            )
+            drive.companion.stop()
 
 
 def soaked(seed: int) -> Soaked:
@@ -109,7 +120,7 @@ def _driven(drive: Drive, result: Soaked) -> Soaked:
     person = Person()
     report = drive.run(lambda status: person.look(drive, status.doing))
     missed = [name for name, status in report.targets if status != "reached"]
-    policy = next((text for text in report.said if text.startswith(POLICIES)), "")
+    policy = next((text for text in report.said if text.startswith(POLICIES)), person.gave_up)
     ended = "reached" if missed in ([], ["sealed"]) else "policy" if policy else "unfinished"
     if not drive.companion.done:
         ended, policy = "unfinished", ""

@@ -66,7 +66,7 @@ class Vehicle:
 def test_the_person_helps_when_asked_for_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     modes, armed = [], []
     monkeypatch.setattr(soak, "set_mode", lambda vehicle, mode: modes.append(mode) or True)
-    monkeypatch.setattr(soak, "arm", armed.append)
+    monkeypatch.setattr(soak, "arm", lambda vehicle: armed.append(vehicle) or True)
     person, run = Person(), Vehicle()
     for run.time_s in np.arange(0.0, 7.5, 0.5):
         person.look(run, "stopped: disarmed, waiting for a person to arm")  # type: ignore[arg-type]
