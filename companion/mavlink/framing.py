@@ -48,9 +48,9 @@ class Framer:
         while at < len(buffer):
             if buffer[at] not in (MAGIC_V1, MAGIC_V2):
                 begin = MAGIC.search(buffer, at)
-                end = len(buffer) if begin is None else begin.start()
-                self.bad_bytes += end - at
-                at = end
+                beyond = len(buffer) if begin is None else begin.start()
+                self.bad_bytes += beyond - at
+                at = beyond
                 continue
             end = _end(buffer, at)
             if end is None:
