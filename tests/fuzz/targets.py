@@ -15,6 +15,7 @@ from companion.mapfiles import MapError, load_map
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.framing import MAGIC_V2
+from companion.mavlink.signing import SigningKeyError, load_key
 from companion.mavlink.transport import MemoryLink
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
@@ -23,13 +24,14 @@ from companion.record import load_record
 from companion.recorded_files import RecordError
 from companion.settings import Settings, SettingsError, load_settings
 from companion.state.format import SUM_BYTES, StateError, decoded, encoded
+from companion.tuning import with_tuned
 from companion.vehicle import VehicleState, fold
 from tests.mavlink_vehicle import Station
 from tests.states import a_state
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 LONGEST_LINE = 1000
-REFUSALS = (MissionError, MapError, SettingsError, RecordError, StateError)
+REFUSALS = (MissionError, MapError, SettingsError, RecordError, StateError, SigningKeyError)
 HOME = GeoPoint(53.0, 23.0)
 
 
@@ -99,6 +101,21 @@ def map_yaml(data: bytes) -> None:
 def settings(data: bytes) -> None:
     """The settings file."""
     _file("s.toml", data, load_settings)
+
+
+def tuned(data: bytes) -> None:
+    """What ground stations have set in earlier runs."""
+    _file("tuned.toml", data, lambda path: with_tuned(Settings(), path))
+
+
+def signing_key(data: bytes) -> None:
+    """A file with a key."""
+
+    def use(path: Path) -> None:
+        path.chmod(0o600)
+        load_key(path)
+
+    _file("key", data, use)
 
 
 def state(data: bytes) -> None:
@@ -187,6 +204,8 @@ def targets() -> dict[str, Target]:
         "settings": Target(
             settings, (b"[guidance]\nhorizon_m = 6.0\n[planner]\n", every.encode(), b'profile = "paper"\n')
         ),
+        "tuned": Target(tuned, (b"[guidance]\nhorizon_m = 6.0\n",)),
+        "signing-key": Target(signing_key, (b"passphrase\n", b"0f" * 32)),
         "state": Target(state, state_examples()),
         "record": Target(record, record_examples()),
         "recorded-mission": Target(recorded_mission, (b'{"name": "m", "targets": [{"name": "t", "place": [1, 2]}]}',)),

@@ -91,7 +91,7 @@ def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) 
 
 
 @pytest.mark.parametrize(
-    ("name", "faults", "limit_s"), [("one-obstacle.toml", "interrupted", 90.0), ("crossing.toml", "radio", 75.0)]
+    ("name", "faults", "limit_s"), [("one-obstacle.toml", "interrupted", 90.0), ("crossing.toml", "radio", 60.0)]
 )
 def test_nothing_differs_under_faults_and_among_moving_things(
     tmp_path: Path, name: str, faults: str, limit_s: float
@@ -128,9 +128,7 @@ class Recorded(Rig):
         assert self._state is not None
         memory = kept_in(self._state, mission, resume=resume)
         files = {"state": self.state_file if resume else None}
-        self.recorder = Recorder(
-            self.place, mission, self.settings, 0, arm=True, files=files
-        )
+        self.recorder = Recorder(self.place, mission, self.settings, 0, arm=True, files=files)
         near, self._far = MemoryLink.pair()
         self.link = AutopilotLink(
             near, Codec(self.settings.link, signer=self._signer), self.settings.link, self.recorder
