@@ -8,7 +8,7 @@ SOURCES := $(shell find companion sitl -name '*.py')
 NAVIGATORS := hybrid,bspline-ga,astar,theta-star,dstar-lite,dijkstra,achour,prm,vertex++
 CANDIDATES := python3.11 python3.12 python3.13 python3.14 python3 python
 
-.PHONY: demo test lint bench results soak clean
+.PHONY: demo test lint bench results soak fuzz clean
 
 demo: $(KERNELS)
 	@$(BIN)/rover-sitl drive missions/rooms.toml --image out/rooms.png --map out/rooms-map
@@ -24,6 +24,10 @@ lint: $(READY)
 
 bench: $(KERNELS)
 	$(BIN)/python -m pytest tests/bench --override-ini addopts= -q -s --benchmark-columns=median,min,max,rounds
+
+# Each reader of bytes from outside for a minute, guided by what of the program the bytes reach. Needs: pip install -e '.[fuzz]'
+fuzz: $(READY)
+	$(BIN)/python -m tests.fuzz all --seconds 60
 
 results: $(KERNELS)
 	$(BIN)/rover-sitl experiment kwasniewski-table1 --docs docs

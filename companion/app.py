@@ -361,8 +361,8 @@ class Companion:
         if self._autopilot.signing_trouble and self.vehicle.heartbeat is not None:
             self._tell_once(self._autopilot.signing_trouble)
         if self._pursuit is not None:
-            if self._autopilot.twin_heard(now_s):
-                self._tell_once("Another companion speaks as this component: stop one of them")
+            if intruder := self._autopilot.intruder(now_s):
+                self._tell_once(intruder)
             if self._autopilot.target_confirmed is not False:
                 self._followed_s = now_s
             elif now_s - self._followed_s > NOT_FOLLOWED_S:

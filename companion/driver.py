@@ -224,10 +224,11 @@ class Driver:
             state = self._state
             grid = with_turning_cost(self.evidence.grid, pose, self._settings.guidance, self._rover.turning_radius_m)
             weights = grid.weights
+            navigator = self.searcher.settings
             movers, motion = self._movers(pose), self._motion(pose)
 
             def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
-                return self.searcher.search(weights, kind, start, target, movers, motion)
+                return self.searcher.search(weights, kind, start, target, movers, motion, navigator)
 
             if cell != state.past[-1]:
                 self.tally.steps += 1

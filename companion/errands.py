@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 
 from companion.commands import AnswerTarget, Command
@@ -20,6 +21,8 @@ from companion.vehicle import VehicleState
 INFO, WARNING = 6, 4
 REPEAT_S = 5.0
 """The same request within so long after it was heard last is a repetition: ground stations repeat what was not answered in time."""
+MOST_A_SECOND = 10
+"""More requests are not even answered, until there are fewer."""
 SAME_M = 0.02
 """Places nearer to each other than this are one: a radio's rounding."""
 
@@ -57,9 +60,15 @@ class Errands:
         self._count = 0
         self._last: TargetAsked | None = None
         self._heard_s = -math.inf
+        self._times_s: deque[float] = deque([-math.inf] * MOST_A_SECOND, maxlen=MOST_A_SECOND)
 
     def take_in(self, asked: TargetAsked, vehicle: VehicleState, pursuit: Pursuit | None, idle: str) -> None:
         """One request. ``idle`` says why the rover is not being driven; it is empty when it is."""
+        flood = asked.time_s - self._times_s[0] < 1.0
+        self._times_s.append(asked.time_s)
+        if flood:
+            self._tell(f"Errands not heard: more than {MOST_A_SECOND} a second", WARNING)
+            return
         if asked.point is None:
             answer, reason = asked.fault, asked.reason
         elif pursuit is None or idle or not _may_drive(vehicle):

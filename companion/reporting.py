@@ -15,6 +15,9 @@ FAULT_AFTER_S = 5.0
 STEPS_KEPT = 100_000
 """The times of so many of the newest rounds are kept."""
 
+SAID_KEPT = 1000
+"""Of so many texts it is remembered that they were said."""
+
 
 @dataclass(frozen=True, slots=True)
 class News:
@@ -68,6 +71,7 @@ class Reporter:
         if self.said and self.said[-1] == text:
             return False
         self.said.append(text)
+        del self.said[:-SAID_KEPT]
         self.news.append(News(severity, text))
         return True
 

@@ -37,13 +37,15 @@ class Searcher:
         target: Cell,
         movers: tuple[Mover, ...] = (),
         motion: Motion = Motion(),  # noqa: B008 - frozen
+        settings: NavigatorSettings | None = None,
     ) -> PlanResult:
-        """One search over ``weights`` (not changed). The field the rover stands in is free, whatever the map says."""
+        """One search over ``weights`` (not changed). ``settings``: as they were when the step began, which may run in a thread. The field the rover stands in is free, whatever the map says."""
         began_s = stopwatch_s()
         if weights[start.y, start.x] >= 1.0:
             weights = np.array(weights)
             weights[start.y, start.x] = 0.9
-        budget = budget_of(self.settings.thorough if kind is SearchKind.THOROUGH else self.settings.quick)
+        settings = settings or self.settings
+        budget = budget_of(settings.thorough if kind is SearchKind.THOROUGH else settings.quick)
         result = self.planner.plan(
             PlanningProblem(weights, start, target, movers=movers, motion=motion), budget, self.rng
         )

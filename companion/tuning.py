@@ -10,7 +10,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from companion.settings import Settings, SettingsError
-from companion.settings.settings import describe_first
+from companion.settings.settings import MAX_BYTES, describe_first
 
 LONGEST_NAME = 16
 """Characters of a MAVLink parameter's name."""
@@ -114,13 +114,14 @@ def with_tuned(base: Settings, path: Path) -> Settings:
     """
     remedy = "put it right, or delete it to go back to the settings file"
     try:
-        told = tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            told = tomllib.loads(file.read(MAX_BYTES).decode("utf-8"))
     except FileNotFoundError:
         return base
     except OSError as error:
         raise SettingsError(f"{path}: cannot be read: {error.strerror}; make it readable") from error
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SettingsError(f"{path}: not valid TOML: {error}; {remedy}") from error
+    except (ValueError, RecursionError) as error:
+        raise SettingsError(f"{path}: not valid TOML: {str(error)[:200]}; {remedy}") from error
     values = base.model_dump()
     for section, entries in told.items():
         inside = values.get(section)

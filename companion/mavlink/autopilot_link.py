@@ -108,6 +108,14 @@ class AutopilotLink:
         """Whether somebody else has just spoken as this very component: two companions would steer one rover."""
         return now_s - self._twin_s < TWIN_S
 
+    def intruder(self, now_s: float) -> str:
+        """Who speaks under ids that are not his, in words; empty when nobody does."""
+        if self.twin_heard(now_s):
+            return "Another companion speaks as this component: stop one of them"
+        kind = self._codec.impostor_type
+        who = f"A vehicle of type {kind} speaks as system {self._codec.system_id}, too"
+        return "" if kind is None else f"{who}: give it another SYSID_THISMAV"
+
     def last_ack(self, command: Command) -> AckSeen | None:
         """The last answer to a command of this kind (result -1: never answered); None while there is none."""
         return self._acks.last(command)

@@ -67,6 +67,11 @@ class Codec:
         return self._decoder.refused_type
 
     @property
+    def impostor_type(self) -> int | None:
+        """MAV_TYPE of something else that says heartbeats under the rover's own ids, which are not heeded; None if nothing does."""
+        return self._decoder.impostor_type
+
+    @property
     def origin(self) -> GeoPoint | None:
         """The EKF origin; None until heard, and again after the autopilot has restarted."""
         return self._decoder.origin

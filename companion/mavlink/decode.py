@@ -60,6 +60,8 @@ class Decoder:
         self.other_systems = 0
         self.refused_type: int | None = None
         """MAV_TYPE of an autopilot that was heard and is not an ArduPilot rover."""
+        self.impostor_type: int | None = None
+        """MAV_TYPE of something else that speaks under the rover's own ids."""
         self.message_counts: dict[int, int] = {}
         self._mav: Any = mavlink.MAVLink(None)
         self._last: dict[int, Packet] = {}
@@ -149,7 +151,8 @@ class Decoder:
         if packet.message_id in RANGE_MESSAGES:
             return self._range(packet, time_s)
         if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
-            return [*self._texts.late(time_s), self._heartbeat(self._message(packet), time_s)]
+            beat = self._heartbeat(self._message(packet), time_s)
+            return [*self._texts.late(time_s), *([] if beat is None else [beat])]
         if packet.message_id == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
             message = self._message(packet)
             return [*self._texts.add(TextSeen(time_s, message.severity, message.text), message.id, message.chunk_seq)]
@@ -224,7 +227,10 @@ class Decoder:
 
     # Vehicle state -----------------------------------------------------------------------------------------------
 
-    def _heartbeat(self, message: Any, time_s: float) -> Event:
+    def _heartbeat(self, message: Any, time_s: float) -> Event | None:
+        if message.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA or message.type not in ROVERS:
+            self.impostor_type = message.type
+            return None
         armed = bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
         return HeartbeatSeen(time_s, message.custom_mode, armed, self.system_id)
 

@@ -7,6 +7,7 @@ beginning does not hold up the valid packets behind it, and only the frame is lo
 
 from __future__ import annotations
 
+import re
 from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega
@@ -15,6 +16,7 @@ MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
 HEADER_V1, HEADER_V2 = 6, 10
 CHECKSUM, SIGNATURE = 2, 13
 SIGNED = 0x01
+MAGIC = re.compile(b"[\xfd\xfe]")
 
 
 class Packet(NamedTuple):
@@ -40,24 +42,27 @@ class Framer:
     def feed(self, data: bytes) -> list[Packet]:
         """The packets completed by these bytes."""
         buffer = self._rest + data
+        ahead = _Ahead(buffer)
         packets: list[Packet] = []
         at = 0
         while at < len(buffer):
             if buffer[at] not in (MAGIC_V1, MAGIC_V2):
-                at += 1
-                self.bad_bytes += 1
+                begin = MAGIC.search(buffer, at)
+                beyond = len(buffer) if begin is None else begin.start()
+                self.bad_bytes += beyond - at
+                at = beyond
                 continue
             end = _end(buffer, at)
             if end is None:
                 break
             if end > len(buffer):
-                if _next_packet(buffer, at + 1, len(buffer)) is None:
+                if not ahead.packet_in(at + 1, len(buffer)):
                     break  # the rest is still to come
             elif (packet := _packet(buffer, at, end)) is not None:
                 packets.append(packet)
                 at = end
                 continue
-            elif _is_unknown(buffer, at, end):
+            elif _is_unknown(buffer, at, end, ahead):
                 self.unknown += 1
                 at = end
                 continue
@@ -89,17 +94,30 @@ def _packet(buffer: bytes, at: int, end: int) -> Packet | None:
     return Packet(message_id, system_id, component_id, sequence, buffer[at:end])
 
 
-def _next_packet(buffer: bytes, start: int, stop: int) -> int | None:
-    """Where a valid packet begins in start <= at < stop, None if nowhere."""
-    for at in range(start, stop):
-        if buffer[at] in (MAGIC_V1, MAGIC_V2):
-            end = _end(buffer, at)
-            if end is not None and end <= len(buffer) and _packet(buffer, at, end) is not None:
+class _Ahead:
+    """Finds the next valid packet. It remembers, so that a place is looked at once, however much nonsense there is."""
+
+    def __init__(self, buffer: bytes) -> None:
+        self._buffer = buffer
+        self._from = 0
+        self._found = -1
+
+    def packet_in(self, start: int, stop: int) -> bool:
+        """Whether a valid packet begins in start <= at < stop."""
+        if not self._from <= start <= self._found:
+            self._from, self._found = start, self._next(start)
+        return self._found < stop
+
+    def _next(self, start: int) -> int:
+        for begin in MAGIC.finditer(self._buffer, start):
+            at = begin.start()
+            end = _end(self._buffer, at)
+            if end is not None and end <= len(self._buffer) and _packet(self._buffer, at, end) is not None:
                 return at
-    return None
+        return len(self._buffer)
 
 
-def _is_unknown(buffer: bytes, at: int, end: int) -> bool:
+def _is_unknown(buffer: bytes, at: int, end: int, ahead: _Ahead) -> bool:
     """Whether this is a packet of a message we do not know, rather than a stray byte that looks like a beginning.
 
     Its checksum cannot be checked; so nothing valid may lie in it, and another packet, or nothing, must follow.
@@ -107,7 +125,7 @@ def _is_unknown(buffer: bytes, at: int, end: int) -> bool:
     if _identity(buffer, at)[0] in ardupilotmega.mavlink_map:
         return False
     followed = end == len(buffer) or buffer[end] in (MAGIC_V1, MAGIC_V2)
-    return followed and _next_packet(buffer, at + 1, end) is None
+    return followed and not ahead.packet_in(at + 1, end)
 
 
 def _end(buffer: bytes, at: int) -> int | None:

@@ -59,6 +59,8 @@ def read_toml(path: Path, error: type[Exception]) -> dict[str, object]:
         raise error(f"{path}: not valid TOML: {fault}") from fault
     except RecursionError as fault:
         raise error(f"{path}: not valid TOML: nested too deeply") from fault
+    except ValueError as fault:  # a number of thousands of digits
+        raise error(f"{path}: not valid TOML: {str(fault)[:80]}") from fault
 
 
 def named(path: Path, kind: str, number: int, make: Callable[[], T], error: type[Exception]) -> T:

@@ -14,6 +14,9 @@ from companion.settings.section import Section, SettingsError, alike
 ControlPoints = tuple[Annotated[int, Field(ge=3, le=64)], ...]
 
 
+MAX_BYTES = 1_000_000
+
+
 class SearchSettings(Section):
     """One kind of search by the navigator: numbers of control points tried one after the other, epochs for each."""
 
@@ -313,13 +316,19 @@ def load_settings(path: Path | None) -> Settings:
     if path is None:
         return Settings()
     try:
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            text = file.read(MAX_BYTES + 1)
+        if len(text) > MAX_BYTES:
+            raise SettingsError(f"{path}: larger than {MAX_BYTES} bytes; a short TOML file is expected")
+        data = tomllib.loads(text.decode("utf-8"))
     except OSError as error:
         raise SettingsError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
         raise SettingsError(f"{path}: not UTF-8 text (byte {error.start})") from error
     except tomllib.TOMLDecodeError as error:
         raise SettingsError(f"{path}: not valid TOML: {error}") from error
+    except (RecursionError, ValueError) as error:
+        raise SettingsError(f"{path}: not valid TOML: {str(error)[:80]}") from error
     return parse_settings(data, str(path))
 
 

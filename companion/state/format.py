@@ -74,7 +74,7 @@ def decoded(data: bytes) -> tuple[SavedState, dict[str, Raster]]:
         raise DamagedError("no state of rover-companion")
     version = line[len(MAGIC) :]
     if version != b"%d" % VERSION:
-        raise StateError(f"written in format {version[:20].decode('ascii', 'replace')}, this program reads {VERSION}")
+        raise StateError(f"written in format {version[:20].decode('ascii', 'replace')!r}, this program reads {VERSION}")
     try:
         return _decoded(rest)
     except (ValueError, KeyError, TypeError, RecursionError, struct.error, zlib.error) as error:

@@ -1,0 +1,235 @@
+"""What is fuzzed: every reader of bytes from outside, each as a function of bytes that returns, or refuses with one line."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.mapfiles import MapError, load_map
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.codec import Codec
+from companion.mavlink.framing import MAGIC_V2
+from companion.mavlink.signing import SigningKeyError, load_key
+from companion.mavlink.transport import MemoryLink
+from companion.mission.load import load_mission
+from companion.mission.mission import MissionError
+from companion.mission.resolve import resolve
+from companion.record import load_record
+from companion.recorded_files import RecordError
+from companion.settings import Settings, SettingsError, load_settings
+from companion.state.format import SUM_BYTES, StateError, decoded, encoded
+from companion.tuning import with_tuned
+from companion.vehicle import VehicleState, fold
+from tests.mavlink_vehicle import Station
+from tests.states import a_state
+
+MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+LONGEST_LINE = 1000
+REFUSALS = (MissionError, MapError, SettingsError, RecordError, StateError, SigningKeyError)
+HOME = GeoPoint(53.0, 23.0)
+
+
+class BadRefusalError(AssertionError):
+    """A refusal that is no clear line."""
+
+
+@contextlib.contextmanager
+def refusing() -> Iterator[None]:
+    """What is refused is refused in one line; anything else comes through."""
+    try:
+        yield
+    except REFUSALS as error:
+        text = str(error)
+        if len(text.splitlines()) != 1 or len(text) > LONGEST_LINE or not text.isprintable():
+            raise BadRefusalError(text[:3000]) from error
+
+
+def _file(name: str, data: bytes, use: Callable[[Path], object]) -> None:
+    with tempfile.TemporaryDirectory(prefix="fuzz", dir="/dev/shm" if Path("/dev/shm").is_dir() else None) as folder:
+        path = Path(folder) / name
+        path.write_bytes(data)
+        with refusing():
+            use(path)
+
+
+def _mission(path: Path) -> None:
+    mission = load_mission(path)
+    resolve(mission, LocalFrame(mission.planned_home or HOME), NedPoint(0.0, 0.0))
+
+
+def mission_toml(data: bytes) -> None:
+    """Our own missions."""
+    _file("m.toml", data, _mission)
+
+
+def mission_plan(data: bytes) -> None:
+    """QGroundControl's."""
+    _file("m.plan", data, _mission)
+
+
+def mission_wpl(data: bytes) -> None:
+    """QGC WPL 110."""
+    _file("m.waypoints", data, _mission)
+
+
+def map_picture(data: bytes) -> None:
+    """PNG, PGM or BMP, whatever it is called."""
+    _file("m.png", data, load_map)
+
+
+def map_movingai(data: bytes) -> None:
+    """MovingAI."""
+    _file("m.map", data, load_map)
+
+
+def map_yaml(data: bytes) -> None:
+    """ROS map_server; the picture it may name is there."""
+
+    def use(path: Path) -> None:
+        path.with_name("p.pgm").write_bytes(b"P5\n2 2\n255\n\0\1\2\3")
+        load_map(path)
+
+    _file("m.yaml", data, use)
+
+
+def settings(data: bytes) -> None:
+    """The settings file."""
+    _file("s.toml", data, load_settings)
+
+
+def tuned(data: bytes) -> None:
+    """What ground stations have set in earlier runs."""
+    _file("tuned.toml", data, lambda path: with_tuned(Settings(), path))
+
+
+def signing_key(data: bytes) -> None:
+    """A file with a key."""
+
+    def use(path: Path) -> None:
+        path.chmod(0o600)
+        load_key(path)
+
+    _file("key", data, use)
+
+
+def state(data: bytes) -> None:
+    """What a run has left; the check sum is put right, or nothing else would ever be looked at."""
+    with refusing():
+        decoded(data + hashlib.sha256(data).digest())
+
+
+def record(data: bytes) -> None:
+    """The head of a record."""
+
+    def use(path: Path) -> None:
+        for name in ("link.tlog", "rounds.bin", "decisions.jsonl", "mission.json"):
+            (path.parent / name).write_bytes(b"")
+        load_record(path.parent)
+
+    _file("meta.json", data, use)
+
+
+def recorded_mission(data: bytes) -> None:
+    """The mission in a record."""
+    from companion.mission.as_json import from_json
+
+    with refusing():
+        from_json(data, "mission.json")
+
+
+def link(data: bytes) -> None:
+    """Bytes from the line, as they are: first a rover, then anything, with the companion's own answers in between."""
+    near, far = MemoryLink.pair()
+    options = Settings().link
+    autopilot = AutopilotLink(near, Codec(options), options)
+    far.write(Station().heartbeat())
+    vehicle = VehicleState()
+    for number in range(0, len(data) + 64, 64):
+        far.write(data[number : number + 64])
+        time_s = number / 64.0
+        for event in autopilot.poll(time_s):
+            vehicle = fold(vehicle, event)
+        autopilot.service(time_s)
+        vehicle.pose_at(time_s)
+
+
+def link_contents(data: bytes) -> None:
+    """The same with packets whose frame is right: number of the message, sender, length, then its contents."""
+    from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+    numbers = sorted(mavlink.mavlink_map)
+    stream, at = b"", 0
+    while at + 4 <= len(data):
+        number = numbers[int.from_bytes(data[at : at + 2], "little") % len(numbers)]
+        sender, length = data[at + 2], data[at + 3]
+        payload = (data[at + 4 : at + 4 + length] or b"\0").rstrip(b"\0") or b"\0"
+        system, component = 1 + (sender & 1), (1, 191, 154, 158)[sender >> 1 & 3]
+        body = bytes([len(payload), 0, 0, at & 0xFF, system, component]) + number.to_bytes(3, "little") + payload
+        crc = mavlink.x25crc(body + bytes([mavlink.mavlink_map[number].crc_extra])).crc
+        stream += bytes([MAGIC_V2]) + body + crc.to_bytes(2, "little")
+        at += 4 + length
+    link(stream)
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A reader, and files that it reads well, to begin with."""
+
+    read: Callable[[bytes], None]
+    examples: tuple[bytes, ...]
+
+
+def targets() -> dict[str, Target]:
+    """All of them by name."""
+    missions = [path.read_bytes() for path in sorted(MISSIONS.glob("*.toml"))]
+    beat = Station()
+    talk = beat.heartbeat() + beat.local_position(1000, 1.0) + beat.heartbeat()
+    every = "".join(f"[{name}]\n" for name in Settings.model_fields if name != "profile")
+    return {
+        "mission-toml": Target(mission_toml, tuple(missions)),
+        "mission-plan": Target(mission_plan, ((MISSIONS / "field.plan").read_bytes(),)),
+        "mission-wpl": Target(mission_wpl, ((MISSIONS / "field.waypoints").read_bytes(),)),
+        "map-picture": Target(
+            map_picture,
+            ((MISSIONS / "maps/rooms.png").read_bytes(), b"P2\n2 2\n255\n0 0 255 254\n", b"P5\n2 2\n255\n\0\1\2\3"),
+        ),
+        "map-movingai": Target(map_movingai, (b"type octile\nheight 2\nwidth 3\nmap\n.@.\nTS.\n",)),
+        "map-yaml": Target(map_yaml, (b"image: p.pgm\nresolution: 0.5\norigin: [1.0, -2.0, 0.0]\nnegate: 0\n",)),
+        "settings": Target(
+            settings, (b"[guidance]\nhorizon_m = 6.0\n[planner]\n", every.encode(), b'profile = "paper"\n')
+        ),
+        "tuned": Target(tuned, (b"[guidance]\nhorizon_m = 6.0\n",)),
+        "signing-key": Target(signing_key, (b"passphrase\n", b"0f" * 32)),
+        "state": Target(state, state_examples()),
+        "record": Target(record, record_examples()),
+        "recorded-mission": Target(recorded_mission, (b'{"name": "m", "targets": [{"name": "t", "place": [1, 2]}]}',)),
+        "link": Target(link, (talk,)),
+        "link-contents": Target(
+            link_contents, (b"\0\0\0\x09" + bytes(9), b"\x1e\0\0\x1c" + bytes(28), b"\x5a\0\1\x22" + bytes(34))
+        ),
+    }
+
+
+def state_examples() -> tuple[bytes, ...]:
+    """A state without its check sum."""
+    return (encoded(a_state(), {})[:-SUM_BYTES],)
+
+
+def record_examples() -> tuple[bytes, ...]:
+    """A head as the recorder writes it."""
+    with tempfile.TemporaryDirectory() as folder:
+        from companion.recorder import Recorder
+
+        recorder = Recorder(Path(folder) / "r", None, Settings(), 0)
+        recorder.close()
+        head = json.loads((Path(folder) / "r" / "meta.json").read_text())
+    return (
+        json.dumps(head).encode(),
+        json.dumps(head | {"inputs": [{"kind": "x", "name": "link.tlog", "source": "", "sha256": ""}]}).encode(),
+    )

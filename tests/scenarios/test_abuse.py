@@ -1,0 +1,295 @@
+"""Hostile sizes, floods and borrowed names: refused or limited, in one clear line; and no file is written where none belongs."""
+
+from __future__ import annotations
+
+import os
+import struct
+import subprocess
+import sys
+import tracemalloc
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from tests.rig import Rig, yard
+from tests.served import mission_path, served
+
+MEMORY_BYTES = 600_000_000
+"""What a program may take beyond its libraries, which reserve much more than they use."""
+ITEM = "0\t0\t3\t16\t0\t0\t0\t0\t53.1\t23.1\t0\t1\n"
+
+
+def png_of(width: int, height: int) -> bytes:
+    """A picture of that size that is one white point and then ends."""
+    head = b"IHDR" + struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+    body = b"IDAT" + zlib.compress(b"\0\xff")
+    chunks = [struct.pack(">I", len(part) - 4) + part + struct.pack(">I", zlib.crc32(part)) for part in (head, body)]
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
+
+
+def mission_with(line: str) -> bytes:
+    return f"{line}\n[[target]]\nnorth_m = 5.0\neast_m = 0.0\n".encode()
+
+
+ROS = b"image: big.png\nresolution: 0.05\norigin: [0.0, 0.0, 0.0]\n"
+HOSTILE: dict[str, tuple[str, Callable[[], bytes], str]] = {
+    "400 000 items, WPL": (
+        "m.waypoints",
+        lambda: b"QGC WPL 110\n" + b"".join(b"%d" % i + ITEM[1:].encode() for i in range(400_000)),
+        "more than",
+    ),
+    "a million items, too long to be read": (
+        "m.waypoints",
+        lambda: b"QGC WPL 110\n" + ITEM.encode() * 1_000_000,
+        "larger than",
+    ),
+    "a million targets": ("m.toml", lambda: b"[[target]]\nnorth_m = 5.0\neast_m = 1.0\n" * 1_000_000, "larger than"),
+    "a grid of 10^9 fields": (
+        "m.toml",
+        lambda: mission_with("[grid]\nsize = [31623, 31623]\nhome = [5, 5]"),
+        "more than",
+    ),
+    "places 10^9 fields apart": (
+        "m.toml",
+        lambda: mission_with("[[keep_out]]\nnorth_m = 900000.0\neast_m = 900000.0\nradius_m = 5.0"),
+        "more than",
+    ),
+    "a number of 5000 digits": ("m.toml", lambda: mission_with(f"name = {'9' * 5000}"), "not valid TOML"),
+    "nested without end": ("m.toml", lambda: b"a = " + b"[" * 100_000, "nested too deeply"),
+    "a plan nested without end": ("m.plan", lambda: b"[" * 1_000_000, "not valid JSON"),
+    "a number of 5000 digits in a plan": ("m.plan", lambda: b'{"fileType": ' + b"9" * 5000 + b"}", "not valid JSON"),
+    "settings nested without end": ("s.toml", lambda: b"a = " + b"[" * 100_000, "not valid TOML"),
+    "settings of 5000 digits": ("s.toml", lambda: b"a = " + b"9" * 5000, "not valid TOML"),
+    "settings without end": ("s.toml", lambda: b"# \n" * 1_000_000, "larger than"),
+    "a map of 10^9 fields": ("big.png", lambda: png_of(31623, 31623), "more than 25000000 fields"),
+    "a map of 10^9 fields, PGM": ("big.pgm", lambda: b"P5\n31623 31623\n255\n", "more than 25000000 fields"),
+    "a map of 10^9 fields, MovingAI": (
+        "big.map",
+        lambda: b"type octile\nheight 31623\nwidth 31623\nmap\n",
+        "more than 25000000 fields",
+    ),
+    "a map of 10^18 fields": (
+        "big.map",
+        lambda: b"type octile\nheight 999999999\nwidth 999999999\nmap\n",
+        "more than 25000000 fields",
+    ),
+}
+
+
+@pytest.fixture(scope="module")
+def check(tmp_path_factory: pytest.TempPathFactory) -> Callable[[list[list[str]]], list[tuple[int, str]]]:
+    """Runs commands in a process that may not take much memory; exit code and output of each."""
+    code = (
+        "import json, resource, sys\n"
+        "from typer.testing import CliRunner\n"
+        "from companion.cli.commands import app\n"
+        "pages = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
+        f"resource.setrlimit(resource.RLIMIT_AS, (pages + {MEMORY_BYTES},) * 2)\n"
+        "for line in sys.stdin:\n"
+        "    result = CliRunner().invoke(app, json.loads(line))\n"
+        "    print(json.dumps([result.exit_code, result.output + repr(result.exception or '')]))\n"
+    )
+
+    def run(commands: list[list[str]]) -> list[tuple[int, str]]:
+        import json
+
+        text = "".join(json.dumps(command) + "\n" for command in commands)
+        done = subprocess.run(
+            [sys.executable, "-c", code], input=text, capture_output=True, text=True, timeout=120, check=True
+        )
+        return [tuple(json.loads(line)) for line in done.stdout.splitlines()]
+
+    return run
+
+
+def test_hostile_sizes_are_refused_in_one_line_and_little_memory(
+    tmp_path: Path, check: Callable[[list[list[str]]], list[tuple[int, str]]]
+) -> None:
+    good = mission_path(yard(tmp_path))
+    commands = []
+    for number, (name, data, _) in enumerate(HOSTILE.values()):
+        folder = tmp_path / f"{number}"
+        folder.mkdir()
+        (folder / name).write_bytes(data())
+        if name.startswith("m."):
+            commands.append(["mission", "check", str(folder / name)])
+        elif name.startswith("s."):
+            commands.append(["run", str(good), "--connect", "tcp:127.0.0.1:9", "--settings", str(folder / name)])
+        else:
+            commands.append(["plan", str(folder / name), "--start", "0,0", "--target", "5,5"])
+    results = check(commands)
+    for (what, (name, _, words)), (code, output) in zip(HOSTILE.items(), results, strict=True):
+        lines = output.replace("SystemExit(2)", "").strip().splitlines()
+        assert (code, len(lines)) == (2, 1), (what, output[:2000])
+        assert words in lines[0] and name in lines[0] and len(lines[0]) < 1000, (what, lines)
+
+
+# --- floods ----------------------------------------------------------------------------------------------------------
+
+TICK_HZ = 20
+
+
+def packed(message: mavlink.MAVLink_message, system: int = 1, component: int = 158, sequence: int = 0) -> bytes:
+    mav = mavlink.MAVLink(None, system, component)
+    mav.seq = sequence % 256
+    return bytes(message.pack(mav))
+
+
+def adsb(n: int) -> bytes:
+    return packed(
+        mavlink.MAVLink_adsb_vehicle_message(n, 530000000 + n, 230000000, 0, 0, 0, 0, 0, b"X", 0, 0, 0xFFFF, 0)
+    )
+
+
+def reposition(n: int) -> bytes:
+    wish = mavlink.MAVLink_command_int_message(1, 191, 6, 192, 0, 0, 0, 0, 0, 0, 530000000 + 99 * n, 230000000, 0)
+    return packed(wish, 255, 190, n)
+
+
+def other_systems(n: int) -> bytes:
+    place = mavlink.MAVLink_global_position_int_message(n, 530000000 + n, 230000000, 0, 0, 0, 0, 0, 0)
+    return packed(place, 2 + n % 250, 1)
+
+
+def texts(n: int) -> bytes:
+    return packed(mavlink.MAVLink_statustext_message(6, b"flood %d" % n), 1, 1, n)
+
+
+def list_parameters(n: int) -> bytes:
+    return packed(mavlink.MAVLink_param_request_list_message(1, 191), 255, 190, n)
+
+
+def set_parameters(n: int) -> bytes:
+    return packed(mavlink.MAVLink_param_set_message(1, 191, b"NONE%d" % (n % 1000), 1.0, 9), 255, 190, n)
+
+
+def nonsense(n: int) -> bytes:
+    return b"\xfd" * 40
+
+
+FLOODS = [adsb, reposition, other_systems, texts, list_parameters, set_parameters, nonsense]
+
+
+def test_a_thousand_messages_a_second_do_not_keep_it_from_its_mission(tmp_path: Path) -> None:
+    """Of all kinds in turn."""
+    rig = Rig(yard(tmp_path))
+    rig.until_driven(1.0)
+    count = 0
+
+    def flooded(data: bytes) -> bytes:
+        nonlocal count
+        count += 1000 // TICK_HZ
+        return data + b"".join(FLOODS[n % len(FLOODS)](n) for n in range(count - 1000 // TICK_HZ, count))
+
+    before, said = len(rig.sent), len(rig.texts())
+    began_s = rig.now_s()
+    rig.garble = flooded
+    tracemalloc.start()
+    rig.run_for(2.0)
+    rig.sent.clear()
+    first, _ = tracemalloc.get_traced_memory()
+    rig.run_for(4.0)
+    sent_hz = len(rig.sent) / 4.0
+    rig.sent.clear()
+    grown = tracemalloc.get_traced_memory()[0] - first
+    tracemalloc.stop()
+    rig.finish()
+    assert rig.companion.outcome.complete and not rig.simulator.collisions, rig.texts()
+    assert before and count >= 6000 and rig.now_s() - began_s < 40.0
+    assert grown < 1_000_000
+    assert sent_hz < 120.0, "it does not answer a flood with a flood"
+    assert len(rig.texts()) - said < 200, rig.texts()
+
+
+def test_another_vehicle_under_the_rovers_own_ids_is_not_heeded_and_told_once(tmp_path: Path) -> None:
+    """A copter that somebody has left at system id 1, armed and in a mode whose number is MANUAL's."""
+    rig = Rig(yard(tmp_path))
+    rig.until_driven(1.0)
+    beat = mavlink.MAVLink_heartbeat_message(
+        mavlink.MAV_TYPE_QUADROTOR, mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA, 81, 0, 4, 3
+    )
+    rig.garble = lambda data: data + packed(beat, 1, 1, 77)
+    rig.finish()
+    assert rig.companion.outcome.complete
+    told = [text for text in rig.texts() if "type 2 speaks as system 1" in text]
+    assert len(told) == 1 and "SYSID_THISMAV" in told[0]
+
+
+# --- files -----------------------------------------------------------------------------------------------------------
+
+WATCHER = """
+import os, sys
+allowed = tuple(os.path.realpath(place) + os.sep for place in sys.argv[1].split(':')) + ('/dev/', '/proc/')
+WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
+NAMED = {'os.mkdir': (0,), 'os.remove': (0,), 'os.rmdir': (0,), 'os.rename': (0, 1), 'os.link': (0, 1), 'os.symlink': (0, 1),
+         'os.truncate': (0,), 'os.chmod': (0,), 'shutil.copyfile': (1,), 'tempfile.mkstemp': (0,), 'tempfile.mkdtemp': (0,)}
+def hook(event, arguments):
+    if event in ('open', 'os.mkdir') and os.path.isdir(arguments[0]):
+        return  # no file, or one without a name: with that the compiler's cache tries whether it could be written
+    if event == 'open' and isinstance(arguments[0], (str, bytes)) and arguments[2] & WRITES:
+        places = arguments[:1]
+    elif event in NAMED:
+        places = [arguments[i] for i in NAMED[event] if isinstance(arguments[i], (str, bytes))]
+    else:
+        return
+    for place in places:
+        if '__pycache__' in os.fsdecode(place):
+            continue  # compiled kernels have a place of their own, here beside the sources
+        if not (os.path.realpath(os.fsdecode(place)) + os.sep).startswith(allowed):
+            print('WRITTEN', event, os.fsdecode(place), file=sys.stderr, flush=True)
+            os._exit(66)
+sys.addaudithook(hook)
+from companion.cli.main import main
+sys.argv[:] = ['rover-companion', *sys.argv[2:]]
+main()
+"""
+
+
+def tree(folder: Path) -> dict[str, tuple[int, int]]:
+    """Every file with its size and time."""
+    found = {}
+    for path in sorted(folder.rglob("*")):
+        status = path.lstat()
+        found[str(path.relative_to(folder))] = (status.st_size, status.st_mtime_ns)
+    return found
+
+
+def watched(place: Path, allowed: list[Path], *arguments: object) -> subprocess.CompletedProcess[str]:
+    """A command in a directory that may not be written, told of by its own interpreter when it writes elsewhere than allowed."""
+    command = [sys.executable, "-B", "-c", WATCHER, ":".join(map(str, allowed)), *map(str, arguments)]
+    home = place / "home"
+    environment = {**os.environ, "HOME": str(home), "XDG_STATE_HOME": str(allowed[-1])}
+    return subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True, timeout=110, check=False)
+
+
+def test_no_file_is_written_outside_of_record_and_state(tmp_path: Path) -> None:
+    place, record, state = tmp_path / "place", tmp_path / "record", tmp_path / "state"
+    (place / "home").mkdir(parents=True)
+    mission = yard(place)
+    before = tree(place)
+    os.chmod(place, 0o555)
+    try:
+        with served(mission) as world:
+            done = watched(
+                place, [record, state], "run", "yard.toml", "--connect", world.url, "--arm", "--record", record
+            )
+        assert done.returncode == 0, done.stderr
+        assert "gate: reached" in done.stdout
+        again = watched(place, [record, state], "replay", record, "--why", "2")
+        assert again.returncode == 0, again.stderr
+    finally:
+        os.chmod(place, 0o755)
+    assert tree(place) == before
+    assert (record / "why-2.png").exists() and any(state.rglob("*"))
+
+
+def test_the_watcher_sees_what_is_written_elsewhere(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    done = watched(
+        tmp_path, [tmp_path / "record"], "plan", "yard.png", "--start", "1,1", "--target", "3,3", "--image", "p.png"
+    )
+    assert mission.source is not None
+    assert done.returncode == 66 and "WRITTEN open" in done.stderr
