@@ -13,7 +13,9 @@ from companion.clock import Clock, stopwatch_s
 from companion.commands import Arm, Command, Say, SetMode
 from companion.driver import Driver
 from companion.errands import Errands
-from companion.events_targets import TargetAsked
+from companion.events.event import Event
+from companion.events.targets import TargetAsked
+from companion.events.vehicle import RangeSeen, RoverMode, TextSeen
 from companion.guidance import STANDSTILL, Guide
 from companion.handover import HandOver
 from companion.itinerary import Itinerary, TargetStatus
@@ -37,7 +39,7 @@ from companion.settings import Settings
 from companion.startup import StartUp, overruled
 from companion.stepping import NotedRunner, StepRunner
 from companion.traffic import announced
-from companion.vehicle import Event, RangeSeen, RoverMode, TextSeen, VehicleState, fold
+from companion.vehicle import VehicleState, fold
 from companion.watchdogs import Watchdogs
 from companion.whereabouts import Whereabouts
 

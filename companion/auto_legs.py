@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from companion.commands import GuidedPosition
-from companion.events_targets import GuidedLeg, LegState
+from companion.events.targets import GuidedLeg, LegState
 from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.guidance import STANDSTILL, Guide, Motion
 from companion.itinerary import Leg, TargetStatus, ended_at, parked, sent_to

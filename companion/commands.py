@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from companion.events_plan import PlanKind
-from companion.events_targets import Asker, TargetAnswer, TargetForm
+from companion.events.plan import PlanKind
+from companion.events.targets import Asker, TargetAnswer, TargetForm
 from companion.frames import NedPoint
 
 

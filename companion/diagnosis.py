@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 
+from companion.events.vehicle import RoverMode
 from companion.examined import Examined
-from companion.vehicle import EKF_CONST_POSITION, EKF_POSITION, RoverMode
+from companion.vehicle import EKF_CONST_POSITION, EKF_POSITION
 
 FIRMWARE = (4, 7)
 """ArduRover's version that all this was written for and measured with."""

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 
 from companion.commands import AnswerTarget, Command
-from companion.events_targets import TargetAnswer, TargetAsked
+from companion.events.targets import TargetAnswer, TargetAsked
 from companion.frames import LocalFrame, NedPoint
 from companion.grid import OBSTACLE
 from companion.itinerary import Leg

@@ -6,14 +6,16 @@ import math
 from collections.abc import Callable
 
 from companion.commands import ReadParameter
-from companion.events_plan import FenceStatusSeen, PlanChangedSeen, PlanKind
+from companion.events.event import Event
+from companion.events.plan import FenceStatusSeen, PlanChangedSeen, PlanKind
+from companion.events.vehicle import ParameterSeen
 from companion.frames import GeoPoint
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.download import Downloaded
 from companion.mission.fence import NO_FENCE, PARAMETERS, AutopilotFence, autopilot_fence
 from companion.mission.items import ItemError, rally_points
 from companion.settings import FenceSettings
-from companion.vehicle import Event, ParameterSeen, VehicleState
+from companion.vehicle import VehicleState
 
 WARNING = 4
 PARAMETER_S, PARAMETER_TRIES = 1.0, 8

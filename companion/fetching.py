@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from companion.clock import Clock
-from companion.events_plan import PlanKind
+from companion.events.plan import PlanKind
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.items import Item
 from companion.mission.mission import MissionError

@@ -6,10 +6,11 @@ import math
 from collections.abc import Callable
 
 from companion.commands import Command, SetMode
+from companion.events.vehicle import RoverMode
 from companion.guidance import STANDSTILL
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety import Control
-from companion.vehicle import RoverMode, VehicleState
+from companion.vehicle import VehicleState
 
 HAND_OVER_S = 0.7
 """So long the companion stays, after its last command, to see that the rover is in HOLD: with all else it does, it is gone within a second."""

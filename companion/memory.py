@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from companion.driver import Tally
+from companion.events.vehicle import LocalPositionSeen
 from companion.frames import NedPoint
 from companion.grid import Cell
 from companion.itinerary import Itinerary, Leg
@@ -20,7 +21,7 @@ from companion.state.format import BandPlace, Raster
 from companion.state.model import SavedDraws, SavedTally
 from companion.state.snapshot import Snapshot
 from companion.state.writer import Update, Writer
-from companion.vehicle import LocalPositionSeen, VehicleState
+from companion.vehicle import VehicleState
 
 SAVE_S = 5.0
 """The state is written this often while the rover moves, and at once when something has happened."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from companion.events.event import Event
 from companion.fencing import Fencing
 from companion.frames import LocalFrame, Pose
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -9,7 +10,7 @@ from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.power import Level, Power
 from companion.pursuit import Pursuit, Tell
 from companion.settings import Settings
-from companion.vehicle import Event, VehicleState
+from companion.vehicle import VehicleState
 
 
 class Oversight:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from companion.commands import Command, TellParameter
-from companion.events_parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
+from companion.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
 from companion.settings import Settings
 from companion.tuning import BY_NAME, TABLE, Parameter, RefusedError, changed
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from companion.events_plan import PlanChangedSeen, PlanKind
-from companion.events_targets import ItemCurrentSeen
+from companion.events.event import Event
+from companion.events.plan import PlanChangedSeen, PlanKind
+from companion.events.targets import ItemCurrentSeen
+from companion.events.vehicle import TextSeen
 from companion.mavlink.download import Downloads
 from companion.mission.stored import digest
 from companion.pursuit import Tell
-from companion.vehicle import Event, TextSeen
 
 WARNING = 4
 RECEIVED = "Flight plan received"

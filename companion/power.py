@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
-from companion.events_plan import BatterySeen
+from companion.events.event import Event
+from companion.events.plan import BatterySeen
 from companion.settings import PowerSettings
-from companion.vehicle import Event
 
 STALE_S = 10.0
 """A reading older than this says nothing; SYS_STATUS counts only while no BATTERY_STATUS is younger."""

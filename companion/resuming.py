@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.events.vehicle import LocalPositionSeen, RoverMode
 from companion.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.grid import Cell
 from companion.itinerary import Itinerary
@@ -20,7 +21,7 @@ from companion.navigator import NavState
 from companion.safety import Control
 from companion.settings import MappingSettings
 from companion.state.model import SavedLeg, SavedPlace, SavedState
-from companion.vehicle import LocalPositionSeen, RoverMode, VehicleState
+from companion.vehicle import VehicleState
 
 SAME_CLOCKS_S = 1.0
 """Two clocks that have both gone on differ by no more than this from what they differed by: a link's delays."""

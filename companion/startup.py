@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from companion.commands import Arm, Command, SetMode
+from companion.events.vehicle import AckSeen, HeartbeatSeen, RoverMode
 from companion.guidance import STANDSTILL
 from companion.itinerary import TargetStatus
 from companion.laying import Laid, lay
@@ -15,7 +16,7 @@ from companion.mission.mission import Mission, MissionError
 from companion.resuming import Kept, Ownership, lay_resumed, ownership, same_boot
 from companion.safety import Control, data_reason
 from companion.settings import SafetySettings, Settings
-from companion.vehicle import AckSeen, HeartbeatSeen, RoverMode, VehicleState
+from companion.vehicle import VehicleState
 
 ASK_AGAIN_S = 3.0
 """A command that has not worked is given again after so long."""

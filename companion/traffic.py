@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from companion.events.vehicle import OtherSeen
 from companion.frames import LocalFrame, NedPoint, Pose
 from companion.grid import Grid
 from companion.planning.problem import Mover
 from companion.settings import TrafficSettings
-from companion.vehicle import OtherSeen, VehicleState
+from companion.vehicle import VehicleState
 
 SAME_M = 1.2
 """What is seen so near to where somebody says he is, is he."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from companion.events.event import Event
+from companion.events.vehicle import RangeSeen
 from companion.loop_watch import LoopWatch
 from companion.scan_watch import ScanWatch
 from companion.settings import SafetySettings
-from companion.vehicle import Event, RangeSeen, VehicleState
+from companion.vehicle import VehicleState
 
 
 class Watchdogs:

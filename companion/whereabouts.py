@@ -6,10 +6,12 @@ import math
 from collections import deque
 from collections.abc import Callable
 
+from companion.events.event import Event
+from companion.events.vehicle import HomeSeen, LocalPositionSeen, OriginSeen
 from companion.laying import apart_m
 from companion.pursuit import Pursuit, Tell
 from companion.settings import Settings
-from companion.vehicle import Event, HomeSeen, LocalPositionSeen, OriginSeen, VehicleState
+from companion.vehicle import VehicleState
 
 WARNING = 4
 HOME_MOVED_M = 2.0

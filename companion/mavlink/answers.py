@@ -9,7 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import AnswerTarget
-from companion.events_targets import TargetAnswer, TargetForm
+from companion.events.targets import TargetAnswer, TargetForm
 
 COMMAND_RESULTS: Mapping[TargetAnswer, int] = MappingProxyType(
     {

@@ -9,6 +9,8 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import AskTime, Command, Heartbeat, RequestMessage
+from companion.events.event import Event
+from companion.events.vehicle import AckSeen, HeartbeatSeen, HomeSeen, TargetSeen
 from companion.latency import TimeAnswered
 from companion.mavlink.acks import AckKeeper
 from companion.mavlink.byte_link import ByteLink
@@ -18,7 +20,6 @@ from companion.mavlink.rates import RateFault, RateKeeper, wanted_rates
 from companion.mavlink.readback import ReadBack
 from companion.rounds import Mark
 from companion.settings import LinkSettings
-from companion.vehicle import AckSeen, Event, HeartbeatSeen, HomeSeen, TargetSeen
 
 HEARTBEAT_S = 1.0
 PLACES_S = 2.0

@@ -8,21 +8,13 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events_plan import FenceStatusSeen, PlanChangedSeen, PlanCountSeen, PlanItemSeen
-from companion.events_targets import ItemCurrentSeen, ItemReachedSeen, LegSeen
-from companion.frames import GeoPoint
-from companion.latency import TimeAnswered
-from companion.mavlink import batteries, others, parameter_requests, ranges, requests
-from companion.mavlink.framing import Packet
-from companion.mavlink.places import point_of
-from companion.mavlink.texts import TextAssembler
-from companion.scan import RangeScan
-from companion.sticks import SticksSeen
-from companion.vehicle import (
+from companion.events.event import Event
+from companion.events.plan import FenceStatusSeen, PlanChangedSeen, PlanCountSeen, PlanItemSeen
+from companion.events.targets import ItemCurrentSeen, ItemReachedSeen, LegSeen
+from companion.events.vehicle import (
     AckSeen,
     AttitudeSeen,
     EkfStatusSeen,
-    Event,
     GlobalPositionSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -34,6 +26,14 @@ from companion.vehicle import (
     TargetSeen,
     TextSeen,
 )
+from companion.frames import GeoPoint
+from companion.latency import TimeAnswered
+from companion.mavlink import batteries, others, parameter_requests, ranges, requests
+from companion.mavlink.framing import Packet
+from companion.mavlink.places import point_of
+from companion.mavlink.texts import TextAssembler
+from companion.scan import RangeScan
+from companion.sticks import SticksSeen
 
 AUTOPILOT = 1
 """Component id of the autopilot: only it speaks for the vehicle."""

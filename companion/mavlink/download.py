@@ -7,10 +7,11 @@ from collections import deque
 from dataclasses import dataclass, field
 
 from companion.commands import Command, EndTransfer, RequestItem, RequestList
-from companion.events_plan import PlanCountSeen, PlanItemSeen, PlanKind
+from companion.events.event import Event
+from companion.events.plan import PlanCountSeen, PlanItemSeen, PlanKind
+from companion.events.vehicle import AckSeen
 from companion.mavlink.decode import MISSION_ACK_COMMAND
 from companion.mission.items import Item
-from companion.vehicle import AckSeen, Event
 
 ANSWER_S = 0.8
 """A request that is not answered for so long is repeated: a slow radio needs about half of it there and back."""

@@ -9,6 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import AskPrearm, Command, ReadParameter, RequestMessage
+from companion.events.vehicle import TextSeen
 from companion.examined import Autopilot, Examined, RangeSource, SlowMessage
 from companion.mavlink import ranges
 from companion.mavlink.byte_link import ByteLink
@@ -18,7 +19,7 @@ from companion.mavlink.framing import Packet
 from companion.mavlink.rates import RateKeeper, wanted_rates
 from companion.mavlink.signing import Signer
 from companion.settings import LinkSettings
-from companion.vehicle import TextSeen, VehicleState, fold
+from companion.vehicle import VehicleState, fold
 
 OTHER_COMPONENT = 192
 """The examiner's own, so that a companion that runs is not disturbed by a twin; it sends no heartbeat, lest the autopilot take

@@ -7,7 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events_targets import Asker, TargetAnswer, TargetAsked, TargetForm
+from companion.events.targets import Asker, TargetAnswer, TargetAsked, TargetForm
 from companion.frames import GeoPoint
 from companion.mavlink.places import point_of
 

@@ -8,11 +8,12 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import GuidedPosition, GuidedVelocity, Say
+from companion.events.vehicle import LocalPositionSeen, RangeSeen
 from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
 from companion.settings import LinkSettings
-from companion.vehicle import LocalPositionSeen, RangeSeen, VehicleState, fold
+from companion.vehicle import VehicleState, fold
 from tests.mavlink_vehicle import Station
 from tests.tlog import messages
 

@@ -7,13 +7,13 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import Arm, ChangeSpeed, GuidedHeading, GuidedPosition, GuidedVelocity, RequestMessage, SetMode
+from companion.events.vehicle import AckSeen, HeartbeatSeen
 from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
 from companion.rounds import Mark
 from companion.settings import LinkSettings
-from companion.vehicle import AckSeen, HeartbeatSeen
 from tests.mavlink_vehicle import Station
 from tests.tlog import messages
 

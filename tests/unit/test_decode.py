@@ -5,11 +5,11 @@ import math
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events_plan import BatterySeen, FenceStatusSeen
+from companion.events.plan import BatterySeen, FenceStatusSeen
+from companion.events.vehicle import AckSeen, HeartbeatSeen, PrearmSeen, TextSeen
 from companion.frames import GeoPoint
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
-from companion.vehicle import AckSeen, HeartbeatSeen, PrearmSeen, TextSeen
 from tests.mavlink_vehicle import Station
 
 

@@ -10,10 +10,7 @@ import numpy as np
 import pytest
 
 from companion.diagnosis import PARAMETERS, Level, diagnose, kernels
-from companion.examined import Autopilot, Examined, RangeSource, SlowMessage
-from companion.frames import GeoPoint
-from companion.scan import RangeScan
-from companion.vehicle import (
+from companion.events.vehicle import (
     EkfStatusSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -22,8 +19,11 @@ from companion.vehicle import (
     PrearmSeen,
     RangeSeen,
     RoverMode,
-    VehicleState,
 )
+from companion.examined import Autopilot, Examined, RangeSource, SlowMessage
+from companion.frames import GeoPoint
+from companion.scan import RangeScan
+from companion.vehicle import VehicleState
 
 HERE = GeoPoint(53.0, 23.0)
 SCAN = RangeSeen(0.0, RangeScan(0.0, np.array([0.0]), np.array([3.0]), 0.1, 8.0, 0.1, "x"))

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events_plan import PlanChangedSeen, PlanKind
+from companion.events.plan import PlanChangedSeen, PlanKind
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.download import MOST_ITEMS, TRIES, Downloaded

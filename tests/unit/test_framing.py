@@ -2,10 +2,10 @@
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.events.vehicle import HeartbeatSeen, LocalPositionSeen
 from companion.mavlink.codec import Codec
 from companion.mavlink.framing import Framer
 from companion.settings import LinkSettings
-from companion.vehicle import HeartbeatSeen, LocalPositionSeen
 from tests.mavlink_vehicle import Station
 
 

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.events_targets import (
+from companion.events.event import Event
+from companion.events.targets import (
     LEG_KEPT_S,
     GuidedLeg,
     ItemCurrentSeen,
@@ -18,8 +19,9 @@ from companion.events_targets import (
     leg_after,
     leg_at_heartbeat,
 )
+from companion.events.vehicle import HeartbeatSeen, RoverMode
 from companion.frames import GeoPoint
-from companion.vehicle import Event, HeartbeatSeen, RoverMode, VehicleState, fold
+from companion.vehicle import VehicleState, fold
 
 HERE, THERE = GeoPoint(53.0, 23.0), GeoPoint(53.1, 23.0)
 LIVE = GuidedLeg(HERE, 10.0, 3)

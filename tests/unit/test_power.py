@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.events_plan import BatterySeen
+from companion.events.plan import BatterySeen
 from companion.power import STALE_S, Level, Power, PowerState, judged, with_battery
 from companion.settings import PowerSettings
 

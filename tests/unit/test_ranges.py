@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 
+from companion.events.vehicle import RangeSeen
 from companion.mavlink.codec import Codec
 from companion.scan import RangeScan
 from companion.settings import LinkSettings
-from companion.vehicle import RangeSeen
 from tests.mavlink_vehicle import Station
 
 

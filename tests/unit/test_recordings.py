@@ -5,14 +5,11 @@ from collections import Counter
 
 import pytest
 
-from companion.frames import GeoPoint, LocalFrame, NedPoint
-from companion.mavlink.codec import Codec
-from companion.settings import LinkSettings
-from companion.vehicle import (
+from companion.events.event import Event
+from companion.events.vehicle import (
     AckSeen,
     AttitudeSeen,
     EkfStatusSeen,
-    Event,
     GlobalPositionSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -24,9 +21,11 @@ from companion.vehicle import (
     RoverMode,
     TargetSeen,
     TextSeen,
-    VehicleState,
-    fold,
 )
+from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.mavlink.codec import Codec
+from companion.settings import LinkSettings
+from companion.vehicle import VehicleState, fold
 from tests.shared_data import SHARED, needs_shared
 from tests.tlog import messages, raw_packets
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import AnswerTarget
-from companion.events_targets import Asker, TargetAnswer, TargetAsked, TargetForm
+from companion.events.targets import Asker, TargetAnswer, TargetAsked, TargetForm
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
 

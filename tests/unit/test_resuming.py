@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from companion.events.vehicle import HeartbeatSeen, LocalPositionSeen, RoverMode
 from companion.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.grid import Cell, empty_grid
 from companion.itinerary import Leg, TargetStatus
@@ -18,7 +19,7 @@ from companion.resuming import Kept, Ownership, lay_resumed, nav_state, ownershi
 from companion.safety import Control
 from companion.settings import MappingSettings
 from companion.state.model import SavedGround, SavedLeg, SavedPlace, SavedProgress
-from companion.vehicle import HeartbeatSeen, LocalPositionSeen, RoverMode, VehicleState
+from companion.vehicle import VehicleState
 from tests.rig import yard
 from tests.states import a_state
 

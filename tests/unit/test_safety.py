@@ -10,12 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.commands import Arm, SetMode
-from companion.frames import GeoPoint
-from companion.safety import Control, Reaction, Verdict, Watch, check, latched, unsafe_reason
-from companion.scan import RangeScan
-from companion.settings import SafetySettings
-from companion.startup import start_step
-from companion.vehicle import (
+from companion.events.vehicle import (
     AttitudeSeen,
     EkfStatusSeen,
     HeartbeatSeen,
@@ -24,8 +19,13 @@ from companion.vehicle import (
     OriginSeen,
     RangeSeen,
     RoverMode,
-    VehicleState,
 )
+from companion.frames import GeoPoint
+from companion.safety import Control, Reaction, Verdict, Watch, check, latched, unsafe_reason
+from companion.scan import RangeScan
+from companion.settings import SafetySettings
+from companion.startup import start_step
+from companion.vehicle import VehicleState
 
 SETTINGS = SafetySettings()
 SCAN = RangeScan(0.0, np.zeros(1), np.ones(1), 0.1, 8.0, 0.1, "test")

@@ -10,13 +10,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.commands import AskTime
+from companion.events.vehicle import HeartbeatSeen, LocalPositionSeen, RoverMode
 from companion.latency import Latency, TimeAnswered, answered, reported
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
 from companion.safety import unsafe_reason
 from companion.settings import LinkSettings, SafetySettings
-from companion.vehicle import HeartbeatSeen, LocalPositionSeen, RoverMode, fold
+from companion.vehicle import fold
 from tests.unit.test_safety import vehicle
 
 SETTINGS = SafetySettings()

@@ -7,9 +7,10 @@ import math
 import numpy as np
 import pytest
 
+from companion.events.vehicle import AttitudeSeen, LocalPositionSeen
 from companion.scan import RangeScan
 from companion.scan_watch import STUCK_M, STUCK_S, ScanWatch
-from companion.vehicle import AttitudeSeen, LocalPositionSeen, VehicleState
+from companion.vehicle import VehicleState
 from tests.shared_data import SHARED, needs_shared
 
 VIEW_RAD = np.radians(np.arange(-45.0, 45.0, 1.25))

@@ -5,12 +5,13 @@ from __future__ import annotations
 import pytest
 
 from companion.commands import ChangeSpeed, SetMode
+from companion.events.vehicle import AckSeen, HeartbeatSeen
 from companion.mavlink.acks import AckKeeper
 from companion.safety import Control, Reaction, Watch, check
 from companion.settings import SafetySettings
 from companion.startup import overruled
 from companion.sticks import Sticks, SticksSeen, followed
-from companion.vehicle import AckSeen, HeartbeatSeen, fold
+from companion.vehicle import fold
 from tests.unit.test_safety import HOLD, vehicle
 
 

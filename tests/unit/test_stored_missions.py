@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from companion.events_plan import PlanChangedSeen, PlanItemSeen, PlanKind
-from companion.events_targets import ItemCurrentSeen
+from companion.events.plan import PlanChangedSeen, PlanItemSeen, PlanKind
+from companion.events.targets import ItemCurrentSeen
+from companion.events.vehicle import TextSeen
 from companion.mavlink.download import Downloaded, Downloads
 from companion.mission.items import Item
 from companion.mission.load import load_mission
 from companion.mission.mission import HomePoint, MissionError
 from companion.mission.stored import digest, mission_of
 from companion.plan_watch import PlanWatch
-from companion.vehicle import TextSeen
 from tests.unit.test_qgc_missions import do, waypoint, wpl
 
 HOME = Item(0, 16, 0, (0.0, 0.0, 0.0, 0.0), 53.1, 23.1)

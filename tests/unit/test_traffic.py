@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.events.vehicle import GlobalPositionSeen, OriginSeen, OtherSeen
 from companion.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.grid import empty_grid
 from companion.mavlink.codec import Codec
@@ -14,7 +15,7 @@ from companion.planning.problem import Path
 from companion.route import Route, with_planned_speeds
 from companion.settings import LinkSettings, TrafficSettings
 from companion.traffic import Moving, announced, merged, motion_changed, planners_movers
-from companion.vehicle import OTHERS_KEPT, GlobalPositionSeen, OriginSeen, OtherSeen, VehicleState, fold
+from companion.vehicle import OTHERS_KEPT, VehicleState, fold
 
 ORIGIN = GeoPoint(53.0, 23.0)
 HERE = Pose(0.0, 0.0, 0.0, 10.0)

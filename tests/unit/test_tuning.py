@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import TellParameter
-from companion.events_parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
+from companion.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
 from companion.mavlink.codec import Codec
 from companion.parameters import ANSWER_S, MOST_OPEN, ParameterServer
 from companion.saving import Saver

@@ -5,13 +5,11 @@ import math
 import numpy as np
 import pytest
 
-from companion.frames import GeoPoint
-from companion.scan import RangeScan
-from companion.vehicle import (
+from companion.events.event import Event
+from companion.events.vehicle import (
     AckSeen,
     AttitudeSeen,
     EkfStatusSeen,
-    Event,
     GlobalPositionSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -22,9 +20,10 @@ from companion.vehicle import (
     RangeSeen,
     TargetSeen,
     TextSeen,
-    VehicleState,
-    fold,
 )
+from companion.frames import GeoPoint
+from companion.scan import RangeScan
+from companion.vehicle import VehicleState, fold
 
 PLACE = GeoPoint(-35.0, 149.0)
 SCAN = RangeScan(1.0, np.full(1, np.pi), np.ones(1), 0.2, 8.0, 0.1, "behind")
