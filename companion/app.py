@@ -10,7 +10,7 @@ import numpy as np
 from companion.attendant import Attendant
 from companion.auto_legs import AutoLegs
 from companion.clock import Clock, stopwatch_s
-from companion.commands import Arm, Command, Say, SetMode
+from companion.commands import Arm, Command, SetMode
 from companion.driver import Driver
 from companion.errands import Errands
 from companion.events.event import Event
@@ -38,6 +38,7 @@ from companion.safety import Control, Reaction, Watch, awaited, check, latched
 from companion.settings import Settings
 from companion.startup import StartUp, overruled
 from companion.stepping import NotedRunner, StepRunner
+from companion.telling import Teller
 from companion.traffic import announced
 from companion.vehicle import VehicleState, fold
 from companion.watchdogs import Watchdogs
@@ -46,8 +47,6 @@ from companion.whereabouts import Whereabouts
 __all__ = ["Companion", "Outcome", "Status"]
 
 INFO, WARNING = 6, 4
-NOT_FOLLOWED_S = 5.0
-"""People are told when the autopilot's read-back has shown another target for so long."""
 
 
 class Companion:
@@ -72,6 +71,9 @@ class Companion:
     ) -> None:
         self.vehicle = VehicleState(in_auto=mission.in_auto)
         self.outcome = Outcome()
+        self._reporter = Reporter(self.outcome.said)
+        self._teller = Teller(autopilot, clock, self._reporter)
+        self._tell = self._teller.tell
         self.watch = Watch()
         self._pursuit: Pursuit | None = None
         self._autopilot = autopilot
@@ -85,7 +87,6 @@ class Companion:
         self._start_up = StartUp(mission, settings, arm=arm, kept=memory.kept if memory else None)
         self._outbox = Outbox(settings.guidance)
         self.output_check = OutputCheck(self._tell)
-        self._reporter = Reporter(self.outcome.said)
         self.oversight = Oversight(autopilot, settings, self._tell)
         self._next_tick_s = now_s = clock.now_s()
         log.begin(now_s, Mark.BEGIN)
@@ -94,7 +95,6 @@ class Companion:
         self._errands = Errands(mission, settings.safety, self._send, self._tell)
         self._legs = AutoLegs(self._tell)
         self._plan_watch = PlanWatch(mission.stored, autopilot.downloads, self._tell)
-        self._followed_s = now_s
         self._stopped = False
         self._stop_asked = False
         tuned = (self._outbox, self._whereabouts, self._start_up)
@@ -166,7 +166,10 @@ class Companion:
         elif self._handover.is_over(self.vehicle, now_s):
             self._done = True
         self._remember(now_s)
-        self._tell_of_faults(now_s)
+        problem = self._log.problem or (self._memory.problem if self._memory else "")
+        self._teller.of_faults(
+            now_s, problem, heard=self.vehicle.heartbeat is not None, underway=self._pursuit is not None
+        )
         self._autopilot.service(now_s)
         self.outcome.step_seconds.append(stopwatch_s() - began_s)
 
@@ -264,7 +267,7 @@ class Companion:
             self._send(command, now_s)
         refused = self._autopilot.last_ack(Arm())
         if refused is not None and refused.result != 0 and self._start_up.missing == "arming":
-            self._tell_once(f"The autopilot refuses to arm (result {refused.result})")
+            self._teller.once(f"The autopilot refuses to arm (result {refused.result})")
         if laid is None:
             self._reporter.doing = f"waiting for {self._start_up.missing}"
             if self.vehicle.heartbeat is None:
@@ -357,28 +360,3 @@ class Companion:
         self._reporter.doing = why
         if self._handover.begin(self.vehicle, self.watch.control, now_s) and why != "done":
             self._tell(f"Companion: {why}, HOLD", WARNING)
-
-    def _tell_of_faults(self, now_s: float) -> None:
-        """What a person should know though it stops nothing, once each."""
-        if self._autopilot.signing_trouble and self.vehicle.heartbeat is not None:
-            self._tell_once(self._autopilot.signing_trouble)
-        if self._pursuit is not None:
-            if intruder := self._autopilot.intruder(now_s):
-                self._tell_once(intruder)
-            if self._autopilot.target_confirmed is not False:
-                self._followed_s = now_s
-            elif now_s - self._followed_s > NOT_FOLLOWED_S:
-                self._tell_once("The autopilot follows another target than the one sent")
-            lost = self._memory.problem if self._memory else ""
-            for text in self._reporter.faults(self._autopilot.rate_faults, self._log.problem or lost, now_s):
-                self._tell_once(text)
-
-    def _tell(self, text: str, severity: int) -> None:
-        """Say it to the ground station, not twice in a row."""
-        if self._reporter.say(text, severity):
-            self._autopilot.send(Say(severity, text), self._clock.now_s())
-
-    def _tell_once(self, text: str) -> None:
-        """Say what goes on being so only the first time."""
-        if text not in self.outcome.said:
-            self._tell(text, WARNING)
