@@ -40,7 +40,13 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
     if turning_radius_m > 0.0:
         _steer(settings)
-    # What lives now lives to the end: a collection that walks through it would stall a tick for a tenth of a second.
+
+
+def settle() -> None:
+    """For a process that drives once: what lives now lives to the end.
+
+    A collection that walks through it would stall a tick for a tenth of a second.
+    """
     gc.collect()
     gc.freeze()
 
