@@ -8,7 +8,9 @@ LATE_S = 0.1
 """A tick that begins so much after its time is late: two whole ticks at 20 Hz."""
 WINDOW_S = 4.0
 LATE_SHARE = 0.5
-"""One hiccup may be as long as a second. Late for more than this share of the window, the computer is too slow, or busy."""
+"""Late for more than this share of the window, the computer is too slow, or busy."""
+HICCUP_S = 1.0
+"""One stall counts for no more than this, however long it was: a computer that was suspended is not slow."""
 
 
 class LoopWatch:
@@ -31,7 +33,7 @@ class LoopWatch:
         """A tick begins now, ``late_s`` after its time; ``planner_works``: a step is being computed beside the loop."""
         elapsed_s = now_s - (now_s if self._before_s is None else self._before_s)
         self._before_s = now_s
-        self._note(now_s, elapsed_s if late_s > LATE_S else 0.0)
+        self._note(now_s, min(elapsed_s, HICCUP_S) if late_s > LATE_S else 0.0)
         since_s = now_s if self._works_since_s is None else self._works_since_s
         self._works_since_s = since_s if planner_works else None
         if planner_works and now_s - since_s > self._planner_s:

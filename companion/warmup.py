@@ -7,9 +7,11 @@ import gc
 import numpy as np
 from numba.core import event
 
+from companion.commands import GuidedVelocity
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
 from companion.mapping import clearance_m, integrate, look_along, new_map, penalise, unseen_beside
+from companion.output_check import Output, Surroundings, velocity_stops_in_time
 from companion.planning import registry
 from companion.prediction import steered
 from companion.reach import RoverLimits
@@ -38,6 +40,8 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]), 5.0)
     steered(0.0, 0.0, 0.0, places, np.zeros(2), np.zeros(1))
     first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
+    known = Surroundings(evidence, RoverLimits(0.35, 2.0, 4.0), settings)
+    velocity_stops_in_time(Output(GuidedVelocity(0.2, 0.1), Pose(4.0, 4.0, 0.0, 0.0), 0.2), known)
     if turning_radius_m > 0.0:
         _steer(settings)
 
