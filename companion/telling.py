@@ -37,8 +37,8 @@ class Teller:
             self.once(self._autopilot.signing_trouble)
         if not underway:
             return
-        if self._autopilot.twin_heard(now_s):
-            self.once("Another companion speaks as this component: stop one of them")
+        if intruder := self._autopilot.intruder(now_s):
+            self.once(intruder)
         if self._autopilot.target_confirmed is not False:
             self._followed_s = now_s
         elif now_s - self._followed_s > NOT_FOLLOWED_S:

@@ -115,7 +115,7 @@ class AutopilotLink:
             return "Another companion speaks as this component: stop one of them"
         kind = self._codec.impostor_type
         who = f"A vehicle of type {kind} speaks as system {self._codec.system_id}, too"
-        return "" if kind is None else f"{who}: give it another SYSID_THISMAV"
+        return "" if kind is None else f"{who}: give it another MAV_SYSID"
 
     def last_ack(self, command: Command) -> AckSeen | None:
         """The last answer to a command of this kind (result -1: never answered); None while there is none."""

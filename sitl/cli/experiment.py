@@ -26,7 +26,7 @@ from sitl.experiments import (
     soak,
     wang_table4,
 )
-from sitl.experiments.experiment import Experiment, ExperimentError, Options, Report
+from sitl.experiments.experiment import Checked, Experiment, ExperimentError, Options, Report
 
 EXPERIMENTS: dict[str, Experiment] = {
     adaptive_control_points.NAME: adaptive_control_points.run,
@@ -41,6 +41,7 @@ EXPERIMENTS: dict[str, Experiment] = {
     soak.NAME: soak.run,
 }
 EXIT_BAD_INPUT = 2
+EXIT_FAILED = 3
 
 
 def experiment(
@@ -72,7 +73,7 @@ def experiment(
         Path | None, typer.Option(help="Folder whose results.md and images/ are brought up to date.")
     ] = None,
 ) -> None:
-    """Make the experiment NAME and print its tables. Exit code 2: bad input."""
+    """Make the experiment NAME and print its tables. Exit code 2: bad input; 3: soak, dead-companion: something touched or failed."""
     console = Console()
     try:
         made = EXPERIMENTS.get(name)
@@ -86,6 +87,9 @@ def experiment(
         options = Options(runs, seed, jobs, maps, tuple(world or ()), names)
         report = _with_progress(name, made, options, console)
         _put_out(report, console, json_file, docs)
+        if isinstance(report, Checked) and report.failure:
+            typer.echo(f"experiment {name}: {report.failure}", err=True)
+            raise typer.Exit(EXIT_FAILED)
     except (ExperimentError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error

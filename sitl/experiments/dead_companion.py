@@ -134,6 +134,12 @@ class DeadReport:
         """One for each suite of sensors."""
         return [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in self._suites()]
 
+    @property
+    def failure(self) -> str:
+        """Contacts."""
+        touched = sum(death.touched for death in self.deaths)
+        return f"{touched} contacts after the companion had fallen dead" if touched else ""
+
     def as_json(self) -> dict[str, object]:
         """Every run."""
         runs = [{name: getattr(death, name) for name in Death.__slots__} for death in self.deaths]

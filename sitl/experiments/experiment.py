@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from importlib.metadata import version
 from os import cpu_count
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from rich.table import Table
 
@@ -59,6 +59,16 @@ class Report(Protocol):
 
     def write_docs(self, folder: Path) -> list[Path]:
         """Write this experiment's part of results.md and its pictures (under images/); gives the files written."""
+        ...
+
+
+@runtime_checkable
+class Checked(Protocol):
+    """A report of something that may not happen."""
+
+    @property
+    def failure(self) -> str:
+        """What happened all the same, in words; empty for nothing."""
         ...
 
 

@@ -37,6 +37,8 @@ PERSON_S = 8.0
 """So long the person looks before doing what the companion waits for."""
 PATIENCE = 5
 """So often in a row the person tries."""
+GROWTH_MB = 20.0
+"""More than this is growth: what the interpreter keeps for later varies by some megabytes."""
 WARM_UP = 10
 """Memory is compared from this run on: until then caches fill."""
 POLICIES = ("Returning: ", "HOLD: battery")
@@ -177,6 +179,19 @@ class SoakReport:
         return [write_section(folder, NAME, self._section(), PAGE)]
 
     @property
+    def failure(self) -> str:
+        """Contacts, errors, targets left without a reason, memory that grows."""
+        left = Counter({
+            "with a contact": sum(run.collisions > 0 for run in self.runs),
+            "with an error": sum(run.error != "" for run in self.runs),
+            "left unfinished": sum(run.ended == "unfinished" for run in self.runs),
+        })  # fmt: skip
+        found = [f"{count} runs {what}" for what, count in left.items() if count]
+        if self.growth_mb is not None and self.growth_mb > GROWTH_MB:
+            found.append(f"memory grew by {self.growth_mb:.0f} MB")
+        return ", ".join(found)
+
+    @property
     def growth_mb(self) -> float | None:
         """By how much the memory of the last runs is more than that of the first after the caches have filled; None: too few runs, or
         more than one process."""
@@ -222,7 +237,9 @@ def _trouble(run: Soaked) -> str:
         return run.error
     if run.collisions:
         return f"{run.collisions} collisions"
-    return f"unfinished: {run.last_text}" if run.ended == "unfinished" else ""
+    if run.ended == "unfinished":
+        return f"unfinished: {run.last_text}"
+    return f"{run.refused} setpoints refused" if run.refused else ""
 
 
 def _row(name: str, runs: Iterable[Soaked]) -> list[str]:

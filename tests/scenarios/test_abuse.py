@@ -215,7 +215,7 @@ def test_another_vehicle_under_the_rovers_own_ids_is_not_heeded_and_told_once(tm
     rig.finish()
     assert rig.companion.outcome.complete
     told = [text for text in rig.texts() if "type 2 speaks as system 1" in text]
-    assert len(told) == 1 and "SYSID_THISMAV" in told[0]
+    assert len(told) == 1 and "MAV_SYSID" in told[0]
 
 
 # --- files -----------------------------------------------------------------------------------------------------------

@@ -101,4 +101,6 @@ def test_the_page_shows_what_was_counted(tmp_path: Path) -> None:
     assert page.name == "safety.md" and "Reboot 39" in text
     assert "| all | 40 | 39 | 39 | 0 | 1 | 2 | 1 | 0 | 0 |" in text
     assert len(report.tables()) == 2
+    assert report.failure == "1 runs with a contact, 1 runs with an error, 1 runs left unfinished"
+    assert SoakReport(Options(39), tuple(runs[:39])).failure == ""
     assert SoakReport(Options(2), tuple(runs[:2])).growth_mb is None
