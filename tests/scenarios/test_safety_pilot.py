@@ -143,7 +143,7 @@ def test_disarming_at_any_phase_silences_it_for_good(tmp_path: Path, phase: str)
 def hold_sticks(rig: Rig, steering_us: int, throttle_us: int, seconds: float) -> None:
     """A ground station's joystick; ArduRover shows it in RC_CHANNELS like a transmitter's sticks, and in GUIDED obeys neither."""
     until_s = rig.now_s() + seconds
-    while rig.now_s() < until_s - 1e-9:
+    while rig.now_s() < until_s - 1e-9 and not rig.companion.done:
         rest = [65535] * 4
         override = mavlink.MAVLink_rc_channels_override_message(1, 1, steering_us, 65535, throttle_us, 65535, *rest)
         rig._pilot.receive(override.pack(rig._pilot_mav))
