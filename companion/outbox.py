@@ -1,4 +1,4 @@
-"""Which commands are really sent: the autopilot brakes for every new setpoint, so only what has changed, or is due again."""
+"""Which commands are really sent: only what has changed, or is due again."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from companion.settings import GuidanceSettings, Settings
 
 VELOCITY_PERIOD_S = 0.2
 SPEED_PERIOD_S = 0.5
+MOVED_M = 0.1
+"""A position that has moved less is still the same."""
 SPEED_AGAIN_S = 3.0
 
 
@@ -49,7 +51,7 @@ class Outbox:
             case GuidedPosition(), GuidedPosition() as last:
                 moved_m = setpoint.point.distance_m(last.point)
                 limit_s = self._settings.resend_s / 2.0 if confirmed is False else self._settings.resend_s
-                return since_s >= limit_s or (moved_m > 0.5 and since_s >= self._settings.change_after_s)
+                return since_s >= limit_s or (moved_m > MOVED_M and since_s >= self._settings.change_after_s)
             case GuidedHeading(), GuidedHeading() as last:
                 turned = abs(wrap_pi_rad(setpoint.heading_rad - last.heading_rad))
                 return since_s >= self._settings.resend_s or (turned > math.radians(5.0) and since_s >= 0.2)

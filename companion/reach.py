@@ -7,6 +7,7 @@ way there. ``companion/output_check.py`` asks the same once more of whatever is 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,8 @@ from companion.swept import UNSEEN, arc_clear, kept_room
 
 BACK_LEAST_M_S = 0.2
 """Where there is less room behind than this needs, it does not back out at all."""
+ROLLED_M = 0.05
+"""So fine are targets chosen along the route."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,26 +68,41 @@ def _farthest_with(
     extra_m: float,
     settings: GuidanceSettings,
 ) -> tuple[NedPoint, float]:
+    def may(point: NedPoint, distance_m: float) -> bool:
+        return may_be_last(pose, point, distance_m, evidence, rover, extra_m, settings)
+
+    farthest = farthest_m(speed_m_s, settings)
     last = min(len(route.points) - 1, route.progress + int(settings.horizon_m / STEP_M))
-    for index in range(last, route.progress, -2):
+    for index in range(last, route.progress, -2):  # in double steps, for speed
         point = route.point(index)
         distance_m = pose.point.distance_m(point)
-        if not 0.05 <= distance_m <= farthest_m(speed_m_s, settings):
-            continue
-        if not _may_be_last(pose, point, distance_m, evidence, rover, extra_m, settings):
-            continue
-        if index < last:  # looked at in double steps, for speed
-            further = route.point(index + 1)
-            further_m = pose.point.distance_m(further)
-            if distance_m < further_m <= farthest_m(speed_m_s, settings) and _may_be_last(
-                pose, further, further_m, evidence, rover, extra_m, settings
-            ):
-                return further, further_m
-        return point, distance_m
+        if 0.05 <= distance_m <= farthest and may(point, distance_m):
+            return rolled_on(route, index, last, pose, farthest, may)
     return pose.point, 0.0
 
 
-def _may_be_last(
+def rolled_on(
+    route: Route, index: int, last: int, pose: Pose, farthest: float, may: Callable[[NedPoint, float], bool]
+) -> tuple[NedPoint, float]:
+    """From a point that may be the target towards the next ones that may not, as near as ``ROLLED_M``; ``farthest``: metres.
+
+    The autopilot drives the faster the farther its target lies, so no decimetre is given away.
+    """
+    point = route.point(index)
+    distance_m = pose.point.distance_m(point)
+    for further in (route.point(i) for i in (index + 1, index + 2) if i <= last):
+        bearing, left_m = point.bearing_rad(further), point.distance_m(further)
+        pieces = max(1, math.ceil(left_m / ROLLED_M - 1e-6))
+        for _ in range(pieces):
+            nearer = point.moved(bearing, left_m / pieces)
+            nearer_m = pose.point.distance_m(nearer)
+            if not distance_m < nearer_m <= farthest or not may(nearer, nearer_m):
+                return point, distance_m
+            point, distance_m = nearer, nearer_m
+    return point, distance_m
+
+
+def may_be_last(
     pose: Pose,
     point: NedPoint,
     distance_m: float,
@@ -107,7 +125,7 @@ def _may_be_last(
     if look_along(evidence, pose.point, stands, rover.radius_m).clear_m < stands_m - 0.05:
         return False
     front = stands.moved(bearing, _inside_m(evidence, stands, bearing, rover.radius_m))
-    if look_along(evidence, stands, front, 0.0).seen_m < stands.distance_m(front) - 0.05:
+    if look_along(evidence, stands, front, 0.0).seen_m < stands.distance_m(front) - 1e-6:
         return False
     return unseen_flank(pose, stands, evidence, rover) is None
 

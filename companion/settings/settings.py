@@ -134,7 +134,7 @@ class GuidanceSettings(Section):
     )
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
     change_after_s: float = Field(
-        0.4, ge=0.0, description="a target that moved is sent not sooner than this after the last"
+        0.1, ge=0.0, description="a target that moved is sent not sooner than this after the last"
     )
     narrow_clearance_m: float = Field(
         0.3, ge=0.0, description="clearances smaller than this are not used with single thin beams"
