@@ -22,7 +22,7 @@ from companion.swept import UNSEEN, arc_clear, kept_room
 BACK_LEAST_M_S = 0.2
 """Where there is less room behind than this needs, it does not back out at all."""
 ROLLED_M = 0.05
-"""So fine are targets chosen along the route."""
+"""So fine are targets chosen along the route, and so far may their front lie beyond seen ground: the steps in which it is looked along."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,7 @@ def may_be_last(
     if look_along(evidence, pose.point, stands, rover.radius_m).clear_m < stands_m - 0.05:
         return False
     front = stands.moved(bearing, _inside_m(evidence, stands, bearing, rover.radius_m))
-    if look_along(evidence, stands, front, 0.0).seen_m < stands.distance_m(front) - 1e-6:
+    if look_along(evidence, stands, front, 0.0).seen_m < stands.distance_m(front) - ROLLED_M:
         return False
     return unseen_flank(pose, stands, evidence, rover) is None
 
