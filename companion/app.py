@@ -261,7 +261,11 @@ class Companion:
             return None
         taken = overruled(self._autopilot.last_ack(SetMode(RoverMode.GUIDED)), self.vehicle.heartbeat)
         control = Control.PERSON if taken else self.watch.control
-        fence, hindrance = self.oversight.before_driving(now_s)
+        out = self._start_up.out(self.vehicle)
+        if out and (reason := self.oversight.emptied(now_s)):
+            self._hand_over(now_s, reason)
+            return None
+        fence, hindrance = self.oversight.before_driving(now_s, out=out)
         laid, command = self._start_up.step(self.vehicle, control, now_s, fence, hindrance)
         if command is not None:
             self._send(command, now_s)

@@ -37,9 +37,19 @@ class Oversight:
             self._tell(breach[0].upper() + breach[1:], 4)
         self._breached = bool(breach)
 
-    def before_driving(self, now_s: float) -> tuple[AutopilotFence, str]:
-        """The autopilot's fence as known now, and what is awaited before the rover may be driven at all; empty when nothing is."""
-        return self._fence, self._fencing.missing or self._power.hindrance(now_s)
+    def before_driving(self, now_s: float, *, out: bool = False) -> tuple[AutopilotFence, str]:
+        """The autopilot's fence as known now, and what is awaited before the rover may be driven at all; empty when nothing is.
+
+        ``out``: an earlier run has left it armed in GUIDED, perhaps far from anybody. A low battery is then a reason to go back, not to stay.
+        """
+        return self._fence, self._fencing.missing or ("" if out else self._power.hindrance(now_s))
+
+    def emptied(self, now_s: float) -> str:
+        """Why the rover must stop for good wherever it is, in words; empty while it need not."""
+        if self._power.level(now_s) is not Level.HOLD:
+            return ""
+        self.ended_by = self._power.reason
+        return self.ended_by
 
     def doubt(self, pursuit: Pursuit, pose: Pose | None, now_s: float) -> str:
         """Why the rover must not be driven now; empty when it may. A fence that has changed is in force from here on."""

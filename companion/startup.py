@@ -135,13 +135,15 @@ class StartUp:
         self._look_again_s = now_s + LOOK_AGAIN_S
         return None, self._standstill(vehicle)
 
-    def _standstill(self, vehicle: VehicleState) -> Command | None:
-        """A rover that an earlier run had set going stops until it is known what it drives on."""
+    def out(self, vehicle: VehicleState) -> bool:
+        """Whether the rover is where an earlier run has left it, armed in GUIDED: nobody else may be there."""
         ours = self._kept is not None and self._kept.state.control is Control.COMPANION
         heartbeat = vehicle.heartbeat
-        if not ours or heartbeat is None or heartbeat.mode != RoverMode.GUIDED or not heartbeat.armed:
-            return None
-        return STANDSTILL.setpoint
+        return ours and heartbeat is not None and heartbeat.mode == RoverMode.GUIDED and heartbeat.armed
+
+    def _standstill(self, vehicle: VehicleState) -> Command | None:
+        """A rover that an earlier run had set going stops until it is known what it drives on."""
+        return STANDSTILL.setpoint if self.out(vehicle) else None
 
     def _due(self, command: Command | None, now_s: float) -> Command | None:
         if command is None or now_s - self._asked_s <= ASK_AGAIN_S:

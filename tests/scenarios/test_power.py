@@ -178,3 +178,35 @@ def test_with_a_low_battery_it_does_not_even_begin(tmp_path: Path) -> None:
     rig.change = None
     rig.finish()
     assert rig.companion.outcome.complete, "with another battery it does"
+
+
+def resumed(rig: Draining, mission: Mission) -> None:
+    """Another companion takes the run up; for a moment it cannot begin, so that it hears of the battery first."""
+    drained = rig.change
+    assert drained is not None
+    rig.change = lambda message: None if message.get_type() == "ATTITUDE" else drained(message)
+    rig.restart_companion(mission, resume=True)
+    rig.run_for(3.0)
+    rig.change = drained
+
+
+@pytest.mark.parametrize("returning", [True, False])
+def test_a_run_that_is_taken_up_out_there_with_a_low_battery_goes_back(tmp_path: Path, returning: bool) -> None:
+    mission = yard(tmp_path)
+    rig = Draining(mission, 9.0, {"percent": 19}, state=tmp_path / "state", late_s=45.0)
+    if returning:
+        rig.until(lambda: rig.said("Returning: battery"), AFTER_S + 1.5)
+    resumed(rig, mission)
+    rig.until(lambda: rig.said("Returning: battery at 19 %"), AFTER_S + 1.5)
+    rig.finish(60.0)
+    assert rig.mode == HOLD and math.hypot(*rig.place) < 1.0
+    assert rig.simulator.collisions == ()
+
+
+def test_a_run_that_is_taken_up_out_there_with_an_empty_battery_ends_in_hold(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    rig = Draining(mission, 9.0, {"percent": 9}, state=tmp_path / "state", late_s=45.0)
+    resumed(rig, mission)
+    assert rig.companion.driver is None, "it could not begin"
+    rig.until(lambda: rig.companion.done, 3.0)
+    assert rig.said("Companion: battery at 9 %, HOLD") and rig.mode == HOLD
