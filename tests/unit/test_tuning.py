@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import TellParameter
+from companion.disk import OsDisk
 from companion.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
 from companion.mavlink.codec import Codec
 from companion.parameters import ANSWER_S, MOST_OPEN, ParameterServer
@@ -269,6 +271,31 @@ def test_the_newest_of_many_is_what_stays(tmp_path: Path) -> None:
     saver.close()
     assert (path.read_bytes(), other.read_bytes()) == (b"199", b"too")
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a", "b"]
+
+
+class HangingDisk(OsDisk):
+    """One that takes a file and never says that it has it, until it is let go."""
+
+    def __init__(self) -> None:
+        self.free = threading.Event()
+
+    def sync(self, handle: int) -> None:
+        self.free.wait(30.0)
+
+
+def test_a_disk_that_hangs_keeps_nobody_from_ending(tmp_path: Path) -> None:
+    disk = HangingDisk()
+    saver = Saver(disk, close_s=0.01)
+    saver.save(tmp_path / "tuned.toml", b"new")
+    writers = [thread for thread in threading.enumerate() if thread.name == "saver"]
+    saver.close()
+    saver.close()
+    still = [thread for thread in writers if thread.is_alive()]
+    assert still and all(thread.daemon for thread in still), (
+        "a thread that is no daemon is waited for at the program's end"
+    )
+    assert saver.problem == f"{tmp_path / 'tuned.toml'}: not written yet: the disk does not answer"
+    disk.free.set()
 
 
 def test_the_page_lists_every_parameter() -> None:
