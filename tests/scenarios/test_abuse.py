@@ -10,6 +10,7 @@ import tracemalloc
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -228,7 +229,12 @@ def test_range_data_at_a_thousand_a_second_is_not_mapped_so_often_and_parameters
     rig = Rig(yard(tmp_path))
     rig.until_driven(1.0)
     take = Pursuit.map_scan
-    monkeypatch.setattr(Pursuit, "map_scan", lambda *given: (mapped.append(given), take(*given)))
+
+    def counted(*given: Any) -> None:
+        mapped.append(given)
+        take(*given)
+
+    monkeypatch.setattr(Pursuit, "map_scan", counted)
     rig.garble = lambda data: data + b"".join(map(lidar, range(50))) + b"".join(map(told_parameters, range(50)))
     rig.run_for(1.0)
     assert 0 < len(mapped) <= 3 * TICK_HZ + 3
