@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
 import threading
@@ -54,11 +55,12 @@ class Ground:
 
 def test_every_parameter_is_a_setting_whose_default_lies_within_its_bounds() -> None:
     assert len(BY_NAME) == len(TABLE)
+    slow = Settings.model_validate({"guidance": {"min_speed_m_s": 0.05}})
     for parameter in TABLE:
         assert len(parameter.name) <= LONGEST_NAME and parameter.name.startswith("CMP_")
         assert parameter.low <= parameter.value(Settings()) <= parameter.high, parameter.name
         for bound in (parameter.low, parameter.high):  # the settings themselves take what is in the table
-            assert parameter.value(changed(Settings(), parameter, bound)) == bound
+            assert parameter.value(changed(slow, parameter, bound)) == bound
         assert isinstance(getattr(getattr(Settings(), parameter.section), parameter.key), int) == parameter.whole
 
 
@@ -75,6 +77,29 @@ def test_a_number_that_travelled_as_32_bits_is_the_one_that_was_typed() -> None:
     assert changed(Settings(), BY_NAME["CMP_ARRIVAL"], received).guidance.arrival_m == 0.15
 
 
+def test_the_slowest_speed_never_lies_above_the_fastest() -> None:
+    slowest, fastest = BY_NAME["CMP_SPD_MIN"], BY_NAME["CMP_SPD_MAX"]
+    with pytest.raises(RefusedError, match=r"^0\.1 below CMP_SPD_MIN 0\.5$"):
+        changed(Settings(), fastest, 0.1)
+    both = changed(changed(Settings(), slowest, 0.1), fastest, 0.2)
+    with pytest.raises(RefusedError, match=r"^0\.3 above CMP_SPD_MAX 0\.2$"):
+        changed(both, slowest, 0.3)
+    assert slowest.value(changed(both, slowest, 0.2)) == 0.2
+
+
+@given(st.lists(st.tuples(st.sampled_from(TABLE), st.floats(0.0, 1.0)), max_size=12))
+def test_however_it_is_tuned_a_rover_that_creeps_stops_within_what_was_measured(choices: list[Any]) -> None:
+    """ArduRover brakes with some 1 m/s2, 0.25 s after it is told."""
+    tuned = Settings()
+    for parameter, share in choices:
+        value = parameter.low + share * (parameter.high - parameter.low)
+        with contextlib.suppress(RefusedError):
+            tuned = changed(tuned, parameter, round(value) if parameter.whole else value)
+    guidance = tuned.guidance
+    assert guidance.min_speed_m_s <= min(0.5, guidance.max_speed_m_s)
+    assert guidance.deceleration_m_s2 <= 1.5 and guidance.brake_delay_s >= 0.2
+
+
 def test_half_a_doubt_is_refused() -> None:
     with pytest.raises(RefusedError, match="whole"):
         changed(Settings(), BY_NAME["CMP_DOUBTS"], 2.5)
@@ -86,7 +111,8 @@ def test_what_is_set_comes_back_from_the_file(tmp_path_factory: Any, choices: li
     tuned = base
     for parameter, share in choices:
         value = parameter.low + share * (parameter.high - parameter.low)
-        tuned = changed(tuned, parameter, round(value) if parameter.whole else value)
+        with contextlib.suppress(RefusedError):  # a slowest speed above the fastest
+            tuned = changed(tuned, parameter, round(value) if parameter.whole else value)
     path = tmp_path_factory.mktemp("state") / "tuned.toml"
     path.write_text(as_toml(base, tuned))
     assert with_tuned(base, path) == tuned
