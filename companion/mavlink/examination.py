@@ -27,7 +27,7 @@ it for the companion that it hands over to in AUTO."""
 ASK_S = 1.0
 PARAMETER_S = 0.05
 """One is asked for in so long: a slow line is not flooded,"""
-TRIES = 3
+TRIES = 5
 """and so often, if no answer comes."""
 WARNING = 4
 MOST_TEXTS, MOST_SOURCES, MOST_SYSTEMS = 32, 64, 32
