@@ -26,6 +26,7 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import EncodeError
 from companion.memory import Memory
 from companion.mission.mission import Mission
+from companion.newest import newest_ranges
 from companion.outbox import Outbox
 from companion.output_check import OutputCheck
 from companion.oversight import Oversight
@@ -151,7 +152,7 @@ class Companion:
             self._whereabouts.stalled(now_s)
         began_s = stopwatch_s()
         self._reporter.news.clear()
-        for event in self._autopilot.poll(now_s):
+        for event in newest_ranges(self._autopilot.poll(now_s)):
             self.vehicle = fold(self.vehicle, event)
             self._attendant.take(event)
             self._take_in(event)

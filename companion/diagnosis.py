@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -23,6 +23,8 @@ NEAR_M, SHORT_M, FAR_M, SLOW_HZ = 0.6, 2.0, 120.0, 3.0
 """Range sensors are odd that are blind nearer than the first, see no farther than the second, claim more than the third."""
 RADIUS_M = 2.0
 LOST_SHARE = 0.1
+STICKS = {"RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0}
+"""Where the companion looks for them."""
 STATIONS = ("MAV_GCS_SYSID", "SYSID_MYGCS")
 """The same parameter in 4.7 and before."""
 
@@ -66,6 +68,7 @@ def diagnose(seen: Examined) -> list[Finding]:
         _ranges,
         _avoidance,
         _guided,
+        _sticks,
         _stations,
         _fence,
     )
@@ -129,11 +132,20 @@ def _identity(seen: Examined) -> Iterator[Finding]:
     if len(missing) == len(seen.asked) > 0:
         says = "The autopilot tells none of its parameters."
         yield Finding("no-parameters", Level.WARN, says, "look whether it is asked through a radio that drops much")
+    elif unheard := _unheard(missing, seen):
+        says = f"Not told, and so not looked at: {', '.join(unheard)}."
+        yield Finding("parameters-unheard", Level.WARN, says, "ask again, over a line that drops less")
     elif seen.packets and seen.lost > LOST_SHARE * seen.packets:
         says = f"{seen.lost} packets of the autopilot were lost, {seen.packets} came."
         yield Finding(
             "packets-lost", Level.WARN, says, "a faster baud rate, a better cable, or fewer messages on this line"
         )
+
+
+def _unheard(missing: Sequence[str], seen: Examined) -> list[str]:
+    """What should have been told: of the two names of one parameter each firmware has one."""
+    station = _station(seen) is not None
+    return [name for name in missing if name not in STATIONS or (not station and name == STATIONS[0])]
 
 
 def _firmware(seen: Examined) -> Iterator[Finding]:
@@ -297,6 +309,14 @@ def _guided(seen: Examined) -> Iterator[Finding]:
         yield _set("wp-speed", Level.WARN, "Guided speed is left to CRUISE_SPEED.", "WP_SPEED", 0.0, 2.0)
 
 
+def _sticks(seen: Examined) -> Iterator[Finding]:
+    for name, wanted in STICKS.items():
+        value = seen.parameters.get(name, wanted)
+        if value != wanted:
+            says = f"The pilot's sticks are looked for on channels 1 and 3, but {name} is {value:g}: they would not be seen."
+            yield _set("sticks", Level.WARN, says, name, value, wanted)
+
+
 def _stations(seen: Examined) -> Iterator[Finding]:
     watching, station = seen.parameters.get("FS_GCS_ENABLE"), _station(seen)
     if watching and station is not None and int(station[1]) not in seen.systems:
@@ -345,6 +365,7 @@ PARAMETERS = (
     "RNGFND1_TYPE",
     "FS_GCS_ENABLE",
     "FENCE_ENABLE",
+    *STICKS,
     *STATIONS,
 )
 """To be asked for."""

@@ -14,6 +14,8 @@ KEPT = 3
 AHEAD_S = 1.0
 """A boot time that runs ahead of our clock by more than this, or back by more than packets overtake each other, has jumped."""
 BACK_S = 5.0
+DRIFT = 1e-4
+"""So fast two quartz clocks may drift apart: what grows no faster is no delay, also where TIMESYNC is never answered."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +35,9 @@ class Latency:
     shifts_s: tuple[float, ...] = ()
     """Our clock minus the autopilot's in its newest position reports, at most KEPT."""
     least_shift_s: float = math.inf
-    """The same without delay: the least that was seen, or what an answer has shown."""
+    """The same without delay: the least that was seen, or what an answer has shown; allowed to rise as clocks drift."""
+    heard_s: float = math.inf
+    """When the newest position report came."""
     jumped_s: float = -math.inf
     """When the autopilot's clock last jumped."""
 
@@ -67,9 +71,11 @@ def reported(latency: Latency, time_s: float, boot_s: float) -> Latency:
     """After a position report of the autopilot's boot time ``boot_s``, heard at ``time_s``."""
     shift_s = time_s - boot_s
     if latency.shifts_s and shift_s < latency.least_shift_s - AHEAD_S:
-        return Latency(latency.round_trips_s, (shift_s,), shift_s, time_s)
+        return Latency(latency.round_trips_s, (shift_s,), shift_s, time_s, time_s)
+    drifted_s = DRIFT * max(0.0, time_s - latency.heard_s)
     return replace(
         latency,
         shifts_s=(*latency.shifts_s[1 - KEPT :], shift_s),
-        least_shift_s=min(latency.least_shift_s, shift_s),
+        least_shift_s=min(latency.least_shift_s + drifted_s, shift_s),
+        heard_s=time_s,
     )

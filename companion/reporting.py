@@ -85,6 +85,7 @@ class Reporter:
         self._slow_since_s = slow
         texts = {
             f"{fault.name} too seldom": f"{fault.name}: {fault.measured_hz:.1f} Hz instead of {fault.wanted_hz:g}, asking again"
+            f"{': ' if fault.means else ''}{fault.means}"
             for fault in rates
             if now_s - slow[fault.message_id] >= FAULT_AFTER_S
         }

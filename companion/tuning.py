@@ -27,7 +27,8 @@ class Parameter:
     """A setting as a MAVLink parameter of the companion.
 
     ``low`` to ``high``: what may be set from afar, narrower than what a settings file may say, lest a slip of the finger
-    switch off a watchdog. ``next_leg``: it counts from the next leg on, all others at once.
+    switch off a watchdog or let the rover drive beyond what it sees: it is not believed that it brakes much harder than was
+    measured, nor is it made to creep faster than by default. ``next_leg``: it counts from the next leg on, all others at once.
     """
 
     name: str
@@ -45,13 +46,13 @@ class Parameter:
 
 TABLE: tuple[Parameter, ...] = (
     Parameter("CMP_SPD_MAX", "guidance", "max_speed_m_s", 0.1, 20.0),
-    Parameter("CMP_SPD_MIN", "guidance", "min_speed_m_s", 0.05, 2.0),
+    Parameter("CMP_SPD_MIN", "guidance", "min_speed_m_s", 0.05, 0.5),
     Parameter("CMP_SPD_BEAMS", "guidance", "narrow_speed_m_s", 0.1, 5.0),
     Parameter("CMP_HORIZON", "guidance", "horizon_m", 2.0, 30.0),
     Parameter("CMP_CLEARANCE", "guidance", "clearance_m", 0.0, 2.0),
     Parameter("CMP_SLOW_WITHIN", "guidance", "slow_within_m", 0.1, 5.0),
-    Parameter("CMP_DECEL", "guidance", "deceleration_m_s2", 0.1, 3.0),
-    Parameter("CMP_BRAKE_DLY", "guidance", "brake_delay_s", 0.0, 2.0),
+    Parameter("CMP_DECEL", "guidance", "deceleration_m_s2", 0.1, 1.5),
+    Parameter("CMP_BRAKE_DLY", "guidance", "brake_delay_s", 0.2, 2.0),
     Parameter("CMP_LATENCY", "guidance", "latency_s", 0.1, 2.0),
     Parameter("CMP_ARRIVAL", "guidance", "arrival_m", 0.1, 5.0),
     Parameter("CMP_STUCK", "guidance", "stuck_after_s", 2.0, 60.0),
@@ -75,6 +76,8 @@ TABLE: tuple[Parameter, ...] = (
 
 BY_NAME = {parameter.name: parameter for parameter in TABLE}
 
+SLOWEST, FASTEST = "CMP_SPD_MIN", "CMP_SPD_MAX"
+
 
 def changed(settings: Settings, parameter: Parameter, value: float) -> Settings:
     """The settings with one parameter set. Raises RefusedError: not a number, not whole, out of bounds."""
@@ -85,12 +88,21 @@ def changed(settings: Settings, parameter: Parameter, value: float) -> Settings:
         raise RefusedError(f"{value:g} no whole number")
     if not parameter.low <= value <= parameter.high:
         raise RefusedError(f"{value:g} not in {parameter.low:g}..{parameter.high:g}")
+    _refuse_crossed(settings, parameter, value)
     section = getattr(settings, parameter.section)
     values = section.model_dump() | {parameter.key: round(value) if parameter.whole else value}
     try:
         return settings.model_copy(update={parameter.section: type(section).model_validate(values)})
     except ValidationError as error:
         raise RefusedError(str(error.errors(include_url=False)[0]["msg"]).lower()) from error
+
+
+def _refuse_crossed(settings: Settings, parameter: Parameter, value: float) -> None:
+    """The slowest speed must not lie above the fastest."""
+    if parameter.name == SLOWEST and value > (fastest := BY_NAME[FASTEST].value(settings)):
+        raise RefusedError(f"{value:g} above {FASTEST} {fastest:g}")
+    if parameter.name == FASTEST and value < (slowest := BY_NAME[SLOWEST].value(settings)):
+        raise RefusedError(f"{value:g} below {SLOWEST} {slowest:g}")
 
 
 def as_toml(base: Settings, tuned: Settings) -> str:

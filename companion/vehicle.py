@@ -38,6 +38,10 @@ from companion.sticks import Sticks, SticksSeen, followed
 EKF_POSITION = 8 | 16
 """POS_HORIZ_REL or POS_HORIZ_ABS: one of them must be set to drive."""
 EKF_CONST_POSITION = 128
+PARAMETERS_KEPT = frozenset(
+    ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS", "WP_RADIUS")
+)
+"""The autopilot tells hundreds of parameters whenever somebody lists them; no other is of use to a run."""
 OTHERS_KEPT = 64
 OTHERS_FORGOTTEN_S = 30.0
 """Other vehicles are remembered for so long after they were last heard, and no more than so many of them."""
@@ -162,9 +166,15 @@ def _fold_seldom(state: VehicleState, event: Event) -> VehicleState:
         case PrearmSeen():
             return replace(state, prearm=event)
         case ParameterSeen():
-            return replace(state, parameters={**state.parameters, event.name: event.value})
+            return _with_parameter(state, event)
         case _:
             return state
+
+
+def _with_parameter(state: VehicleState, event: ParameterSeen) -> VehicleState:
+    if event.name not in PARAMETERS_KEPT or state.parameters.get(event.name) == event.value:
+        return state
+    return replace(state, parameters={**state.parameters, event.name: event.value})
 
 
 def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, OtherSeen]:

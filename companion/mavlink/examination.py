@@ -9,7 +9,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import AskPrearm, Command, ReadParameter, RequestMessage
-from companion.events.vehicle import TextSeen
+from companion.events.vehicle import ParameterSeen, TextSeen
 from companion.examined import Autopilot, Examined, RangeSource, SlowMessage
 from companion.mavlink import ranges
 from companion.mavlink.byte_link import ByteLink
@@ -27,7 +27,7 @@ it for the companion that it hands over to in AUTO."""
 ASK_S = 1.0
 PARAMETER_S = 0.05
 """One is asked for in so long: a slow line is not flooded,"""
-TRIES = 3
+TRIES = 5
 """and so often, if no answer comes."""
 WARNING = 4
 MOST_TEXTS, MOST_SOURCES, MOST_SYSTEMS = 32, 64, 32
@@ -54,6 +54,7 @@ class Examination:
         self._names = tuple(names)
         self._open = [name for _ in range(TRIES) for name in names]
         self._vehicle = VehicleState()
+        self._parameters: dict[str, float] = {}
         self._ask_s = self._parameter_s = -math.inf
         self._first_s: float | None = None
         self._checked = False
@@ -80,6 +81,8 @@ class Examination:
                 self._look(packet)
                 for event in self._codec.decode_packet(packet, now_s):
                     self._vehicle = fold(self._vehicle, event)
+                    if isinstance(event, ParameterSeen) and event.name in self._names:
+                        self._parameters[event.name] = event.value
                     if isinstance(event, TextSeen) and event.severity <= WARNING and len(self._texts) < MOST_TEXTS:
                         self._texts[event.text] = None
         for command in self._questions(now_s):
@@ -101,7 +104,7 @@ class Examination:
             systems=frozenset(self._systems),
             companion_heard=self._companion_heard,
             version=self._version,
-            parameters={name: value for name, value in self._vehicle.parameters.items() if name in self._names},
+            parameters=dict(self._parameters),
             asked=self._names,
             sources=tuple(self._source(key, seen) for key, seen in self._sources.items()),
             slow=slow,
@@ -129,7 +132,7 @@ class Examination:
             self._checked = True
             questions += [] if self._vehicle.heartbeat.armed else [AskPrearm()]
         if now_s - self._parameter_s >= PARAMETER_S - 1e-6:
-            while self._open and self._open[0] in self._vehicle.parameters:
+            while self._open and self._open[0] in self._parameters:
                 self._open.pop(0)
             if self._open:
                 self._parameter_s = now_s

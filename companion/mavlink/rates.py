@@ -20,6 +20,7 @@ EKF_HZ = 5.0
 SLOW_HZ = 2.0
 STICKS_HZ = 5.0
 POWER_HZ = 1.0
+STICKS_UNSEEN = "the pilot's sticks are not seen"
 HEARTBEAT_HZ = 5.0
 """Mode and arming are known only from it: at the 1 Hz that comes unasked, a pilot could be overlooked for a second."""
 
@@ -29,13 +30,15 @@ class WantedRate:
     """A message that is to come at a rate.
 
     ``always`` False: it comes only under conditions, so that none at all is no fault. ``told`` False: asked for again
-    while it is too seldom, but nobody need hear of it.
+    while it is too seldom, but nobody need hear of it. ``silence``: what it means that none comes at all, which people do
+    hear then.
     """
 
     message_id: int
     rate_hz: float
     always: bool = True
     told: bool = True
+    silence: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,6 +48,8 @@ class RateFault:
     message_id: int
     wanted_hz: float
     measured_hz: float
+    means: str = ""
+    """What follows from it, where that is not plain."""
 
     @property
     def name(self) -> str:
@@ -57,7 +62,8 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
 
     OBSTACLE_DISTANCE is not asked for: ArduRover refuses to stream it, it comes from the lidar's own driver. The read-back of the
     target comes only while there is one (not while it turns or brakes), DISTANCE_SENSOR and RANGEFINDER only with a rangefinder,
-    BATTERY_STATUS only with a battery monitor, FENCE_STATUS only while a fence is switched on.
+    BATTERY_STATUS only with a battery monitor, FENCE_STATUS only while a fence is switched on; these two are asked for again
+    all the same, for a request that was lost would never be missed.
     """
     return (
         WantedRate(mavlink.MAVLINK_MSG_ID_HEARTBEAT, HEARTBEAT_HZ, told=False),
@@ -65,13 +71,13 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
         WantedRate(mavlink.MAVLINK_MSG_ID_ATTITUDE, settings.attitude_rate_hz),
         WantedRate(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, SLOW_HZ),
         WantedRate(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, EKF_HZ),
-        WantedRate(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, STICKS_HZ, always=False, told=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, STICKS_HZ, told=False, silence=STICKS_UNSEEN),
         WantedRate(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_RANGEFINDER, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_POSITION_TARGET_GLOBAL_INT, SLOW_HZ, always=False, told=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_SYS_STATUS, POWER_HZ, told=False),
-        WantedRate(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, POWER_HZ, always=False, told=False),
-        WantedRate(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, POWER_HZ, always=False, told=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_BATTERY_STATUS, POWER_HZ, told=False),
+        WantedRate(mavlink.MAVLINK_MSG_ID_FENCE_STATUS, POWER_HZ, told=False),
     )
 
 
@@ -100,7 +106,7 @@ class RateKeeper:
             return []
         found = [(rate, self._fault(rate, now_s - self._began_s, counts)) for rate in self._wanted]
         faults = [(rate, fault) for rate, fault in found if fault is not None]
-        self.faults = tuple(fault for rate, fault in faults if rate.told)
+        self.faults = tuple(fault for rate, fault in faults if rate.told or fault.means)
         self._begin(now_s, counts)
         return [RequestRate(fault.message_id, fault.wanted_hz) for _, fault in faults if self._may_ask(fault, now_s)]
 
@@ -115,7 +121,7 @@ class RateKeeper:
             self._again_s[rate.message_id] = 0.0
         if enough or (came == 0 and not rate.always):
             return None
-        return RateFault(rate.message_id, rate.rate_hz, came / elapsed_s)
+        return RateFault(rate.message_id, rate.rate_hz, came / elapsed_s, "" if came else rate.silence)
 
     def _may_ask(self, fault: RateFault, now_s: float) -> bool:
         if now_s < self._again_s[fault.message_id]:

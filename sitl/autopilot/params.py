@@ -90,6 +90,8 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "RALLY_INCL_HOME": (1, INT8),
     "RALLY_LIMIT_KM": (0.5, REAL32),
     "RALLY_TOTAL": (0, INT8),
+    "RCMAP_ROLL": (1, INT8),
+    "RCMAP_THROTTLE": (3, INT8),
     "RC_OVERRIDE_TIME": (3.0, REAL32),
     "RNGFND1_MAX": (0.0, REAL32),
     "RNGFND1_MIN": (0.0, REAL32),

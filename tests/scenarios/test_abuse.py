@@ -10,10 +10,13 @@ import tracemalloc
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.pursuit import Pursuit
+from companion.vehicle import PARAMETERS_KEPT
 from tests.rig import Rig, yard
 from tests.served import mission_path, served
 
@@ -170,7 +173,21 @@ def nonsense(n: int) -> bytes:
     return b"\xfd" * 40
 
 
-FLOODS = [adsb, reposition, other_systems, texts, list_parameters, set_parameters, nonsense]
+def told_parameters(n: int) -> bytes:
+    """Never the same name twice."""
+    return packed(mavlink.MAVLink_param_value_message(b"X%d" % n, float(n), 9, 1000, n % 1000), 1, 1, n)
+
+
+def lidar(n: int) -> bytes:
+    """A second one that sees nothing at all, far too often."""
+    return packed(mavlink.MAVLink_obstacle_distance_message(n, 0, [801] * 72, 5, 20, 800), 1, 158, n)
+
+
+def beams(n: int) -> bytes:
+    return packed(mavlink.MAVLink_distance_sensor_message(n, 20, 800, 800, 0, n % 250, n % 8, 0), 1, 159, n)
+
+
+FLOODS = [adsb, reposition, other_systems, texts, list_parameters, set_parameters, told_parameters, beams, nonsense]
 
 
 def test_a_thousand_messages_a_second_do_not_keep_it_from_its_mission(tmp_path: Path) -> None:
@@ -202,6 +219,26 @@ def test_a_thousand_messages_a_second_do_not_keep_it_from_its_mission(tmp_path: 
     assert grown < 1_000_000
     assert sent_hz < 120.0, "it does not answer a flood with a flood"
     assert len(rig.texts()) - said < 200, rig.texts()
+
+
+def test_range_data_at_a_thousand_a_second_is_not_mapped_so_often_and_parameters_are_not_hoarded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Work is counted, not time: of one kind of message at most three a tick."""
+    mapped = []
+    rig = Rig(yard(tmp_path))
+    rig.until_driven(1.0)
+    take = Pursuit.map_scan
+
+    def counted(*given: Any) -> None:
+        mapped.append(given)
+        take(*given)
+
+    monkeypatch.setattr(Pursuit, "map_scan", counted)
+    rig.garble = lambda data: data + b"".join(map(lidar, range(50))) + b"".join(map(told_parameters, range(50)))
+    rig.run_for(1.0)
+    assert 0 < len(mapped) <= 3 * TICK_HZ + 3
+    assert set(rig.companion.vehicle.parameters) <= PARAMETERS_KEPT
 
 
 def test_another_vehicle_under_the_rovers_own_ids_is_not_heeded_and_told_once(tmp_path: Path) -> None:

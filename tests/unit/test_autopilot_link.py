@@ -12,6 +12,7 @@ from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
+from companion.reporting import FAULT_AFTER_S, Reporter
 from companion.rounds import Mark
 from companion.settings import LinkSettings
 from tests.mavlink_vehicle import Station
@@ -88,6 +89,10 @@ def test_places_are_asked_for_until_known_and_seldom_after() -> None:
     assert len(bench.commands(33.0, 512)) == 2
 
 
+QUIET = {65: 5.0, 147: 1.0, 162: 1.0}
+"""What is asked for again without a word."""
+
+
 def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, float]) -> list[tuple[float, int]]:
     """Let messages come at these rates; returns when which rate was asked for."""
     asked = []
@@ -98,6 +103,9 @@ def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, f
         33: lambda ms: bench.rover.pack(mavlink.MAVLink_global_position_int_message(ms, 1, 1, 0, 0, 0, 0, 0, 0)),
         1: lambda ms: bench.rover.pack(mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 12600, -1, -1, *[0] * 6)),
         193: lambda ms: bench.rover.pack(mavlink.MAVLink_ekf_status_report_message(831, 0, 0, 0, 0, 0)),
+        65: lambda ms: bench.rover.pack(mavlink.MAVLink_rc_channels_message(ms, 16, *[1500] * 18, 0)),
+        147: lambda ms: bench.rover.pack(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, ms, 0, 90)),
+        162: lambda ms: bench.rover.pack(mavlink.MAVLink_fence_status_message(0, 0, 0, ms)),
         132: lambda ms: bench.rover.distance(300 + ms % 7),
     }
     ticks = round((end_s - begin_s) / 0.05)
@@ -112,13 +120,13 @@ def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, f
 
 def test_rates_that_arrive_are_not_asked_for_again() -> None:
     bench = Bench()
-    assert feed_rates(bench, 0.05, 20.0, {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0}) == []
+    assert feed_rates(bench, 0.05, 20.0, {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0, **QUIET}) == []
     assert bench.link.rate_faults == ()
 
 
 def test_a_rate_that_falls_is_asked_for_again_with_growing_pauses() -> None:
     bench = Bench()
-    asked = feed_rates(bench, 0.05, 90.0, {0: 5.0, 30: 20.0, 32: 1.0, 33: 2.0, 193: 5.0, 1: 1.0})
+    asked = feed_rates(bench, 0.05, 90.0, {0: 5.0, 30: 20.0, 32: 1.0, 33: 2.0, 193: 5.0, 1: 1.0, **QUIET})
     times = [time_s for time_s, message_id in asked if message_id == 32]
     assert {message_id for _, message_id in asked} == {32}
     pauses = [later - earlier for earlier, later in pairwise(times)]
@@ -130,7 +138,7 @@ def test_a_rate_that_falls_is_asked_for_again_with_growing_pauses() -> None:
 
 def test_missing_range_data_is_no_fault_but_slow_range_data_is() -> None:
     bench = Bench()
-    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0}
+    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0, **QUIET}
     assert feed_rates(bench, 0.05, 10.0, steady) == []
     asked = feed_rates(bench, 10.0, 20.0, {**steady, 132: 1.0})
     assert {message_id for _, message_id in asked} == {132}
@@ -138,8 +146,33 @@ def test_missing_range_data_is_no_fault_but_slow_range_data_is() -> None:
 
 def test_seldom_heartbeats_are_asked_for_again_but_nobody_is_told() -> None:
     bench = Bench()
-    asked = feed_rates(bench, 0.05, 20.0, {0: 1.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0})
+    asked = feed_rates(bench, 0.05, 20.0, {0: 1.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0, **QUIET})
     assert {message_id for _, message_id in asked} == {0} and bench.link.rate_faults == ()
+
+
+@pytest.mark.parametrize("message_id", QUIET)
+def test_what_never_comes_is_asked_for_again_and_again(message_id: int) -> None:
+    bench = Bench()
+    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0, **QUIET}
+    del steady[message_id]
+    asked = feed_rates(bench, 0.05, 100.0, steady)
+    assert {number for _, number in asked} == {message_id} and len(asked) >= 4
+
+
+def test_that_the_sticks_are_never_seen_is_told_but_not_that_they_are_seen_seldom() -> None:
+    bench = Bench()
+    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0, 147: 1.0, 162: 1.0}
+    feed_rates(bench, 0.05, 10.0, {**steady, 65: 1.0})
+    assert bench.link.rate_faults == ()
+    feed_rates(bench, 10.0, 20.0, steady)
+    (fault,) = bench.link.rate_faults
+    assert (fault.name, fault.means) == ("RC_CHANNELS", "the pilot's sticks are not seen")
+    reporter = Reporter([])
+    assert [reporter.faults((fault,), "", time_s) for time_s in (0.0, FAULT_AFTER_S, 100.0)] == [
+        [],
+        ["RC_CHANNELS: 0.0 Hz instead of 5, asking again: the pilot's sticks are not seen"],
+        [],
+    ]
 
 
 def test_a_command_is_repeated_twice_and_then_given_up() -> None:

@@ -32,6 +32,7 @@ BEAM = RangeSource("DISTANCE_SENSOR", 1, 0, 0, 0.2, 20.0, 10.0)
 WELL_SET = {
     "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0, "GUID_OPTIONS": 0.0, "GUID_TIMEOUT": 3.0, "WP_RADIUS": 1.0, "WP_SPEED": 2.0,
     "PRX1_TYPE": 0.0, "RNGFND1_TYPE": 0.0, "FS_GCS_ENABLE": 1.0, "FENCE_ENABLE": 0.0, "MAV_GCS_SYSID": 255.0,
+    "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0,
 }  # fmt: skip
 WELL = Examined(
     place="memory",
@@ -60,6 +61,10 @@ def with_set(**values: float) -> Examined:
     return replace(WELL, parameters={**WELL_SET, **values})
 
 
+def without(*names: str) -> Examined:
+    return replace(WELL, parameters={name: value for name, value in WELL_SET.items() if name not in names})
+
+
 def with_state(**parts: Any) -> Examined:
     return replace(WELL, vehicle=replace(WELL.vehicle, **parts))
 
@@ -83,6 +88,9 @@ CASES: list[tuple[str, Level, Examined]] = [
     ("fence", N, with_set(FENCE_ENABLE=1.0)),
     ("fence-breached", S, replace(with_set(FENCE_ENABLE=1.0), fence_breached=True)),
     ("no-parameters", W, replace(WELL, parameters={})),
+    ("parameters-unheard", W, without("OA_TYPE")),
+    ("parameters-unheard", W, without("MAV_GCS_SYSID")),
+    ("sticks", W, with_set(RCMAP_THROTTLE=2.0)),
     ("packets-lost", W, replace(WELL, lost=200)),
     ("firmware", W, replace(WELL, version=(4, 5, 6))),
     ("firmware", N, replace(WELL, version=None)),
@@ -137,6 +145,11 @@ def test_one_fault_is_one_finding(name: str, level: Level, seen: Examined) -> No
 
 def test_what_is_to_be_set_keeps_the_other_bits() -> None:
     assert diagnose(with_set(GUID_OPTIONS=72.0))[0].wanted == 8.0
+
+
+def test_what_was_not_heard_is_named() -> None:
+    (finding,) = diagnose(without("OA_TYPE", "GUID_OPTIONS"))
+    assert finding.says == "Not told, and so not looked at: OA_TYPE, GUID_OPTIONS."
 
 
 def test_the_gravest_comes_first() -> None:

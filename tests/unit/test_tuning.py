@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import os
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +15,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.commands import TellParameter
+from companion.disk import OsDisk
 from companion.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
 from companion.mavlink.codec import Codec
 from companion.parameters import ANSWER_S, MOST_OPEN, ParameterServer
@@ -52,11 +55,12 @@ class Ground:
 
 def test_every_parameter_is_a_setting_whose_default_lies_within_its_bounds() -> None:
     assert len(BY_NAME) == len(TABLE)
+    slow = Settings.model_validate({"guidance": {"min_speed_m_s": 0.05}})
     for parameter in TABLE:
         assert len(parameter.name) <= LONGEST_NAME and parameter.name.startswith("CMP_")
         assert parameter.low <= parameter.value(Settings()) <= parameter.high, parameter.name
         for bound in (parameter.low, parameter.high):  # the settings themselves take what is in the table
-            assert parameter.value(changed(Settings(), parameter, bound)) == bound
+            assert parameter.value(changed(slow, parameter, bound)) == bound
         assert isinstance(getattr(getattr(Settings(), parameter.section), parameter.key), int) == parameter.whole
 
 
@@ -73,6 +77,29 @@ def test_a_number_that_travelled_as_32_bits_is_the_one_that_was_typed() -> None:
     assert changed(Settings(), BY_NAME["CMP_ARRIVAL"], received).guidance.arrival_m == 0.15
 
 
+def test_the_slowest_speed_never_lies_above_the_fastest() -> None:
+    slowest, fastest = BY_NAME["CMP_SPD_MIN"], BY_NAME["CMP_SPD_MAX"]
+    with pytest.raises(RefusedError, match=r"^0\.1 below CMP_SPD_MIN 0\.5$"):
+        changed(Settings(), fastest, 0.1)
+    both = changed(changed(Settings(), slowest, 0.1), fastest, 0.2)
+    with pytest.raises(RefusedError, match=r"^0\.3 above CMP_SPD_MAX 0\.2$"):
+        changed(both, slowest, 0.3)
+    assert slowest.value(changed(both, slowest, 0.2)) == 0.2
+
+
+@given(st.lists(st.tuples(st.sampled_from(TABLE), st.floats(0.0, 1.0)), max_size=12))
+def test_however_it_is_tuned_a_rover_that_creeps_stops_within_what_was_measured(choices: list[Any]) -> None:
+    """ArduRover brakes with some 1 m/s2, 0.25 s after it is told."""
+    tuned = Settings()
+    for parameter, share in choices:
+        value = parameter.low + share * (parameter.high - parameter.low)
+        with contextlib.suppress(RefusedError):
+            tuned = changed(tuned, parameter, round(value) if parameter.whole else value)
+    guidance = tuned.guidance
+    assert guidance.min_speed_m_s <= min(0.5, guidance.max_speed_m_s)
+    assert guidance.deceleration_m_s2 <= 1.5 and guidance.brake_delay_s >= 0.2
+
+
 def test_half_a_doubt_is_refused() -> None:
     with pytest.raises(RefusedError, match="whole"):
         changed(Settings(), BY_NAME["CMP_DOUBTS"], 2.5)
@@ -84,7 +111,8 @@ def test_what_is_set_comes_back_from_the_file(tmp_path_factory: Any, choices: li
     tuned = base
     for parameter, share in choices:
         value = parameter.low + share * (parameter.high - parameter.low)
-        tuned = changed(tuned, parameter, round(value) if parameter.whole else value)
+        with contextlib.suppress(RefusedError):  # a slowest speed above the fastest
+            tuned = changed(tuned, parameter, round(value) if parameter.whole else value)
     path = tmp_path_factory.mktemp("state") / "tuned.toml"
     path.write_text(as_toml(base, tuned))
     assert with_tuned(base, path) == tuned
@@ -269,6 +297,31 @@ def test_the_newest_of_many_is_what_stays(tmp_path: Path) -> None:
     saver.close()
     assert (path.read_bytes(), other.read_bytes()) == (b"199", b"too")
     assert sorted(one.name for one in tmp_path.iterdir()) == ["a", "b"]
+
+
+class HangingDisk(OsDisk):
+    """One that takes a file and never says that it has it, until it is let go."""
+
+    def __init__(self) -> None:
+        self.free = threading.Event()
+
+    def sync(self, handle: int) -> None:
+        self.free.wait(30.0)
+
+
+def test_a_disk_that_hangs_keeps_nobody_from_ending(tmp_path: Path) -> None:
+    disk = HangingDisk()
+    saver = Saver(disk, close_s=0.01)
+    saver.save(tmp_path / "tuned.toml", b"new")
+    writers = [thread for thread in threading.enumerate() if thread.name == "saver"]
+    saver.close()
+    saver.close()
+    still = [thread for thread in writers if thread.is_alive()]
+    assert still and all(thread.daemon for thread in still), (
+        "a thread that is no daemon is waited for at the program's end"
+    )
+    assert saver.problem == f"{tmp_path / 'tuned.toml'}: not written yet: the disk does not answer"
+    disk.free.set()
 
 
 def test_the_page_lists_every_parameter() -> None:

@@ -22,8 +22,9 @@ from companion.events.vehicle import (
     TextSeen,
 )
 from companion.frames import GeoPoint
+from companion.mission.fence import PARAMETERS
 from companion.scan import RangeScan
-from companion.vehicle import VehicleState, fold
+from companion.vehicle import PARAMETERS_KEPT, VehicleState, fold
 
 PLACE = GeoPoint(-35.0, 149.0)
 SCAN = RangeScan(1.0, np.full(1, np.pi), np.ones(1), 0.2, 8.0, 0.1, "behind")
@@ -80,10 +81,20 @@ def test_answers_and_texts_are_no_state(event: Event) -> None:
 
 
 def test_parameters_are_collected_and_the_old_state_is_not_touched() -> None:
-    first = fold(VehicleState(), ParameterSeen(1.0, "WP_SPEED", 2.0))
-    second = fold(fold(first, ParameterSeen(2.0, "WP_RADIUS", 1.0)), ParameterSeen(3.0, "WP_SPEED", 3.0))
-    assert first.parameters == {"WP_SPEED": 2.0}
-    assert second.parameters == {"WP_SPEED": 3.0, "WP_RADIUS": 1.0}
+    first = fold(VehicleState(), ParameterSeen(1.0, "FENCE_RADIUS", 20.0))
+    second = fold(fold(first, ParameterSeen(2.0, "WP_RADIUS", 1.0)), ParameterSeen(3.0, "FENCE_RADIUS", 30.0))
+    assert first.parameters == {"FENCE_RADIUS": 20.0}
+    assert second.parameters == {"FENCE_RADIUS": 30.0, "WP_RADIUS": 1.0}
+
+
+def test_of_a_flood_of_parameters_only_those_of_use_are_kept() -> None:
+    assert set(PARAMETERS) <= PARAMETERS_KEPT
+    state = VehicleState()
+    for n in range(1000):
+        state = fold(state, ParameterSeen(1.0, f"FENCE_{n}", 1.0))
+    assert state == VehicleState()
+    known = fold(state, ParameterSeen(1.0, "WP_RADIUS", 1.0))
+    assert fold(known, ParameterSeen(2.0, "WP_RADIUS", 1.0)) is known, "nothing is copied for what is known"
 
 
 def moving() -> VehicleState:
