@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -252,6 +253,23 @@ def flipped(name: str, at: int) -> Callable[[Path], None]:
     return change
 
 
+def huge(name: str) -> Callable[[Path], None]:
+    def change(record: Path) -> None:
+        reopened(record)
+        os.truncate(record / name, 3_000_000_000)
+
+    return change
+
+
+def linked(name: str, place: str) -> Callable[[Path], None]:
+    def change(record: Path) -> None:
+        reopened(record)
+        (record / name).unlink()
+        (record / name).symlink_to(place)
+
+    return change
+
+
 REFUSED: dict[str, tuple[Callable[[Path], None], list[str]]] = {
     "mission changed": (flipped("inputs/mission/yard.toml", 3), ["yard.toml", "changed since the run"]),
     "mission as understood changed": (flipped("mission.json", 30), ["mission.json", "changed since the run"]),
@@ -268,6 +286,9 @@ REFUSED: dict[str, tuple[Callable[[Path], None], list[str]]] = {
     "decisions damaged": (flipped("decisions.jsonl", 500), ["decisions.jsonl", "damaged"]),
     "nothing there": (shutil.rmtree, ["meta.json", "cannot be read"]),
     "no packets": (lambda record: (record / "link.tlog").unlink(), ["link.tlog", "cannot be read"]),
+    "rounds huge": (huge("rounds.bin"), ["rounds.bin", "larger than"]),
+    "decisions huge": (huge("decisions.jsonl"), ["decisions.jsonl", "larger than"]),
+    "packets without end": (linked("link.tlog", "/dev/zero"), ["link.tlog", "not a file"]),
     "no rounds": (overwritten("rounds.bin", b""), ["rounds.bin", "no rounds"]),
 }
 
