@@ -199,6 +199,18 @@ def test_a_run_that_took_up_another_is_replayed_from_the_copy_of_its_state(tmp_p
     assert json.loads(loaded.decisions[0])["path"][0][0] > 4, "it went on where it was"
 
 
+def test_a_run_that_could_not_save_its_state_is_replayed(tmp_path: Path) -> None:
+    rig = Recorded(tmp_path, yard(tmp_path))
+    rig.until_driven(1.0)
+    shutil.rmtree(tmp_path / "state")
+    rig.until_driven(3.0)
+    rig.companion.stop()
+    rig.finish()
+    rig.recorder.close()
+    assert any("The state cannot be saved" in text for text in rig.texts())
+    assert_same(rig.place)
+
+
 def reopened(record: Path) -> None:
     """As if it had never been closed: there are no check sums of whole files."""
     meta = json.loads((record / "meta.json").read_text())
