@@ -19,7 +19,7 @@ from companion.mission.mission import Mission, MissionError
 from companion.provenance import versions
 from companion.reading import open_file, read_at_most
 from companion.recorded_files import RecordError
-from companion.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS, settings_sum
+from companion.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS, run_sum, settings_sum
 from companion.rounds import Round, unpacked
 from companion.settings import Settings, SettingsError, parse_settings
 
@@ -57,6 +57,7 @@ class Meta(BaseModel):
     arm: bool
     settings: dict[str, object]
     settings_sha256: str
+    run_sha256: str
     versions: dict[str, str]
     inputs: list[Entry]
     end: dict[str, Length] | None
@@ -111,6 +112,10 @@ def load_record(directory: Path) -> Record:
         settings = parse_settings(dict(meta.settings), str(directory / META))
         if settings_sum(settings) != meta.settings_sha256:
             raise RecordError(f"{directory / META}: settings changed since the run; a replay needs them as they were")
+        if run_sum(meta.seed, meta.settings_sha256, arm=meta.arm) != meta.run_sha256:
+            raise RecordError(
+                f"{directory / META}: seed or arm changed since the run; a replay needs them as they were"
+            )
     except OSError as error:
         raise RecordError(
             f"{directory / MISSION}: cannot be read: {error.strerror}; there is nothing to replay"
@@ -148,7 +153,9 @@ def _meta(directory: Path) -> Meta:
         raise RecordError(
             f"{file}: damaged, not JSON ({' '.join(str(error).split())}); nothing can be replayed"
         ) from error
-    found = values.get("format", 1) if isinstance(values, dict) else None
+    if not isinstance(values, dict):
+        raise RecordError(f"{file}: damaged, not what a run writes there; take the record from a copy that is whole")
+    found = values.get("format", 1)
     if found != FORMAT:
         raise RecordError(
             f"{file}: a record of format {found!r:.20}, this program replays format {FORMAT}; use the version it was made with"

@@ -29,7 +29,7 @@ from companion.mission.mission import Mission
 from companion.navigator import Decision, NavState
 from companion.record import Record, load_record
 from companion.recorded_files import RecordError
-from companion.recorder import Recorder
+from companion.recorder import Recorder, run_sum
 from companion.replay import replay
 from companion.rounds import CHECKED, Mark, unpacked
 from companion.settings import Settings
@@ -242,7 +242,9 @@ def changed(what: str, value: object) -> Callable[[Path], None]:
 
 
 def test_a_run_that_was_otherwise_differs(copy: Path) -> None:
+    meta = json.loads((copy / "meta.json").read_text())
     changed("arm", False)(copy)
+    changed("run_sha256", run_sum(meta["seed"], meta["settings_sha256"], arm=False))(copy)
     result = CliRunner().invoke(app, ["replay", str(copy)])
     assert result.exit_code == 1
     assert "COMMAND_LONG 400" in result.output and "... and " in result.output
@@ -287,11 +289,15 @@ REFUSED: dict[str, tuple[Callable[[Path], None], list[str]]] = {
     "mission as understood changed": (flipped("mission.json", 30), ["mission.json", "changed since the run"]),
     "map gone": (lambda record: (record / "inputs/mission/yard.png").unlink(), ["yard.png", "cannot be read"]),
     "settings changed": (changed("settings", {"safety": {"stale_s": 2.0}}), ["meta.json", "settings changed"]),
-    "older": (changed("format", 1), ["meta.json", "format 1", "format 2", "version it was made with"]),
+    "older": (changed("format", 1), ["meta.json", "format 1", "format 3", "version it was made with"]),
     "newer": (changed("format", 99), ["format 99"]),
     "no json": (overwritten("meta.json", b"{"), ["meta.json", "damaged"]),
-    "no object": (overwritten("meta.json", b"[]"), ["meta.json", "format None"]),
-    "half": (overwritten("meta.json", b'{"format": 2}'), ["meta.json", "seed"]),
+    "no object": (overwritten("meta.json", b"[]"), ["meta.json", "damaged"]),
+    "zeros": (overwritten("meta.json", bytes(1000)), ["meta.json", "damaged"]),
+    "a number": (overwritten("meta.json", b"0"), ["meta.json", "damaged"]),
+    "seed changed": (changed("seed", 7), ["meta.json", "seed or arm changed"]),
+    "arm changed": (changed("arm", False), ["meta.json", "seed or arm changed"]),
+    "half": (overwritten("meta.json", b'{"format": 3}'), ["meta.json", "seed"]),
     "outside": (changed("inputs", [{"kind": "x", "name": "../x", "source": "", "sha256": ""}]), ["outside"]),
     "packets damaged": (flipped("link.tlog", 5000), ["link.tlog", "damaged"]),
     "rounds damaged": (flipped("rounds.bin", 500), ["rounds.bin", "damaged"]),
