@@ -92,13 +92,25 @@ def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) 
 
 
 @pytest.mark.parametrize(
-    ("name", "faults", "limit_s"), [("one-obstacle.toml", "interrupted", 90.0), ("crossing.toml", "radio", 60.0)]
+    ("name", "faults", "limit_s"), [("crossing.toml", "radio", 60.0)]
 )
 def test_nothing_differs_under_faults_and_among_moving_things(
     tmp_path: Path, name: str, faults: str, limit_s: float
 ) -> None:
     loaded = assert_same(recorded(tmp_path / "record", load_mission(MISSIONS / name), faults, limit_s))
     assert len(loaded.decisions) > 10 and loaded.notes == []
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in MISSIONS.glob("*.[tpw]*")))
+def test_nothing_differs_in_any_shipped_mission(tmp_path: Path, name: str) -> None:
+    loaded = assert_same(recorded(tmp_path / "record", load_mission(MISSIONS / name), limit_s=65.0))
+    assert loaded.decisions
+
+
+@pytest.mark.parametrize("faults", sorted(path.stem for path in (MISSIONS / "faults").glob("*.toml")))
+def test_nothing_differs_under_any_shipped_faults(tmp_path: Path, faults: str) -> None:
+    mission = load_mission(MISSIONS / "one-obstacle.toml")
+    assert assert_same(recorded(tmp_path / "record", mission, faults, 90.0)).decisions
 
 
 class LateRunner(InlineRunner):
