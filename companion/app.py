@@ -167,7 +167,7 @@ class Companion:
         elif self._handover.is_over(self.vehicle, now_s):
             self._done = True
         self._remember(now_s)
-        problem = self._log.problem or (self._memory.problem if self._memory else "")
+        problem = self._log.problem or (self._memory.heed_problem(self._log) if self._memory else "")
         self._teller.of_faults(
             now_s, problem, heard=self.vehicle.heartbeat is not None, underway=self._pursuit is not None
         )

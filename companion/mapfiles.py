@@ -21,6 +21,7 @@ from PIL import Image, UnidentifiedImageError
 
 from companion.frames import NedPoint
 from companion.grid import BASE_WEIGHT, OBSTACLE, Grid, Weights
+from companion.reading import open_file
 
 MAX_FIELDS = 25_000_000
 """Larger maps are refused before memory is asked for (5000 x 5000 fields are 200 MB of weights)."""
@@ -103,7 +104,7 @@ def save_ros_map(grid: Grid, path_without_suffix: Path, known: NDArray[np.bool_]
 
 def _read_bytes(path: Path, limit: int) -> bytes:
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(limit + 1)
     except OSError as error:
         raise MapError(f"{path}: cannot be read: {error.strerror}") from error

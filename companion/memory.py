@@ -15,7 +15,9 @@ from companion.mapping import EvidenceMap
 from companion.mission.fingerprint import fingerprint
 from companion.mission.mission import Mission
 from companion.pursuit import Pursuit
+from companion.recorder import DecisionLog
 from companion.resuming import Kept, clock_ahead_s, nav_state, shift_of
+from companion.rounds import Mark
 from companion.safety import Control
 from companion.state.format import BandPlace, Raster
 from companion.state.model import SavedDraws, SavedTally
@@ -28,6 +30,7 @@ SAVE_S = 5.0
 MOVED_M = 0.3
 CARRIED_M = 25.0
 """A rover that is found farther than this from where it was has been carried: the leg begins anew where it stands."""
+UNSAVED = "The state cannot be saved: no --resume from here"
 BAND_CELLS = 250_000
 """So much of the map is copied in one tick, a megabyte; larger maps take several."""
 
@@ -54,6 +57,13 @@ class Memory:
     def problem(self) -> str:
         """Why the state cannot be saved; empty while it can."""
         return self._writer.problem
+
+    def heed_problem(self, log: DecisionLog) -> str:
+        """What people are told of it, in words that follow from the record: the disk's own reason is known to this computer only."""
+        if not self.problem:
+            return ""
+        log.mark(Mark.UNSAVED)
+        return UNSAVED
 
     def take_up(self, pursuit: Pursuit, vehicle: VehicleState, now_s: float) -> bool:
         """Go on in the middle of the leg: once, with a pursuit on the ground of ``lay_resumed``. False: there is nothing to take up."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -16,12 +17,15 @@ from companion.mavlink.framing import first_packet
 from companion.mission.as_json import from_json
 from companion.mission.mission import Mission, MissionError
 from companion.provenance import versions
+from companion.reading import open_file, read_at_most
 from companion.recorded_files import RecordError
-from companion.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS, settings_sum
+from companion.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS, run_sum, settings_sum
 from companion.rounds import Round, unpacked
 from companion.settings import Settings, SettingsError, parse_settings
 
 MAX_META_BYTES = 10_000_000
+MAX_BYTES = 200_000_000
+"""Of the rounds or the decisions: more than a day of driving."""
 STAMP_BYTES = 8
 LONGEST_PACKET = 280
 CHUNK = 1 << 20
@@ -53,6 +57,7 @@ class Meta(BaseModel):
     arm: bool
     settings: dict[str, object]
     settings_sha256: str
+    run_sha256: str
     versions: dict[str, str]
     inputs: list[Entry]
     end: dict[str, Length] | None
@@ -84,8 +89,8 @@ class Record:
 
     def rounds(self) -> Iterator[Heard]:
         """Round by round, as far as there are both the round and its packets. Raises RecordError when packets are damaged."""
-        rounds, _ = unpacked((self.directory / ROUNDS).read_bytes())
-        with (self.directory / PACKETS).open("rb") as file:
+        rounds, _ = unpacked(read_at_most(self.directory / ROUNDS, MAX_BYTES))
+        with open_file(self.directory / PACKETS) as file:
             for number, entry in enumerate(rounds):
                 packets = list(_packets(file, entry.heard + entry.said, self.directory / PACKETS))
                 if len(packets) < entry.heard + entry.said:
@@ -103,10 +108,14 @@ def load_record(directory: Path) -> Record:
         if entry.name != MISSION and _is_other(Path(entry.source), entry.sha256):
             notes.append(f"{entry.source}: changed since the run; its copy in the record is used")
     try:
-        mission = from_json((directory / MISSION).read_bytes(), str(directory / MISSION))
+        mission = from_json(read_at_most(directory / MISSION, MAX_META_BYTES), str(directory / MISSION))
         settings = parse_settings(dict(meta.settings), str(directory / META))
         if settings_sum(settings) != meta.settings_sha256:
             raise RecordError(f"{directory / META}: settings changed since the run; a replay needs them as they were")
+        if run_sum(meta.seed, meta.settings_sha256, arm=meta.arm) != meta.run_sha256:
+            raise RecordError(
+                f"{directory / META}: seed or arm changed since the run; a replay needs them as they were"
+            )
     except OSError as error:
         raise RecordError(
             f"{directory / MISSION}: cannot be read: {error.strerror}; there is nothing to replay"
@@ -121,20 +130,20 @@ def load_record(directory: Path) -> Record:
             f"{directory}: the record was not closed (killed, power lost or the disk full); what there is of it is replayed"
         ]
     rounds_file = directory / ROUNDS
-    data = rounds_file.read_bytes()
+    data = _whole(rounds_file)
     rounds, length = unpacked(data)
     if not rounds:
         raise RecordError(f"{rounds_file}: holds no rounds; there is nothing to replay")
     if len(data) - length >= len(rounds[0].packed()):
         raise RecordError(f"{rounds_file}: damaged at byte {length}; take the record from a copy that is whole")
-    decisions = (directory / DECISIONS).read_text(encoding="utf-8", errors="replace").split("\n")[:-1]
+    decisions = _whole(directory / DECISIONS).decode(errors="replace").split("\n")[:-1]
     return Record(directory, meta, mission, settings, decisions, not cut, notes + cut)
 
 
 def _meta(directory: Path) -> Meta:
     file = directory / META
     try:
-        with file.open("rb") as opened:
+        with open_file(file) as opened:
             data = opened.read(MAX_META_BYTES + 1)
     except OSError as error:
         raise RecordError(f"{file}: cannot be read: {error.strerror}; give the directory of a record") from error
@@ -144,7 +153,9 @@ def _meta(directory: Path) -> Meta:
         raise RecordError(
             f"{file}: damaged, not JSON ({' '.join(str(error).split())}); nothing can be replayed"
         ) from error
-    found = values.get("format", 1) if isinstance(values, dict) else None
+    if not isinstance(values, dict):
+        raise RecordError(f"{file}: damaged, not what a run writes there; take the record from a copy that is whole")
+    found = values.get("format", 1)
     if found != FORMAT:
         raise RecordError(
             f"{file}: a record of format {found!r:.20}, this program replays format {FORMAT}; use the version it was made with"
@@ -167,7 +178,7 @@ def _check_input(directory: Path, entry: Entry) -> None:
     if not file.resolve().is_relative_to(directory.resolve()):
         raise RecordError(f"{directory / META}: damaged: {entry.name!r:.100} lies outside the record")
     try:
-        found = hashlib.sha256(file.read_bytes()).hexdigest()
+        found = _sha256(file)
     except OSError as error:
         raise RecordError(f"{file}: cannot be read: {error.strerror}; the run cannot be replayed without it") from error
     if found != entry.sha256:
@@ -176,24 +187,37 @@ def _check_input(directory: Path, entry: Entry) -> None:
         )
 
 
+def _whole(file: Path) -> bytes:
+    try:
+        return read_at_most(file, MAX_BYTES)
+    except OSError as error:
+        raise RecordError(f"{file}: cannot be read: {error.strerror}; there is nothing to replay") from error
+
+
+def _sha256(file: Path) -> str:
+    with open_file(file) as opened:
+        return hashlib.file_digest(opened, "sha256").hexdigest()
+
+
 def _is_other(source: Path, sha256: str) -> bool:
     """Whether the file is still where it was, with another content."""
     try:
-        return hashlib.sha256(source.read_bytes()).hexdigest() != sha256
+        return _sha256(source) != sha256
     except OSError:
         return False
 
 
 def _check_length(file: Path, meta: Meta) -> str:
     """A line if the file is shorter than it was. Raises RecordError if it is missing or what there is has been changed."""
-    crc = size = 0
+    meant = (meta.end or {}).get(file.name)
+    crc = 0
     try:
-        with file.open("rb") as opened:
-            while data := opened.read(CHUNK):
-                crc, size = zlib.crc32(data, crc), size + len(data)
+        with open_file(file) as opened:
+            size = os.fstat(opened.fileno()).st_size
+            while meant is not None and size == meant.bytes and (data := opened.read(CHUNK)):
+                crc = zlib.crc32(data, crc)
     except OSError as error:
         raise RecordError(f"{file}: cannot be read: {error.strerror}; there is nothing to replay") from error
-    meant = (meta.end or {}).get(file.name)
     if meant is None:
         return ""
     if size < meant.bytes:

@@ -22,7 +22,7 @@ from companion.settings import Settings
 
 __all__ = ["DecisionLog", "NullRecorder", "RecordError", "Recorder", "decision_line", "unused"]
 
-FORMAT = 2
+FORMAT = 3
 """Of the whole directory; a reader refuses others."""
 META, MISSION, PACKETS, ROUNDS, DECISIONS = "meta.json", "mission.json", "link.tlog", "rounds.bin", "decisions.jsonl"
 STATE = "state"
@@ -231,6 +231,11 @@ def settings_sum(settings: Settings) -> str:
     return hashlib.sha256(json.dumps(settings.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()
 
 
+def run_sum(seed: int, settings_sha256: str, *, arm: bool) -> str:
+    """SHA-256 of what a run follows from beside its files."""
+    return hashlib.sha256(f"{seed} {arm} {settings_sha256}".encode()).hexdigest()
+
+
 def unused(directory: Path) -> Path:
     """The directory itself, or with the first number from 2 on that has no record in it yet."""
     candidate, number = directory, 2
@@ -250,6 +255,7 @@ def _meta(
         "arm": arm,
         "settings": settings.model_dump(mode="json"),
         "settings_sha256": settings_sum(settings),
+        "run_sha256": run_sum(seed, settings_sum(settings), arm=arm),
         "start_unix_us": start_us,
         "versions": versions(),
         "inputs": [entry._asdict() for entry in inputs],

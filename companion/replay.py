@@ -235,7 +235,7 @@ def replay(record: Record, observer: Observer | None = None) -> Replayed:
         tape,
         seed=record.meta.seed,
         arm=record.meta.arm,
-        memory=_memory(record),
+        memory=_memory(record, tape),
     )
     tape.result.companion = companion
     try:
@@ -248,22 +248,29 @@ def replay(record: Record, observer: Observer | None = None) -> Replayed:
     return tape.result
 
 
-def _memory(record: Record) -> Memory | None:
-    """What an earlier run has left, if this one took it up. Raises RecordError."""
+def _memory(record: Record, tape: Tape) -> Memory:
+    """With what an earlier run has left, if this one took it up. Raises RecordError."""
     file = record.input(STATE)
     if file is None:
-        return None
+        return Memory(record.mission, _NoWriter(tape))
     try:
-        return Memory(record.mission, _NoWriter(), Kept(*decoded(file.read_bytes())))
+        return Memory(record.mission, _NoWriter(tape), Kept(*decoded(file.read_bytes())))
     except StateError as error:
         raise RecordError(f"{file}: {error}") from error
 
 
 class _NoWriter:
-    """A replay keeps nothing."""
+    """A replay keeps nothing, but fails when the run did."""
 
     busy = False
-    problem = ""
+
+    def __init__(self, tape: Tape) -> None:
+        self._tape = tape
+
+    @property
+    def problem(self) -> str:
+        """Whether the run could not save its state."""
+        return "not saved" if self._tape.round.marks & Mark.UNSAVED else ""
 
     def put(self, update: Update) -> None:
         """Not kept."""

@@ -36,6 +36,8 @@ class Mark(IntFlag):
     """signed with another key,"""
     OLD = 256
     """or signed too long ago, or heard again."""
+    UNSAVED = 512
+    """The state of the run could not be saved the last time."""
 
 
 class Round(NamedTuple):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from companion.reading import open_file
 from companion.settings import Settings, SettingsError
 from companion.settings.settings import MAX_BYTES, describe_first
 
@@ -126,7 +127,7 @@ def with_tuned(base: Settings, path: Path) -> Settings:
     """
     remedy = "put it right, or delete it to go back to the settings file"
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             told = tomllib.loads(file.read(MAX_BYTES).decode("utf-8"))
     except FileNotFoundError:
         return base

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from companion.reading import open_file
 from companion.settings import alike, describe_first
 from sitl.faults import (
     BatteryLow,
@@ -275,7 +276,7 @@ class PlanTable(BaseModel):
 def load_faults(path: Path) -> FaultPlan:
     """Read a plan. Raises FaultFileError: one line with file, place, reason and remedy."""
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise FaultFileError(f"{path}: larger than {MAX_BYTES} bytes; a fault plan is a short TOML file")

@@ -117,11 +117,16 @@ def _some(names: Sequence[str]) -> str:
 def load_parameters(path: Path) -> ParameterFile:
     """Read a parameter file. Raises ParameterFileError."""
     try:
-        data = path.read_bytes()
+        if path.exists() and not path.is_file():
+            raise ParameterFileError(f"{path}: not a file; name a parameter file")
+        with path.open("rb") as file:
+            data = file.read(MOST_BYTES + 1)
     except OSError as error:
         raise ParameterFileError(f"{path}: cannot be read: {error.strerror or error}; check the name") from error
     if len(data) > MOST_BYTES:
-        raise ParameterFileError(f"{path}: {len(data)} bytes are too many for a parameter file; is it another file?")
+        raise ParameterFileError(
+            f"{path}: more than {MOST_BYTES} bytes are too many for a parameter file; is it another file?"
+        )
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -16,6 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.clock import unix_time_us
 from companion.mavlink.framing import CHECKSUM, MAGIC_V2, SIGNATURE, SIGNED, Packet
+from companion.reading import open_file
 from companion.rounds import Mark
 
 TICKS_PER_S = 100_000
@@ -50,7 +51,7 @@ def load_key(path: Path) -> bytes:
             raise SigningKeyError(f"{path}: not a file; name a file with the passphrase or 64 hexadecimal digits")
         if mode & (stat.S_IRWXG | stat.S_IRWXO):
             raise SigningKeyError(f"{path}: others may use this file (mode {stat.S_IMODE(mode):04o}); chmod 600 {path}")
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(LONGEST_KEY + 1)
     except OSError as error:
         raise SigningKeyError(f"{path}: cannot be read: {error.strerror or error}") from error

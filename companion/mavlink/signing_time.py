@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from companion.mavlink.signing import LAST_TICK, SigningKeyError
+from companion.reading import open_file
 from companion.saving import Saver
 
 
@@ -28,7 +29,7 @@ class TimeFile:
 def _read(path: Path) -> int:
     remedy = "delete it if the computer's clock is right and was so before"
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             text = file.read(64)
     except FileNotFoundError:
         return 0

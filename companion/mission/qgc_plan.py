@@ -11,6 +11,7 @@ from pathlib import Path
 from companion.frames import GeoPoint
 from companion.mission.items import MAX_ITEMS, Item, ItemError, circle, geo_point, understand
 from companion.mission.mission import Area, Mission, MissionError, open_ring
+from companion.reading import open_file
 
 MAX_BYTES = 50_000_000
 
@@ -60,7 +61,7 @@ def _understood(plan: Json, path: Path) -> Mission:
 
 def _read(path: Path) -> Json:
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise MissionError(f"{path}: larger than {MAX_BYTES} bytes")

@@ -16,6 +16,7 @@ from companion.frames import GeoPoint
 from companion.mission import mav_commands as mav
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point, understand
 from companion.mission.mission import Mission, MissionError
+from companion.reading import open_file
 
 HEADER = ("QGC", "WPL", "110")
 MAX_BYTES = 20_000_000
@@ -48,7 +49,7 @@ def load(path: Path) -> Mission:
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Line numbers and words, without comments and blank lines."""
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise MissionError(f"{path}: cannot be read: {error.strerror}") from error

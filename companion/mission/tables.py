@@ -10,6 +10,7 @@ from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from companion.reading import open_file
 from companion.settings import describe_first
 
 MAX_BYTES = 5_000_000
@@ -46,7 +47,7 @@ def read_table(path: Path, kind: type[M], error: type[Exception], remedy: str = 
 def read_toml(path: Path, error: type[Exception]) -> dict[str, object]:
     """What a TOML file says, whatever it is about. Raises ``error``: one line with file, place and reason."""
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
             raise error(f"{path}: larger than {MAX_BYTES} bytes; a short TOML file is expected")

@@ -10,6 +10,7 @@ from pathlib import Path
 from companion.disk import BESIDE, OsDisk, set_aside
 from companion.mission.fingerprint import fingerprint
 from companion.mission.mission import Mission
+from companion.reading import open_file
 from companion.state.format import MAX_FILE_BYTES, DamagedError, Raster, StateError, decoded
 from companion.state.model import SavedState
 
@@ -98,7 +99,7 @@ class StatePlace:
             self._lock = None
 
     def _read(self) -> bytes:
-        with self.file.open("rb") as file:
+        with open_file(self.file) as file:
             data = file.read(MAX_FILE_BYTES + 1)
         if len(data) > MAX_FILE_BYTES:
             raise DamagedError("larger than any state is")

@@ -78,7 +78,7 @@ def test_a_state_of_another_version_stays(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     place = left(tmp_path, mission)
     place.file.write_bytes(sealed(MAGIC + b"9\nnew things"))
-    assert "format 9, this program reads 1" in refused(place, mission)
+    assert "format '9', this program reads 1" in refused(place, mission)
     assert place.file.exists()
 
 

@@ -1,0 +1,30 @@
+"""Opening the files that people name: only what is a file, because a pipe would keep the program waiting and a device has no end."""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from io import BufferedReader
+from pathlib import Path
+
+
+def open_file(path: Path) -> BufferedReader:
+    """An ordinary file, open for reading. Raises OSError, also for a pipe, a socket or a device; never waits for another program."""
+    # Without O_NONBLOCK to open a pipe is to wait for somebody who writes into it.
+    handle = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    mode = os.fstat(handle).st_mode
+    if stat.S_ISREG(mode):
+        return os.fdopen(handle, "rb")
+    os.close(handle)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    raise OSError(errno.EINVAL, "not a file", str(path))
+
+
+def read_at_most(path: Path, limit: int) -> bytes:
+    """A whole ordinary file. Raises OSError, also if it has more bytes than ``limit``, before they take any memory."""
+    with open_file(path) as file:
+        if os.fstat(file.fileno()).st_size > limit:
+            raise OSError(errno.EFBIG, f"larger than {limit} bytes", str(path))
+        return file.read(limit)
