@@ -79,7 +79,8 @@ class Memory:
             pursuit.trail.enter(Cell(x + shift.x, y + shift.y))
         _look(pursuit, vehicle)
         itinerary, leg, pose = pursuit.itinerary, state.leg, vehicle.pose_at(now_s)
-        if leg is not None and pose is not None and itinerary.leg in (Leg.TRAVEL, Leg.HOME):
+        drives = itinerary.leg in (Leg.TRAVEL, Leg.HOME) and not pursuit.target_refused
+        if leg is not None and pose is not None and drives:
             past = nav_state(leg, shift)
             if pursuit.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
                 pursuit.driver.take_up(itinerary.goal, past, leg.doubts_left, pose)

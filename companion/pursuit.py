@@ -117,6 +117,12 @@ class Pursuit:
         """Whether the rover is on its way back for good."""
         return bool(self._refuges) or self.itinerary.ended
 
+    @property
+    def target_refused(self) -> str:
+        """Why the target that is next must not be driven to; empty when it may, and while the rover is on an errand or on its way back."""
+        on_errand = self.itinerary.errand is not None or self.itinerary.leg is not Leg.TRAVEL
+        return "" if on_errand else self.laid.refused.get(self.itinerary.index, "")
+
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
         return [(t.name, status) for t, status in zip(self.itinerary.targets, self.itinerary.statuses, strict=True)]
@@ -227,8 +233,8 @@ class Pursuit:
 
     def _is_refused(self, now_s: float) -> bool:
         """Whether the target that is next lies behind the autopilot's fence: it is not even tried, and the mission goes on after it."""
-        reason = self.laid.refused.get(self.itinerary.index)
-        if self.itinerary.leg is not Leg.TRAVEL or reason is None:
+        reason = self.target_refused
+        if not reason:
             return False
         self._tell(f"Refused: {reason}", WARNING)
         navigator = self._settings.navigator

@@ -60,16 +60,18 @@ def ownership(state: SavedState, vehicle: VehicleState) -> Ownership | None:
     """Whose the rover is that an earlier run left behind; None while too little has been heard.
 
     A rover that a person had taken stays with that person, over any restart, until somebody sets GUIDED. One that was ours and that has left GUIDED
-    without us was taken meanwhile, unless its autopilot has restarted; and one that has been disarmed without us is not armed.
+    without us was taken meanwhile, unless its autopilot has restarted; and one that has been disarmed without us is not armed. One that we have
+    stopped in HOLD ourselves waits there for us only as we have left it: a person may have driven it, switched it off, put it away.
     """
     heartbeat, position = vehicle.heartbeat, vehicle.position
     if heartbeat is None or position is None:
         return None
     if state.control is Control.PERSON:
         return Ownership(Control.PERSON, may_arm=False)
-    if state.released:
-        return Ownership(Control.NOBODY, may_arm=True)
     restarted = position.boot_s < state.boot_s
+    if state.released:
+        as_left = heartbeat.mode == RoverMode.HOLD and heartbeat.armed == state.armed and not restarted
+        return Ownership(Control.NOBODY if as_left else Control.PERSON, may_arm=as_left and state.armed)
     if heartbeat.mode != RoverMode.GUIDED and (heartbeat.armed or not restarted):
         return Ownership(Control.PERSON, may_arm=False)
     return Ownership(Control.NOBODY, may_arm=restarted)

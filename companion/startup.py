@@ -111,7 +111,7 @@ class StartUp:
         """The mission on the ground once the rover may be driven; until then the command to give now, if any.
 
         ``fence``: the autopilot's own. ``hindrance``: see ``start_step``. Raises MissionError as soon as it is known that the mission
-        cannot be laid out, or has a target behind a fence, before anybody arms.
+        cannot be laid out, or (unless it is taken up) has a target behind a fence, before anybody arms.
         """
         if now_s < self._look_again_s:
             return None, None
@@ -166,7 +166,8 @@ class StartUp:
         laid = self._lay(vehicle, now_s, fence)
         if laid is None:
             return
-        for number, reason in laid.refused.items():
+        # One that a fence has closed while nobody listened is no error of whoever starts: it is refused when its turn comes, as on the way.
+        for number, reason in laid.refused.items() if self._kept is None else ():
             if laid.itinerary.statuses[number] is TargetStatus.PENDING:
                 raise MissionError(f"{self._mission.source or self._mission.name}: {reason}")
         self._checked, self._bounds = ground, laid.bounds

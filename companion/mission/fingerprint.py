@@ -11,9 +11,10 @@ from companion.mission.mission import Mission, MissionError
 def fingerprint(mission: Mission) -> str:
     """SHA-256, in hexadecimal, of all that decides where the rover drives: not of comments, notes and the simulator's part.
 
+    Nor of the planned home: the rover's own is what counts, and an autopilot tells its stored mission with its home of now.
     A known map counts with its contents. Raises MissionError when that cannot be read.
     """
-    plain = replace(mission, source=None, notes=(), sitl=None, prior_map=None, stored="")
+    plain = replace(mission, source=None, notes=(), sitl=None, prior_map=None, planned_home=None, stored="")
     digest = hashlib.sha256(repr(plain).encode())
     if mission.prior_map is not None:
         try:

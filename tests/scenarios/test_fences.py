@@ -11,6 +11,7 @@ import shapely
 
 from companion.mission.mission import MissionError
 from companion.settings import Settings, parse_settings
+from tests.asker import Asker
 from tests.rig import ARM, GUIDED, HOLD, SET_MODE, Rig, yard
 from tests.stored import CIRCLE_IN, CIRCLE_OUT, KEEP_IN, KEEP_OUT, POLYGONS, Person, box, stored
 
@@ -143,6 +144,46 @@ def test_a_target_that_comes_to_lie_outside_is_given_up_and_the_next_one_driven(
     assert [str(status) for _, status in rig.companion.statuses()] == ["unreachable", "reached"]
     assert any(text.startswith("Refused: target 1 'far': lies outside") for text in rig.texts())
     assert max(east for _, east in rig.track) < 12.0 and rig.breaches == 0
+
+
+def test_a_target_that_comes_to_lie_outside_while_nobody_listens_is_given_up_too(tmp_path: Path) -> None:
+    two = '[[target]]\nname = "far"\nfield = [19, 7]\n[[target]]\nname = "near"\nfield = [4, 7]\n'
+    mission, prepare = yard(tmp_path, two), stored(box(KEEP_IN, -6.0, -2.4, 7.0, 21.4), **POLYGONS, FENCE_MARGIN=0.0)
+    rig = Watched(mission, prepare=prepare, state=tmp_path / "state")
+    rig.until_driven(2.0)
+    rig.run_for(0.5)
+    # The companion is gone, and somebody changes the fence before another one has heard anything.
+    stored([*box(KEEP_IN, -6.0, -2.4, 7.0, 12.0), (CIRCLE_IN, 0.0, 0.0, 90.0)], **POLYGONS, FENCE_MARGIN=0.0)(
+        rig.simulator
+    )
+    rig._now_s = rig.simulator.time_s
+    rig.restart_companion(mission, resume=True)
+    rig.finish()
+    assert [str(status) for _, status in rig.companion.statuses()] == ["unreachable", "reached"]
+    assert any(text.startswith("Refused: target 1 'far': lies outside") for text in rig.texts())
+    assert max(east for _, east in rig.track) < 12.0 and rig.breaches == 0
+
+
+@pytest.mark.parametrize("when", ["before the errand", "during the errand"])
+def test_an_errand_is_driven_though_the_target_after_it_is_refused(tmp_path: Path, when: str) -> None:
+    target = '[[target]]\nname = "far"\nfield = [19, 7]\non_blocked = "wait"\n'
+    prepare = stored(box(KEEP_IN, -6.0, -2.4, 7.0, 21.4), **POLYGONS, FENCE_MARGIN=0.0)
+    options = parse_settings({"navigator": {"wait_retry_s": 10.0, "wait_limit_s": 20.0}}, "test")
+    rig = Asker(yard(tmp_path, target), options, prepare=prepare)
+    rig.until_driven(2.0)
+    smaller = [*box(KEEP_IN, -6.0, -2.4, 7.0, 12.0), (CIRCLE_IN, 0.0, 0.0, 90.0)]
+    if when == "before the errand":
+        Person(rig).upload(smaller)
+        rig.until(lambda: any(text.startswith("Refused: ") for text in rig.texts()), 3.0)
+        rig.reposition(rig.field(4, 3))
+    else:
+        rig.reposition(rig.field(4, 3))
+        rig.run_for(0.5)
+        Person(rig).upload(smaller)
+    rig.until(lambda: "Reached errand 1" in rig.texts(), 30.0)
+    assert rig.passed_m(4, 3) < 0.7
+    rig.finish()
+    assert [str(status) for _, status in rig.companion.statuses()] == ["unreachable"]
 
 
 def test_a_fence_that_leaves_the_rover_outside_stops_it(tmp_path: Path) -> None:

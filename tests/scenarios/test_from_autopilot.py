@@ -198,3 +198,19 @@ def test_a_mission_that_hands_over_is_not_armed_for(tmp_path: Path) -> None:
     refuse_arming(mission, arm=False)
     with pytest.raises(MissionError, match=r"the autopilot's mission: .* leave out --arm"):
         refuse_arming(mission, arm=True)
+
+
+def test_it_is_taken_up_again_though_home_is_another(tmp_path: Path) -> None:
+    """The autopilot tells its home of now as item 0, and that moves with every start."""
+    rig = Asker(yard(tmp_path), late_s=44.0, state=tmp_path / "state")
+    rig.run_for(3.0)
+    rig.upload(stored(ROUND))
+    first = replace(fetched(rig), rover=RoverSpec())
+    rig.restart_companion(first)
+    rig.until_driven(4.0)
+    assert first.planned_home is not None
+    home = replace(first.planned_home, lat_deg=first.planned_home.lat_deg + 1e-5)
+    rig.restart_companion(replace(first, planned_home=home), resume=True)
+    rig.finish()
+    assert any(text.startswith("Resumed with its map") for text in rig.texts())
+    assert rig.companion.outcome.complete

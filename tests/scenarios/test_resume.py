@@ -17,7 +17,7 @@ from companion.resuming import Kept
 from companion.safety import Control
 from companion.state.format import decoded
 from companion.state.model import SavedState
-from tests.rig import ARM, GATE, GUIDED, HOLD, MANUAL, Rig, Sent, yard
+from tests.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, yard
 
 TWO = GATE + 'hold_s = 1.0\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
 UP_S = 45.0
@@ -233,6 +233,26 @@ def test_after_an_orderly_stop_it_goes_on_by_itself(tmp_path: Path) -> None:
     rig.restart_companion(mission, resume=True)
     rig.finish()
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+def test_after_an_orderly_stop_a_rover_that_a_person_has_put_away_is_not_armed(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(4.0)
+    rig.companion.stop()
+    rig.finish()
+    for command, value in ((SET_MODE, MANUAL), (ARM, 0)):
+        rig.pilot(command, *((1, value) if command == SET_MODE else (value,)))
+        rig.sleep_until_s(rig.now_s() + 2.0)
+    assert rig.mode == MANUAL and not rig.armed
+    rig.restart_companion(mission, resume=True)
+    since_s = rig.now_s()
+    rig.run_for(10.0)
+    assert [one for one in rig.sent_since(since_s) if one.moves_or_changes] == []
+    assert "a person to set GUIDED" in rig.companion.status().doing
+    rig.pilot_mode(GUIDED)
+    rig.pilot(ARM, 1)
+    rig.finish()
+    assert rig.companion.outcome.complete
 
 
 def test_an_error_in_the_program_leaves_a_state_to_go_on_from(tmp_path: Path) -> None:
