@@ -195,11 +195,6 @@ def _home(mission: Mission, spec: SitlSpec) -> GeoPoint:
     return places[0] if places else SOMEWHERE
 
 
-def with_parameters(scenario: Scenario, changes: dict[str, float]) -> Scenario:
-    """The same scenario with some of ArduRover's parameters changed."""
-    return replace(scenario, parameters={**scenario.parameters, **changes})
-
-
 def with_faults(scenario: Scenario, plan: FaultPlan | None) -> Scenario:
     """The same scenario with what goes wrong. Raises ScenarioError for a fault of something that it does not have."""
     described = isinstance(scenario.sensors, SensorSuite)

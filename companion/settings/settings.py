@@ -112,9 +112,6 @@ class GuidanceSettings(Section):
         0.3, ge=0.0, description="faster than this the rover first brakes straight, then turns on the spot"
     )
     reach_after_look_m: float = Field(2.5, gt=0.0, description="having turned to look, drive off when so much is clear")
-    flanks_seen_m: float = Field(
-        0.6, ge=0.0, description="ground at the rover's flanks must be seen so far beyond the stopping distance"
-    )
     turned_deg: float = Field(6.0, gt=0.0, description="turned to a place when it is this near to straight ahead")
     turn_cost: float = Field(0.45, ge=0.0, description="weight added to fields behind the rover when it plans")
     turn_reach_m: float = Field(6.0, ge=0.0, description="how far behind")

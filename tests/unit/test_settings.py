@@ -1,6 +1,8 @@
+import re
 from pathlib import Path
 
 import pytest
+from pydantic import BaseModel
 
 from companion.planning.registry import PLANNERS
 from companion.settings import Settings, SettingsError, alike, load_settings, parse_settings
@@ -100,3 +102,16 @@ def test_the_papers_profile_means_the_genetic_algorithm_alone_unless_said_otherw
 def test_settings_cannot_be_changed():
     with pytest.raises(ValueError, match="frozen"):
         Settings().profile = "paper"
+
+
+def test_every_setting_is_read_somewhere() -> None:
+    root = Path(__file__).parents[2]
+    files = [
+        path for part in ("companion", "sitl") for path in (root / part).rglob("*.py") if path.name != "settings.py"
+    ]
+    text = "\n".join(path.read_text(encoding="utf-8") for path in files)
+    settings = root / "companion" / "settings" / "settings.py"
+    own = settings.read_text(encoding="utf-8")
+    names = {(section, key) for section, part in Settings() if isinstance(part, BaseModel) for key, _ in part}
+    unread = {(s, key) for s, key in names if not re.search(rf"\b{key}\b", text) and f".{key}" not in own}
+    assert len(names) > 50 and unread == set()

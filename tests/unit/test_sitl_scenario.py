@@ -8,7 +8,7 @@ from PIL import Image
 from companion.frames import GeoPoint
 from companion.grid import Cell
 from companion.mission.mission import GridSpec, Mission, RoverSpec, SitlSpec, Target
-from sitl.scenario import SOMEWHERE, ScenarioError, scenario_from_mission, with_parameters
+from sitl.scenario import SOMEWHERE, ScenarioError, scenario_from_mission
 
 
 @pytest.fixture
@@ -47,7 +47,6 @@ def test_the_rover_of_the_mission_is_driven(world_file: Path) -> None:
     scenario = scenario_from_mission(replace(mission(world_file), rover=RoverSpec(radius_m=0.5, cruise_speed_m_s=1.5)))
     assert scenario.rover_radius_m == 0.5
     assert scenario.parameters == {"WP_SPEED": 1.5, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
-    assert with_parameters(scenario, {"WP_SPEED": 1.0}).parameters["WP_SPEED"] == 1.0
     assert scenario.sensors == "beams"
 
 
