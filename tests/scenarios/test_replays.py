@@ -91,9 +91,7 @@ def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) 
     assert done.stdout.startswith("gate: reached\n") and done.stdout.endswith("differences: none\n")
 
 
-@pytest.mark.parametrize(
-    ("name", "faults", "limit_s"), [("crossing.toml", "radio", 60.0)]
-)
+@pytest.mark.parametrize(("name", "faults", "limit_s"), [("crossing.toml", "radio", 60.0)])
 def test_nothing_differs_under_faults_and_among_moving_things(
     tmp_path: Path, name: str, faults: str, limit_s: float
 ) -> None:
