@@ -94,12 +94,21 @@ def save_ros_map(grid: Grid, path_without_suffix: Path, known: NDArray[np.bool_]
         allow_unicode=True,
     )
     try:
-        image.write_bytes(f"P5\n{grid.width} {grid.height}\n255\n".encode() + grey[::-1].tobytes())
-        image.with_suffix(".yaml").write_text(text, encoding="utf-8")
+        _write_whole(image, f"P5\n{grid.width} {grid.height}\n255\n".encode() + grey[::-1].tobytes())
+        _write_whole(image.with_suffix(".yaml"), text.encode())
     except OSError as error:
-        raise MapError(
-            f"{error.filename or image}: cannot be written: {error.strerror}; choose another place"
-        ) from error
+        raise MapError(f"{image}: cannot be written: {error.strerror}; choose another place") from error
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """Nothing is left of a file for which there was no room, and one that was there stays as it was. Raises OSError."""
+    part = path.with_name(path.name + ".part")
+    try:
+        part.write_bytes(data)
+        part.replace(path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
 
 
 def _read_bytes(path: Path, limit: int) -> bytes:

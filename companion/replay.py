@@ -143,7 +143,7 @@ class Tape:
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
         """Compared with the recorded one of the same number."""
         number, self.result.decisions = self.result.decisions, self.result.decisions + 1
-        self._on_decision(self.result.decisions, time_s, target, decision)
+        self._on_decision(self.result.decisions, self.result.seconds, target, decision)
         if number >= len(self._record.decisions):
             if self._record.whole:
                 self.differs(f"decision {number + 1} ({decision.reason}) was not made in the run")
@@ -215,7 +215,7 @@ class Observer:
         """The navigator's step is about to be computed."""
 
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
-        """A decision was made; they count from 1."""
+        """A decision was made; they count from 1, and the seconds from the beginning of the run."""
 
 
 def replay(record: Record, observer: Observer | None = None) -> Replayed:

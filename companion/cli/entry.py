@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import errno
 import os
+import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import FrameType
 from typing import cast
 
 from companion.cli.kernels import VARIABLE, choose_place
@@ -34,11 +36,30 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
     except OSError as error:
         print(f"{name}: no place for compiled kernels ({error.strerror or error}); set {VARIABLE}", file=sys.stderr)
         return EXIT_USAGE
+    terminated = _Terminated()
+    before = signal.signal(signal.SIGTERM, terminated)
     try:
         return _run(name, load())
     except KeyboardInterrupt:
-        print(f"{name}: stopped by Ctrl-C", file=sys.stderr)
+        print(f"{name}: stopped by {'SIGTERM' if terminated.asked else 'Ctrl-C'}", file=sys.stderr)
         return EXIT_STOPPED
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+class _Terminated:
+    """SIGTERM ends a command like Ctrl-C, from its first moment on; a process that it has started simply ends."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        self._process = os.getpid()
+
+    def __call__(self, number: int, frame: FrameType | None) -> None:
+        if os.getpid() != self._process:
+            signal.signal(number, signal.SIG_DFL)
+            os.kill(os.getpid(), number)
+        self.asked = True
+        raise KeyboardInterrupt
 
 
 def unsuitable(greatest_int: int) -> str:

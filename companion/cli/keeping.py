@@ -47,6 +47,14 @@ class Keeping:
         return None if self._place is None else self._place.file
 
     @property
+    def problem(self) -> str:
+        """Why the state is not that of the end of the run, and what to do; empty while all is well."""
+        if self.memory is None or not self.memory.problem or self.file is None:
+            return ""
+        stale = f", and do not --resume: {self.file.name} is older than this run" if self.file.exists() else ""
+        return f"{self.memory.problem}; make room there or name another place with --state DIR{stale}"
+
+    @property
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """What became of the targets of a mission that has ended."""
         if self.kept is None:

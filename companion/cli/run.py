@@ -169,7 +169,7 @@ def _drive(
         recorder.close()
     code = _told(companion.statuses(), companion.oversight.ended_by)
     with contextlib.suppress(OSError):  # nobody reads on: the exit code still tells
-        for line in (files.close(), str(autopilot.codec.counters.refused)):
+        for line in (files.close(), keeping.problem, str(autopilot.codec.counters.refused)):
             if line:
                 typer.echo(line, err=True)
         if record is not None:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.cli.inputs import writable
+from companion.cli.inputs import OutputError, writable
 from companion.mavlink.signing import Signer, load_key
 from companion.mavlink.signing_time import TimeFile
 from companion.saving import Saver
@@ -28,6 +28,8 @@ class StateFiles:
         self._directory = named or default_directory(os.environ)
         self._saver = Saver()
         self._base = Settings()
+        if named is not None and named.exists() and not named.is_dir():
+            raise OutputError(f"{named}: is a file; --state takes a directory")
         if named is not None:
             writable(named / TUNED)
 

@@ -16,6 +16,8 @@ from companion.why import Candidate, Explanation, cost_in_words
 
 UNSEEN_TINT = np.array([0.86, 0.9, 1.0])
 UNSEEN_COLOUR = (160, 167, 185)
+FREE_COLOUR = (185, 185, 185)
+"""Of fields with the base weight."""
 TAKEN_COLOUR, PAST_COLOUR = (214, 60, 50), (150, 120, 90)
 CANDIDATE_COLOURS = ((40, 110, 200), (130, 60, 170), (20, 140, 140), (120, 200, 40), (240, 90, 190))
 Line = NDArray[np.float64]
@@ -44,6 +46,7 @@ def draw(why: Explanation) -> Image.Image:
             pen.line(at, colour, width, "curve")
 
     entries: list[Entry] = [("past path", PAST_COLOUR), ("target", TARGET_COLOUR), ("obstacle", OBSTACLE_COLOUR)]
+    entries.append(("seen free (what is darker is dearer)", FREE_COLOUR))
     entries.append(("not seen yet (what is darker is dearer)", UNSEEN_COLOUR))
     line(np.array(why.state.past, np.float64), PAST_COLOUR, thick)
     # The one taken goes under the candidates and is broader, so that both are seen.

@@ -100,4 +100,6 @@ def _reason(error: Exception) -> str:
         return "another program uses it; stop that one"
     if isinstance(error, ValueError | OverflowError):
         return f"the port does not take this baud rate ({text})"
-    return text
+    if "Could not configure port" in text:
+        return "it is no serial port; see `ls /dev/tty*`"
+    return f"{text}; check the device"

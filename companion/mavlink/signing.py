@@ -54,7 +54,9 @@ def load_key(path: Path) -> bytes:
         with open_file(path) as file:
             data = file.read(LONGEST_KEY + 1)
     except OSError as error:
-        raise SigningKeyError(f"{path}: cannot be read: {error.strerror or error}") from error
+        raise SigningKeyError(
+            f"{path}: cannot be read: {error.strerror or error}; name a file with the passphrase or 64 hexadecimal digits"
+        ) from error
     try:
         text = data.decode().removesuffix("\n").removesuffix("\r")
     except UnicodeDecodeError as error:

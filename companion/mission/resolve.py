@@ -147,7 +147,7 @@ def _fixed_grid(mission: Mission, home: NedPoint) -> Grid | None:
     if spec.size is None or spec.home is None:
         return None
     width, height = spec.size
-    _refuse_large(width, height, spec.resolution_m)
+    _refuse_large(width, height, spec.resolution_m, mission)
     return empty_grid(width, height, spec.resolution_m, _south_west(home, spec.home, spec.resolution_m))
 
 
@@ -174,16 +174,20 @@ def _laid_grid(mission: Mission, places: Places, points: list[NedPoint], prior: 
         math.ceil((edge - at + margin_m) / size_m) for at, edge in zip((home.east_m, home.north_m), high, strict=True)
     )
     width, height = west + east + 1, south + north + 1
-    _refuse_large(width, height, size_m)
+    _refuse_large(width, height, size_m, mission)
     return empty_grid(width, height, size_m, _south_west(home, Cell(west, south), size_m))
 
 
-def _refuse_large(width: int, height: int, resolution_m: float) -> None:
+def _refuse_large(width: int, height: int, resolution_m: float, mission: Mission) -> None:
     if width * height > MAX_GRID_FIELDS:
         enough_m = resolution_m * math.sqrt(width * height / MAX_GRID_FIELDS)
+        of_ours = not mission.stored and (mission.source is None or mission.source.suffix.lower() == ".toml")
+        remedy = f"use resolution_m = {math.ceil(enough_m * 10.0) / 10.0:g} or larger, or a smaller margin_m"
+        if not of_ours:  # nothing of the kind can be said in a ground station's mission
+            remedy = "write a TOML mission with a larger resolution_m"
         raise MissionError(
             f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; are all places near "
-            f"home? If they are, use resolution_m = {math.ceil(enough_m * 10.0) / 10.0:g} or larger, or a smaller margin_m"
+            f"home? If they are, {remedy}"
         )
 
 

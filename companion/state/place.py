@@ -71,7 +71,7 @@ class StatePlace:
             ) from None
         except OSError as error:
             raise StatePlaceError(
-                f"{self.file}: cannot be read: {error.strerror or error}; start without --resume"
+                f"{self.file}: cannot be read: {error.strerror or error}; remove it, or start without --resume"
             ) from None
         if state.mission_sha256 != fingerprint(mission) or len(state.progress.statuses) != len(mission.targets):
             done = f"{state.reached} of {len(state.progress.statuses)} targets reached"

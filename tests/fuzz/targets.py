@@ -27,11 +27,16 @@ from companion.state.format import SUM_BYTES, StateError, decoded, encoded
 from companion.tuning import with_tuned
 from companion.vehicle import VehicleState, fold
 from tests.mavlink_vehicle import Station
+from tests.rig import Rig, yard
 from tests.states import a_state
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 LONGEST_LINE = 1000
 REFUSALS = (MissionError, MapError, SettingsError, RecordError, StateError, SigningKeyError)
+HEADER_BYTES = 10
+ROVER, STATION = 0, 5
+"""Senders as ``_packets`` reads them."""
+PART_BYTES = 512
 HOME = GeoPoint(53.0, 23.0)
 
 
@@ -159,8 +164,8 @@ def link(data: bytes) -> None:
         vehicle.pose_at(time_s)
 
 
-def link_contents(data: bytes) -> None:
-    """The same with packets whose frame is right: number of the message, sender, length, then its contents."""
+def _packets(data: bytes) -> bytes:
+    """Packets whose frame is right, of any contents: number of the message, sender, length, then its contents."""
     from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
     numbers = sorted(mavlink.mavlink_map)
@@ -174,7 +179,35 @@ def link_contents(data: bytes) -> None:
         crc = mavlink.x25crc(body + bytes([mavlink.mavlink_map[number].crc_extra])).crc
         stream += bytes([MAGIC_V2]) + body + crc.to_bytes(2, "little")
         at += 4 + length
-    link(stream)
+    return stream
+
+
+def link_contents(data: bytes) -> None:
+    """The same with packets whose frame is right."""
+    link(_packets(data))
+
+
+def driving(data: bytes) -> None:
+    """Packets whose frame is right, among those of a rover that is being driven: to parameters, errands, fence and all else that listens."""
+    with tempfile.TemporaryDirectory() as folder:
+        rig = Rig(yard(Path(folder)))
+    rig.until_driven(0.2)
+    stream = _packets(data)
+    parts = [stream[at : at + PART_BYTES] for at in range(0, len(stream), PART_BYTES)]
+    rig.garble = lambda heard: heard + (parts.pop(0) if parts else b"")
+    rig.run_for((len(parts) + 4) / Settings().link.tick_hz)
+
+
+def _said(sender: int, name: str, **fields: object) -> bytes:
+    """A message as ``_packets`` takes it; to the companion, if it is to anybody."""
+    from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+    kind = next(kind for kind in mavlink.mavlink_map.values() if kind.msgname == name)
+    usual = {"target_system": 1, "target_component": 191, "param_id": b""}
+    message = kind(**{field: fields.get(field, usual.get(field, 0)) for field in kind.fieldnames})
+    payload = message.pack(mavlink.MAVLink(None, 255, 190))[HEADER_BYTES:-2]
+    number = sorted(mavlink.mavlink_map).index(kind.id)
+    return number.to_bytes(2, "little") + bytes([sender, len(payload)]) + payload
 
 
 @dataclass(frozen=True, slots=True)
@@ -210,10 +243,26 @@ def targets() -> dict[str, Target]:
         "record": Target(record, record_examples()),
         "recorded-mission": Target(recorded_mission, (b'{"name": "m", "targets": [{"name": "t", "place": [1, 2]}]}',)),
         "link": Target(link, (talk,)),
+        "driving": Target(driving, driving_examples()),
         "link-contents": Target(
             link_contents, (b"\0\0\0\x09" + bytes(9), b"\x1e\0\0\x1c" + bytes(28), b"\x5a\0\1\x22" + bytes(34))
         ),
     }
+
+
+def driving_examples() -> tuple[bytes, ...]:
+    """Parameters, places to go to, a fence."""
+    place = {"frame": 6, "x": 530000000, "y": 230000000}
+    return (
+        _said(STATION, "PARAM_REQUEST_LIST")
+        + _said(STATION, "PARAM_REQUEST_READ", param_id=b"CMP_SPD_MAX", param_index=-1),
+        _said(STATION, "PARAM_SET", param_id=b"CMP_SPD_MAX", param_value=0.5, param_type=9),
+        _said(STATION, "COMMAND_INT", command=192, **place)
+        + _said(STATION, "MISSION_ITEM_INT", command=16, current=2, **place),
+        _said(ROVER, "PARAM_VALUE", param_id=b"FENCE_ENABLE", param_value=1.0, param_type=2, param_count=1)
+        + _said(ROVER, "FENCE_STATUS", breach_status=1)
+        + _said(ROVER, "MISSION_COUNT", count=3, mission_type=1),
+    )
 
 
 def state_examples() -> tuple[bytes, ...]:

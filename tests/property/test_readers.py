@@ -9,6 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from companion.errands import Errands
+from companion.fencing import Fencing
+from companion.parameters import ParameterServer
 from tests.fuzz.finds import FINDS
 from tests.fuzz.targets import BadRefusalError, refusing, targets
 
@@ -28,10 +31,39 @@ def test_its_own_files_are_read(name: str) -> None:
         TARGETS[name].read(example)
 
 
-@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("name", sorted(TARGETS.keys() - {"driving"}))
 @given(data=st.data())
 @settings(max_examples=25, deadline=None)
 def test_changed_files_are_read_or_refused_in_one_line(name: str, data: st.DataObject) -> None:
+    read_changed(name, data)
+
+
+@given(data=st.data())
+@settings(max_examples=6, deadline=None)  # each is a drive
+def test_changed_packets_are_survived_by_a_companion_that_drives(data: st.DataObject) -> None:
+    read_changed("driving", data)
+
+
+@pytest.mark.parametrize(
+    ("example", "part", "method"), [(1, ParameterServer, "_change"), (2, Errands, "_judge"), (3, Fencing, "breached")]
+)
+def test_packets_reach_whom_they_are_for(
+    example: int, part: type, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    reached = []
+    before = getattr(part, method)
+
+    def watched(*given: object, **named: object) -> object:
+        answer = before(*given, **named)
+        reached.append(answer)
+        return answer
+
+    monkeypatch.setattr(part, method, watched)
+    TARGETS["driving"].read(TARGETS["driving"].examples[example])
+    assert any(reached) if method == "breached" else reached
+
+
+def read_changed(name: str, data: st.DataObject) -> None:
     bytes_in = data.draw(st.sampled_from(TARGETS[name].examples))
     for where, cut, put in data.draw(CHANGES):
         at = int(where * len(bytes_in))

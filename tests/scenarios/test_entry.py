@@ -38,6 +38,17 @@ def test_wrong_usage_gets_one_line_and_exit_code_2(arguments: tuple[str, ...], w
     assert done.stdout == "" and done.stderr.count("\n") == 1 and what in done.stderr
 
 
+def test_sigterm_ends_a_command_like_an_interrupt(capsys: pytest.CaptureFixture[str]) -> None:
+    def load() -> typer.Typer:
+        signal.raise_signal(signal.SIGTERM)
+        raise AssertionError("the signal has been passed over")
+
+    before = signal.getsignal(signal.SIGTERM)
+    assert start("rover-companion", load) == 130
+    assert capsys.readouterr().err == "rover-companion: stopped by SIGTERM\n"
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_an_interrupt_while_it_loads_is_no_traceback(name: str) -> None:
     quiet = 0

@@ -20,6 +20,7 @@ from typer.testing import CliRunner
 
 from companion.app import Companion
 from companion.cli.commands import app
+from companion.cli.why_image import FREE_COLOUR
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import Signer
@@ -91,9 +92,7 @@ def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) 
     assert done.stdout.startswith("gate: reached\n") and done.stdout.endswith("differences: none\n")
 
 
-@pytest.mark.parametrize(
-    ("name", "faults", "limit_s"), [("crossing.toml", "radio", 60.0)]
-)
+@pytest.mark.parametrize(("name", "faults", "limit_s"), [("crossing.toml", "radio", 60.0)])
 def test_nothing_differs_under_faults_and_among_moving_things(
     tmp_path: Path, name: str, faults: str, limit_s: float
 ) -> None:
@@ -390,9 +389,19 @@ def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
     with Image.open(picture) as image:
         assert image.width >= 900
         colours = {colour for _, colour in image.convert("RGB").getcolors(1 << 20) or []}
-    assert {(214, 60, 50), (40, 110, 200), (150, 120, 90)} <= colours
+    assert {(214, 60, 50), (40, 110, 200), (150, 120, 90), FREE_COLOUR} <= colours
     late = CliRunner().invoke(app, ["replay", str(record), "--why", "100000"])
     assert late.exit_code == 2 and "the last one is" in late.output
+
+
+def test_why_tells_the_seconds_since_the_beginning(copy: Path) -> None:
+    time_s = json.loads(load_record(copy).decisions[1])["time_s"]
+    rounds, _ = unpacked((copy / "rounds.bin").read_bytes())
+    later = b"".join(entry._replace(time_s=entry.time_s + 50000.0).packed() for entry in rounds)
+    (copy / "rounds.bin").write_bytes(later)  # as on a computer that has run for half a day
+    reopened(copy)
+    result = CliRunner().invoke(app, ["replay", str(copy), "--why", "2"])
+    assert f"decision 2 at {time_s:.2f} s" in result.output
 
 
 def test_drive_records_what_it_was_given(tmp_path: Path) -> None:

@@ -10,7 +10,16 @@ import pytest
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
+from companion.cli.inputs import OutputError
+from companion.cli.state import StateFiles
+from companion.clock import WallClock
+from companion.frames import GeoPoint, LocalFrame
+from companion.mavlink.byte_link import LinkError
+from companion.mavlink.serial_port import SerialLink
+from companion.mavlink.signing import SigningKeyError, load_key
 from companion.mission.load import load_mission
+from companion.mission.mission import MissionError
+from companion.mission.resolve import resolve
 from companion.reading import open_file, read_at_most
 from companion.settings import Settings, SettingsError, load_settings
 from companion.state.place import StatePlace, StatePlaceError
@@ -79,3 +88,40 @@ def test_a_record_of_pipes_is_not_replayed(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "meta.json")
     result = CliRunner().invoke(app, ["replay", str(tmp_path)])
     assert result.exit_code == 2 and "meta.json: cannot be read: not a file" in result.output
+
+
+def far(folder: Path) -> None:
+    mission = load_mission(Path(__file__).parents[2] / "missions" / "field.waypoints")
+    lay = GeoPoint(0.0, 0.0)
+    resolve(mission, LocalFrame(lay), LocalFrame(lay).to_ned(lay))
+
+
+def state_is_a_folder(folder: Path) -> None:
+    yard(folder)
+    (folder / "mission.state").mkdir()
+    load_state(folder / "mission.state")
+
+
+def state_is_a_file(folder: Path) -> None:
+    (folder / "file").touch()
+    StateFiles(folder / "file")
+
+
+REMEDIES: dict[str, tuple[Callable[[Path], object], str]] = {
+    "a state that is a file": (state_is_a_file, "file: is a file; --state takes a directory"),
+    "a state that is a folder": (state_is_a_folder, "Is a directory; remove it, or start without --resume"),
+    "no serial port": (lambda folder: SerialLink("/etc/passwd", 57600, WallClock()), "it is no serial port; see `ls"),
+    "no key": (lambda folder: load_key(folder / "nokey"), "No such file or directory; name a file with the passphrase"),
+    "settings in a folder": (load_settings, "Is a directory; name a TOML file, or leave --settings out"),
+    "a mission that says no resolution": (far, "If they are, write a TOML mission with a larger resolution_m"),
+}
+
+
+@pytest.mark.parametrize("what", REMEDIES)
+def test_what_cannot_be_used_is_told_with_a_remedy(tmp_path: Path, what: str) -> None:
+    use, words = REMEDIES[what]
+    with pytest.raises(
+        (OutputError, StatePlaceError, LinkError, SigningKeyError, SettingsError, MissionError)
+    ) as caught:
+        use(tmp_path)
+    assert words in str(caught.value) and "\n" not in str(caught.value)
