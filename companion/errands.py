@@ -23,6 +23,7 @@ REPEAT_S = 5.0
 """The same request within so long after it was heard last is a repetition: ground stations repeat what was not answered in time."""
 MOST_A_SECOND = 10
 """More requests are not even answered, until there are fewer."""
+REFUSED_AGAIN_S = 1.0
 SAME_M = 0.02
 """Places nearer to each other than this are one: a radio's rounding."""
 
@@ -59,7 +60,9 @@ class Errands:
         self._tell = tell
         self._count = 0
         self._last: TargetAsked | None = None
-        self._heard_s = -math.inf
+        self._heard_s = self._refused_s = -math.inf
+        self._reason = ""
+        self._refusals = 0
         self._times_s: deque[float] = deque([-math.inf] * MOST_A_SECOND, maxlen=MOST_A_SECOND)
 
     def take_in(self, asked: TargetAsked, vehicle: VehicleState, pursuit: Pursuit | None, idle: str) -> None:
@@ -76,8 +79,18 @@ class Errands:
         else:
             answer, reason = self._judge(asked, vehicle, pursuit)
         if reason:
-            self._tell(f"Errand refused: {reason}", WARNING)
+            self._refuse(reason, asked.time_s)
         self._send(AnswerTarget(asked.asker, asked.form, answer), asked.time_s)
+
+    def _refuse(self, reason: str, now_s: float) -> None:
+        """Say why. A reason that was the last one's too is said again, but not at every repetition of one request."""
+        same = reason == self._reason
+        if same and now_s - self._refused_s < REFUSED_AGAIN_S:
+            return
+        self._reason, self._refused_s = reason, now_s
+        self._refusals = self._refusals + 1 if same else 1
+        again = f" ({self._refusals} times)" if same else ""
+        self._tell(f"Errand refused{again}: {reason}", WARNING)
 
     def _judge(self, asked: TargetAsked, vehicle: VehicleState, pursuit: Pursuit) -> tuple[TargetAnswer, str]:
         """A place, and a rover that is driven: the answer, and the reason of a refusal."""

@@ -105,6 +105,16 @@ polygon_fields = [[8, 5], [8, 9], [10, 9], [10, 5]]
 """
 
 
+def test_a_place_refused_again_is_told_again(driving: Asker) -> None:
+    for _ in range(3):
+        driving.reposition(driving.field(40, 7))
+        assert driving.answered() == DENIED
+        driving.run_for(1.0)
+    told = [text for text in driving.texts() if text.startswith("Errand refused")]
+    reason = "outside the mission's grid"
+    assert told == [f"Errand refused{again}: {reason}" for again in ("", " (2 times)", " (3 times)")]
+
+
 def test_a_place_where_an_obstacle_was_seen_is_refused(driving: Asker) -> None:
     driving.reposition(driving.field(8, 7))
     assert driving.answered() == DENIED
