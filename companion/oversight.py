@@ -1,4 +1,4 @@
-"""What the autopilot knows that ends or bounds a mission: its own fence, its batteries, and targets that somebody else gave it."""
+"""What the autopilot knows that ends or bounds a mission: its own fence, and its batteries."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ class Oversight:
         self._fencing = Fencing(autopilot, settings.fence, tell)
         self._power = Power(settings.power)
         self._to_rally = settings.power.to_rally
-        self._rivals = autopilot.rivals
         self._breached = False
         self._tell = tell
 
@@ -43,8 +42,7 @@ class Oversight:
 
         ``out``: an earlier run has left it armed in GUIDED, perhaps far from anybody. A low battery is then a reason to go back, not to stay.
         """
-        awaited = "" if out else self._rivals.awaited(now_s) or self._power.hindrance(now_s)
-        return self._fence, self._fencing.missing or awaited
+        return self._fence, self._fencing.missing or ("" if out else self._power.hindrance(now_s))
 
     def emptied(self, now_s: float) -> str:
         """Why the rover must stop for good wherever it is, in words; empty while it need not."""
@@ -56,8 +54,6 @@ class Oversight:
     def doubt(self, pursuit: Pursuit, pose: Pose | None, now_s: float) -> str:
         """Why the rover must not be driven now; empty when it may. A fence that has changed is in force from here on."""
         pursuit.heed_fence(self._fence)
-        if self._rivals.steering(now_s):
-            return "another companion or ground station commands this rover"
         return self._fencing.breached(now_s) or ("" if pose is None else pursuit.outside(pose.point))
 
     def broken_off(self, pursuit: Pursuit, pose: Pose, now_s: float) -> str:

@@ -18,7 +18,6 @@ from companion.mavlink.codec import Codec
 from companion.mavlink.download import Downloads
 from companion.mavlink.rates import RateFault, RateKeeper, wanted_rates
 from companion.mavlink.readback import ReadBack
-from companion.mavlink.rivals import Rivals
 from companion.rounds import Mark
 from companion.settings import LinkSettings
 
@@ -63,8 +62,6 @@ class AutopilotLink:
         self._rates = RateKeeper(wanted_rates(settings))
         self._acks = AckKeeper()
         self._read_back = ReadBack()
-        self.rivals = Rivals()
-        """Whoever else may steer this rover."""
         self.downloads = Downloads()
         """The lists that the autopilot has stored: mission, fence, rally points."""
         self._heartbeat_s = -math.inf
@@ -147,7 +144,6 @@ class AutopilotLink:
         self._write(command, now_s)
         self._acks.sent(command, now_s)
         self._read_back.sent(command, now_s)
-        self.rivals.sent(command)
 
     def service(self, now_s: float) -> None:
         """To be called every tick: heartbeat, requests, repetitions.
@@ -197,8 +193,6 @@ class AutopilotLink:
         return True
 
     def _note(self, event: Event) -> None:
-        if isinstance(event, HeartbeatSeen | TargetSeen):
-            self.rivals.heard(event, self._codec.origin)
         match event:
             case HeartbeatSeen() | AckSeen():
                 self._acks.heard(event)
