@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Protocol
 
 BESIDE = ".new"
+PRIVATE, SHARED = 0o600, 0o666
+"""A state file tells where somebody's rover has been: only its owner may read it. What a user asks for is like any other file."""
 
 
 class Disk(Protocol):
@@ -45,9 +47,13 @@ class Disk(Protocol):
 class OsDisk:
     """The real one."""
 
+    def __init__(self, mode: int = PRIVATE) -> None:
+        """``mode``: who may read and write the files, less what the process takes away (umask)."""
+        self._mode = mode
+
     def create(self, path: Path) -> int:
-        """See Disk. Only its owner may read what is written: a record of where somebody's rover has been."""
-        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, 0o600)
+        """See Disk."""
+        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, self._mode)
 
     def write(self, handle: int, data: bytes) -> int:
         """See Disk."""
@@ -96,6 +102,11 @@ def replace_file(disk: Disk, path: Path, data: bytes) -> None:
             disk.remove(beside)
         raise
     disk.sync_directory(path.parent)
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Put ``data`` in place of a file that others may read too (see ``replace_file``). Raises OSError."""
+    replace_file(OsDisk(SHARED), path, data)
 
 
 def set_aside(path: Path, word: str) -> Path:

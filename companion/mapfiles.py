@@ -19,6 +19,7 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from companion.disk import write_whole
 from companion.frames import NedPoint
 from companion.grid import BASE_WEIGHT, OBSTACLE, Grid, Weights
 from companion.reading import open_file
@@ -94,21 +95,10 @@ def save_ros_map(grid: Grid, path_without_suffix: Path, known: NDArray[np.bool_]
         allow_unicode=True,
     )
     try:
-        _write_whole(image, f"P5\n{grid.width} {grid.height}\n255\n".encode() + grey[::-1].tobytes())
-        _write_whole(image.with_suffix(".yaml"), text.encode())
+        write_whole(image, f"P5\n{grid.width} {grid.height}\n255\n".encode() + grey[::-1].tobytes())
+        write_whole(image.with_suffix(".yaml"), text.encode())
     except OSError as error:
         raise MapError(f"{image}: cannot be written: {error.strerror}; choose another place") from error
-
-
-def _write_whole(path: Path, data: bytes) -> None:
-    """Nothing is left of a file for which there was no room, and one that was there stays as it was. Raises OSError."""
-    part = path.with_name(path.name + ".part")
-    try:
-        part.write_bytes(data)
-        part.replace(path)
-    except OSError:
-        part.unlink(missing_ok=True)
-        raise
 
 
 def _read_bytes(path: Path, limit: int) -> bytes:

@@ -46,13 +46,6 @@ def in_record(entries: list[Copied], source: Path) -> str:
     return next((entry.name for entry in entries if entry.source == str(source)), str(source))
 
 
-def replaced(path: Path, data: bytes) -> None:
-    """Write a whole file, so that there is always either the old one or the new one. Raises OSError."""
-    part = path.with_name(path.name + ".part")
-    part.write_bytes(data)
-    part.replace(path)
-
-
 def _copy(directory: Path, kind: str, place: Path, path: Path) -> Copied:
     data = path.read_bytes()
     (directory / place).parent.mkdir(parents=True, exist_ok=True)

@@ -12,11 +12,12 @@ from pathlib import Path
 from typing import IO, Protocol
 
 from companion.clock import unix_time_us
+from companion.disk import write_whole
 from companion.mission.as_json import to_json
 from companion.mission.mission import Mission
 from companion.navigator import Decision
 from companion.provenance import versions
-from companion.recorded_files import Copied, RecordError, copied, in_record, replaced
+from companion.recorded_files import Copied, RecordError, copied, in_record
 from companion.rounds import Mark, Round
 from companion.settings import Settings
 
@@ -108,7 +109,7 @@ class Recorder:
             if mission is not None:
                 known = None if mission.prior_map is None else Path(in_record(inputs, mission.prior_map))
                 text = to_json(replace(mission, prior_map=known)).encode()
-                replaced(self.directory / MISSION, text)
+                write_whole(self.directory / MISSION, text)
                 inputs.append(Copied("mission", MISSION, str(mission.source or ""), hashlib.sha256(text).hexdigest()))
             self._meta = _meta(mission, settings, seed, arm, self._start_us, inputs)
             self._write_meta(None)
@@ -206,7 +207,7 @@ class Recorder:
 
     def _write_meta(self, end: dict[str, dict[str, int]] | None) -> None:
         meta = {**self._meta, "end": end}
-        replaced(self.directory / META, json.dumps(meta, indent=2).encode() + b"\n")
+        write_whole(self.directory / META, json.dumps(meta, indent=2).encode() + b"\n")
 
 
 def decision_line(time_s: float, target: str, decision: Decision) -> str:

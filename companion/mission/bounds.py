@@ -84,11 +84,11 @@ class Bounds:
 
         A rover that is too near already may move as long as it comes no nearer, and its middle stays on this side.
         """
-        way = shapely.LineString([(point.east_m, point.north_m) for point in points])
-        here = shapely.Point(points[0].east_m, points[0].north_m)
+        places = [_place(point) for point in points]
+        way, here = shapely.LineString(places), shapely.Point(places[0])
         for bound in self._near(way):
             depth_m = bound.depth_m(way)
-            if depth_m <= 0.0 or depth_m < min(bound.body_m, bound.depth_m(here)) - SLACK_M:
+            if not (depth_m > 0.0 and depth_m >= min(bound.body_m, bound.depth_m(here)) - SLACK_M):
                 return bound.name
         return ""
 
@@ -132,6 +132,11 @@ def autopilot_bounds(fence: AutopilotFence, frame: LocalFrame, body_m: float) ->
         circle = shape_of(Area((fence.home,), fence.circle_m), places)
         bounds.append(Bound(f"{OURS} (circle of {fence.circle_m:g} m round home)", circle, True, keep_m, body_m))
     return bounds
+
+
+def _place(point: NedPoint) -> tuple[float, float]:
+    """To a micrometre: lengths whose square is no number any more have no distance from anything."""
+    return round(point.east_m, 6), round(point.north_m, 6)
 
 
 def _in_fields(area: Area) -> bool:

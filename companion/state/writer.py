@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import queue
-import threading
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Protocol
 
+from companion.beside import Beside
 from companion.disk import Disk, replace_file
 from companion.state.format import BandPlace, Raster, deflated, encoded
 from companion.state.snapshot import Snapshot, saved_state
@@ -99,20 +99,17 @@ class InlineWriter:
 
 
 class ThreadWriter:
-    """Writes beside the loop. The thread ends with the program, whatever the disk does: ``close`` waits only so long."""
+    """Writes beside the loop."""
 
     def __init__(self, file: StateFile, close_s: float = 0.5) -> None:
         self._file = file
-        self._close_s = close_s
-        self._updates: queue.SimpleQueue[Update | None] = queue.SimpleQueue()
-        self._given = self._taken = 0
-        self._thread = threading.Thread(target=self._work, name="state", daemon=True)
-        self._thread.start()
+        self._newest: Snapshot | None = None
+        self._beside = Beside("state", close_s)
 
     @property
     def busy(self) -> bool:
         """See Writer."""
-        return self._given != self._taken
+        return self._beside.busy
 
     @property
     def problem(self) -> str:
@@ -121,25 +118,16 @@ class ThreadWriter:
 
     def put(self, update: Update) -> None:
         """See Writer."""
-        self._given += 1
-        self._updates.put(update)
+        self._beside.put(partial(self._take, update))
 
     def close(self) -> None:
         """See Writer; gives up after a while."""
-        self._updates.put(None)
-        self._thread.join(self._close_s)
+        self._beside.close()
 
-    def _work(self) -> None:
+    def _take(self, update: Update) -> None:
         """Of snapshots that have piled up behind a slow disk only the newest is written."""
-        newest = None
-        while True:
-            update = self._updates.get()
-            if update is not None:
-                self._file.take(Update(update.rows, None, update.afresh))
-                newest = update.snapshot or newest
-            if newest is not None and (update is None or self._updates.empty()):
-                self._file.take(Update(snapshot=newest))
-                newest = None
-            if update is None:
-                return
-            self._taken += 1
+        self._file.take(Update(update.rows, None, update.afresh))
+        self._newest = update.snapshot or self._newest
+        if self._newest is not None and not self._beside.behind:
+            self._file.take(Update(snapshot=self._newest))
+            self._newest = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -36,12 +36,37 @@ def sys_status(vehicle: Vehicle) -> list[Any]:
     enabled |= GEOFENCE if vehicle.plan.fence.enabled and vehicle.parameters["FENCE_ACTION"] > 0.0 else 0
     health &= ~GEOFENCE if vehicle.plan.fence.breached else ~0
     health &= ~BATTERY if vehicle.battery.worst else ~0
-    volts_mv, amps_ca, percent = battery_readings(vehicle)
+    battery = battery_readings(vehicle)
     return [
-        mavlink.MAVLink_sys_status_message(present, enabled, health, 0, volts_mv, amps_ca, percent, 0, 0, 0, 0, 0, 0)
+        mavlink.MAVLink_sys_status_message(
+            present, enabled, health, 0, battery.volts_mv, battery.amps_ca, battery.percent, 0, 0, 0, 0, 0, 0
+        )
     ]
 
 
-def battery_readings(vehicle: Vehicle) -> tuple[int, int, int]:
-    """The battery's millivolts, hundredths of an ampere and per cent that are left."""
-    return round(1000.0 * vehicle.volts()), int(100.0 * vehicle.amps()), vehicle.battery_percent()
+class BatteryReadings(NamedTuple):
+    """What the battery monitor tells, each as far as its field in a message goes (a parameter may ask for more)."""
+
+    volts_mv: int
+    amps_ca: int
+    used_mah: int
+    used_hj: int
+    """Hundreds of joules since boot."""
+    percent: int
+
+
+def battery_readings(vehicle: Vehicle) -> BatteryReadings:
+    """The readings of this moment."""
+    used_hj = 36.0 * float(vehicle.control[0]["used_wh"])
+    return BatteryReadings(
+        _within(1000.0 * vehicle.volts() + 0.5, 0, 65534),
+        _within(100.0 * vehicle.amps(), -32768, 32767),
+        _within(vehicle.used_mah(), -(2**31), 2**31 - 1),
+        _within(used_hj, -(2**31), 2**31 - 1),
+        vehicle.battery_percent(),
+    )
+
+
+def _within(value: float, low: int, high: int) -> int:
+    """Whole, and between the two; what is no number is the lower one."""
+    return int(min(max(value, low), high)) if value > low else low

@@ -253,13 +253,12 @@ def stick_us(share: float) -> int:
 
 
 def _battery(vehicle: Vehicle) -> list[Any]:
-    volts_mv, amps_ca, percent = battery_readings(vehicle)
-    used_hj = int(36.0 * float(vehicle.control[0]["used_wh"]))
-    voltages = [min(volts_mv, 65534)] + [65535] * 9
+    battery = battery_readings(vehicle)
+    voltages = [battery.volts_mv] + [65535] * 9
     state = 1 + vehicle.battery.worst
     return [
         mavlink.MAVLink_battery_status_message(
-            0, 0, 0, 32767, voltages, amps_ca, int(vehicle.used_mah()), used_hj, percent, 0, state
+            0, 0, 0, 32767, voltages, battery.amps_ca, battery.used_mah, battery.used_hj, battery.percent, 0, state
         )
     ]
 

@@ -146,6 +146,6 @@ def test_bands_that_do_not_fit_are_refused(table: list[Any], bands: bytes) -> No
 
 
 def test_another_version_is_named_and_not_called_damaged() -> None:
-    with pytest.raises(StateError, match="format 7") as caught:
+    with pytest.raises(StateError, match="format '7'") as caught:
         decoded(sealed(MAGIC + b"7\n" + b"whatever"))
     assert not isinstance(caught.value, DamagedError)

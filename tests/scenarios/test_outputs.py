@@ -24,7 +24,7 @@ def mission(tmp_path: Path) -> Path:
 
 
 def test_a_full_disk_is_one_line_for_each_file_and_keeps_the_others(mission: Path, tmp_path: Path) -> None:
-    for name in ("run.png", "seen.pgm"):
+    for name in ("run.png", "seen.pgm.new"):
         (tmp_path / name).symlink_to("/dev/full")
     image, stem, figures = tmp_path / "run.png", tmp_path / "seen", tmp_path / "run.json"
     arguments = ["drive", mission, "--image", image, "--map", stem, "--json", figures]

@@ -303,6 +303,7 @@ class HangingDisk(OsDisk):
     """One that takes a file and never says that it has it, until it is let go."""
 
     def __init__(self) -> None:
+        super().__init__()
         self.free = threading.Event()
 
     def sync(self, handle: int) -> None:
