@@ -163,10 +163,12 @@ def _look_or_blocked(
     if not _is_turned_to(bearing, pose, settings):
         return turn_to(bearing, speed_m_s, settings)
     if line.clear_m >= distance_m - 0.05:
-        # Looked at, and nothing there, but between the beams: creep.
-        creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
+        # Looked at, and nothing there, but between the beams: creep, up to what stands farther on.
         bearing = pose.point.bearing_rad(ahead)
-        return Guide(Motion.DRIVE, GuidedPosition(pose.point.moved(bearing, creep_m)), settings.min_speed_m_s)
+        creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
+        clear_m = look_along(evidence, pose.point, pose.point.moved(bearing, creep_m), rover.radius_m).clear_m
+        target = pose.point.moved(bearing, min(creep_m, clear_m))
+        return Guide(Motion.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
     return Guide(Motion.BLOCKED, STOP, 0.0)
 
 

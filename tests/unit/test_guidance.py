@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from companion.reach import RoverLimits
 from companion.route import STEP_M, Route, advanced, route_along_cells, route_along_curve, route_is_clear
 from companion.settings import GuidanceSettings
 from companion.stopping import fastest_within_m, stopping_distance_m
-from tests.unit.test_mapping import HERE, Ground, Post
+from tests.unit.test_mapping import HERE, Ground, Post, scan
 
 SETTINGS = GuidanceSettings()
 ROVER = RoverLimits(radius_m=0.35, cruise_speed_m_s=2.0, sight_m=8.0)
@@ -132,6 +133,25 @@ def test_a_wall_right_ahead_is_blocked():
     ground.look_round(Pose(9.5, 10.5, 0.0, 0.0), wall, 10)
     answer = told(ground, Pose(10.6, 10.5, 0.0, 0.0), route=northward(ground, NedPoint(10.6, 10.5)))
     assert answer.motion is Motion.BLOCKED and answer.setpoint == GuidedVelocity(0.0, 0.0)
+
+
+@pytest.mark.parametrize("post_m", [1.45, 1.55, 1.65, 1.75])
+def test_creeping_between_beams_it_is_told_no_place_behind_what_stands_farther_on(post_m):
+    """A single beam has freed the line, not the ground beside it, and has seen a post beside its end earlier."""
+    pose, ground = Pose(10.56, 10.56, 0.0, 0.0), Ground()
+    ground.take(pose, scan(np.array([4.0]), np.zeros(1)), times=10)
+    post = NedPoint(pose.north_m + post_m, pose.east_m + 0.15)
+    row, column = (int(metres * ground.map.subdivisions) for metres in (post.north_m, post.east_m))
+    ground.map.log_odds[row, column] = ground.map.settings.limit
+    route, settings = northward(ground, pose.point), SETTINGS.model_copy(update={"least_reach_m": 0.6})
+    answer = guide(route, pose, 0.0, ground.map, ROVER, settings)
+    while answer.motion is Motion.LOOK:  # having turned, it sees nothing new
+        pose = replace(pose, heading_rad=answer.setpoint.heading_rad)
+        answer = guide(route, pose, 0.0, ground.map, ROVER, settings, looking_rad=pose.heading_rad)
+    assert answer.motion is Motion.DRIVE and isinstance(answer.setpoint, GuidedPosition)
+    distance_m = pose.point.distance_m(answer.setpoint.point)
+    assert 0.9 < distance_m < post_m
+    assert look_along(ground.map, pose.point, answer.setpoint.point, ROVER.radius_m).clear_m >= distance_m - 0.01
 
 
 def test_far_aside_it_turns_first():
