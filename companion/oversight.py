@@ -1,8 +1,11 @@
-"""What the autopilot knows that ends or bounds a mission: its own fence, and its batteries."""
+"""What is known beside the map that ends or bounds a mission: the autopilot's own fence, its batteries, another companion."""
 
 from __future__ import annotations
 
+import math
+
 from companion.events.event import Event
+from companion.events.vehicle import HeartbeatSeen, RoverMode
 from companion.fencing import Fencing
 from companion.frames import LocalFrame, Pose
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -12,20 +15,28 @@ from companion.pursuit import Pursuit, Tell
 from companion.settings import Settings
 from companion.vehicle import VehicleState
 
+LISTEN_S = 1.5
+"""Who finds a rover armed in GUIDED listens so long before driving it: another companion's figures come every second."""
+
 
 class Oversight:
     """Listens before and during the mission. ``ended_by``: why it was broken off, in words; empty while it was not."""
 
     def __init__(self, autopilot: AutopilotLink, settings: Settings, tell: Tell) -> None:
         self.ended_by = ""
+        self._autopilot = autopilot
         self._fencing = Fencing(autopilot, settings.fence, tell)
         self._power = Power(settings.power)
         self._to_rally = settings.power.to_rally
         self._breached = False
+        self._listens_until_s = math.nan
         self._tell = tell
 
     def take_in(self, event: Event) -> None:
         """One more event."""
+        if isinstance(event, HeartbeatSeen) and math.isnan(self._listens_until_s):
+            driven = event.armed and event.mode == RoverMode.GUIDED
+            self._listens_until_s = event.time_s + (LISTEN_S if driven else 0.0)
         self._fencing.take_in(event)
         self._power.take_in(event)
 
@@ -40,9 +51,13 @@ class Oversight:
     def before_driving(self, now_s: float, *, out: bool = False) -> tuple[AutopilotFence, str]:
         """The autopilot's fence as known now, and what is awaited before the rover may be driven at all; empty when nothing is.
 
-        ``out``: an earlier run has left it armed in GUIDED, perhaps far from anybody. A low battery is then a reason to go back, not to stay.
+        ``out``: an earlier run has left it armed in GUIDED, perhaps far from anybody: nobody else drives it, and a low battery is a reason
+        to go back, not to stay.
         """
-        return self._fence, self._fencing.missing or ("" if out else self._power.hindrance(now_s))
+        if out:
+            return self._fence, self._fencing.missing
+        doubt = "" if now_s >= self._listens_until_s else "signs of another companion (the rover is armed in GUIDED)"
+        return self._fence, self._fencing.missing or doubt or self._power.hindrance(now_s)
 
     def emptied(self, now_s: float) -> str:
         """Why the rover must stop for good wherever it is, in words; empty while it need not."""
@@ -54,6 +69,8 @@ class Oversight:
     def doubt(self, pursuit: Pursuit, pose: Pose | None, now_s: float) -> str:
         """Why the rover must not be driven now; empty when it may. A fence that has changed is in force from here on."""
         pursuit.heed_fence(self._fence)
+        if self._autopilot.rival_heard(now_s):
+            return "another companion drives this rover"
         return self._fencing.breached(now_s) or ("" if pose is None else pursuit.outside(pose.point))
 
     def broken_off(self, pursuit: Pursuit, pose: Pose, now_s: float) -> str:

@@ -8,13 +8,13 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.commands import AskTime, Command, Heartbeat, RequestMessage
+from companion.commands import AskTime, Command, Heartbeat, RequestMessage, TellFigure
 from companion.events.event import Event
 from companion.events.vehicle import AckSeen, HeartbeatSeen, HomeSeen, TargetSeen
 from companion.latency import TimeAnswered
 from companion.mavlink.acks import AckKeeper
 from companion.mavlink.byte_link import ByteLink
-from companion.mavlink.codec import Codec
+from companion.mavlink.codec import Codec, Packet
 from companion.mavlink.download import Downloads
 from companion.mavlink.rates import RateFault, RateKeeper, wanted_rates
 from companion.mavlink.readback import ReadBack
@@ -29,7 +29,9 @@ PLACES_AGAIN_S = 30.0
 TIME_S = 0.5
 """The autopilot's time is asked for this often: how long the answer takes is how late the link is."""
 TWIN_S = 3.5
-"""Another companion's heartbeat counts for so long."""
+"""What another companion has said counts for so long."""
+REMEMBERED = 64
+"""Packets of our own that a network may send back to us."""
 
 
 class PacketLog(Protocol):
@@ -67,10 +69,10 @@ class AutopilotLink:
         self._heartbeat_s = -math.inf
         self._places_s = -math.inf
         self._home_known = False
-        self._own: deque[bytes] = deque(maxlen=8)
+        self._own: deque[bytes] = deque(maxlen=REMEMBERED)
         self._time_s = -math.inf
         self._asked_ns: deque[int] = deque(maxlen=64)
-        self._twin_s = -math.inf
+        self._twin_s = self._rival_s = -math.inf
 
     @property
     def description(self) -> str:
@@ -107,7 +109,12 @@ class AutopilotLink:
 
     def twin_heard(self, now_s: float) -> bool:
         """Whether somebody else has just spoken as this very component: two companions would steer one rover."""
-        return now_s - self._twin_s < TWIN_S
+        return now_s - max(self._twin_s, self._rival_s) < TWIN_S
+
+    def rival_heard(self, now_s: float) -> bool:
+        """Whether that other companion is driving, for only then it tells its figures. The autopilot passes those on between links,
+        but no heartbeat of a component that it hears on both of them."""
+        return now_s - self._rival_s < TWIN_S
 
     def intruder(self, now_s: float) -> str:
         """Who speaks under ids that are not his, in words; empty when nobody does."""
@@ -127,8 +134,7 @@ class AutopilotLink:
         packets = [packet for packet in self._codec.packets(self._link.read()) if self._codec.accepts(packet)]
         self._log.heard(now_s, [packet.raw for packet in packets], self._codec.marks)
         for packet in packets:
-            if self._codec.is_own_heartbeat(packet) and packet.raw not in self._own:  # some networks send all back
-                self._twin_s = now_s
+            self._look_for_twin(packet, now_s)
             for event in self._codec.decode_packet(packet, now_s):
                 if isinstance(event, TimeAnswered) and not self._is_ours(event):
                     continue
@@ -185,6 +191,14 @@ class AutopilotLink:
             self._asked_ns.append(round(now_s * 1e9))
             self._write(AskTime(self._asked_ns[-1]), now_s)
 
+    def _look_for_twin(self, packet: Packet, now_s: float) -> None:
+        if not self._codec.is_own(packet) or packet.raw in self._own:  # some networks send all back
+            return
+        if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
+            self._twin_s = now_s
+        elif packet.message_id == mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT:
+            self._rival_s = now_s
+
     def _is_ours(self, answer: TimeAnswered) -> bool:
         """Whether it answers our own question, for the first time: others ask as well, and answers are sent to everybody."""
         if answer.asked_ns not in self._asked_ns:
@@ -208,5 +222,5 @@ class AutopilotLink:
         for raw in self._codec.encode_packets(command, repetition):
             self._log.said(now_s, raw)
             self._link.write(raw)
-            if isinstance(command, Heartbeat):
+            if isinstance(command, Heartbeat | TellFigure):
                 self._own.append(raw)

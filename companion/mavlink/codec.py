@@ -86,10 +86,10 @@ class Codec:
         """How many messages of each id the autopilot has sent."""
         return self._decoder.message_counts
 
-    def is_own_heartbeat(self, packet: Packet) -> bool:
-        """Whether this is a heartbeat under our own system and component id."""
+    def is_own(self, packet: Packet) -> bool:
+        """Whether this was said under our own system and component id."""
         own = (self._decoder.system_id, self._decoder.component_id)
-        return self.vehicle_known and packet.message_id == 0 and (packet.system_id, packet.component_id) == own
+        return self.vehicle_known and (packet.system_id, packet.component_id) == own
 
     @property
     def counters(self) -> LinkCounters:

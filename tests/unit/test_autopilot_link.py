@@ -6,7 +6,16 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.commands import Arm, ChangeSpeed, GuidedHeading, GuidedPosition, GuidedVelocity, RequestMessage, SetMode
+from companion.commands import (
+    Arm,
+    ChangeSpeed,
+    GuidedHeading,
+    GuidedPosition,
+    GuidedVelocity,
+    RequestMessage,
+    SetMode,
+    TellFigure,
+)
 from companion.events.vehicle import AckSeen, HeartbeatSeen
 from companion.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -343,3 +352,14 @@ def test_another_companion_is_noticed_and_our_own_echo_is_not() -> None:
         raw = twin.heartbeat(kind=18, autopilot=8)
     bench.hear(2.0, raw)
     assert bench.link.twin_heard(2.1) and not bench.link.twin_heard(6.0)
+    assert not bench.link.rival_heard(2.1), "it may be only beginning"
+
+
+def test_figures_of_another_companion_tell_that_it_drives_and_our_own_do_not() -> None:
+    bench, twin = Bench(), Station(1, 191)
+    bench.link.send(TellFigure("PROGRESS", 50.0), 1.0)
+    bench.hear(1.1, bench.far.read())
+    assert not bench.link.rival_heard(1.2)
+    raw = twin.pack(mavlink.MAVLink_named_value_float_message(0, b"PROGRESS", 50.0))
+    bench.hear(2.0, raw)
+    assert bench.link.rival_heard(2.1) and bench.link.twin_heard(2.1) and not bench.link.rival_heard(6.0)
