@@ -270,6 +270,8 @@ class Companion:
         laid, command = self._start_up.step(self.vehicle, control, now_s, fence, hindrance)
         if command is not None:
             self._send(command, now_s)
+        if command == SetMode(RoverMode.HOLD):
+            self._tell(f"HOLD: waited too long for {self._start_up.missing}", WARNING)
         refused = self._autopilot.last_ack(Arm())
         if refused is not None and refused.result != 0 and self._start_up.missing == "arming":
             self._teller.once(f"The autopilot refuses to arm (result {refused.result})")

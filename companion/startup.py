@@ -22,6 +22,8 @@ ASK_AGAIN_S = 3.0
 """A command that has not worked is given again after so long."""
 TAKEN_S = 0.5
 """A heartbeat so long after the answer to a mode change shows what has become of it."""
+LEFT_S = 10.0
+"""A rover that an earlier run has left armed in GUIDED, and that cannot be driven for so long, is put into HOLD and left to a person."""
 LOOK_AGAIN_S = 2.0
 """A rover that stands beside the mission's grid is looked at again after so long."""
 
@@ -92,6 +94,7 @@ class StartUp:
         self._settings = settings
         self._arm = arm
         self._asked_s = -math.inf
+        self._left_since_s = math.inf
         self._look_again_s = -math.inf
         self._checked: tuple[object, ...] = ()
         self._bounds: Bounds | None = None
@@ -123,7 +126,7 @@ class StartUp:
         step = start_step(vehicle, now_s, self._settings.safety, arm=self._arm, control=control, hindrance=hindrance)
         self.missing = step.missing
         if step.missing:
-            return None, self._due(step.command or self._standstill(vehicle), now_s)
+            return None, self._due(step.command or self._standstill(vehicle, now_s), now_s)
         laid, pose = self._lay(vehicle, now_s, fence), vehicle.pose_at(now_s)
         if (
             laid is not None
@@ -133,7 +136,7 @@ class StartUp:
             return laid, None
         self.missing = "the rover to stand on the mission's grid"
         self._look_again_s = now_s + LOOK_AGAIN_S
-        return None, self._standstill(vehicle)
+        return None, self._standstill(vehicle, now_s)
 
     def out(self, vehicle: VehicleState) -> bool:
         """Whether the rover is where an earlier run has left it, armed in GUIDED: nobody else may be there."""
@@ -141,9 +144,16 @@ class StartUp:
         heartbeat = vehicle.heartbeat
         return ours and heartbeat is not None and heartbeat.mode == RoverMode.GUIDED and heartbeat.armed
 
-    def _standstill(self, vehicle: VehicleState) -> Command | None:
-        """A rover that an earlier run had set going stops until it is known what it drives on."""
-        return STANDSTILL.setpoint if self.out(vehicle) else None
+    def _standstill(self, vehicle: VehicleState, now_s: float) -> Command | None:
+        """A rover that an earlier run had set going stops until it is known what it drives on, and is in HOLD if that takes long."""
+        if not self.out(vehicle):
+            self._left_since_s = math.inf
+            return None
+        self._left_since_s = min(self._left_since_s, now_s)
+        if now_s - self._left_since_s < LEFT_S:
+            return STANDSTILL.setpoint
+        self._owner = Ownership(Control.PERSON, may_arm=False)
+        return SetMode(RoverMode.HOLD)
 
     def _due(self, command: Command | None, now_s: float) -> Command | None:
         if command is None or now_s - self._asked_s <= ASK_AGAIN_S:

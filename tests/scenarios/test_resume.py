@@ -15,6 +15,7 @@ from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.resuming import Kept
 from companion.safety import Control
+from companion.startup import LEFT_S
 from companion.state.format import decoded
 from companion.state.model import SavedState
 from tests.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, yard
@@ -156,6 +157,24 @@ def test_the_link_comes_up_and_within_two_seconds_it_drives(tmp_path: Path) -> N
     assert goes_on_after_s(rig, rig.now_s()) <= RESUMED_S
     rig.finish()
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+
+
+def test_a_rover_that_cannot_be_driven_again_stands_and_is_left_to_a_person_in_hold(tmp_path: Path) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(5.0)
+    rig.change = lambda message: None if message.get_type() == "EKF_STATUS_REPORT" else message
+    kill_and_resume(rig, mission)
+    since_s = rig.now_s()
+    rig.until(lambda: rig.mode == HOLD, 20.0)
+    assert LEFT_S <= rig.now_s() - since_s <= LEFT_S + 4.0
+    assert all(one.is_standstill for one in rig.sent_since(since_s) if one.is_setpoint)
+    assert "HOLD: waited too long for good data (no EKF status)" in rig.texts()
+    rig.change = None
+    rig.run_for(10.0)
+    assert rig.mode == HOLD and rig.speed_m_s < 0.05, "good data alone do not bring it back"
+    rig.pilot_mode(GUIDED)
+    rig.finish()
+    assert rig.companion.outcome.complete
 
 
 def lose_power(rig: Rig, mission: Mission) -> None:
