@@ -168,9 +168,8 @@ class Companion:
             self._done = True
         self._remember(now_s)
         problem = self._log.problem or (self._memory.heed_problem(self._log) if self._memory else "")
-        self._teller.of_faults(
-            now_s, problem, heard=self.vehicle.heartbeat is not None, underway=self._pursuit is not None
-        )
+        ours, underway = self.watch.control is Control.COMPANION, self._pursuit is not None
+        self._teller.of_faults(now_s, problem, heard=self.vehicle.heartbeat is not None, underway=underway, ours=ours)
         self._autopilot.service(now_s)
         self.outcome.step_seconds.append(stopwatch_s() - began_s)
 
@@ -365,5 +364,6 @@ class Companion:
     def _hand_over(self, now_s: float, why: str) -> None:
         """The run ends."""
         self._reporter.doing = why
-        if self._handover.begin(self.vehicle, self.watch.control, now_s) and why != "done":
+        stopped = self._handover.begin(self.vehicle, self.watch.control, now_s, driven=self._pursuit is not None)
+        if stopped and why != "done":
             self._tell(f"Companion: {why}, HOLD", WARNING)

@@ -34,11 +34,16 @@ class HandOver:
         """Whether the run is ending."""
         return self._leave_at_s is not None
 
-    def begin(self, vehicle: VehicleState, control: Control, now_s: float) -> bool:
-        """Stop the rover and ask for HOLD; False, and nothing is sent, if the rover is not ours."""
+    def begin(self, vehicle: VehicleState, control: Control, now_s: float, *, driven: bool) -> bool:
+        """Stop the rover and ask for HOLD; False, and nothing is sent, if the rover is not ours.
+
+        ``driven``: whether this run has driven it at all; if not, it may be another companion's.
+        """
         self._leave_at_s = now_s
         heartbeat = vehicle.heartbeat
         if heartbeat is None or not vehicle.is_ours or control is not Control.COMPANION:
+            return False
+        if not driven and self._autopilot.twin_heard(now_s):
             return False
         self._leave_at_s = now_s + HAND_OVER_S
         if heartbeat.armed:

@@ -31,15 +31,18 @@ class Teller:
         if text not in self._reporter.said:
             self.tell(text, WARNING)
 
-    def of_faults(self, now_s: float, problem: str, *, heard: bool, underway: bool) -> None:
-        """What a person should know though it stops nothing, once each. ``problem``: of record or state; ``heard``: an autopilot has been."""
+    def of_faults(self, now_s: float, problem: str, *, heard: bool, underway: bool, ours: bool) -> None:
+        """What a person should know though it stops nothing, once each.
+
+        ``problem``: of record or state; ``heard``: an autopilot has been; ``ours``: we have the rover now.
+        """
         if heard and self._autopilot.signing_trouble:
             self.once(self._autopilot.signing_trouble)
         if not underway:
             return
         if intruder := self._autopilot.intruder(now_s):
             self.once(intruder)
-        if self._autopilot.target_confirmed is not False:
+        if not ours or self._autopilot.target_confirmed is not False:
             self._followed_s = now_s
         elif now_s - self._followed_s > NOT_FOLLOWED_S:
             self.once("The autopilot follows another target than the one sent")

@@ -46,7 +46,8 @@ class Two(Rig):
         super().sleep_until_s(time_s)
         if self.other is not None:
             self._other_far.write(self._other_link.take())
-            self.other.tick()
+            if not self.other.done:
+                self.other.tick()
             self._other_link.receive(self._other_far.read())
 
 
@@ -68,6 +69,20 @@ def test_a_rover_that_another_companion_drives_is_left_to_it(tmp_path: Path) -> 
         assert other.driver is None or rig.companion.done
     assert "waiting for another companion with the same component id to fall silent" in said
     assert rig.companion.outcome.complete and DRIVES not in " ".join(rig.texts())
+
+
+def test_one_that_waits_for_another_companion_leaves_without_touching_the_rover(tmp_path: Path) -> None:
+    first, second = missions(tmp_path)
+    rig = Two(first, late_s=45.0)
+    rig.until_driven(1.0)
+    rig.second(second)
+    other = rig.other
+    assert other is not None
+    rig.until(lambda: "fall silent" in other.status().doing, 5.0)
+    other.stop()
+    rig.until(lambda: other.done, 2.0)
+    rig.finish()
+    assert rig.companion.outcome.complete and not [text for text in rig.texts() if "HOLD" in text]
 
 
 def test_two_companions_that_begin_together_both_stop_and_leave_it_to_a_person(tmp_path: Path) -> None:
