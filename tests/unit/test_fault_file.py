@@ -13,7 +13,8 @@ from typer.testing import CliRunner
 
 from companion.mission.load import load_mission
 from sitl.cli.commands import app
-from sitl.fault_file import KINDS, FaultFileError, load_faults
+from sitl.fault_file import FaultFileError, load_faults
+from sitl.fault_tables import KINDS
 from sitl.faults import Fault, GpsGlitch, LinkFault, PilotTakesOver, Reboot, SensorFault
 from sitl.scenario import ScenarioError, scenario_from_mission, with_faults
 
