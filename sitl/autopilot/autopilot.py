@@ -17,8 +17,9 @@ from sitl.autopilot.params import REAL32
 from sitl.autopilot.progress import plan_due_us, run_plan, set_mission_current
 from sitl.autopilot.proximity import forget_stale, take_in
 from sitl.autopilot.signing import SECURE_PORT
-from sitl.autopilot.streams import heartbeat, send_due, set_group
+from sitl.autopilot.streams import send_due, set_group
 from sitl.autopilot.targets import attitude_target, global_target, local_target
+from sitl.autopilot.telemetry import heartbeat
 from sitl.autopilot.transfer import TRANSFERS, keep_home
 from sitl.autopilot.vehicle import (
     ALTITUDE_M,

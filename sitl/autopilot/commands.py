@@ -13,8 +13,9 @@ from sitl.autopilot.control import LOOP_HZ
 from sitl.autopilot.fence import enable_fence
 from sitl.autopilot.link import Channel
 from sitl.autopilot.modes import FORCE, arm, arming_faults, disarm, set_mode
-from sitl.autopilot.streams import DEFAULT_INTERVAL_US, MESSAGES, set_interval, streamable
+from sitl.autopilot.streams import DEFAULT_INTERVAL_US, set_interval
 from sitl.autopilot.targets import GLOBAL_FRAMES, change_speed, go_to, valid_place
+from sitl.autopilot.telemetry import MESSAGES, streamable
 from sitl.autopilot.vehicle import CRITICAL, INFO, Mode, Vehicle
 
 ACCEPTED, TRY_LATER, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4

@@ -12,7 +12,7 @@ from sitl.autopilot.fence import run_fence
 from sitl.autopilot.link import Channel
 from sitl.autopilot.modes import disarm, set_mode
 from sitl.autopilot.plan import Submode
-from sitl.autopilot.streams import mission_current
+from sitl.autopilot.telemetry import mission_current
 from sitl.autopilot.transfer import run_uploads
 from sitl.autopilot.vehicle import CRITICAL, Mode, Vehicle
 from sitl.autopilot.ways import SAVE_EVERY_US, remember_path, run_return, run_way_back, stand
