@@ -13,7 +13,8 @@ from companion.frames import GeoPoint
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.download import Downloaded
 from companion.mission.fence import NO_FENCE, PARAMETERS, AutopilotFence, autopilot_fence
-from companion.mission.items import ItemError, rally_points
+from companion.mission.fence_items import rally_points
+from companion.mission.items import ItemError
 from companion.settings import FenceSettings
 from companion.vehicle import VehicleState
 

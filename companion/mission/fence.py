@@ -7,7 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from companion.frames import GeoPoint
-from companion.mission.items import FenceAreas, Item, fence_areas
+from companion.mission.fence_items import FenceAreas, fence_areas
+from companion.mission.items import Item
 from companion.mission.mission import Area
 
 ENABLE, KINDS, MARGIN, RADIUS, OPTIONS = "FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS"

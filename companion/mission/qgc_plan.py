@@ -9,8 +9,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from companion.frames import GeoPoint
-from companion.mission.items import MAX_ITEMS, Item, ItemError, circle, geo_point, understand
+from companion.mission.fence_items import circle
+from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
 from companion.mission.mission import Area, Mission, MissionError, open_ring
+from companion.mission.walk import understand
 from companion.reading import open_file
 
 MAX_BYTES = 50_000_000

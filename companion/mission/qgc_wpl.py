@@ -14,8 +14,9 @@ from pathlib import Path
 
 from companion.frames import GeoPoint
 from companion.mission import mav_commands as mav
-from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point, understand
+from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
 from companion.mission.mission import Mission, MissionError
+from companion.mission.walk import understand
 from companion.reading import open_file
 
 HEADER = ("QGC", "WPL", "110")

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.mission.check import check_mission
-from companion.mission.items import Item, ItemError, understand
+from companion.mission.items import Item, ItemError
 from companion.mission.mission import Mission, MissionError
 from companion.mission.qgc_wpl import home_of
+from companion.mission.walk import understand
 
 NAME = "the autopilot's mission"
 
