@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from companion.reading import open_file
 from companion.settings import Settings, SettingsError
-from companion.settings.settings import MAX_BYTES, describe_first
+from companion.settings.settings_file import MAX_BYTES, describe_first
 
 LONGEST_NAME = 16
 """Characters of a MAVLink parameter's name."""

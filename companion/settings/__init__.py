@@ -14,10 +14,8 @@ from companion.settings.settings import (
     Settings,
     SteeringSettings,
     TrafficSettings,
-    describe_first,
-    load_settings,
-    parse_settings,
 )
+from companion.settings.settings_file import describe_first, load_settings, parse_settings
 
 __all__ = [
     "FenceSettings",
