@@ -14,7 +14,9 @@ from rich.table import Table
 from companion.cli.inputs import OutputError, usable_settings
 from companion.cli.state import StateFiles
 from companion.clock import WallClock
-from companion.diagnosis import PARAMETERS, Finding, Level, diagnose, kernels
+from companion.diagnosis.diagnose import diagnose, kernels
+from companion.diagnosis.finding import Finding, Level
+from companion.diagnosis.parameters import PARAMETERS
 from companion.examined import Examined
 from companion.mavlink.examination import Examination
 from companion.mavlink.signing import SigningKeyError

@@ -16,7 +16,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
-from companion.diagnosis import PARAMETERS, Level, diagnose
+from companion.diagnosis.diagnose import diagnose
+from companion.diagnosis.finding import Level
+from companion.diagnosis.parameters import PARAMETERS
 from companion.mavlink.byte_link import MemoryLink
 from companion.mavlink.examination import Examination
 from companion.mavlink.signing import Signer

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from companion.diagnosis import PARAMETERS, Level, diagnose, kernels
+from companion.diagnosis.diagnose import diagnose, kernels
+from companion.diagnosis.finding import Level
+from companion.diagnosis.parameters import PARAMETERS
 from companion.events.vehicle import (
     EkfStatusSeen,
     HeartbeatSeen,

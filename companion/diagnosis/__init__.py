@@ -1,0 +1,1 @@
+"""What of an autopilot that has been examined would stop a mission."""
