@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, replace
 
 from companion.commands import GuidedHeading
-from companion.frames import NedPoint, Pose, wrap_pi_rad
+from companion.frames import NedPoint, Pose
 from companion.grid import Cell
 from companion.guidance import STANDSTILL, Guide, Motion, guide
 from companion.mapping import EvidenceMap, doubt
@@ -27,14 +27,14 @@ from companion.planning import problem
 from companion.planning.problem import PlanResult
 from companion.reach import RoverLimits
 from companion.recovery import Recovery
-from companion.route import Route, advanced, route_along_cells, route_along_curve, route_is_clear, with_planned_speeds
-from companion.searching import Searcher
+from companion.route import Route, advanced, route_along
+from companion.searching import Searcher, motion_of
 from companion.settings import Settings
 from companion.steering import Helm
 from companion.stepping import StepRunner
 from companion.traffic import Moving, motion_changed, planners_movers
 from companion.turning import with_turning_cost
-from companion.yielding import yielded
+from companion.yielding import WayGiver
 
 DOUBT_REACH_M = 2.5
 
@@ -85,8 +85,7 @@ class Driver:
         self._moving: tuple[Moving, ...] = ()
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf
-        self._yielding_s: float | None = None
-        self._aside_rad: float | None = None
+        self._way_giver = WayGiver(evidence, rover)
 
     def head_for(self, goal: ResolvedTarget, pose: Pose, way: tuple[Cell, ...] = ()) -> None:
         """Begin a leg from here, if there is one along a way that was driven before."""
@@ -156,26 +155,16 @@ class Driver:
         if self._goal is None or not moving or (decision is not None and decision.action is Action.REACHED):
             return guide, decision
         way = self._make_way(guide, pose, speed_m_s, moving)
-        self._note_yielding(pose, way is not guide)
+        # Who makes way is not stuck; who does so for very long is.
+        if self._way_giver.is_patient(pose.time_s, self._settings.traffic.patience_s, yields=way is not guide):
+            self.pause()
         return way, decision
 
     def _make_way(self, guide: Guide, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> Guide:
-        rover, settings = self._rover, self._settings
         manoeuvre = self._helm.manoeuvre if self._helm else None
         route = self.route if manoeuvre is None else manoeuvre.as_route()
-        way, self._aside_rad = yielded(
-            guide,
-            route,
-            pose,
-            speed_m_s,
-            moving,
-            self.evidence,
-            rover,
-            settings,
-            self._aside_rad,
-            backwards=self._helm is not None and self._helm.backwards,
-        )
-        return way
+        backwards = self._helm is not None and self._helm.backwards
+        return self._way_giver.give(guide, route, pose, speed_m_s, moving, self._settings, backwards=backwards)
 
     def _drive(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> tuple[Guide, Decision | None]:
         """The same as if nothing came across."""
@@ -194,12 +183,9 @@ class Driver:
         if self.route is None:
             return STANDSTILL, decision
         self.route = advanced(self.route, pose)
-        rover = self._rover
-        if self._goal.speed_m_s is not None:
-            rover = replace(rover, cruise_speed_m_s=self._goal.speed_m_s)
         guidance = self._settings.guidance
         planned_m_s = min(max(self.route.planned_m_s, guidance.min_speed_m_s), guidance.max_speed_m_s)
-        rover = replace(rover, cruise_speed_m_s=min(rover.cruise_speed_m_s, planned_m_s))
+        rover = replace(self._rover, cruise_speed_m_s=min(self._fastest_m_s, planned_m_s))
         now = self._guided(self.route, pose, speed_m_s, rover)
         if self._recovery.is_stuck(pose, now):
             self._get_unstuck(pose)
@@ -262,19 +248,14 @@ class Driver:
         return planners_movers(self._moving, self.evidence.grid, radius_m, pose.time_s, traffic)
 
     def _motion(self, pose: Pose) -> problem.Motion:
-        """Where the rover points, how tightly it can turn and how fast it may be planned to go."""
-        fastest_m_s = self._rover.cruise_speed_m_s
-        if self._goal is not None and self._goal.speed_m_s is not None:
-            fastest_m_s = self._goal.speed_m_s
-        fastest_m_s = min(fastest_m_s, self._settings.guidance.max_speed_m_s)
-        slowest_m_s = min(self._settings.guidance.min_speed_m_s, fastest_m_s)
-        resolution_m = self.evidence.base.resolution_m
-        turning_radius_m = self._rover.turning_radius_m * self._settings.steering.planned_radius
-        return problem.Motion(
-            heading_rad=wrap_pi_rad(0.5 * math.pi - pose.heading_rad),
-            turning_radius_fields=turning_radius_m / resolution_m,
-            speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m),
-        )
+        """How the rover can move, for the planner."""
+        return motion_of(pose, self._rover, self._fastest_m_s, self._settings, self.evidence.base.resolution_m)
+
+    @property
+    def _fastest_m_s(self) -> float:
+        """The mission's own speed for this leg, or the rover's."""
+        wanted_m_s = None if self._goal is None else self._goal.speed_m_s
+        return self._rover.cruise_speed_m_s if wanted_m_s is None else wanted_m_s
 
     def _notice_changes(self, pose: Pose) -> None:
         """A plan made among moving things is dropped when one of them moves otherwise than it did."""
@@ -284,15 +265,6 @@ class Driver:
         if not self._runner.busy and motion_changed(self._planned_among, self._moving, traffic):
             self._replanned_s, self._planned_among = pose.time_s, self._moving
             self._state = abandon_path(state)
-
-    def _note_yielding(self, pose: Pose, yields: bool) -> None:
-        """Who makes way is not stuck; who does so for very long is."""
-        if not yields:
-            self._yielding_s = None
-            return
-        self._yielding_s = pose.time_s if self._yielding_s is None else self._yielding_s
-        if pose.time_s - self._yielding_s < self._settings.traffic.patience_s:
-            self.pause()
 
     def _is_doubtful(self, decision: Decision) -> bool:
         """Before the first step back, or giving up, on a proof: the proof is only as good as the map."""
@@ -317,15 +289,8 @@ class Driver:
             self.route = None
             return
         end = self._goal.point if decision.action is Action.FOLLOW else None
-        grid = self.evidence.grid
-        path = decision.new_path
-        if path is not None and path.curve is not None:
-            route = route_along_curve(grid, path.curve, pose.point, end)
-            if route_is_clear(route, self.evidence, self._rover.radius_m + self._settings.guidance.clearance_m):
-                self.route = with_planned_speeds(route, path, grid.resolution_m)
-                return
-        route = route_along_cells(grid, decision.path, pose.point, end)
-        self.route = route if path is None else with_planned_speeds(route, path, grid.resolution_m)
+        half_width_m = self._rover.radius_m + self._settings.guidance.clearance_m
+        self.route = route_along(decision.new_path, decision.path, self.evidence, pose.point, end, half_width_m)
 
     def _arrived(self, pose: Pose, speed_m_s: float) -> bool:
         assert self._goal is not None

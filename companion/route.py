@@ -72,6 +72,27 @@ def route_along_curve(grid: Grid, curve: NDArray[np.float64], start: NedPoint, e
     return Route(_densified(points))
 
 
+def route_along(
+    path: Path | None,
+    cells: tuple[Cell, ...],
+    evidence: EvidenceMap,
+    start: NedPoint,
+    end: NedPoint | None,
+    half_width_m: float,
+) -> Route:
+    """The route along a planned path: along its curve where a rover of this half width can drive that, else through its fields.
+
+    ``cells`` are those fields, or the way back (``path`` is None then). ``start`` and ``end`` replace the ends.
+    """
+    grid = evidence.grid
+    if path is not None and path.curve is not None:
+        route = route_along_curve(grid, path.curve, start, end)
+        if route_is_clear(route, evidence, half_width_m):
+            return with_planned_speeds(route, path, grid.resolution_m)
+    route = route_along_cells(grid, cells, start, end)
+    return route if path is None else with_planned_speeds(route, path, grid.resolution_m)
+
+
 def route_is_clear(route: Route, evidence: EvidenceMap, half_width_m: float) -> bool:
     """Whether a rover of this half width can drive the whole route on the map as known."""
     stride = max(1, round(evidence.base.resolution_m / STEP_M))

@@ -1,23 +1,37 @@
-"""The navigator's searches: which budget each kind gets, and what they have cost."""
+"""The navigator's searches: which budget each kind gets, what the planner is told of the rover, and what they have cost."""
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.random import Generator
 
 from companion.clock import stopwatch_s
+from companion.frames import Pose, wrap_pi_rad
 from companion.grid import Cell, Weights
 from companion.navigator import SearchKind
 from companion.planning.planner import Planner
 from companion.planning.problem import Budget, Motion, Mover, PlanningProblem, PlanResult
-from companion.settings import NavigatorSettings, SearchSettings
+from companion.reach import RoverLimits
+from companion.settings import NavigatorSettings, SearchSettings, Settings
 
 
 def budget_of(settings: SearchSettings) -> Budget:
     """The planner's budget for one kind of search."""
     return Budget(settings.min_epochs, settings.max_epochs, settings.control_points, settings.population)
+
+
+def motion_of(pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, resolution_m: float) -> Motion:
+    """As a planner is told it: where the rover points, how tightly it can turn and how fast it may be planned to go."""
+    fastest_m_s = min(fastest_m_s, settings.guidance.max_speed_m_s)
+    slowest_m_s = min(settings.guidance.min_speed_m_s, fastest_m_s)
+    return Motion(
+        heading_rad=wrap_pi_rad(0.5 * math.pi - pose.heading_rad),
+        turning_radius_fields=rover.turning_radius_m * settings.steering.planned_radius / resolution_m,
+        speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m),
+    )
 
 
 @dataclass
@@ -39,7 +53,10 @@ class Searcher:
         motion: Motion = Motion(),  # noqa: B008 - frozen
         settings: NavigatorSettings | None = None,
     ) -> PlanResult:
-        """One search over ``weights`` (not changed). ``settings``: as they were when the step began, which may run in a thread. The field the rover stands in is free, whatever the map says."""
+        """One search over ``weights`` (not changed). The field the rover stands in is free, whatever the map says.
+
+        ``settings``: as they were when the step began, which may run in a thread.
+        """
         began_s = stopwatch_s()
         if weights[start.y, start.x] >= 1.0:
             weights = np.array(weights)

@@ -76,6 +76,42 @@ def yielded(
     return best.guide, best.aside_rad
 
 
+class WayGiver:
+    """Makes way on behalf of one rover, and keeps in mind where it moves aside to and since when it has not got on."""
+
+    def __init__(self, evidence: EvidenceMap, rover: RoverLimits) -> None:
+        self._evidence = evidence
+        self._rover = rover
+        self._aside_rad: float | None = None
+        self._since_s: float | None = None
+
+    def give(
+        self,
+        now: Guide,
+        route: Route | None,
+        pose: Pose,
+        speed_m_s: float,
+        moving: tuple[Moving, ...],
+        settings: Settings,
+        *,
+        backwards: bool,
+    ) -> Guide:
+        """What to do instead of ``now``, as ``yielded`` says."""
+        evidence, rover, aside_rad = self._evidence, self._rover, self._aside_rad
+        guide, self._aside_rad = yielded(
+            now, route, pose, speed_m_s, moving, evidence, rover, settings, aside_rad, backwards=backwards
+        )
+        return guide
+
+    def is_patient(self, now_s: float, patience_s: float, *, yields: bool) -> bool:
+        """Whether the rover is kept from getting on by making way (``yields``: at this moment), and that not for too long yet."""
+        if not yields:
+            self._since_s = None
+            return False
+        self._since_s = now_s if self._since_s is None else self._since_s
+        return now_s - self._since_s < patience_s
+
+
 def _matters(one: Moving, pose: Pose, rover: RoverLimits, settings: Settings) -> bool:
     """Whether it moves at all and the two could meet while the rover looks ahead."""
     traffic = settings.traffic
