@@ -28,19 +28,16 @@ from companion.events.vehicle import (
 )
 from companion.frames import GeoPoint
 from companion.latency import TimeAnswered
-from companion.mavlink import batteries, others, parameter_requests, ranges, requests
+from companion.mavlink import batteries, live_ranges, others, parameter_requests, requests
 from companion.mavlink.framing import Packet
+from companion.mavlink.live_ranges import LiveRanges
 from companion.mavlink.places import point_of
 from companion.mavlink.texts import TextAssembler
-from companion.scan import RangeScan
 from companion.sticks import SticksSeen
 
 AUTOPILOT = 1
 """Component id of the autopilot: only it speaks for the vehicle."""
 ROVERS = (mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT)
-RANGE_MESSAGES = (mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE)
-ECHO_S = 2.0
-"""For so long after a message, what repeats its readings in a coarser form is left out."""
 REBOOT_MS = 5000
 """A boot time that goes back further than packets overtake each other means that the autopilot has restarted."""
 MISSION_ACK_COMMAND = -1
@@ -49,7 +46,7 @@ NOT_TOLD = 0xFFFF
 
 
 class Decoder:
-    """Turns packets into events and remembers what that needs: the vehicle's id, its clock, and which range data is live."""
+    """Turns packets into events and remembers what that needs: the vehicle's id, its clock, and what was heard before."""
 
     def __init__(self, system_id: int, component_id: int) -> None:
         self.system_id = system_id
@@ -68,10 +65,7 @@ class Decoder:
         self.lost = 0
         self._newest_ms: dict[int, int] = {}
         self._texts = TextAssembler()
-        self._first_s: float | None = None
-        self._cells_s = -math.inf
-        self._other_range_s = -math.inf
-        self._beam_s: dict[int, float] = {}
+        self._ranges = LiveRanges()
         self._readers: dict[int, Callable[[Any, float], Event | None]] = {
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: batteries.battery_status,
             mavlink.MAVLINK_MSG_ID_FENCE_STATUS: _fence_status,
@@ -107,12 +101,11 @@ class Decoder:
             return self._of_others(packet, time_s) if self.vehicle_known else []
         if packet.component_id == self.component_id or self._is_repeated(packet):
             return []
-        if self._first_s is None:
-            self._first_s = time_s
+        self._ranges.begin(time_s)
         if packet.component_id == AUTOPILOT:
             self.message_counts[packet.message_id] = self.message_counts.get(packet.message_id, 0) + 1
             return self._of_autopilot(packet, time_s)
-        if packet.message_id in RANGE_MESSAGES:
+        if packet.message_id in live_ranges.MESSAGES:
             return self._range(packet, time_s)
         ours = (*others.RECEIVED, *requests.REQUESTS)
         return self._of_others(packet, time_s) if packet.message_id in ours else []
@@ -148,7 +141,7 @@ class Decoder:
         self.refused_type = None
 
     def _of_autopilot(self, packet: Packet, time_s: float) -> list[Event]:
-        if packet.message_id in RANGE_MESSAGES:
+        if packet.message_id in live_ranges.MESSAGES:
             return self._range(packet, time_s)
         if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             beat = self._heartbeat(self._message(packet), time_s)
@@ -193,39 +186,13 @@ class Decoder:
         self._newest_ms[message_id] = self.boot_ms = now_ms
         return False
 
-    # Range data --------------------------------------------------------------------------------------------------
-
     def _range(self, packet: Packet, time_s: float) -> list[Event]:
-        message = self._message(packet)
-        if packet.message_id == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
-            scan = ranges.obstacle_distance(message, time_s)
-            self._cells_s = time_s if scan is not None else self._cells_s
-        else:
-            scan = self._distance_sensor(message, packet.component_id == AUTOPILOT, time_s)
-        if scan is None:
-            return []
-        self._other_range_s = time_s
-        return [RangeSeen(time_s, scan)]
-
-    def _distance_sensor(self, message: Any, of_autopilot: bool, time_s: float) -> RangeScan | None:
-        """Leaves out proximity sectors that only echo finer data: a lidar's cells, or a rangefinder that looks the same way."""
-        if of_autopilot and ranges.is_sector(message):
-            finer_s = max(self._cells_s, self._beam_s.get(message.orientation, -math.inf))
-            return None if time_s - finer_s < ECHO_S else ranges.distance_sensor(message, time_s, sector=True)
-        scan = ranges.distance_sensor(message, time_s, sector=False)
-        if scan is not None:
-            self._beam_s[message.orientation] = time_s
-        return scan
+        scan = self._ranges.scan(self._message(packet), time_s, of_autopilot=packet.component_id == AUTOPILOT)
+        return [] if scan is None else [RangeSeen(time_s, scan)]
 
     def _rangefinder(self, message: Any, time_s: float) -> Event | None:
-        """Only when nothing better has been heard for a while."""
-        assert self._first_s is not None
-        if time_s - max(self._other_range_s, self._first_s) < ECHO_S:
-            return None
-        scan = ranges.rangefinder(message, time_s)
+        scan = self._ranges.rangefinder(message, time_s)
         return None if scan is None else RangeSeen(time_s, scan)
-
-    # Vehicle state -----------------------------------------------------------------------------------------------
 
     def _heartbeat(self, message: Any, time_s: float) -> Event | None:
         if message.autopilot != mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA or message.type not in ROVERS:
