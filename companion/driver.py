@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from companion.commands import GuidedHeading
 from companion.frames import NedPoint, Pose
 from companion.grid import Cell
-from companion.guidance import STANDSTILL, Guide, Motion, guide
+from companion.guidance import STANDSTILL, STOP, Guide, Motion, guide
 from companion.mapping import EvidenceMap, doubt
 from companion.mission.resolve import ResolvedTarget
 from companion.navigator import (
@@ -37,6 +37,8 @@ from companion.turning import with_turning_cost
 from companion.yielding import WayGiver
 
 DOUBT_REACH_M = 2.5
+OVERSPEED = 1.15
+"""A rover that surges so far beyond its speed, as one does that leaves soft ground, is braked: room was kept for the speed it was told."""
 
 
 @dataclass
@@ -75,6 +77,7 @@ class Driver:
         self._doubts_left = 0
         self.seed = int(searcher.rng.integers(2**63)) if seed is None else seed
         self._epoch = 0
+        self._sure_from_s = -math.inf
         self._began_s = 0.0
         self.step_s = 0.0
         """From the round in which the last step began to the one that took its answer: a replay has the same rounds."""
@@ -133,6 +136,10 @@ class Driver:
     def goal(self) -> ResolvedTarget | None:
         """Where this leg leads."""
         return self._goal
+
+    def doubt_until(self, time_s: float) -> None:
+        """No target is given up before then: the position jumped, and what is seen now may lie elsewhere."""
+        self._sure_from_s = time_s
 
     def leave(self) -> None:
         """The leg is over (or must begin again from where the rover is now)."""
@@ -195,6 +202,9 @@ class Driver:
         """The setpoint that leads along the route, for a rover that turns on the spot or for one that cannot."""
         if self._helm is not None:
             return self._helm.guide(route, pose, speed_m_s, rover)
+        told_m_s = self._goal.speed_m_s if self._goal is not None else None
+        if speed_m_s > OVERSPEED * max(self._rover.cruise_speed_m_s, told_m_s or 0.0):
+            return Guide(Motion.BRAKE, STOP, 0.0)
         settings, looking, braking = self._settings.guidance, self._looking_rad, self._braking
         now = guide(route, pose, speed_m_s, self.evidence, rover, settings, looking_rad=looking, braking=braking)
         self._braking = now.motion is Motion.BRAKE
@@ -227,8 +237,7 @@ class Driver:
             self.step_s = pose.time_s - self._began_s
         if result is None or self._pending != self._epoch:
             return None
-        if self._is_doubtful(result[1]) and doubt(self.evidence, pose.point, DOUBT_REACH_M):
-            self._doubts_left -= 1
+        if self._is_doubted(result[1], pose):
             self._state = abandon_path(self._state)
             self.route = self.decision = None
             return None
@@ -266,10 +275,16 @@ class Driver:
             self._replanned_s, self._planned_among = pose.time_s, self._moving
             self._state = abandon_path(state)
 
-    def _is_doubtful(self, decision: Decision) -> bool:
-        """Before the first step back, or giving up, on a proof: the proof is only as good as the map."""
+    def _is_doubted(self, decision: Decision, pose: Pose) -> bool:
+        """Before the first step back, or giving up, on a proof: that is only as good as the map, which is looked at again, and as the
+        position."""
         giving_up = decision.action is Action.UNREACHABLE or (decision.part is Part.RETURN and decision.proved)
-        return giving_up and self._doubts_left > 0
+        if not giving_up or pose.time_s < self._sure_from_s:
+            return giving_up
+        if self._doubts_left == 0 or not doubt(self.evidence, pose.point, DOUBT_REACH_M):
+            return False
+        self._doubts_left -= 1
+        return True
 
     def _step_is_due(self, cell: Cell) -> bool:
         assert self._state is not None

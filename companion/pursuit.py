@@ -44,6 +44,8 @@ from companion.trail import Trail
 INFO, WARNING = 6, 4
 ORIGIN_MOVED_M = 0.2
 """The autopilot tells its origin in whole 1e-7 degrees (1 cm): more than this is another origin."""
+VERDICT_S = 15.0
+"""After a jump of the position no target is given up for so long: a receiver that errs is mostly right again by then."""
 
 WATCHED_SCANS = 20
 """Before another try after waiting, obstacles that are not in the newest scans are forgotten: a door may have opened."""
@@ -148,7 +150,7 @@ class Pursuit:
             integrate(self.evidence, pose, scan, self._scans)
             self._tracker.remember(pose, scan.max_range_m)
 
-    def follow_origin(self, origin: GeoPoint) -> bool:
+    def follow_origin(self, origin: GeoPoint, now_s: float) -> bool:
         """Whether the autopilot has moved the origin of its frame; the mission is then laid out anew, with an empty map."""
         moved_m = apart_m(origin, self.laid.origin)
         if moved_m <= ORIGIN_MOVED_M:
@@ -162,6 +164,7 @@ class Pursuit:
         searcher, seed = before.searcher, before.seed
         self.driver = Driver(self.evidence, self._limits, self._settings, searcher, self._runner, seed)
         self.driver.tally = before.tally
+        self.driver.doubt_until(now_s + VERDICT_S)
         self._tracker = Tracker(self.evidence, self._settings.traffic)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         return True
@@ -199,12 +202,13 @@ class Pursuit:
         along = " along the way it came" if refuge.way else ""
         self._tell(f"Back to {refuge.place.name}, {refuge.length_m:.0f} m{along}", WARNING)
 
-    def forget_map(self) -> None:
+    def forget_map(self, now_s: float) -> None:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
         self.maps_begun += 1
         self._tracker = Tracker(self.evidence, self._settings.traffic)
         self.driver.leave()
+        self.driver.doubt_until(now_s + VERDICT_S)
 
     def drive(self, pose: Pose, speed_m_s: float, now_s: float, announced: tuple[Moving, ...] = ()) -> Guide | None:
         """What to do for the mission now; None when it has ended. ``announced``: who has told of itself and may come near."""

@@ -100,9 +100,9 @@ class Whereabouts:
 
     def _find_ground(self, event: OriginSeen, pursuit: Pursuit) -> None:
         """The origin as it is now: after a jump this tells whether the frame has moved or only the rover's place in it."""
-        if pursuit.follow_origin(event.point):
+        if pursuit.follow_origin(event.point, event.time_s):
             self._doubt, self._doubt_s = "EKF origin moved", event.time_s
         elif self._doubt and event.time_s - self._doubt_s >= SETTLED_S:
-            pursuit.forget_map()
+            pursuit.forget_map(event.time_s)
             self._doubt = ""
             self._start_afresh()

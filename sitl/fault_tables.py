@@ -195,13 +195,15 @@ class GpsNoiseTable(FaultTable):
 
 
 class Stuck(FaultTable):
-    """``sensor_stuck``."""
+    """``sensor_stuck``; ``in_view``: only from the first reading on that shows something."""
 
     beams: Numbers | None = None
+    in_view: bool = False
 
     def fault(self) -> Fault:
         """As a value."""
-        return SensorFault(**self.window(), what="stuck", beams=tuple(self.beams or ()))
+        what: Literal["stuck", "stuck in view"] = "stuck in view" if self.in_view else "stuck"
+        return SensorFault(**self.window(), what=what, beams=tuple(self.beams or ()))
 
 
 class Silent(FaultTable):

@@ -99,12 +99,13 @@ class GpsNoise(Fault):
 
 @dataclass(frozen=True, slots=True)
 class SensorFault(Fault):
-    """Range sensors repeat their last reading (``stuck``) or give none (``silent``).
+    """Range sensors repeat their last reading (``stuck``) or give none (``silent``); ``stuck in view``: each from the first reading on
+    that shows something.
 
     ``beams``: numbers of the suite's rangefinders from 1; empty for all, and for the lidar.
     """
 
-    what: Literal["stuck", "silent"] = "silent"
+    what: Literal["stuck", "stuck in view", "silent"] = "silent"
     beams: tuple[int, ...] = ()
 
 

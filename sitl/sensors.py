@@ -32,7 +32,7 @@ def spread_rad(middle_deg: NDArray[np.float64], width_deg: float, rays: int) -> 
     return np.asarray(np.radians(middle_deg[:, None] + spread[None, :] * width_deg), dtype=np.float64)
 
 
-Defect = Literal["", "stuck", "silent"]
+Defect = Literal["", "stuck", "stuck in view", "silent"]
 """What is wrong with a sensor: it repeats its last reading, or gives none."""
 
 
@@ -177,10 +177,10 @@ class RangeSensing:
         """The scanner's 72 ranges; maximum + 1 where nothing was seen, 65535 where that is not known."""
         lidar = self.suite.lidar
         assert lidar is not None
-        if self.lidar_fault == "stuck" and self._last_scan_cm:
+        nothing = round(lidar.max_m * 100) + 1
+        if self._last_scan_cm and _repeats(self.lidar_fault, min(self._last_scan_cm) < nothing):
             return list(self._last_scan_cm)
         true_m = self._world.rays_m(north_m, east_m, self._lidar_rad + heading_rad, lidar.max_m, self.time_s)
-        nothing = round(lidar.max_m * 100) + 1
         if lidar.flaws != NO_FLAWS:
             middle_rad = self._lidar_rad.mean(axis=1) + heading_rad
             limits_m = (lidar.min_m, lidar.max_m)
@@ -233,9 +233,10 @@ class RangeSensing:
         told = []
         for reading in readings:
             fault = self.beam_faults.get(reading.number, "")
-            if fault == "stuck":
-                told.append(self._last_readings.get(reading.number, reading))
-            elif not fault:
+            last = self._last_readings.get(reading.number, reading)
+            if _repeats(fault, last.range_cm < last.max_cm):
+                told.append(last)
+            elif fault != "silent":
                 self._last_readings[reading.number] = reading
                 told.append(reading)
         return told
@@ -256,6 +257,11 @@ class RangeSensing:
 
     def _noise(self, count: int) -> NDArray[np.float64]:
         return self._rng.standard_normal(count) * self._noise_m
+
+
+def _repeats(defect: Defect, in_view: bool) -> bool:
+    """Whether a sensor says its last reading again; ``in_view``: whether that shows something."""
+    return defect == "stuck" or (defect == "stuck in view" and in_view)
 
 
 def _sampler(

@@ -32,11 +32,12 @@ def write_section(folder: Path, name: str, text: str, file: str = "results.md") 
     return page
 
 
-def terminal_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
-    """The same for the terminal, narrow enough for 80 columns."""
+def terminal_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], texts: Sequence[str] = ()) -> Table:
+    """The same for the terminal, narrow enough for 80 columns. ``texts``: columns of words, which may take several lines."""
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     for column, name in enumerate(head):
-        table.add_column(name, justify="right" if column else "left", no_wrap=True)
+        text = name in texts
+        table.add_column(name, justify="right" if column and not text else "left", no_wrap=not text)
     for row in rows:
         table.add_row(*row)
     return table

@@ -158,11 +158,10 @@ class SoakReport:
         """A row for each kind of ground, and one line for each run that is worth a look."""
         odd = [[str(run.seed), run.ground, ", ".join(run.faults), _trouble(run)] for run in self.runs if _trouble(run)]
         summary = terminal_table(f"{NAME}: {self._memory()}", HEAD, self._rows())
-        return (
-            [summary, terminal_table(f"{NAME}: worth a look", ("seed", "ground", "faults", "what"), odd)]
-            if odd
-            else [summary]
-        )
+        if not odd:
+            return [summary]
+        head, texts = ("seed", "ground", "faults", "what"), ("faults", "what")
+        return [summary, terminal_table(f"{NAME}: worth a look", head, odd, texts)]
 
     def as_json(self) -> dict[str, object]:
         """Every run."""
@@ -222,7 +221,7 @@ class SoakReport:
 reached, in a quarter of them one that cannot, a lidar of 90 or 360 degrees, and none to {soak_faults.MOST} faults each at random times: {_named(met)}. A person stands by
 who sets GUIDED again, and arms, {PERSON_S:g} s after the companion has asked for one. *reached*: every target that can be reached; *policy*:
 targets missed as this page says ({by_policy}); *left*: missed without such a reason, or not at the end after {TIME_LIMIT_S:g} s; *coll.*: contacts; *errors*: exceptions that nobody caught; *person*: how often the person helped.
-The process's {self._memory()}. {where_measured()}.
+A sensor gets stuck only with something in view (of the other case see [what it does not do](#what-it-does-not-do)). The process's {self._memory()}. {where_measured()}.
 
 {markdown_table(HEAD, self._rows())}
 """

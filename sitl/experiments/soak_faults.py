@@ -1,4 +1,7 @@
-"""Random plans of faults: what a rover may meet on a bad day. Each ends by itself, so that there is a way on."""
+"""Random plans of faults: what a rover may meet on a bad day. Each ends by itself, so that there is a way on.
+
+A sensor that is stuck while it sees nothing cannot be told from one over open ground (docs/safety.md): here it has something in view.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ def _link(what: LinkWhat, longest_s: float, *, probability: float = 1.0, delay_s
     return made
 
 
-def _sensor(what: Literal["stuck", "silent"]) -> Make:
+def _sensor(what: Literal["stuck in view", "silent"]) -> Make:
     def made(rng: np.random.Generator, start_s: float) -> Fault:
         return SensorFault(start_s, start_s + rng.uniform(0.5, 8.0), "driving", what=what)
 
@@ -80,7 +83,7 @@ FAULTS: dict[str, Make] = {
     "GPS noise": lambda rng, start_s: GpsNoise(
         start_s, start_s + rng.uniform(5.0, 40.0), "driving", metres=float(rng.uniform(0.1, 1.0))
     ),
-    "sensor stuck": _sensor("stuck"),
+    "sensor stuck": _sensor("stuck in view"),
     "sensor silent": _sensor("silent"),
     "wheels slip": _slip,
     "pilot takes over": _pilot,

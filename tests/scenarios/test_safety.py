@@ -278,6 +278,19 @@ def test_a_position_jump_is_noticed_and_the_map_forgotten(rig: Rig) -> None:
     assert_setpoints_only_when_ours(rig.sent)
 
 
+def test_no_target_is_given_up_while_a_position_that_jumped_may_jump_back(tmp_path: Path) -> None:
+    """Eight seconds of a false position, by which the wall stands where the target is."""
+    rig = Rig(yard(tmp_path, '[[target]]\nname = "gate"\nfield = [14, 7]\n'), late_s=45.0)
+    rig.until_driven(1.0)
+    rig.change = shifted(0.0, 6.0)
+    rig.run_for(8.0)
+    assert any("jumped" in text for text in rig.texts())
+    rig.change = None
+    rig.finish()
+    assert rig.companion.outcome.complete, rig.texts()
+    assert not [text for text in rig.texts() if "Unreachable" in text]
+
+
 def test_a_position_that_freezes_stops_the_rover(rig: Rig) -> None:
     """The clock and the velocity go on: only the two together tell."""
     rig.until(lambda: rig.companion.vehicle.speed_m_s > 1.0)

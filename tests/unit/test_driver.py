@@ -8,6 +8,7 @@ from companion.commands import GuidedPosition, GuidedVelocity
 from companion.driver import Driver
 from companion.frames import NedPoint, Pose
 from companion.grid import empty_grid
+from companion.guidance import Motion
 from companion.mapping import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -132,3 +133,13 @@ def test_the_thread_gives_the_same_decision() -> None:
         assert decision.path == wanted.path
     finally:
         runner.close()
+
+
+def test_a_rover_faster_than_it_may_be_is_braked() -> None:
+    one = driver(InlineRunner(), at(0.0))
+    one.head_for(target(32.5, 20.5), at(0.0))
+    assert one.update(at(0.0), 0.0)[0].motion is Motion.DRIVE
+    assert one.update(at(0.1), 2.2)[0].motion is Motion.DRIVE
+    surging, _ = one.update(at(0.2), 2.4)
+    assert (surging.motion, surging.setpoint) == (Motion.BRAKE, GuidedVelocity(0.0, 0.0))
+    assert one.update(at(0.3), 2.2)[0].motion is Motion.DRIVE

@@ -77,6 +77,10 @@ def test_what_is_said_is_understood(tmp_path: Path) -> None:
     kind = "sensor_stuck"
     start_s = 0
     beams = [2]
+    [[fault]]
+    kind = "sensor_stuck"
+    start_s = 0
+    in_view = true
     """
     plan = load_faults(plan_file(tmp_path, text))
     assert plan.seed == 7
@@ -85,6 +89,7 @@ def test_what_is_said_is_understood(tmp_path: Path) -> None:
         GpsGlitch(5.0, 7.0, "driving", metres=10.0, bearing_deg=90.0),
         PilotTakesOver(0.0, mode="MANUAL", steering=-0.5, throttle=0.25),
         SensorFault(0.0, what="stuck", beams=(2,)),
+        SensorFault(0.0, what="stuck in view"),
     )
 
 

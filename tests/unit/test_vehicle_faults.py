@@ -441,9 +441,9 @@ def test_a_power_failure_stops_drops_and_boots() -> None:
 # Sensors -------------------------------------------------------------------------------------------------------------
 
 
-def towards_a_wall(suite: str, *faults: Fault) -> Client:
+def towards_a_wall(suite: str, *faults: Fault, north_m: int = 6) -> Client:
     obstacles = np.zeros((60, 21), dtype=bool)
-    obstacles[6, :] = True
+    obstacles[north_m, :] = True
     world, start = World(obstacles), SimStart(2.5, 10.5, 0.0, HOME)
     client = ready(Simulator(world, start, suite, faults=FaultPlan(faults)))
     client.drive_at(0.5)
@@ -471,6 +471,20 @@ def test_a_stuck_lidar_repeats_itself() -> None:
     client.received.clear()
     client.run_to(53.0)
     assert len({tuple(m.distances) for m in client.of("OBSTACLE_DISTANCE")}) > 20
+
+
+@pytest.mark.parametrize("what", ["stuck", "stuck in view"])
+def test_a_lidar_that_is_stuck_in_view_shows_something_for_ever(what: Any) -> None:
+    client = towards_a_wall("lidar-90", SensorFault(46.0, what=what), north_m=9)
+    client.received.clear()
+    for _ in range(6):
+        client.drive_at(0.5)
+        client.run_for(2.0)
+    scans = [tuple(m.distances) for m in client.of("OBSTACLE_DISTANCE")]
+    nothing, *shown = [scan for number, scan in enumerate(scans) if not number or scan != scans[number - 1]]
+    assert min(nothing) == 451
+    assert [min(scan) <= 450 for scan in shown] == ([True] if what == "stuck in view" else [])
+    assert len(scans) > 80
 
 
 def test_single_beams_fail_on_their_own() -> None:
