@@ -10,20 +10,19 @@ import numpy as np
 from companion.attendant import Attendant
 from companion.auto_legs import AutoLegs
 from companion.clock import Clock, stopwatch_s
-from companion.commands import Arm, Command, SetMode
+from companion.commands import SetMode
 from companion.driver import Driver
 from companion.errands import Errands
 from companion.events.event import Event
 from companion.events.targets import TargetAsked
 from companion.events.vehicle import RangeSeen, RoverMode, TextSeen
-from companion.guidance import STANDSTILL, Guide
+from companion.guidance import STANDSTILL
 from companion.handover import HandOver
 from companion.itinerary import Itinerary, TargetStatus
 from companion.laying import from_home
 from companion.mapfiles import save_ros_map
 from companion.mapping import EvidenceMap, known_fields
 from companion.mavlink.autopilot_link import AutopilotLink
-from companion.mavlink.codec import EncodeError
 from companion.memory import Memory
 from companion.mission.mission import Mission
 from companion.newest import newest_ranges
@@ -36,8 +35,10 @@ from companion.recorder import DecisionLog
 from companion.reporting import Outcome, Reporter, Status
 from companion.rounds import Mark
 from companion.safety import Control, Reaction, Watch, awaited, check, latched
+from companion.setting_out import SettingOut
 from companion.settings import Settings
-from companion.startup import StartUp, overruled
+from companion.speaking import Speaker
+from companion.startup import StartUp
 from companion.stepping import NotedRunner, StepRunner
 from companion.telling import Teller
 from companion.traffic import announced
@@ -87,20 +88,23 @@ class Companion:
         self._memory = memory
         self._start_up = StartUp(mission, settings, arm=arm, kept=memory.kept if memory else None)
         self._outbox = Outbox(settings.guidance)
+        self._speaker = Speaker(autopilot, self._outbox, self._tell)
         self.output_check = OutputCheck(self._tell)
         self.oversight = Oversight(autopilot, settings, self._tell)
         self._next_tick_s = now_s = clock.now_s()
         log.begin(now_s, Mark.BEGIN)
         self._watchdogs = Watchdogs(settings.safety)
         self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
-        self._errands = Errands(mission, settings.safety, self._send, self._tell)
+        self._errands = Errands(mission, settings.safety, self._speaker.send, self._tell)
         self._legs = AutoLegs(self._tell)
         self._plan_watch = PlanWatch(mission.stored, autopilot.downloads, self._tell)
         self._stopped = False
         self._stop_asked = False
         tuned = (self._outbox, self._whereabouts, self._start_up)
         self._attendant = Attendant(settings, autopilot, self._tell, keep_settings, tuned)
-        self._handover = HandOver(autopilot, self._send)
+        self._handover = HandOver(autopilot, self._speaker.send)
+        waits = (self._start_up, autopilot, self.oversight, self._reporter, self._teller)
+        self._setting_out = SettingOut(*waits, self._speaker.send, self._hand_over)
         self._done = False
 
     @property
@@ -141,21 +145,10 @@ class Companion:
         return self.outcome
 
     def tick(self) -> None:
-        """One round: listen, judge, map, decide, command."""
-        self._next_tick_s += 1.0 / self._settings.link.tick_hz
-        self._clock.sleep_until_s(self._next_tick_s)
-        now_s = self._clock.now_s()
-        late_s = now_s - self._next_tick_s
-        if late_s > 1.0:
-            # After a stall (a suspended computer) do not catch up tick by tick, and do not believe what piled up meanwhile.
-            self._next_tick_s = now_s
-            self._whereabouts.stalled(now_s)
+        """One round: sleep, listen and map, judge, decide and guide, speak."""
+        now_s, late_s = self._sleep()
         began_s = stopwatch_s()
-        self._reporter.news.clear()
-        for event in newest_ranges(self._autopilot.poll(now_s)):
-            self.vehicle = fold(self.vehicle, event)
-            self._attendant.take(event)
-            self._take_in(event)
+        self._listen(now_s)
         self._watchdogs.tick(now_s, late_s, planner_works=self._runner.working)
         self._settings = self._attendant.attend(self._pursuit, now_s)
         self.oversight.service(self.vehicle, now_s)
@@ -167,9 +160,7 @@ class Companion:
         elif self._handover.is_over(self.vehicle, now_s):
             self._done = True
         self._remember(now_s)
-        problem = self._log.problem or (self._memory.heed_problem(self._log) if self._memory else "")
-        ours, underway = self.watch.control is Control.COMPANION, self._pursuit is not None
-        self._teller.of_faults(now_s, problem, heard=self.vehicle.heartbeat is not None, underway=underway, ours=ours)
+        self._tell_of_faults(now_s)
         self._autopilot.service(now_s)
         self.outcome.step_seconds.append(stopwatch_s() - began_s)
 
@@ -214,6 +205,48 @@ class Companion:
             news=tuple(self._reporter.news),
         )
 
+    # Listening ---------------------------------------------------------------------------------------------------
+
+    def _sleep(self) -> tuple[float, float]:
+        """Until the round begins; in lock-step this moves the world. Returns the time, and how late it is."""
+        self._next_tick_s += 1.0 / self._settings.link.tick_hz
+        self._clock.sleep_until_s(self._next_tick_s)
+        now_s = self._clock.now_s()
+        late_s = now_s - self._next_tick_s
+        if late_s > 1.0:
+            # After a stall (a suspended computer) do not catch up tick by tick, and do not believe what piled up meanwhile.
+            self._next_tick_s = now_s
+            self._whereabouts.stalled(now_s)
+        return now_s, late_s
+
+    def _listen(self, now_s: float) -> None:
+        """Everything that has come in since the last round."""
+        self._reporter.news.clear()
+        for event in newest_ranges(self._autopilot.poll(now_s)):
+            self.vehicle = fold(self.vehicle, event)
+            self._attendant.take(event)
+            self._take_in(event)
+
+    def _take_in(self, event: Event) -> None:
+        """Scans go into the map; a position that jumps, or an origin that moves, makes the map worthless."""
+        if isinstance(event, TextSeen) and event.severity <= WARNING:
+            self._reporter.note(f"autopilot: {event.text}", event.severity)
+        self._watchdogs.take_in(event, self.vehicle)
+        self.oversight.take_in(event)
+        self._plan_watch.take_in(event)
+        if isinstance(event, TargetAsked):
+            idle = self._pursuit is None or self._stopped or self._handover.begun
+            self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
+        if self._pursuit is None:
+            # At every heartbeat: a person may take the rover out of GUIDED within a tick of our having set it.
+            self.watch = Watch(latched(self.watch.control, self.vehicle))
+            return
+        if isinstance(event, RangeSeen) and self._watchdogs.scan_fits and not self._whereabouts.position_doubted:
+            pose, attitude = self.vehicle.pose_at(event.time_s), self.vehicle.attitude
+            if pose is not None and attitude is not None:
+                self._pursuit.map_scan(pose, attitude.yaw_rate_rad_s, event.scan)
+        self._whereabouts.take_in(event, self.vehicle, self._pursuit)
+
     # Judging -----------------------------------------------------------------------------------------------------
 
     def _act(self, now_s: float) -> None:
@@ -244,40 +277,22 @@ class Companion:
         match verdict.reaction:
             case Reaction.STOP:
                 self._tell(f"Stopping: {verdict.reason}", WARNING)
-                self._command(STANDSTILL, now_s)
+                self._speaker.guide(STANDSTILL, now_s)
             case Reaction.HOLD:
                 self._tell(f"HOLD: {verdict.reason}", WARNING)
-                self._send(SetMode(RoverMode.HOLD), now_s)
+                self._speaker.send(SetMode(RoverMode.HOLD), now_s)
             case _:
                 if before is Control.COMPANION:
                     self._tell(f"Companion silent: {verdict.reason}", WARNING)
                 if missing := awaited(self.vehicle, now_s, self._settings.safety):
                     self._reporter.doing = f"stopped: {verdict.reason}, waiting for {missing}"
 
+    # Driving -----------------------------------------------------------------------------------------------------
+
     def _begin(self, now_s: float) -> Pursuit | None:
-        """Everything before the first metre; once the rover may be driven, the mission on the map."""
-        if self._autopilot.twin_heard(now_s):
-            self._reporter.doing = "waiting for another companion with the same component id to fall silent"
-            return None
-        taken = overruled(self._autopilot.last_ack(SetMode(RoverMode.GUIDED)), self.vehicle.heartbeat)
-        control = Control.PERSON if taken else self.watch.control
-        out = self._start_up.out(self.vehicle)
-        if out and (reason := self.oversight.emptied(now_s)):
-            self._hand_over(now_s, reason)
-            return None
-        fence, hindrance = self.oversight.before_driving(now_s, out=out)
-        laid, command = self._start_up.step(self.vehicle, control, now_s, fence, hindrance)
-        if command is not None:
-            self._send(command, now_s)
-        if command == SetMode(RoverMode.HOLD):
-            self._tell(f"HOLD: waited too long for {self._start_up.missing}", WARNING)
-        refused = self._autopilot.last_ack(Arm())
-        if refused is not None and refused.result != 0 and self._start_up.missing == "arming":
-            self._teller.once(f"The autopilot refuses to arm (result {refused.result})")
+        """Once the rover may be driven, the mission on the map; until then whatever brings it there."""
+        laid = self._setting_out.step(self.vehicle, self.watch.control, now_s)
         if laid is None:
-            self._reporter.doing = f"waiting for {self._start_up.missing}"
-            if self.vehicle.heartbeat is None:
-                self._reporter.doing += self._autopilot.trouble
             return None
         self._tell(f"Companion: {self._mission.name}, {len(laid.itinerary.targets)} targets", INFO)
         assert self.vehicle.scan is not None
@@ -286,36 +301,6 @@ class Companion:
         if self._memory is not None and self._memory.take_up(pursuit, self.vehicle, now_s):
             self._tell(f"Resumed {self._start_up.found}, {pursuit.reached} targets reached before", INFO)
         return pursuit
-
-    def _remember(self, now_s: float) -> None:
-        """What this run would need to go on after a crash."""
-        if self._memory is not None and self._pursuit is not None:
-            left, doubted = self._handover.ours, self._whereabouts.position_doubted
-            self._memory.note(now_s, self.vehicle, self.watch.control, self._pursuit, doubted, left, self._done)
-
-    # Listening ---------------------------------------------------------------------------------------------------
-
-    def _take_in(self, event: Event) -> None:
-        """Scans go into the map; a position that jumps, or an origin that moves, makes the map worthless."""
-        if isinstance(event, TextSeen) and event.severity <= WARNING:
-            self._reporter.note(f"autopilot: {event.text}", event.severity)
-        self._watchdogs.take_in(event, self.vehicle)
-        self.oversight.take_in(event)
-        self._plan_watch.take_in(event)
-        if isinstance(event, TargetAsked):
-            idle = self._pursuit is None or self._stopped or self._handover.begun
-            self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
-        if self._pursuit is None:
-            # At every heartbeat: a person may take the rover out of GUIDED within a tick of our having set it.
-            self.watch = Watch(latched(self.watch.control, self.vehicle))
-            return
-        if isinstance(event, RangeSeen) and self._watchdogs.scan_fits and not self._whereabouts.position_doubted:
-            pose, attitude = self.vehicle.pose_at(event.time_s), self.vehicle.attitude
-            if pose is not None and attitude is not None:
-                self._pursuit.map_scan(pose, attitude.yaw_rate_rad_s, event.scan)
-        self._whereabouts.take_in(event, self.vehicle, self._pursuit)
-
-    # Driving -----------------------------------------------------------------------------------------------------
 
     def _drive(self, pursuit: Pursuit, now_s: float) -> None:
         """One tick on the way."""
@@ -331,7 +316,9 @@ class Companion:
         self._reporter.doing = pursuit.doing
         guide = self._legs.guide(guide, pursuit, self._settings.guidance.min_speed_m_s)
         if guide is not None:
-            self._command(self.output_check.passed(guide, pose, self.vehicle.speed_m_s, pursuit.surroundings), now_s)
+            self._speaker.guide(
+                self.output_check.passed(guide, pose, self.vehicle.speed_m_s, pursuit.surroundings), now_s
+            )
         else:
             self._end(pursuit, now_s)
 
@@ -347,19 +334,7 @@ class Companion:
         if self._pursuit is not None:
             self._pursuit.driver.leave()
 
-    # Speaking ----------------------------------------------------------------------------------------------------
-
-    def _command(self, guide: Guide, now_s: float) -> None:
-        for command in self._outbox.due(guide, now_s, self._autopilot.target_confirmed):
-            self._send(command, now_s)
-
-    def _send(self, command: Command, now_s: float) -> None:
-        """Say it; what cannot be said (degrees, while the autopilot has no origin) leaves the rover standing instead."""
-        try:
-            self._autopilot.send(command, now_s)
-        except EncodeError as error:
-            self._tell(f"Stopping: {error}", WARNING)
-            self._autopilot.send(STANDSTILL.setpoint, now_s)
+    # Ending, and what outlasts the round -------------------------------------------------------------------------
 
     def _hand_over(self, now_s: float, why: str) -> None:
         """The run ends."""
@@ -367,3 +342,15 @@ class Companion:
         stopped = self._handover.begin(self.vehicle, self.watch.control, now_s, driven=self._pursuit is not None)
         if stopped and why != "done":
             self._tell(f"Companion: {why}, HOLD", WARNING)
+
+    def _remember(self, now_s: float) -> None:
+        """What this run would need to go on after a crash."""
+        if self._memory is not None and self._pursuit is not None:
+            left, doubted = self._handover.ours, self._whereabouts.position_doubted
+            self._memory.note(now_s, self.vehicle, self.watch.control, self._pursuit, doubted, left, self._done)
+
+    def _tell_of_faults(self, now_s: float) -> None:
+        """What a person should know though it stops nothing."""
+        problem = self._log.problem or (self._memory.heed_problem(self._log) if self._memory else "")
+        ours, underway = self.watch.control is Control.COMPANION, self._pursuit is not None
+        self._teller.of_faults(now_s, problem, heard=self.vehicle.heartbeat is not None, underway=underway, ours=ours)

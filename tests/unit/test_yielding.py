@@ -17,7 +17,7 @@ from companion.route import Route
 from companion.scan import RangeScan
 from companion.settings import Settings
 from companion.traffic import Moving
-from companion.yielding import first_near, least_room_m, yielded
+from companion.yielding import WayGiver, first_near, least_room_m, yielded
 
 SETTINGS = Settings()
 ROVER = RoverLimits(0.35, 2.0, 8.0)
@@ -137,3 +137,12 @@ def test_it_looks_where_it_really_drives_and_not_where_the_route_is() -> None:
 
     assert then(NedPoint(20.0, 22.0)) is DRIVE
     assert then(NedPoint(25.0, 24.0)) is not DRIVE
+
+
+def test_who_makes_way_is_patient_for_a_while_and_anew_each_time() -> None:
+    giver = WayGiver(open_ground(), ROVER)
+    assert not giver.is_patient(0.0, 30.0, yields=False)
+    assert all(giver.is_patient(now_s, 30.0, yields=True) for now_s in (1.0, 10.0, 30.9))
+    assert not giver.is_patient(31.0, 30.0, yields=True)
+    assert not giver.is_patient(40.0, 30.0, yields=False)
+    assert giver.is_patient(41.0, 30.0, yields=True), "it has got on meanwhile"
