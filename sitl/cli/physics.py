@@ -14,6 +14,7 @@ from companion.clock import WallClock
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from sitl.cli.equipment import equipped
 from sitl.cli.serve import BAD_INPUT, say, stop_signals
 from sitl.endpoints import ListenError
 from sitl.endpoints.client import FORMS, ClientLink, open_link
@@ -23,7 +24,7 @@ from sitl.paramfile import ParameterFileError
 from sitl.physics import Physics
 from sitl.physics_news import PhysicsNews, summary
 from sitl.physics_server import open_port, run
-from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_parameter_file, with_sensors
+from sitl.scenario import Scenario, ScenarioError, scenario_from_mission
 
 
 def physics(
@@ -45,10 +46,7 @@ def physics(
     clock = WallClock()
     link: ClientLink | None = None
     try:
-        mission = load_mission(mission_file)
-        mission = mission if sensors is None else with_sensors(mission, sensors)
-        mission = mission if params is None else with_parameter_file(mission, params)
-        scenario = scenario_from_mission(mission)
+        scenario = scenario_from_mission(equipped(load_mission(mission_file), sensors, params))
         behind = scenario.physics(seed, scans=mavlink is not None)
         _write_parameters(scenario, behind, write_params)
         link = open_link(mavlink) if mavlink else None

@@ -16,11 +16,12 @@ from companion.clock import WallClock
 from companion.mapfiles import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from sitl.cli.equipment import equipped, simulated
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.endpoints import FORMS, Endpoint, ListenError, open_endpoint
-from sitl.fault_file import FaultFileError, load_faults
+from sitl.fault_file import FaultFileError
 from sitl.news import News
-from sitl.scenario import Scenario, ScenarioError, scenario_from_mission, with_faults, with_parameter_file, with_sensors
+from sitl.scenario import Scenario, ScenarioError
 from sitl.server import serve as run_server
 from sitl.watching import Watching
 
@@ -88,10 +89,8 @@ def _scenario(
     mission_file: Path, sensors: str | None, params: Path | None, faults: Path | None
 ) -> tuple[str, Scenario]:
     """The mission's name, and what it and the options ask for; what people should know of it is said."""
-    mission = load_mission(mission_file)
-    mission = mission if sensors is None else with_sensors(mission, sensors)
-    mission = mission if params is None else with_parameter_file(mission, params)
-    scenario = with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
+    mission = equipped(load_mission(mission_file), sensors, params)
+    scenario = simulated(mission, faults)
     for note in scenario.notes:
         typer.echo(note, err=True)
     return mission.name, scenario

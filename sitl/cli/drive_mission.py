@@ -1,0 +1,74 @@
+"""Which mission ``drive`` drives, and where: from a file, on any map, or both; and those that it refuses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from companion.mission.load import load_mission
+from companion.mission.mission import Mission, MissionError
+from sitl.ground import field_at, mission_in_world, mission_on_map
+from sitl.scenario import Scenario
+from sitl.worldfile import ground_grid
+
+
+@dataclass(frozen=True, slots=True)
+class OnWorld:
+    """``--world`` and what goes with it."""
+
+    world: Path | None
+    start: str | None
+    target: str | None
+    resolution_m: float | None
+    top_left: bool
+    prior: bool
+
+
+def mission_to_drive(mission_file: Path | None, on: OnWorld) -> Mission:
+    """The mission to drive, from a file, from --world with --start and --target, or from both. Raises MissionError."""
+    world = on.world
+    if world is None:
+        if mission_file is None:
+            raise MissionError("drive: give a MISSION file, or --world MAP with --start X,Y and --target X,Y")
+        if on.start or on.target or on.top_left or on.prior or on.resolution_m is not None:
+            raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
+        return _driven_here(load_mission(mission_file))
+    if on.prior and world.suffix.lower() == ".toml":
+        raise MissionError(f"drive: --prior: {world} is drawn in shapes; the companion can be given a map only")
+    ground = ground_grid(world, on.resolution_m)
+    begin = field_at(ground, on.start, "--start", top_left=on.top_left) if on.start else None
+    if mission_file is not None:
+        if on.target is not None:
+            raise MissionError("drive: --target goes with --world alone; the mission has its own targets")
+        return mission_in_world(_driven_here(load_mission(mission_file)), world, ground, begin, prior=on.prior)
+    if begin is None or on.target is None:
+        raise MissionError("drive: --world without a mission needs --start X,Y and --target X,Y")
+    end = field_at(ground, on.target, "--target", top_left=on.top_left)
+    return mission_on_map(world, ground, begin, end, prior=on.prior)
+
+
+def _driven_here(mission: Mission) -> Mission:
+    """The mission, unless it is the autopilot's to drive."""
+    if mission.in_auto:
+        raise MissionError(
+            f"{mission.source}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE); use rover-sitl serve, upload the mission, "
+            "and rover-companion run"
+        )
+    return mission
+
+
+def refuse_blind(mission: Mission) -> None:
+    """The companion must see something. Raises MissionError."""
+    if mission.sitl is not None and str(mission.sitl.sensors) == "none":
+        raise MissionError(
+            "sensors none: the companion does not drive without range data; none is for rover-sitl serve"
+        )
+
+
+def refuse_untold(mission: Mission, scenario: Scenario) -> None:
+    """The companion must know that it cannot turn on the spot. Raises MissionError."""
+    if scenario.turning_radius_m > 0.0 and mission.rover.turning_radius_m <= 0.0:
+        raise MissionError(
+            f"{mission.source or mission.name}: the parameters are of a rover with steered wheels: give the mission "
+            f"[rover] turning_radius_m = {scenario.turning_radius_m:g}, or the companion would turn it on the spot"
+        )
