@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
@@ -109,9 +110,8 @@ def run(
             keeping.start()
             autopilot = AutopilotLink(link, Codec(settings.link, signer=signer), settings.link, recorder)
             live = Live(console, mission.name, reader)
-            code = _drive(
-                mission, settings, link, autopilot, recorder, live, stop, place, keeping, files, seed=seed, arm=arm
-            )
+            outfit = _Outfit(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop)
+            code = _drive(outfit, seed=seed, arm=arm)
     except BAD_INPUT as error:
         typer.echo(levelled(str(error), ERROR, reader) if reader is Reader.JOURNAL else str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -120,62 +120,69 @@ def run(
     raise typer.Exit(code)
 
 
-def _drive(
-    mission: Mission,
-    settings: Settings,
-    link: ByteLink,
-    autopilot: AutopilotLink,
-    recorder: Recorder | NullRecorder,
-    live: Live,
-    stop: _StopSignals,
-    record: Path | None,
-    keeping: Keeping,
-    files: StateFiles,
-    *,
-    seed: int,
-    arm: bool,
-) -> int:
+@dataclass(frozen=True, slots=True)
+class _Outfit:
+    """What a run is driven with. ``place``: where its record really goes; None without one."""
+
+    mission: Mission
+    settings: Settings
+    link: ByteLink
+    autopilot: AutopilotLink
+    recorder: Recorder | NullRecorder
+    place: Path | None
+    keeping: Keeping
+    files: StateFiles
+    live: Live
+    stop: _StopSignals
+
+
+def _drive(outfit: _Outfit, *, seed: int, arm: bool) -> int:
     """Drive to the end, close everything, and say what came of it. Returns the exit code."""
     runner = ThreadRunner()
     companion = Companion(
-        autopilot,
+        outfit.autopilot,
         WallClock(),
-        mission,
-        settings,
+        outfit.mission,
+        outfit.settings,
         runner,
-        recorder,
+        outfit.recorder,
         seed=seed,
         arm=arm,
-        memory=keeping.memory,
-        keep_settings=files.keep,
+        memory=outfit.keeping.memory,
+        keep_settings=outfit.files.keep,
     )
-    stop.listener = companion
+    outfit.stop.listener = companion
     service = Service(os.environ)
 
     def show(status: Status) -> None:
-        live.show(status)
+        outfit.live.show(status)
         service.show(status)
 
     service.ready()
     try:
-        with live:
+        with outfit.live:
             companion.run(show)
     finally:
         service.stopping()
         companion.close()
-        keeping.close()
+        outfit.keeping.close()
         runner.close()
-        link.close()
-        recorder.close()
+        outfit.link.close()
+        outfit.recorder.close()
+    return _ended(companion, outfit)
+
+
+def _ended(companion: Companion, outfit: _Outfit) -> int:
+    """Say what came of it, and what could not be kept; the exit code."""
     code = _told(companion.statuses(), companion.oversight.ended_by)
     with contextlib.suppress(OSError):  # nobody reads on: the exit code still tells
-        for line in (files.close(), keeping.problem, str(autopilot.codec.counters.refused)):
+        for line in (outfit.files.close(), outfit.keeping.problem, str(outfit.autopilot.codec.counters.refused)):
             if line:
                 typer.echo(line, err=True)
-        if record is not None:
-            _save_map(companion, record)
-            if recorder.problem:
-                typer.echo(recorder.problem, err=True)
+        if outfit.place is not None:
+            _save_map(companion, outfit.place)
+            if outfit.recorder.problem:
+                typer.echo(outfit.recorder.problem, err=True)
     return code
 
 
