@@ -19,7 +19,7 @@ from sitl.motion import NoiseSettings
 from sitl.movers import Floats, Ints
 from sitl.rover import GRAVITY_M_S2, drive, meet_movers, new_rover
 from sitl.sensors import RangeSensing, SensorSuite
-from sitl.truth import Collision, SimStart
+from sitl.truth import Collision, SimStart, collision_of
 from sitl.world import Ground, Obstacles, World
 
 PLANT_STEP_S = 0.005
@@ -226,14 +226,7 @@ class Physics:
         )  # fmt: skip
         self.time_s += step_s
         if int(self._rover[0]["contacts"]) > contacts:
-            self.collisions += (self._collision(),)
-
-    def _collision(self) -> Collision:
-        rover = self._rover[0]
-        struck, here = int(rover["struck"]), (float(rover["north_m"]), float(rover["east_m"]))
-        if struck == 0:
-            return Collision(self.time_s, *here)
-        return Collision(self.time_s, *here, self.world.movers[struck - 1].name, float(rover["struck_m_s"]))
+            self.collisions += (collision_of(self._rover[0], world.movers, self.time_s),)
 
     def _body(self, before: Motion, now: Motion, step_s: float) -> BodyState:
         """Mean turn rate and acceleration of the step: integrated, they give the heading and the velocity that are told.

@@ -27,7 +27,7 @@ from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.rover import new_rover
 from sitl.sensors import RangeSensing, SensorSuite, suite_named
 from sitl.sim_link import SimLink
-from sitl.truth import Collision, SimStart, Truth
+from sitl.truth import Collision, SimStart, Truth, collision_of
 from sitl.world import World
 
 NOISE_ROWS = 500
@@ -287,14 +287,7 @@ class Simulator:
         self._tick += done
         self._sensing.time_s = self.time_s
         if int(rover["contacts"]) > contacts:
-            self._collisions.append(self._collision())
-
-    def _collision(self) -> Collision:
-        rover = self._rover[0]
-        struck, here = int(rover["struck"]), (float(rover["north_m"]), float(rover["east_m"]))
-        if struck == 0:
-            return Collision(self.time_s, *here)
-        return Collision(self.time_s, *here, self.world.movers[struck - 1].name, float(rover["struck_m_s"]))
+            self._collisions.append(collision_of(rover, world.movers, self.time_s))
 
     def _send(self) -> None:
         if not self._is_off:

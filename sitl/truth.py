@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 
 class GeoPlace(Protocol):
@@ -60,3 +61,20 @@ class Collision:
     east_m: float
     mover: str | None = None
     speed_m_s: float = math.nan
+
+
+class Named(Protocol):
+    """Anything with a name for people."""
+
+    @property
+    def name(self) -> str:
+        """The name."""
+        ...
+
+
+def collision_of(rover: Any, movers: Sequence[Named], time_s: float) -> Collision:
+    """What the record of the rover's plant says of the contact that it has just had; ``movers``: the world's, in their order."""
+    struck, here = int(rover["struck"]), (float(rover["north_m"]), float(rover["east_m"]))
+    if struck == 0:
+        return Collision(time_s, *here)
+    return Collision(time_s, *here, movers[struck - 1].name, float(rover["struck_m_s"]))

@@ -12,8 +12,8 @@ from companion.frames import GeoPoint
 from companion.mission.fence_items import circle
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
 from companion.mission.mission import Area, Mission, MissionError, open_ring
+from companion.mission.text_file import read_text
 from companion.mission.walk import understand
-from companion.reading import open_file
 
 MAX_BYTES = 50_000_000
 
@@ -62,16 +62,9 @@ def _understood(plan: Json, path: Path) -> Mission:
 
 
 def _read(path: Path) -> Json:
+    text = read_text(path, MAX_BYTES)
     try:
-        with open_file(path) as file:
-            data = file.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise MissionError(f"{path}: larger than {MAX_BYTES} bytes")
-        plan = json.loads(data.decode("utf-8-sig"))
-    except OSError as error:
-        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
-    except UnicodeDecodeError as error:
-        raise MissionError(f"{path}: not UTF-8 text (byte {error.start})") from error
+        plan = json.loads(text)
     except json.JSONDecodeError as error:
         raise MissionError(f"{path}: line {error.lineno}: not valid JSON: {error.msg.lower()}") from error
     except (RecursionError, ValueError) as error:

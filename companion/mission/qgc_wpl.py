@@ -16,8 +16,8 @@ from companion.frames import GeoPoint
 from companion.mission import mav_commands as mav
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
 from companion.mission.mission import Mission, MissionError
+from companion.mission.text_file import read_text
 from companion.mission.walk import understand
-from companion.reading import open_file
 
 HEADER = ("QGC", "WPL", "110")
 MAX_BYTES = 20_000_000
@@ -49,17 +49,7 @@ def load(path: Path) -> Mission:
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Line numbers and words, without comments and blank lines."""
-    try:
-        with open_file(path) as file:
-            data = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
-    if len(data) > MAX_BYTES:
-        raise MissionError(f"{path}: larger than {MAX_BYTES} bytes")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MissionError(f"{path}: not UTF-8 text (byte {error.start})") from error
+    text = read_text(path, MAX_BYTES)
     split = (
         (number, line.partition("#")[0].split()) for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1)
     )

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from companion.grid import Weights
 from companion.planning import bspline
 from companion.planning.chance import draw_seed, seeded
-from companion.planning.ends import ends_free
+from companion.planning.ends import answered_at_once
 from companion.planning.ga_fitness import Task, Tuning, is_correct, way_point, way_points_for
 from companion.planning.ga_islands import Archipelago, evolve_islands
 from companion.planning.ga_population import evolve, vln_of
@@ -120,10 +120,8 @@ class BsplineGa:
         """
         counts = counts_of(budget.control_points, budget.population)
         seed = draw_seed(rng)
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
-        if problem.start == problem.target:
-            return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
+        if (answer := answered_at_once(problem, self.name)) is not None:
+            return answer
         found, cells, curve, cost, count, epochs, evaluations = self._search(problem, budget, counts, seed)
         if not found:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, evaluations, epochs)

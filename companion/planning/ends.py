@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from companion.grid import OBSTACLE
-from companion.planning.problem import PlanningProblem
+from companion.planning.problem import Path, PlanningProblem, PlanResult, PlanStatus
 
 
 def ends_free(problem: PlanningProblem) -> bool:
@@ -14,3 +14,12 @@ def ends_free(problem: PlanningProblem) -> bool:
         if not (0 <= x < width and 0 <= y < height and weights[y, x] < OBSTACLE):
             return False
     return True
+
+
+def answered_at_once(problem: PlanningProblem, planner: str) -> PlanResult | None:
+    """The answer of a planner that proves nothing where there is nothing to search: an end that is not free, or no way to go."""
+    if not ends_free(problem):
+        return PlanResult(PlanStatus.BUDGET_SPENT, None, planner)
+    if problem.start == problem.target:
+        return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), planner)
+    return None

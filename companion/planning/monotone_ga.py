@@ -11,7 +11,7 @@ from numpy.random import Generator
 
 from companion.grid import Weights
 from companion.planning.chance import draw_seed, seeded
-from companion.planning.ends import ends_free
+from companion.planning.ends import answered_at_once
 from companion.planning.monotone_evolution import ONE_FLAG, ROW_WISE, SWITCHING, Tuning, evolve
 from companion.planning.monotone_kernel import square_over, summed
 from companion.planning.planner import Capabilities
@@ -62,10 +62,8 @@ class MonotoneGa:
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
         """See ``Planner.plan``. FOUND or BUDGET_SPENT; population and generations come from the settings, not the budget."""
         seed = draw_seed(rng)
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
-        if problem.start == problem.target:
-            return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
+        if (answer := answered_at_once(problem, self.name)) is not None:
+            return answer
         places = (*problem.start, *problem.target)
         found, cells, cost, generations = search(plain(problem.weights), places, self._settings, seed)
         evaluations = generations * self._settings[1]

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from numpy.random import Generator
 
 from companion.planning.chance import draw_seed
-from companion.planning.ends import ends_free
+from companion.planning.ends import answered_at_once
 from companion.planning.planner import Capabilities
 from companion.planning.prm_kernel import search
-from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
+from companion.planning.problem import Budget, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, plain
 from companion.planning.segment_ga import path_through
 from companion.settings import PlannerSettings
@@ -59,10 +59,8 @@ class Prm:
         """See ``Planner.plan``. FOUND or BUDGET_SPENT; samples and rounds come from the settings, not the budget."""
         del budget
         seed = draw_seed(rng)
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
-        if problem.start == problem.target:
-            return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
+        if (answer := answered_at_once(problem, self.name)) is not None:
+            return answer
         query = queried(problem, self._settings, seed)
         if len(query.nodes) == 0:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, query.lines, query.rounds + 1)

@@ -10,7 +10,7 @@ from numpy.random import Generator
 
 from companion.grid import Weights
 from companion.planning.chance import draw_seed
-from companion.planning.ends import ends_free
+from companion.planning.ends import answered_at_once
 from companion.planning.planner import Capabilities
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.raster import CellArray, cells_cost, plain, polyline, without_loops
@@ -68,10 +68,8 @@ class SegmentGa:
         """See ``Planner.plan``. FOUND or BUDGET_SPENT; attempts and iterations come from the settings, not the budget."""
         del budget
         seed = draw_seed(rng)
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
-        if problem.start == problem.target:
-            return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
+        if (answer := answered_at_once(problem, self.name)) is not None:
+            return answer
         walk = walked(problem, self._settings, seed)
         if len(walk.nodes) == 0:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, walk.evaluations, walk.iterations)

@@ -15,7 +15,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.planning.chance import draw_seed
-from companion.planning.ends import ends_free
+from companion.planning.ends import answered_at_once
 from companion.planning.planner import Capabilities
 from companion.planning.polygons import Polygons, polygons_of
 from companion.planning.problem import Budget, Mover, Path, PlanningProblem, PlanResult, PlanStatus
@@ -144,10 +144,8 @@ class VertexGa:
         """See ``Planner.plan``. FOUND or BUDGET_SPENT; population and generations are the planner's own settings."""
         del budget
         seed = draw_seed(rng)
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name)
-        if problem.start == problem.target:
-            return PlanResult(PlanStatus.FOUND, Path((problem.start,), 0.0), self.name)
+        if (answer := answered_at_once(problem, self.name)) is not None:
+            return answer
         plan = planned(problem, self._settings, seed, timed=self._timed)
         if len(plan.corners) == 0:
             return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, plan.evaluations, plan.generations)
