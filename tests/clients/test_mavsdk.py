@@ -147,3 +147,4 @@ def test_mavsdk_beside_the_companion(tmp_path: Path) -> None:
     installed("mavsdk", "mavsdk")
     with scene(tmp_path, companion_on="tcp") as here:
         asyncio.run(session(here))
+        assert here.serve.child.poll() is None, "the simulator is up to the end"

@@ -22,6 +22,7 @@ from companion.mission.mission import MissionError
 from companion.mission.resolve import resolve
 from companion.record import load_record
 from companion.recorded_files import RecordError
+from companion.rounds import Round
 from companion.settings import Settings, SettingsError, load_settings
 from companion.state.format import SUM_BYTES, StateError, decoded, encoded
 from companion.tuning import with_tuned
@@ -31,6 +32,7 @@ from tests.rig import Rig, yard
 from tests.states import a_state
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+A_MISSION = b'{"name": "m", "targets": [{"name": "t", "place": [1, 2]}]}'
 LONGEST_LINE = 1000
 REFUSALS = (MissionError, MapError, SettingsError, RecordError, StateError, SigningKeyError)
 HEADER_BYTES = 10
@@ -133,8 +135,10 @@ def record(data: bytes) -> None:
     """The head of a record."""
 
     def use(path: Path) -> None:
-        for name in ("link.tlog", "rounds.bin", "decisions.jsonl", "mission.json"):
+        for name in ("link.tlog", "decisions.jsonl"):
             (path.parent / name).write_bytes(b"")
+        (path.parent / "mission.json").write_bytes(A_MISSION)
+        (path.parent / "rounds.bin").write_bytes(Round(0.0, 0, 0).packed())
         load_record(path.parent)
 
     _file("meta.json", data, use)
@@ -241,7 +245,7 @@ def targets() -> dict[str, Target]:
         "signing-key": Target(signing_key, (b"passphrase\n", b"0f" * 32)),
         "state": Target(state, state_examples()),
         "record": Target(record, record_examples()),
-        "recorded-mission": Target(recorded_mission, (b'{"name": "m", "targets": [{"name": "t", "place": [1, 2]}]}',)),
+        "recorded-mission": Target(recorded_mission, (A_MISSION,)),
         "link": Target(link, (talk,)),
         "driving": Target(driving, driving_examples()),
         "link-contents": Target(
@@ -271,7 +275,7 @@ def state_examples() -> tuple[bytes, ...]:
 
 
 def record_examples() -> tuple[bytes, ...]:
-    """A head as the recorder writes it."""
+    """Heads as the recorder writes them, at the end of a run and before."""
     with tempfile.TemporaryDirectory() as folder:
         from companion.recorder import Recorder
 
@@ -280,5 +284,6 @@ def record_examples() -> tuple[bytes, ...]:
         head = json.loads((Path(folder) / "r" / "meta.json").read_text())
     return (
         json.dumps(head).encode(),
+        json.dumps(head | {"end": None}).encode(),
         json.dumps(head | {"inputs": [{"kind": "x", "name": "link.tlog", "source": "", "sha256": ""}]}).encode(),
     )

@@ -64,7 +64,7 @@ def test_a_laid_grid_holds_all_targets_with_a_margin(
         assert result.grid.cell_at(target.point) == target.cell
 
 
-def one_line_or_fine(name: str, data: bytes) -> None:
+def assert_fine_or_one_line(name: str, data: bytes) -> None:
     """Loading and laying out either works or says why in one line."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
@@ -95,7 +95,7 @@ HEADS = [
 @given(st.sampled_from(NAMES), st.sampled_from(HEADS), st.binary(max_size=200))
 @settings(max_examples=200, deadline=None)
 def test_nonsense(name: str, head: bytes, data: bytes) -> None:
-    one_line_or_fine(name, head + data)
+    assert_fine_or_one_line(name, head + data)
 
 
 SEEDS = {
@@ -117,7 +117,7 @@ def test_damaged_files(name: str, changes: list[tuple[float, int, bytes]]) -> No
     for where, cut, put in changes:
         at = int(where * len(data))
         data = data[:at] + put + data[at + cut :]
-    one_line_or_fine(name, data)
+    assert_fine_or_one_line(name, data)
 
 
 json_values = st.recursive(
@@ -142,4 +142,4 @@ def test_plans_with_one_value_replaced(data: st.DataObject, value: object) -> No
     collect(plan)
     node, key = data.draw(st.sampled_from(places))
     node[key] = value  # type: ignore[index]
-    one_line_or_fine("m.plan", json.dumps(plan).encode())
+    assert_fine_or_one_line("m.plan", json.dumps(plan).encode())

@@ -203,6 +203,7 @@ def test_a_leg_may_be_said_in_any_frame_with_a_latitude(tmp_path: Path, frame: i
     rig = in_auto(tmp_path, ROUND_THE_WALL)
     rig.change = HandOver(rig, coordinate_frame=frame)
     rig.until(lambda: "Heading for guided item 2" in rig.texts(), 60.0)
+    assert rig.companion.status().target == "guided item 2"
 
 
 OTHERS = {"component": {"target_component": 195}, "everybody": {"target_component": 0}, "system": {"target_system": 2},

@@ -131,6 +131,8 @@ def test_a_fence_of_the_same_length_is_noticed_when_it_is_read_again(tmp_path: P
     rig.until_driven(1.0)
     Person(rig).upload(box(KEEP_IN, -6.5, -2.4, 7.0, 20.0))
     rig.until(lambda: any("fence has changed" in text for text in rig.texts()), 4.0)
+    rig.run_for(4.0)
+    assert sum("fence has changed" in text for text in rig.texts()) == 1
 
 
 def test_a_target_that_comes_to_lie_outside_is_given_up_and_the_next_one_driven(tmp_path: Path) -> None:

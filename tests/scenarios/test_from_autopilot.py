@@ -128,6 +128,7 @@ def test_a_change_that_nothing_tells_of_is_found_within_a_minute(tmp_path: Path)
     rig.until_driven(2.0)
     rig.upload(stored([(WAYPOINT, NONE, (15, 8)), (DELAY, (90.0, 0.0, 0.0, 0.0), None)]))
     rig.until(lambda: any("mission has changed" in text for text in rig.texts()), AGAIN_S + 2.0)
+    assert sum("mission has changed" in text for text in rig.texts()) == 1
 
 
 def test_a_mission_of_the_autopilots_that_hands_over_is_driven_in_auto(tmp_path: Path) -> None:

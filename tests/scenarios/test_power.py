@@ -150,6 +150,7 @@ def test_it_empties_on_the_way_back(tmp_path: Path) -> None:
 def test_thresholds_in_volts(tmp_path: Path) -> None:
     rig = Draining(yard(tmp_path), 5.0, {"volts": 11.4}, settings(return_volts=11.5))
     rig.until(lambda: rig.said("Returning: battery at 11.4 V"), AFTER_S + 1.5)
+    assert rig.now_s() - rig.began_s >= AFTER_S
 
 
 @pytest.mark.parametrize("change", [{"percent": -1, "volts": 0.0}, {"percent": 0, "volts": 0.0}, {"percent": 20}])

@@ -51,7 +51,7 @@ def worlds(draw):
     return rng, ground(kind, rng, height, width, blocked), draw(st.booleans())
 
 
-def as_cheap(found, best):
+def assert_as_cheap(found, best):
     assert found.status == best.status
     if best.path is not None:
         assert found.path.cost == pytest.approx(best.path.cost, rel=1e-10)
@@ -62,7 +62,7 @@ def as_cheap(found, best):
 def test_astar_is_as_cheap_as_dijkstra(world):
     rng, weights, corner_cutting = world
     problem = PlanningProblem(weights, some_cell(rng, weights), some_cell(rng, weights), corner_cutting)
-    as_cheap(plan(Astar(SETTINGS), problem), plan(Dijkstra(SETTINGS), problem))
+    assert_as_cheap(plan(Astar(SETTINGS), problem), plan(Dijkstra(SETTINGS), problem))
 
 
 def test_astar_on_a_large_rough_map_is_as_cheap_as_dijkstra():
@@ -71,7 +71,7 @@ def test_astar_on_a_large_rough_map_is_as_cheap_as_dijkstra():
     problem = PlanningProblem(weights, Cell(0, 0), Cell(399, 299), True)
     best = plan(Dijkstra(SETTINGS), problem)
     assert best.path is not None
-    as_cheap(plan(Astar(SETTINGS), problem), best)
+    assert_as_cheap(plan(Astar(SETTINGS), problem), best)
 
 
 def test_astars_equally_short_ways_have_few_bends():
@@ -131,7 +131,7 @@ def drive(planner, seed, steps=12):
 @settings(max_examples=200, deadline=None)
 def test_dstar_lite_stays_as_cheap_as_dijkstra_on_a_map_that_changes(seed):
     for problem, result in drive(DstarLite(SETTINGS), seed):
-        as_cheap(result, plan(Dijkstra(SETTINGS), problem))
+        assert_as_cheap(result, plan(Dijkstra(SETTINGS), problem))
         if result.path is not None:
             assert is_path(problem.weights, result.path.cells, problem.corner_cutting)
             assert result.path.cells[0] == problem.start and result.path.cells[-1] == problem.target
@@ -153,7 +153,7 @@ def test_dstar_lite_repairs_instead_of_searching_anew():
     x, y = path.cells[-5]  # near the target, where the search began: not even the easiest case
     weights[y, x] = 1.0
     changed = PlanningProblem(weights, path.cells[3], problem.target)
-    as_cheap(plan(planner, changed), plan(Dijkstra(SETTINGS), changed))
+    assert_as_cheap(plan(planner, changed), plan(Dijkstra(SETTINGS), changed))
     assert planner._memory.g is begun.g
     plan(planner, PlanningProblem(weights, path.cells[3], Cell(1, 1)))
     assert planner._memory.g is not begun.g

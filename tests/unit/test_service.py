@@ -48,6 +48,7 @@ def test_without_systemd_nothing_happens(tmp_path: Path) -> None:
         service.ready()
         service.show(status(0.0, "driving"))
         service.stopping()
+    assert list(tmp_path.iterdir()) == [], "not even a socket"
 
 
 def test_who_reads_is_known_and_gets_the_level_his_way() -> None:

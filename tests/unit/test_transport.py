@@ -187,6 +187,7 @@ class TestTcpClient:
             return not link.connected
 
         eventually(gone)
+        assert "not connected" in link.description
         link.close()
 
     def test_a_server_that_comes_late(self, clock: HandClock) -> None:
