@@ -10,10 +10,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from sitl.autopilot.boot import HOME_S, ORIGIN_S, POSITION_S
 from sitl.autopilot.control import Record
 from sitl.autopilot.ekf import STEP_S
 from sitl.autopilot.modes import apply_sticks, set_mode, tell_of_ekf
-from sitl.autopilot.vehicle import HOME_S, ORIGIN_S, POSITION_S, Mode, Sticks, Vehicle
+from sitl.autopilot.vehicle import Mode, Sticks, Vehicle
 from sitl.faults import (
     BatteryLow,
     Fault,

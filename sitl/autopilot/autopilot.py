@@ -7,6 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.autopilot.boot import HOME_S, ORIGIN_S, POSITION_S
 from sitl.autopilot.commands import answer
 from sitl.autopilot.control import LOOP_HZ
 from sitl.autopilot.files import answer_file_request
@@ -21,17 +22,7 @@ from sitl.autopilot.streams import send_due, set_group
 from sitl.autopilot.targets import attitude_target, global_target, local_target
 from sitl.autopilot.telemetry import heartbeat
 from sitl.autopilot.transfer import TRANSFERS, keep_home
-from sitl.autopilot.vehicle import (
-    ALTITUDE_M,
-    HOME_S,
-    INFO,
-    ORIGIN_S,
-    POSITION_S,
-    WARNING,
-    Sticks,
-    Vehicle,
-    parameter_message,
-)
+from sitl.autopilot.vehicle import ALTITUDE_M, INFO, WARNING, Sticks, Vehicle, parameter_message
 
 PARAMETERS_PER_LOOP = 5
 TIMESYNC_S = 10.0

@@ -5,21 +5,12 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.battery import LOW, NAMES, OK, arming_complaint
+from sitl.autopilot.boot import ARMABLE_S, PREARM_S
 from sitl.autopilot.control import COAST, STOP, outputs_fault
 from sitl.autopilot.ekf import Change
 from sitl.autopilot.fence import arming_fault
 from sitl.autopilot.plan import GuidedTask, Submode
-from sitl.autopilot.vehicle import (
-    ARMABLE_S,
-    AUTOPILOT_MODES,
-    CRITICAL,
-    INFO,
-    NOTICE,
-    PREARM_S,
-    WARNING,
-    Mode,
-    Vehicle,
-)
+from sitl.autopilot.vehicle import AUTOPILOT_MODES, CRITICAL, INFO, NOTICE, WARNING, Mode, Vehicle
 from sitl.autopilot.ways import begin_driving, begin_return, begin_way_back, remember_start
 
 NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.INITIALISING}

@@ -6,8 +6,9 @@ from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sitl.autopilot.boot import ARMABLE_S
 from sitl.autopilot.modes import NOT_ARMABLE, arming_faults
-from sitl.autopilot.vehicle import ARMABLE_S, AUTOPILOT_MODES, Mode, Vehicle
+from sitl.autopilot.vehicle import AUTOPILOT_MODES, Mode, Vehicle
 
 GYRO_ACCEL_MAG_BARO, GPS, LASER = 0b1111, 1 << 5, 1 << 8
 STABILISED, NAVIGATING = 1 << 10 | 1 << 11, 1 << 12 | 1 << 14

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from sitl.autopilot.boot import STREAMS_S
 from sitl.autopilot.link import Channel
 from sitl.autopilot.telemetry import MESSAGES, requested_messages
-from sitl.autopilot.vehicle import STREAMS_S, Vehicle
+from sitl.autopilot.vehicle import Vehicle
 
 DEFAULT_INTERVAL_US = 1_000_000
 

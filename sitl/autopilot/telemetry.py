@@ -9,19 +9,13 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl import geodesy
+from sitl.autopilot.boot import EKF_SEEN_S, LOCAL_POSITION_S
 from sitl.autopilot.control import LEG
 from sitl.autopilot.fence import fence_status
 from sitl.autopilot.modes import base_mode
 from sitl.autopilot.proximity import echoes
 from sitl.autopilot.status import battery_readings, sys_status
-from sitl.autopilot.vehicle import (
-    ALTITUDE_M,
-    AUTOPILOT_MODES,
-    EKF_SEEN_S,
-    LOCAL_POSITION_S,
-    Mode,
-    Vehicle,
-)
+from sitl.autopilot.vehicle import ALTITUDE_M, AUTOPILOT_MODES, Mode, Vehicle
 from sitl.sensors import Reading
 
 NAN = float("nan")

@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl import geodesy
 from sitl.autopilot.battery import Battery, rest_volts
+from sitl.autopilot.boot import ATTITUDE_S, HOME_S, ORIGIN_S, POSITION_S, GpsLate
 from sitl.autopilot.control import CIRCLE, LEG, LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
 from sitl.autopilot.ekf import Ekf
 from sitl.autopilot.link import Channel
@@ -24,17 +25,6 @@ from sitl.sensors import RangeSensing
 
 ALTITUDE_M = 120.0
 """Height of the ground everywhere, above sea level."""
-
-STREAMS_S = 3.0
-EKF_SEEN_S = 4.0
-ATTITUDE_S = 7.0
-HOME_S = 10.0
-LOCAL_POSITION_S = 11.0
-ORIGIN_S = 19.0
-PREARM_S = 24.0
-POSITION_S = 42.0
-ARMABLE_S = 43.0
-"""The firmware's start-up, seconds since boot (measured)."""
 
 MOST_TEXTS = 30
 """Texts that wait to be sent; more push the oldest ones out, as in the firmware's queue."""
@@ -102,15 +92,6 @@ class Sticks:
     throttle: float = 0.0
     overridden_s: float | None = None
     """When an override was heard last; when none comes any more, the transmitter counts again."""
-
-
-@dataclass
-class GpsLate:
-    """How much later than without faults the parts of the start-up come that need GPS, seconds."""
-
-    home_s: float = 0.0
-    origin_s: float = 0.0
-    position_s: float = 0.0
 
 
 class Vehicle:
