@@ -40,6 +40,7 @@ from companion.settings import Settings
 from companion.speaking import Speaker
 from companion.startup import StartUp
 from companion.stepping import NotedRunner, StepRunner
+from companion.sticks import Sticks
 from companion.telling import Teller
 from companion.traffic import announced
 from companion.vehicle import VehicleState, fold
@@ -71,7 +72,7 @@ class Companion:
         memory: Memory | None = None,
         keep_settings: Callable[[Settings], None] | None = None,
     ) -> None:
-        self.vehicle = VehicleState(in_auto=mission.in_auto)
+        self.vehicle = VehicleState(in_auto=mission.in_auto, sticks=memory.sticks if memory else Sticks())
         self.outcome = Outcome()
         self._reporter = Reporter(self.outcome.said)
         self._teller = Teller(autopilot, clock, self._reporter)

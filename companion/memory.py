@@ -23,6 +23,7 @@ from companion.state.format import BandPlace, Raster
 from companion.state.model import SavedDraws, SavedTally
 from companion.state.snapshot import Snapshot
 from companion.state.writer import Update, Writer
+from companion.sticks import Sticks
 from companion.vehicle import VehicleState
 
 SAVE_S = 5.0
@@ -52,6 +53,12 @@ class Memory:
         self._saved_s = -math.inf
         self._saved_at = NedPoint(math.inf, math.inf)
         self._draws: Mapping[str, Any] | None = None
+
+    @property
+    def sticks(self) -> Sticks:
+        """Where a rover's sticks rested that is still ours: who has taken hold of them since is not to be left without it."""
+        ours = self.kept is not None and self.kept.state.control is Control.COMPANION
+        return Sticks(self.kept.state.sticks_us if self.kept is not None and ours else None)
 
     @property
     def problem(self) -> str:
@@ -120,7 +127,7 @@ class Memory:
             self._rows, self._complete = None, True
             self._saved_s, self._saved_at = now_s, NedPoint(position.north_m, position.east_m)
         if afresh or through or done or (happened and self._complete):
-            now = self._snapshot(now_s, position, pursuit, occasion)
+            now = self._snapshot(now_s, position, vehicle.sticks, pursuit, occasion)
             self._writer.put(Update(snapshot=now, afresh=afresh))
 
     def close(self) -> None:
@@ -132,7 +139,9 @@ class Memory:
         moved_m = NedPoint(position.north_m, position.east_m).distance_m(self._saved_at)
         return now_s - self._saved_s >= SAVE_S and moved_m >= MOVED_M
 
-    def _snapshot(self, now_s: float, position: LocalPositionSeen, pursuit: Pursuit, occasion: Occasion) -> Snapshot:
+    def _snapshot(
+        self, now_s: float, position: LocalPositionSeen, sticks: Sticks, pursuit: Pursuit, occasion: Occasion
+    ) -> Snapshot:
         _, control, armed, released, ended = occasion
         driver, laid = pursuit.driver, pursuit.laid
         leg, doubts_left, epoch = driver.leg
@@ -157,6 +166,7 @@ class Memory:
             subdivisions=pursuit.evidence.subdivisions,
             tally=SavedTally(steps=tally.steps, return_steps=tally.return_steps, stuck=tally.stuck, epoch=epoch),
             draws=self._draws,
+            sticks_us=sticks.rest_us,
         )
 
 

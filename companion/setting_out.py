@@ -56,7 +56,7 @@ class SettingOut:
         if command is not None:
             self._send(command, now_s)
         if command == SetMode(RoverMode.HOLD):
-            self._teller.tell(f"HOLD: waited too long for {self._start_up.missing}", WARNING)
+            self._teller.tell(f"HOLD: {self._start_up.held}", WARNING)
         if laid is None:
             self._tell_what_is_missing(heard=vehicle.heartbeat is not None)
         return laid

@@ -19,7 +19,9 @@ from companion.settings import SafetySettings, Settings
 from companion.vehicle import VehicleState
 
 ASK_AGAIN_S = 3.0
-"""A command that has not worked is given again after so long."""
+"""A command that has not worked is given again after so long,"""
+AGAIN_RESUMED_S = 1.0
+"""and by a run that is to go on as soon as the autopilot lets itself be armed, after so long."""
 TAKEN_S = 0.5
 """A heartbeat so long after the answer to a mode change shows what has become of it."""
 LEFT_S = 10.0
@@ -47,8 +49,8 @@ def start_step(
 ) -> StartStep:
     """What stands between now and driving. ``hindrance``: anything else that must be out of the way before GUIDED is set.
 
-    GUIDED is set only on a rover that nobody drives (disarmed, or in HOLD), and never on one that a person has just taken
-    out of GUIDED (``control``); arming only if told to (``arm``).
+    GUIDED is set only on a rover that nobody drives (disarmed, or in HOLD), and never on one that a person has had
+    (``control``); arming only if told to (``arm``).
     """
     if vehicle.heartbeat is None:
         return StartStep("the autopilot's heartbeat")
@@ -63,10 +65,10 @@ def start_step(
         ready = vehicle.heartbeat.mode == RoverMode.AUTO and vehicle.heartbeat.armed
         return StartStep("" if ready else "a person to arm and to set AUTO (the autopilot drives this mission)")
     if vehicle.heartbeat.mode != RoverMode.GUIDED:
-        if control is Control.PERSON:
-            return StartStep("a person to set GUIDED (the rover was taken out of it)")
         if vehicle.heartbeat.armed and vehicle.heartbeat.mode != RoverMode.HOLD:
             return StartStep("a person to set GUIDED (somebody is driving)")
+        if control is Control.PERSON:
+            return StartStep("a person to set GUIDED (a person has had the rover)")
         return StartStep("GUIDED", SetMode(RoverMode.GUIDED))
     if not vehicle.heartbeat.armed:
         return StartStep("arming", Arm()) if arm else StartStep("a person to arm (or run with --arm)")
@@ -88,12 +90,17 @@ class StartUp:
         self.missing = ""
         self.found = ""
         """What is to be said of a run that has been taken up."""
+        self.held = ""
+        """Why a rover that an earlier run has left armed is put into HOLD, in words."""
         self._kept = kept
         self._owner: Ownership | None = None
         self._mission = mission
         self._settings = settings
         self._arm = arm
+        self._asked: Command | None = None
         self._asked_s = -math.inf
+        self._mode: int | None = None
+        self._persons = False
         self._left_since_s = math.inf
         self._look_again_s = -math.inf
         self._checked: tuple[object, ...] = ()
@@ -120,7 +127,7 @@ class StartUp:
             return None, None
         self._check(vehicle, now_s, fence)
         hindrance = hindrance or self._stands_too_near(vehicle, now_s)
-        control = self._whose(vehicle, control)
+        control = Control.PERSON if self._had_by_person(vehicle) else self._whose(vehicle, control)
         # Whoever disarms the rover does not want it armed again by itself.
         self._arm = self._arm and not (vehicle.heartbeat is not None and vehicle.heartbeat.armed)
         step = start_step(vehicle, now_s, self._settings.safety, arm=self._arm, control=control, hindrance=hindrance)
@@ -139,8 +146,11 @@ class StartUp:
         return None, self._standstill(vehicle, now_s)
 
     def out(self, vehicle: VehicleState) -> bool:
-        """Whether the rover is where an earlier run has left it, armed in GUIDED: nobody else may be there."""
-        ours = self._kept is not None and self._kept.state.control is Control.COMPANION
+        """Whether the rover is where an earlier run has left it, armed in GUIDED: nobody else may be there.
+
+        While AUTO is served, GUIDED is a person's.
+        """
+        ours = self._kept is not None and self._kept.state.control is Control.COMPANION and not vehicle.in_auto
         heartbeat = vehicle.heartbeat
         return ours and heartbeat is not None and heartbeat.mode == RoverMode.GUIDED and heartbeat.armed
 
@@ -150,16 +160,29 @@ class StartUp:
             self._left_since_s = math.inf
             return None
         self._left_since_s = min(self._left_since_s, now_s)
-        if now_s - self._left_since_s < LEFT_S:
+        if now_s - self._left_since_s < LEFT_S and not vehicle.sticks.moved:
             return STANDSTILL.setpoint
+        self.held = "the sticks were moved" if vehicle.sticks.moved else f"waited too long for {self.missing}"
         self._owner = Ownership(Control.PERSON, may_arm=False)
         return SetMode(RoverMode.HOLD)
 
     def _due(self, command: Command | None, now_s: float) -> Command | None:
-        if command is None or now_s - self._asked_s <= ASK_AGAIN_S:
+        again_s = ASK_AGAIN_S if self._kept is None else AGAIN_RESUMED_S
+        if command is None or (command == self._asked and now_s - self._asked_s <= again_s):
             return None
-        self._asked_s = now_s
+        self._asked, self._asked_s = command, now_s
         return command
+
+    def _had_by_person(self, vehicle: VehicleState) -> bool:
+        """Whether a person has driven it, or taken it out of our mode, since this run looks on, and has not set our mode since."""
+        if (heartbeat := vehicle.heartbeat) is None:
+            return False
+        if heartbeat.mode == vehicle.own_mode:
+            self._persons = False
+        elif self._mode == vehicle.own_mode or (heartbeat.armed and heartbeat.mode != RoverMode.HOLD):
+            self._persons = True
+        self._mode = heartbeat.mode
+        return self._persons
 
     def _whose(self, vehicle: VehicleState, control: Control) -> Control:
         """Who drives, where an earlier run had the rover: looked at once, then by the mode as ever."""

@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from companion.itinerary import Leg, TargetStatus
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.safety import Control
+from companion.sticks import PULSES_US
 
 Latitude = Annotated[float, Field(ge=-90.0, le=90.0)]
 Longitude = Annotated[float, Field(ge=-180.0, le=180.0)]
@@ -19,6 +20,7 @@ Seconds = Annotated[float, Field(ge=0.0, le=LONGEST_S)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
 FieldNumber = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 Geo = tuple[Latitude, Longitude]
+Pulse = Annotated[int, Field(ge=PULSES_US.start, lt=PULSES_US.stop)]
 
 UNDER_WAY = (Leg.TRAVEL, Leg.STAY, Leg.WAIT)
 MAX_TARGETS = 1_000_000
@@ -133,6 +135,8 @@ class SavedState(Part):
     ground: SavedGround
     tally: SavedTally
     draws: SavedDraws | None
+    sticks_us: tuple[Pulse, Pulse] | None = None
+    """Where the pilot's sticks rested, steering and throttle; None where they were not seen."""
 
     @property
     def reached(self) -> int:

@@ -48,6 +48,7 @@ class Snapshot:
     subdivisions: int
     tally: SavedTally
     draws: Mapping[str, Any] | None
+    sticks_us: tuple[int, int] | None
 
 
 def saved_state(now: Snapshot) -> SavedState:
@@ -78,6 +79,7 @@ def saved_state(now: Snapshot) -> SavedState:
         ground=ground,
         tally=now.tally,
         draws=None if now.draws is None else _draws(now.draws),
+        sticks_us=now.sticks_us,
     )
 
 

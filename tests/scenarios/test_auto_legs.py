@@ -292,3 +292,14 @@ def test_a_battery_that_runs_low_in_a_leg_is_the_autopilots_affair(tmp_path: Pat
     rig.finish(120.0)
     assert rig.companion.outcome.complete
     assert not any(text.startswith("Returning") for text in rig.texts())
+
+
+def test_a_run_of_auto_that_is_taken_up_leaves_a_rover_in_guided_to_its_person(tmp_path: Path) -> None:
+    rig = in_leg(tmp_path)
+    rig.pilot_mode(GUIDED)
+    rig.sleep_until_s(rig.now_s() + 1.0)  # the companion is dead
+    rig.restart_companion(as_file(tmp_path, ROUND_THE_WALL), resume=True)
+    since_s = rig.now_s()
+    rig.run_for(15.0)
+    assert_silent_since(rig, since_s)
+    assert "a person to arm and to set AUTO" in rig.companion.status().doing

@@ -18,7 +18,8 @@ from companion.safety import Control
 from companion.startup import LEFT_S
 from companion.state.format import decoded
 from companion.state.model import SavedState
-from tests.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, yard
+from tests.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, without, yard
+from tests.scenarios.test_safety_pilot import hold_sticks
 
 TWO = GATE + 'hold_s = 1.0\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
 UP_S = 45.0
@@ -177,6 +178,26 @@ def test_a_rover_that_cannot_be_driven_again_stands_and_is_left_to_a_person_in_h
     assert rig.companion.outcome.complete
 
 
+@pytest.mark.parametrize("data", ["good", "missing"])
+def test_sticks_that_were_taken_hold_of_while_the_companion_was_dead_take_the_rover(tmp_path: Path, data: str) -> None:
+    rig, mission = rig_of(tmp_path)
+    rig.until_driven(8.0)
+    rig.run_for(5.0)  # long enough for a state with sticks
+    kill_and_resume(rig, mission)
+    rig.change = without("OBSTACLE_DISTANCE") if data == "missing" else None
+    since_s = rig.now_s()
+    hold_sticks(rig, 1700, 1300, 4.0)
+    assert rig.mode == HOLD, rig.texts()
+    assert "HOLD: the sticks were moved" in rig.texts()
+    held_s = next(one.time_s for one in rig.sent_since(since_s) if one.command == SET_MODE)
+    assert held_s - since_s <= 1.5
+    assert all(one.is_standstill for one in rig.sent_since(since_s) if one.is_setpoint and data == "missing")
+    assert not [one for one in rig.sent_since(held_s + 0.01) if one.is_setpoint]
+    rig.change = None
+    rig.run_for(10.0)
+    assert rig.mode == HOLD
+
+
 def lose_power(rig: Rig, mission: Mission) -> None:
     """Of the whole rover, autopilot and companion; it is back at once."""
     rig.simulator._reboot()
@@ -188,6 +209,8 @@ def test_after_a_loss_of_power_it_arms_and_goes_on_where_it_was(tmp_path: Path) 
     rig.until(lambda: "Heading for corner" in rig.texts())
     rig.run_for(2.0)
     lose_power(rig, mission)
+    rig.until(lambda: rig.companion.vehicle.ekf_ok and rig.companion.vehicle.position is not None, 60.0)
+    assert goes_on_after_s(rig, rig.now_s()) <= RESUMED_S
     rig.finish()
     assert rig.companion.outcome.complete, rig.texts()
     assert "Reached gate" not in rig.texts()

@@ -156,6 +156,43 @@ def test_armed_in_manual_at_connection_it_waits_for_a_person(tmp_path: Path) -> 
     assert_reached(rig)
 
 
+@pytest.mark.parametrize("arm", [False, True])
+@pytest.mark.parametrize("ends", ["HOLD", "disarmed"])
+def test_a_person_who_drives_and_stops_before_the_first_metre_keeps_the_rover(
+    tmp_path: Path, ends: str, arm: bool
+) -> None:
+    rig = Rig(yard(tmp_path), late_s=50.0, arm=arm)
+    rig.pilot(ARM, 1)
+    rig.until(lambda: "somebody is driving" in rig.companion.status().doing, 3.0)
+    since_s = rig.now_s()
+    if ends == "HOLD":
+        rig.pilot_mode(HOLD)
+    else:
+        rig.pilot(ARM, 0)
+        rig.run_for(5.0)
+        rig.pilot(ARM, 1)
+    rig.run_for(10.0)
+    assert not [one for one in rig.sent_since(since_s) if one.moves_or_changes]
+    assert "a person to set GUIDED" in rig.companion.status().doing
+    rig.pilot_mode(GUIDED)
+    assert_reached(rig)
+
+
+def test_a_person_who_takes_it_out_of_guided_before_the_first_metre_keeps_the_rover(tmp_path: Path) -> None:
+    rig = Rig(yard(tmp_path), late_s=50.0, arm=False)
+    rig.change = without("LOCAL_POSITION_NED")
+    rig.pilot_mode(GUIDED)
+    rig.pilot(ARM, 1)
+    rig.until(lambda: rig.mode == GUIDED and rig.armed, 3.0)
+    rig.pilot_mode(HOLD)
+    rig.until(lambda: rig.mode == HOLD, 3.0)
+    rig.change, since_s = None, rig.now_s()
+    rig.run_for(10.0)
+    assert not [one for one in rig.sent_since(since_s) if one.moves_or_changes]
+    rig.pilot_mode(GUIDED)
+    assert_reached(rig)
+
+
 # --- data that goes silent or bad -----------------------------------------------------------------------------------
 
 
