@@ -26,8 +26,8 @@ class Beside:
 
     @property
     def behind(self) -> bool:
-        """Whether jobs wait; asked by a job, whether others follow it."""
-        return not self._jobs.empty()
+        """Asked by a job: whether others follow it."""
+        return self._given - self._done > 1
 
     def put(self, job: Job) -> None:
         """One more; returns at once."""
