@@ -29,12 +29,13 @@ from companion.newest import newest_ranges
 from companion.outbox import Outbox
 from companion.output_check import OutputCheck
 from companion.oversight import Oversight
+from companion.overview import status_of, statuses_of
 from companion.plan_watch import PlanWatch
 from companion.pursuit import Pursuit
 from companion.recorder import DecisionLog
 from companion.reporting import Outcome, Reporter, Status
 from companion.rounds import Mark
-from companion.safety import Control, Reaction, Watch, awaited, check, latched
+from companion.safety import Control, Reaction, Verdict, Watch, awaited, check, latched
 from companion.setting_out import SettingOut
 from companion.settings import Settings
 from companion.speaking import Speaker
@@ -187,24 +188,11 @@ class Companion:
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
-        if self._pursuit is None:
-            return [(target.name, TargetStatus.PENDING) for target in self._mission.targets]
-        return self._pursuit.statuses()
+        return statuses_of(self._mission, self._pursuit)
 
     def status(self) -> Status:
         """A picture of this moment."""
-        now_s, pursuit = self._clock.now_s(), self._pursuit
-        return Status(
-            time_s=now_s,
-            doing=self._reporter.doing,
-            pose=self.vehicle.pose_at(now_s),
-            decision=pursuit.driver.decision if pursuit else None,
-            target=pursuit.itinerary.goal.name if pursuit and not pursuit.itinerary.ended else "",
-            targets_reached=pursuit.reached if pursuit else 0,
-            targets=len(self._mission.targets),
-            steps=pursuit.driver.tally.steps if pursuit else 0,
-            news=tuple(self._reporter.news),
-        )
+        return status_of(self._clock.now_s(), self.vehicle, self._mission, self._pursuit, self._reporter)
 
     # Listening ---------------------------------------------------------------------------------------------------
 
@@ -262,15 +250,23 @@ class Companion:
         if self._whereabouts.must_ask(now_s):
             self._autopilot.ask_places()
         before = self.watch.control
-        doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason
-        doubt = doubt or self.oversight.doubt(self._pursuit, self.vehicle.pose_at(now_s), now_s)
+        doubt = self._doubt(self._pursuit, now_s)
         self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, doubt)
-        if verdict.reaction is Reaction.DRIVE:
-            if self._stopped or before is not Control.COMPANION:
-                self._start_afresh()
-            self._stopped = False
-            self._drive(self._pursuit, now_s)
+        if verdict.reaction is not Reaction.DRIVE:
+            self._refrain(verdict, before, now_s)
             return
+        if self._stopped or before is not Control.COMPANION:
+            self._start_afresh()
+        self._stopped = False
+        self._drive(self._pursuit, now_s)
+
+    def _doubt(self, pursuit: Pursuit, now_s: float) -> str:
+        """Why the rover must not be driven now, besides old data and modes; empty when it may."""
+        doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason
+        return doubt or self.oversight.doubt(pursuit, self.vehicle.pose_at(now_s), now_s)
+
+    def _refrain(self, verdict: Verdict, before: Control, now_s: float) -> None:
+        """Stop, HOLD or silence. ``before``: who drove until now."""
         if not self._stopped:
             self._start_afresh()
         self._stopped = True
