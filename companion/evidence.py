@@ -16,11 +16,11 @@ DIAGONAL = math.sqrt(2.0)
 @njit(cache=True, nogil=True)
 def cast_scan(
     log_odds, stamps, stamp, x0, y0, heading_rad, bearing_rad, range_cells, min_cells, max_cells, width_rad,
-    depth_cells, kept_cells, radius_cells, hit, miss, limit, free_limit,
+    witnessed, depth_cells, kept_cells, radius_cells, hit, miss, limit, free_limit,
 ):  # fmt: skip
     """Add one scan to the evidence. Lengths are in evidence cells, (x0, y0) is the sensor, headings clockwise from north.
 
-    The last ``kept_cells`` before a hit are not freed.
+    The last ``kept_cells`` before a hit are not freed, nor are the cells ``witnessed``: shape (n, 2), x and y, all of the map.
     """
     height, width = log_odds.shape
     # Hits first: a cell stamped by a hit cannot be freed by another beam of the same scan.
@@ -34,6 +34,8 @@ def cast_scan(
         if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
             stamps[y, x] = stamp
             log_odds[y, x] = min(log_odds[y, x] + hit, limit)
+    for i in range(witnessed.shape[0]):
+        stamps[witnessed[i, 1], witnessed[i, 0]] = stamp
     for i in range(bearing_rad.size):
         r = range_cells[i]
         if math.isnan(r):

@@ -8,7 +8,7 @@ in its middle would touch something; beside obstacles the mission's own weight i
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,7 @@ from companion.grid import Cell, Grid
 from companion.scan import RangeScan
 from companion.settings import MappingSettings
 from companion.swept import Ground
+from companion.witnesses import Witnesses
 
 MAX_EVIDENCE_CELLS = 16_000_000
 MAX_SOFT_WEIGHT = 0.9
@@ -43,6 +44,7 @@ class EvidenceMap:
     subdivisions: int
     rover_radius_m: float
     settings: MappingSettings
+    witnesses: Witnesses = field(default_factory=Witnesses)
 
     @property
     def evidence_m(self) -> float:
@@ -82,19 +84,21 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
     """Take one scan into the map; ``stamp`` must differ from scan to scan.
 
     A beam frees the cells it passed and hardens the one it ended in; in one scan a hit outweighs any number of passes, and
-    each cell changes once. The ground under the rover is free.
+    each cell changes once; what another sensor has just seen it does not free. The ground under the rover is free.
     """
     settings = evidence.settings
     scale = 1.0 / evidence.evidence_m
     x0 = (pose.east_m - evidence.base.south_west.east_m) * scale
     y0 = (pose.north_m - evidence.base.south_west.north_m) * scale
+    witnessed = evidence.witnesses.others(scan)
     cast_scan(
         evidence.log_odds, evidence.stamps, np.int32(stamp), x0, y0, pose.heading_rad,
         scan.bearing_rad, scan.range_m * scale, scan.min_range_m * scale, scan.max_range_m * scale, scan.beam_width_rad,
-        settings.hit_depth_m * scale, settings.narrow_kept_m * scale if scan.is_narrow else 0.0,
+        witnessed, settings.hit_depth_m * scale, settings.narrow_kept_m * scale if scan.is_narrow else 0.0,
         evidence.rover_radius_m * scale,
         settings.hit, settings.miss, settings.limit, settings.free_limit,
     )  # fmt: skip
+    evidence.witnesses.note(scan, _hit_cells(evidence, pose, scan))
     reach = math.ceil(scan.max_range_m / evidence.base.resolution_m) + 1 + _soft_reach(evidence)
     cell = evidence.base.cell_at(pose.point)
     _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
@@ -112,6 +116,7 @@ def forget(evidence: EvidenceMap) -> None:
     """Drop all that was seen (the local frame has moved under it); fences and prior knowledge stay."""
     evidence.log_odds.fill(0.0)
     evidence.penalty.fill(0.0)
+    evidence.witnesses.clear()
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
 
 
@@ -242,6 +247,16 @@ def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
     s = evidence.subdivisions
     blocks = (evidence.log_odds != 0.0).reshape(evidence.base.height, s, evidence.base.width, s)
     return np.asarray(blocks.any(axis=(1, 3)))
+
+
+def _hit_cells(evidence: EvidenceMap, pose: Pose, scan: RangeScan) -> NDArray[np.int64]:
+    """The evidence cells of the map in which its readings ended, shape (n, 2): x and y."""
+    hit = np.isfinite(scan.range_m)
+    angle_rad, end_m = pose.heading_rad + scan.bearing_rad[hit], scan.range_m[hit] + evidence.settings.hit_depth_m
+    ends = np.column_stack((pose.north_m + end_m * np.cos(angle_rad), pose.east_m + end_m * np.sin(angle_rad)))
+    cells = np.floor(in_cells(ends, evidence)).astype(np.int64)
+    height, width = evidence.log_odds.shape
+    return cells[np.all((cells >= 0) & (cells < (width, height)), axis=1)]
 
 
 def _soft_reach(evidence: EvidenceMap) -> int:

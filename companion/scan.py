@@ -28,6 +28,14 @@ class RangeScan:
     max_range_m: float
     beam_width_rad: float
     source: str
+    """What it came in: the kind of message, and the number of the sensor if that bears one."""
+    sender: int = 1
+    """Component id of who sent it; 1 is the autopilot."""
+
+    @property
+    def voice(self) -> tuple[int, str]:
+        """Who speaks here: two components may send the same kind of message, and one component for several sensors."""
+        return self.sender, self.source
 
     @property
     def is_narrow(self) -> bool:

@@ -46,17 +46,17 @@ class _Repeats:
 
 
 class ScanWatch:
-    """One record for every sensor, by the name that its scans bear."""
+    """One record for every sensor, by its sender and the name that its scans bear."""
 
     def __init__(self) -> None:
-        self._last: dict[str, _Repeats] = {}
+        self._last: dict[tuple[int, str], _Repeats] = {}
         self._moved_s: float | None = None
         self._newest_s = -math.inf
 
     @property
     def reason(self) -> str:
         """Why the range data cannot be believed; empty when it can."""
-        for source, one in self._last.items():
+        for (_, source), one in self._last.items():
             if one.stuck and self._newest_s - one.scan.time_s < FORGOTTEN_S:
                 return f"{source} repeats itself"
         return ""
@@ -65,9 +65,9 @@ class ScanWatch:
         """Take note of a scan. Returns whether it fits the place where the rover is now."""
         self._move(scan.time_s, vehicle)
         self._newest_s = scan.time_s
-        last = self._last.get(scan.source)
+        last = self._last.get(scan.voice)
         if last is None or not _same(last.scan, scan):
-            self._last[scan.source] = _Repeats(scan, scan.time_s)
+            self._last[scan.voice] = _Repeats(scan, scan.time_s)
             return True
         last.scan = scan
         by_way_m, by_turn_rad = _telling(scan)

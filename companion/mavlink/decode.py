@@ -187,7 +187,7 @@ class Decoder:
         return False
 
     def _range(self, packet: Packet, time_s: float) -> list[Event]:
-        scan = self._ranges.scan(self._message(packet), time_s, of_autopilot=packet.component_id == AUTOPILOT)
+        scan = self._ranges.scan(self._message(packet), time_s, packet.component_id)
         return [] if scan is None else [RangeSeen(time_s, scan)]
 
     def _rangefinder(self, message: Any, time_s: float) -> Event | None:

@@ -187,7 +187,18 @@ def beams(n: int) -> bytes:
     return packed(mavlink.MAVLink_distance_sensor_message(n, 20, 800, 800, 0, n % 250, n % 8, 0), 1, 159, n)
 
 
-FLOODS = [adsb, reposition, other_systems, texts, list_parameters, set_parameters, told_parameters, beams, nonsense]
+FLOODS = [
+    adsb,
+    reposition,
+    other_systems,
+    texts,
+    list_parameters,
+    set_parameters,
+    told_parameters,
+    lidar,
+    beams,
+    nonsense,
+]
 
 
 def test_a_thousand_messages_a_second_do_not_keep_it_from_its_mission(tmp_path: Path) -> None:
@@ -224,7 +235,7 @@ def test_a_thousand_messages_a_second_do_not_keep_it_from_its_mission(tmp_path: 
 def test_range_data_at_a_thousand_a_second_is_not_mapped_so_often_and_parameters_are_not_hoarded(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Work is counted, not time: of one kind of message at most three a tick."""
+    """Work is counted, not time: of one sensor at most three a tick, and the rover's own lidar ten times a second."""
     mapped = []
     rig = Rig(yard(tmp_path))
     rig.until_driven(1.0)
@@ -237,8 +248,26 @@ def test_range_data_at_a_thousand_a_second_is_not_mapped_so_often_and_parameters
     monkeypatch.setattr(Pursuit, "map_scan", counted)
     rig.garble = lambda data: data + b"".join(map(lidar, range(50))) + b"".join(map(told_parameters, range(50)))
     rig.run_for(1.0)
-    assert 0 < len(mapped) <= 3 * TICK_HZ + 3
+    assert 0 < len(mapped) <= 3 * TICK_HZ + 3 + 12
     assert set(rig.companion.vehicle.parameters) <= PARAMETERS_KEPT
+
+
+@pytest.mark.parametrize(("flood", "hz"), [(lidar, 20), (lidar, 40), (lidar, 1000), (beams, 1000)])
+def test_a_sensor_that_sees_nothing_far_too_often_does_not_hide_the_wall_from_the_one_that_sees_it(
+    tmp_path: Path, flood: Callable[[int], bytes], hz: int
+) -> None:
+    rig = Rig(yard(tmp_path))
+    rig.until_driven(1.0)
+    count = 0
+
+    def flooded(data: bytes) -> bytes:
+        nonlocal count
+        count += hz // TICK_HZ
+        return data + b"".join(flood(n) for n in range(count - hz // TICK_HZ, count))
+
+    rig.garble = flooded
+    rig.finish(60.0)
+    assert rig.companion.outcome.complete and not rig.simulator.collisions, rig.texts()
 
 
 def test_another_vehicle_under_the_rovers_own_ids_is_not_heeded_and_told_once(tmp_path: Path) -> None:

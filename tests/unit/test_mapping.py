@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from companion.mapping import (
 )
 from companion.scan import RangeScan
 from companion.settings import MappingSettings
+from companion.witnesses import BELIEVED_S
 
 SETTINGS = MappingSettings()
 RADIUS_M = 0.35
@@ -77,6 +79,42 @@ class Ground:
 
 
 HERE = Pose(10.5, 10.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("often", [1, 40])
+def test_a_sensor_that_sees_nothing_does_not_outvote_one_that_sees_something(often):
+    """At ten scans a second of the one and any number of another; when the one falls silent, the other is believed."""
+    ground, ahead = Ground(), np.zeros(1)
+    nothing = replace(scan(np.array([np.inf]), ahead), sender=158)
+    ground.take(HERE, nothing, times=often)
+    for i in range(30):
+        ground.take(HERE, replace(scan(np.array([4.0]), ahead), time_s=0.1 * i))
+        ground.take(HERE, replace(nothing, time_s=0.1 * i + 0.05), times=often)
+        assert i < 5 or (10, 14) in ground.obstacles()
+    ground.take(HERE, replace(nothing, time_s=2.9 + BELIEVED_S + 0.01), times=40)
+    assert (10, 14) not in ground.obstacles()
+
+
+def test_a_sensor_frees_at_once_where_it_saw_something_itself():
+    ground, ahead = Ground(), np.zeros(1)
+    ground.take(HERE, scan(np.array([4.0]), ahead), times=3)
+    ground.take(HERE, scan(np.array([np.inf]), ahead), times=12)
+    assert (10, 14) not in ground.obstacles()
+
+
+def test_what_a_moved_map_forgets_it_does_not_keep_from_being_freed():
+    ground, ahead = Ground(), np.zeros(1)
+    ground.take(HERE, scan(np.array([4.0]), ahead), times=3)
+    forget(ground.map)
+    ground.take(HERE, replace(scan(np.array([np.inf]), ahead), sender=158))
+    assert known_fields(ground.map)[11:18, 10].all() and not (ground.map.log_odds > 0.0).any()
+
+
+def test_what_is_seen_beyond_the_map_is_nobodys_cell():
+    ground, round_about = Ground(empty_grid(3, 3)), np.radians([0.0, 90.0, 180.0, 270.0])
+    for sender in (1, 158):
+        ground.take(Pose(1.5, 1.5, 0.3, 0.0), replace(scan(np.full(4, 5.0), round_about), sender=sender))
+    assert known_fields(ground.map).any() and not (ground.map.log_odds > 0.0).any()
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 45.0, 90.0, 180.0, -135.0])

@@ -12,8 +12,8 @@ from companion.newest import MOST_SCANS, SAME, newest_ranges
 from companion.scan import RangeScan
 
 
-def seen(time_s: float, source: str = "obstacle distance", bearing_deg: float = 0.0) -> RangeSeen:
-    scan = RangeScan(time_s, np.array([math.radians(bearing_deg)]), np.array([3.0]), 0.2, 8.0, 0.1, source)
+def seen(time_s: float, source: str = "obstacle distance", bearing_deg: float = 0.0, sender: int = 1) -> RangeSeen:
+    scan = RangeScan(time_s, np.array([math.radians(bearing_deg)]), np.array([3.0]), 0.2, 8.0, 0.1, source, sender)
     return RangeSeen(time_s, scan)
 
 
@@ -28,6 +28,14 @@ def test_of_a_flood_the_newest_of_each_kind_remain_in_their_order() -> None:
     beam = seen(0.5, "distance sensor 1", 90.0)
     kept = newest_ranges([beam, *flood, TextSeen(50.0, 6, "a")])
     assert kept == [beam, *flood[-SAME:], TextSeen(50.0, 6, "a")]
+
+
+def test_a_flood_of_one_sender_leaves_the_same_message_of_another_in_its_place() -> None:
+    lidar = seen(0.0, sender=196)
+    flood = [seen(float(i), f"distance sensor {i % 6}", sender=158) for i in range(50)]
+    again = [seen(float(i), sender=158) for i in range(50)]
+    kept = newest_ranges([lidar, *flood, *again])
+    assert kept[0] is lidar and len(kept) == MOST_SCANS and kept[-SAME:] == again[-SAME:]
 
 
 def test_kinds_without_end_are_too_many_and_nothing_but_range_data_is_left_out() -> None:

@@ -98,6 +98,30 @@ def test_sectors_that_echo_a_rangefinder_are_left_out_in_its_direction_only(list
     assert len(listener.scans(listener.rover.distance(300, 1, sensor_id=11), 10.5)) == 1
 
 
+def test_a_sector_that_sees_what_finer_data_does_not_is_no_echo(listener: Listener) -> None:
+    """The autopilot has a sensor of its own, and somebody else sends that there is nothing."""
+    listener.scans(listener.lidar.cells([801] * 72), 10.0)
+    listener.scans(listener.lidar.distance(2000, 0, sensor_id=0), 10.0)
+    assert listener.scans(listener.rover.distance(2000, 0, sensor_id=10), 10.1) == []
+    (scan,) = listener.scans(listener.rover.distance(300, 0, sensor_id=10), 10.1)
+    assert scan.source == "sector 10" and np.all(scan.range_m == 3.0)
+    listener.scans(listener.lidar.cells([801] * 9 + [300] + [801] * 62), 10.2)
+    assert listener.scans(listener.rover.distance(300, 0, sensor_id=10), 10.3) == []
+    assert len(listener.scans(listener.rover.distance(300, 4, sensor_id=14), 10.3)) == 1
+
+
+def test_ever_new_sensors_do_not_keep_out_those_that_were_there_first(listener: Listener) -> None:
+    crowd = Station(1, 158)
+    listener.scans(listener.lidar.cells([300] * 72), 10.0)
+    taken = sum(
+        len(listener.scans(crowd.distance(300 + n, n % 8, sensor_id=n % 250), 10.0 + 0.001 * n)) for n in range(1000)
+    )
+    assert 0 < taken < 100
+    (scan,) = listener.scans(listener.lidar.cells([301] * 72), 11.0)
+    assert scan.voice == (196, "obstacle distance")
+    assert len(listener.scans(crowd.distance(900, 0, sensor_id=251), 20.0)) == 1, "who falls silent gives up its place"
+
+
 def test_a_sensor_10_of_another_component_is_no_sector(listener: Listener) -> None:
     listener.scans(listener.lidar.cells([300] * 72), 10.0)
     (scan,) = listener.scans(listener.lidar.distance(300, 0, sensor_id=10), 10.1)

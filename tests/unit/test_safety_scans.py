@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,6 +94,15 @@ def test_it_is_believed_again_when_it_says_something_else_and_another_sensor_doe
     assert watch.reason
     assert watch.take(scan(4.0, [one + 0.01 for one in MANY]), vehicle(4.0, *MOTION["standing"]))
     assert not watch.reason
+
+
+def test_a_stuck_sensor_does_not_hide_behind_another_component_with_the_same_message():
+    watch = ScanWatch()
+    for i in range(20):
+        watch.take(scan(0.1 * i, MANY), vehicle(0.1 * i, *MOTION["driving"]))
+        another = replace(scan(0.1 * i, [2.0 + 0.01 * i] * 72), sender=158)
+        watch.take(another, vehicle(0.1 * i, *MOTION["driving"]))
+    assert watch.reason == "lidar repeats itself"
 
 
 @needs_shared
