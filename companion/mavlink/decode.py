@@ -175,10 +175,13 @@ class Decoder:
         return False
 
     def _is_late(self, message: Any) -> bool:
-        """Whether a newer message of this kind has been heard; notices a restart, after which nothing old holds."""
+        """Whether this message, or a newer one of its kind, has been heard; notices a restart, after which nothing old holds.
+
+        One that comes again and again is as old as its boot time says: what it tells grows stale as if nothing came.
+        """
         message_id, now_ms = message.get_msgId(), message.time_boot_ms
-        newest_ms = self._newest_ms.get(message_id, 0)
-        if newest_ms - REBOOT_MS < now_ms < newest_ms:
+        newest_ms = self._newest_ms.get(message_id, -1)
+        if newest_ms - REBOOT_MS < now_ms <= newest_ms:
             return True
         if now_ms < newest_ms:
             self.origin = None

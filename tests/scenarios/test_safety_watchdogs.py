@@ -89,6 +89,49 @@ def test_a_lidar_that_repeats_itself_for_ever_ends_in_hold_however_often_a_perso
     assert modes_asked_for(rig, since_s) == [HOLD] * 3
 
 
+# --- packets that come again and again --------------------------------------------------------------------------------
+
+
+class Again:
+    """In place of every message of a kind comes the first, with the boot time that it had then."""
+
+    def __init__(self, *kinds: str) -> None:
+        self._first: dict[str, Any] = {}
+        self._kinds = kinds
+
+    def __call__(self, message: Any) -> Any:
+        kind = message.get_type()
+        return self._first.setdefault(kind, message) if kind in self._kinds else message
+
+
+@pytest.mark.parametrize("lost", [(), ("TIMESYNC",)])
+@pytest.mark.parametrize(("kind", "name"), [("ATTITUDE", "attitude"), ("LOCAL_POSITION_NED", "position")])
+def test_a_packet_that_comes_again_and_again_is_as_old_as_its_boot_time(
+    rig: Rig, kind: str, name: str, lost: tuple[str, ...]
+) -> None:
+    again, lose, since_s = Again(kind), without(*lost), rig.now_s()
+    rig.change = lambda message: None if lose(message) is None else again(message)
+    rig.until(lambda: rig.mode == HOLD, 3.5)
+    assert first_stop_s(rig, since_s) - since_s <= 1.0 + 3 * TICK_S
+    assert any(text.startswith(f"Stopping: {name} silent") for text in rig.texts())
+    assert modes_asked_for(rig, since_s) == [HOLD]
+
+
+@pytest.mark.parametrize("later_ticks", [0, 4])
+def test_a_line_that_delivers_everything_twice_does_no_harm(rig: Rig, later_ticks: int) -> None:
+    waiting = deque([b""] * later_ticks)
+
+    def twice(data: bytes) -> bytes:
+        waiting.append(data)
+        return data + waiting.popleft()
+
+    rig.garble, since_s = twice, rig.now_s()
+    rig.finish()
+    assert rig.companion.outcome.complete and rig.simulator.collisions == ()
+    assert not any(text.startswith("Stopping") for text in rig.texts())
+    assert modes_asked_for(rig, since_s) == [HOLD], "only the one at the end"
+
+
 # --- a late link ----------------------------------------------------------------------------------------------------
 
 

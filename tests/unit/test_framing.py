@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events.vehicle import HeartbeatSeen, LocalPositionSeen
+from companion.events.vehicle import AttitudeSeen, HeartbeatSeen, LocalPositionSeen
 from companion.mavlink.codec import Codec
 from companion.mavlink.framing import Framer
 from companion.settings import LinkSettings
@@ -101,6 +101,19 @@ def test_packets_that_overtake_each_other_do_not_bring_old_positions_back() -> N
     events = codec.decode(new + old, 1.0)
     assert [event.boot_s for event in events if isinstance(event, LocalPositionSeen)] == [10.1]
     assert codec.boot_s == 10.1
+
+
+def test_an_attitude_or_position_counts_once() -> None:
+    """Each kind has a time of its own: two messages of the same moment are both taken."""
+    rover, codec = Station(), Codec(LinkSettings())
+    codec.decode(rover.heartbeat(), 0.0)
+    taken: dict[type, list[float]] = {LocalPositionSeen: [], AttitudeSeen: []}
+    for boot_ms in (0, 0, 10_000, 10_000, 10_020, 10_000, 10_020):
+        attitude = rover.pack(mavlink.MAVLink_attitude_message(boot_ms, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0))
+        for event in codec.decode(rover.local_position(boot_ms) + attitude, 1.0):
+            assert isinstance(event, LocalPositionSeen | AttitudeSeen)
+            taken[type(event)].append(event.boot_s)
+    assert taken == {LocalPositionSeen: [0.0, 10.0, 10.02], AttitudeSeen: [0.0, 10.0, 10.02]}
 
 
 def test_a_restart_of_the_autopilot_is_noticed() -> None:
