@@ -17,7 +17,7 @@ from companion.mapping import EvidenceMap, Unseen, ground_of, in_cells, look_alo
 from companion.route import STEP_M, Route
 from companion.settings import GuidanceSettings
 from companion.stopping import blind_distance_m, farthest_m, fastest_blind_m_s, overshoot_m
-from companion.swept import UNSEEN, arc_clear, kept_room
+from companion.swept import BLOCKED, UNSEEN, arc_clear, kept_room
 
 BACK_LEAST_M_S = 0.2
 """Where there is less room behind than this needs, it does not back out at all."""
@@ -168,8 +168,14 @@ def arc_is_free(pose: Pose, target: NedPoint, evidence: EvidenceMap, rover: Rove
 
 
 def backing_speed_m_s(pose: Pose, evidence: EvidenceMap, radius_m: float, settings: GuidanceSettings) -> float:
-    """How fast a rover may be told to back off: it goes on until the velocity is forgotten, should nothing more be said."""
-    fastest_m_s = settings.back_out_speed_m_s
-    behind = pose.point.moved(pose.heading_rad + math.pi, blind_distance_m(fastest_m_s, settings))
-    line = look_along(evidence, pose.point, behind, radius_m + settings.clearance_m)
-    return min(fastest_m_s, fastest_blind_m_s(min(line.clear_m, line.seen_m), settings))
+    """How fast a rover may be told to back off: it goes on until the velocity is forgotten, should nothing more be said.
+
+    Closed fields count from the first one on that it does not stand in: a line looked along passes over those that begin close by.
+    """
+    fastest_m_s, scale, ground = settings.back_out_speed_m_s, 1.0 / evidence.evidence_m, ground_of(evidence, pose)
+    tail_rad, reach_m = pose.heading_rad + math.pi, blind_distance_m(fastest_m_s, settings)
+    line = look_along(evidence, pose.point, pose.point.moved(tail_rad, reach_m), radius_m + settings.clearance_m)
+    x, y = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0].tolist()
+    room = kept_room(ground, x, y, radius_m * scale, 0.0)
+    open_m = arc_clear(ground, x, y, tail_rad, 0.0, room, reach_m * scale, BLOCKED) / scale
+    return min(fastest_m_s, fastest_blind_m_s(min(line.clear_m, line.seen_m, open_m), settings))

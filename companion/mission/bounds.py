@@ -19,7 +19,9 @@ from companion.mission.fence import AutopilotFence
 from companion.mission.mission import Area, Mission
 
 SLACK_M = 0.05
-"""A rover that stands nearer to a border than it should may not come nearer still by more than this: positions wander."""
+"""A rover may come nearer to a border than it should by no more than this: positions wander."""
+NEARER_M = 0.01
+"""One that is nearer still comes no nearer at all; so much is no way."""
 ROUND = 1.0 / math.cos(math.pi / (4 * CIRCLE_QUARTER))
 """A circle drawn with corners on it lies inside of it; one that keeps out is drawn so much larger."""
 OURS = "the autopilot's fence"
@@ -88,7 +90,8 @@ class Bounds:
         way, here = shapely.LineString(places), shapely.Point(places[0])
         for bound in self._near(way):
             depth_m = bound.depth_m(way)
-            if not (depth_m > 0.0 and depth_m >= min(bound.body_m, bound.depth_m(here)) - SLACK_M):
+            least_m = min(bound.body_m - SLACK_M, bound.depth_m(here) - NEARER_M)
+            if not (depth_m > 0.0 and depth_m >= least_m):
                 return bound.name
         return ""
 

@@ -8,7 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from PIL import Image
 
+from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.settings import Settings, parse_settings
 from tests.asker import Asker
@@ -44,6 +46,47 @@ class Watched(Rig):
 
 def driven(tmp_path: Path, prepare: object, settings: Settings | None = None, **more: object) -> Watched:
     return Watched(yard(tmp_path), settings, prepare=prepare, **more)  # type: ignore[arg-type]
+
+
+STRIP = """
+name = "Strip"
+[grid]
+size = [30, 20]
+home = [2, 10]
+[rover]
+cruise_speed_m_s = 2.0
+turning_radius_m = 1.5
+[sitl]
+world = "strip.png"
+heading_deg = 90.0
+sensors = "lidar-360"
+[[keep_in]]
+polygon_m = [[-3.0, -1.5], [-3.0, 16.0], [3.0, 16.0], [3.0, -1.5]]
+[[keep_out]]
+north_m = 0.3
+east_m = 8.0
+radius_m = 1.2
+"""
+CORNERS = ((2.2, 15.3), (-2.3, 15.2), (-2.3, 0.5), (2.3, 14.0))
+
+
+def test_who_cannot_turn_on_the_spot_keeps_inside_a_narrow_strip_by_itself(tmp_path: Path) -> None:
+    """Targets in the corners: it has to back out again and again. Guidance itself asks for nothing that the last look refuses."""
+    Image.new("L", (30, 20), 255).save(tmp_path / "strip.png")
+    targets = "".join(f"[[target]]\nnorth_m = {north_m}\neast_m = {east_m}\n" for north_m, east_m in CORNERS)
+    (tmp_path / "strip.toml").write_text(STRIP + targets)
+    rig = Watched(load_mission(tmp_path / "strip.toml"), seed=2)
+    inside_m = []
+    while not rig.companion.done:
+        rig.companion.tick()
+        pose = rig.companion.vehicle.pose_at(rig.now_s())
+        if pose is not None:
+            inside_m.append(min(3.0 - abs(pose.north_m), pose.east_m + 1.5, 16.0 - pose.east_m))
+        assert rig.now_s() < 400.0
+    assert rig.companion.outcome.complete and rig.companion.output_check.refused == {}
+    assert min(inside_m) >= 0.35, "by the position that it is told: the whole body"
+    assert min(min(3.0 - abs(north_m), 16.0 - east_m) for north_m, east_m in rig.track) > 0.0
+    assert rig.companion.driver is not None and rig.companion.driver.tally.stuck > 0
 
 
 def changes(rig: Rig) -> list[int]:

@@ -191,6 +191,18 @@ def test_a_way_that_crosses_a_border_is_found(
     assert name in fault and bool(name) == bool(fault)
 
 
+def test_who_stands_too_near_comes_no_nearer_however_often_it_is_asked() -> None:
+    bounds, north_m = Bounds([Bound("b", shapely.box(-20.0, -20.0, 20.0, 20.0), True, 0.35, 0.35)]), 19.6
+    for _ in range(100):
+        nearer = NedPoint(north_m + 0.04, 0.0)
+        if not bounds.fault([NedPoint(north_m, 0.0), nearer]):
+            north_m = nearer.north_m
+    assert 19.6 < north_m <= 19.7 + 1e-9
+    for start_m in (19.6, 19.75, 19.95):
+        assert bounds.fault([NedPoint(start_m, 0.0), NedPoint(start_m, 5.0)]) == "", "beside the border"
+        assert bounds.fault([NedPoint(start_m, 0.0), NedPoint(start_m - 1.0, 5.0)]) == "", "away from it"
+
+
 def test_a_rover_begins_with_the_whole_margin_or_not_at_all(walled: Bounds) -> None:
     assert walled.too_near(NedPoint(17.9, 0.0)) == ""
     assert "2 m or more inside the autopilot's fence (inclusion area 1)" in walled.too_near(NedPoint(18.2, 0.0))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -19,7 +20,7 @@ from companion.guidance import STOP, Guide, Motion
 from companion.mapping import EvidenceMap, new_map
 from companion.mission.bounds import Bound, Bounds
 from companion.output_check import Output, OutputCheck, Surroundings, fault_of, inside_borders
-from companion.reach import RoverLimits
+from companion.reach import BACK_LEAST_M_S, RoverLimits, backing_speed_m_s
 from companion.settings import Settings
 from companion.stopping import farthest_m
 from tests.rig import Rig, yard
@@ -116,6 +117,27 @@ def test_a_velocity_that_passes_can_be_stopped_on_its_arc(evidence: EvidenceMap,
         north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
         course_rad += 0.02 * curvature_m
         assert gap_m(standing, north_m, east_m) > RADIUS_M - 0.05 - evidence.evidence_m
+
+
+CELLS = st.sets(st.tuples(st.integers(0, SIDE - 1), st.integers(0, SIDE - 1)), max_size=60)
+
+
+@runs(max_examples=400, deadline=None)
+@given(grounds(), CELLS, POSITIONS)
+def test_backing_out_asks_for_nothing_that_is_refused(
+    evidence: EvidenceMap, closed: set[tuple[int, int]], output: Output
+) -> None:
+    """Neither fences nor what stands there: also where the rover stands close beside closed fields, or in one."""
+    for x, y in closed:
+        evidence.base.weights[y, x] = 1.0
+    speed_m_s = backing_speed_m_s(output.pose, evidence, RADIUS_M, SETTINGS.guidance)
+    back = replace(output, setpoint=GuidedVelocity(-speed_m_s, 0.0))
+    assert speed_m_s < BACK_LEAST_M_S or fault_of(back, surroundings(evidence)) == ""
+
+
+def test_on_open_ground_it_backs_out_as_fast_as_it_may() -> None:
+    back_m_s = backing_speed_m_s(Pose(MIDDLE, MIDDLE, 0.7, 0.0), open_ground(), RADIUS_M, SETTINGS.guidance)
+    assert back_m_s == SETTINGS.guidance.back_out_speed_m_s
 
 
 @runs(max_examples=200, deadline=None)
