@@ -131,8 +131,8 @@ def data_reason(vehicle: VehicleState, now_s: float, settings: SafetySettings) -
             return f"no {name}"
         if now_s - event.time_s > limit_s:
             return f"{name} silent for over {limit_s:g} s"
-    if not vehicle.ekf_ok:
-        return "EKF has no position"
+    if vehicle.ekf_lacks:
+        return f"EKF has no {vehicle.ekf_lacks}"
     if now_s - vehicle.latency.jumped_s < settings.settle_s:
         return "the autopilot's clock has jumped"
     if vehicle.latency.lasting_s > settings.latency_s:

@@ -35,9 +35,12 @@ from companion.latency import BACK_S, Latency, TimeAnswered, answered, reported
 from companion.reckoning import Reckoned, Wander, jump_m, reckoned, wandered
 from companion.sticks import Sticks, SticksSeen, followed
 
+EKF_ATTITUDE, EKF_VELOCITY = 1, 2
+"""ATTITUDE and VELOCITY_HORIZ must both be set to drive."""
 EKF_POSITION = 8 | 16
 """POS_HORIZ_REL or POS_HORIZ_ABS: one of them must be set to drive."""
 EKF_CONST_POSITION = 128
+"""CONST_POS_MODE must not be set. No other flag counts: GPS_GLITCH alone stops neither ArduRover nor us."""
 PARAMETERS_KEPT = frozenset(
     ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS", "WP_RADIUS")
 )
@@ -121,10 +124,19 @@ class VehicleState:
         return self.latency.longest_s
 
     @property
-    def ekf_ok(self) -> bool:
-        """Whether the autopilot trusts its own position."""
+    def ekf_lacks(self) -> str:
+        """What the autopilot does not trust of its own estimate, in a word; empty when the rover may be driven by it."""
         flags = 0 if self.ekf is None else self.ekf.flags
-        return bool(flags & EKF_POSITION) and not flags & EKF_CONST_POSITION
+        if not flags & EKF_POSITION or flags & EKF_CONST_POSITION:
+            return "position"
+        if not flags & EKF_ATTITUDE:
+            return "attitude"
+        return "" if flags & EKF_VELOCITY else "velocity"
+
+    @property
+    def ekf_ok(self) -> bool:
+        """Whether the autopilot trusts its own estimate."""
+        return not self.ekf_lacks
 
 
 def fold(state: VehicleState, event: Event) -> VehicleState:

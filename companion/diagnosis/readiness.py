@@ -33,7 +33,7 @@ def position(seen: Examined) -> Iterator[Finding]:
     if vehicle.ekf is None:
         says, remedy = "EKF_STATUS_REPORT does not come.", "look at the rates of this port"
         yield Finding("ekf", Level.STOP, says, remedy)
-    elif not vehicle.ekf_ok:
+    elif vehicle.ekf_lacks == "position":
         flags = vehicle.ekf.flags
         why = "it only knows where it began" if flags & EKF_CONST_POSITION else "it has none"
         why = (
@@ -45,6 +45,11 @@ def position(seen: Examined) -> Iterator[Finding]:
         says = f"The EKF has no position: {why}."
         yield Finding(
             "ekf", Level.STOP, says, "wait for GPS under open sky (about 45 s), or set up another source of position"
+        )
+    elif vehicle.ekf_lacks:
+        says = f"The EKF has no {vehicle.ekf_lacks}."
+        yield Finding(
+            "ekf", Level.STOP, says, "let the rover stand until it has, and look at the messages of the autopilot"
         )
     if vehicle.origin is None or vehicle.home is None:
         what = " and ".join(name for name, one in (("origin", vehicle.origin), ("home", vehicle.home)) if one is None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -196,10 +197,15 @@ def test_a_person_who_takes_it_out_of_guided_before_the_first_metre_keeps_the_ro
 # --- data that goes silent or bad -----------------------------------------------------------------------------------
 
 
-def bad_ekf(message: Any) -> Any:
-    if message.get_type() == "EKF_STATUS_REPORT":
-        message.flags = 128 | 1
-    return message
+def ekf_flags(clear: int = 0, set_too: int = 0) -> Callable[[Any], Any]:
+    """EKF_STATUS_REPORT with some flags changed."""
+
+    def changed(message: Any) -> Any:
+        if message.get_type() == "EKF_STATUS_REPORT":
+            message.flags = message.flags & ~clear | set_too
+        return message
+
+    return changed
 
 
 FAULTS = {
@@ -207,8 +213,16 @@ FAULTS = {
     "position": without("LOCAL_POSITION_NED"),
     "attitude": without("ATTITUDE"),
     "EKF status": without("EKF_STATUS_REPORT"),
-    "EKF has no position": bad_ekf,
+    "EKF has no position": ekf_flags(clear=8 | 16, set_too=128),
+    "EKF has no attitude": ekf_flags(clear=1),
+    "EKF has no velocity": ekf_flags(clear=2),
 }
+
+
+def test_the_flag_of_a_gps_glitch_alone_does_not_stop_it_as_it_does_not_stop_ardurover(rig: Rig) -> None:
+    rig.change = ekf_flags(set_too=32768)
+    rig.finish()
+    assert rig.companion.outcome.complete and not any(text.startswith("Stopping") for text in rig.texts())
 
 
 @pytest.mark.parametrize("name", FAULTS)

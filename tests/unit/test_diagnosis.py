@@ -102,6 +102,7 @@ CASES: list[tuple[str, Level, Examined]] = [
     ("ekf", S, with_state(ekf=None)),
     ("ekf", S, with_state(ekf=EkfStatusSeen(0.0, 1 | 128))),
     ("ekf", S, with_state(ekf=EkfStatusSeen(0.0, 1024))),
+    ("ekf", S, with_state(ekf=EkfStatusSeen(0.0, 831 & ~1))),
     ("origin", S, with_state(origin=None)),
     ("origin", S, with_state(home=None)),
     ("no-position", S, with_state(position=None)),

@@ -121,7 +121,7 @@ def test_boot_leads_to_a_rover_that_may_be_armed() -> None:
         if isinstance(event, AckSeen) and event.command == 400:
             arming.append(event.result)
         if isinstance(event, PrearmSeen) and event.ok:
-            ready_before_gps.append(not state.ekf_ok)
+            ready_before_gps.append(state.ekf_lacks == "position")
     assert modes[0] == (16, False), "INITIALISING"
     assert (RoverMode.MANUAL, False) in modes
     assert modes[-1][0] == RoverMode.GUIDED

@@ -180,7 +180,7 @@ def test_what_is_missing_or_stale_is_unsafe(name):
 
 
 @pytest.mark.parametrize(
-    ("flags", "ok"), [(831, True), (8, True), (16, True), (7, False), (831 | 128, False), (0, False)]
+    ("flags", "ok"), [(831, True), (3 | 8, True), (3 | 16, True), (7, False), (831 | 128, False), (0, False)]
 )
 def test_the_ekf_must_have_a_position(flags, ok):
     assert (unsafe_reason(vehicle(ekf=flags), 10.0, SETTINGS) == "") is ok

@@ -129,11 +129,25 @@ def test_speed_over_ground() -> None:
 
 
 @pytest.mark.parametrize(
-    ("flags", "ok"), [(None, False), (0, False), (1024, False), (8, True), (16, True), (831, True), (831 | 128, False)]
+    ("flags", "lacks"),
+    [
+        (None, "position"),
+        (0, "position"),
+        (1024, "position"),
+        (831, ""),
+        (1 | 2 | 8, ""),
+        (1 | 2 | 16, ""),
+        (831 & ~(8 | 16), "position"),
+        (831 | 128, "position"),
+        (167, "position"),
+        (831 & ~1, "attitude"),
+        (831 & ~2, "velocity"),
+        (831 | 32768, ""),
+    ],
 )
-def test_ekf_flags(flags: int | None, ok: bool) -> None:
+def test_ekf_flags(flags: int | None, lacks: str) -> None:
     state = VehicleState() if flags is None else fold(VehicleState(), EkfStatusSeen(1.0, flags))
-    assert state.ekf_ok is ok
+    assert state.ekf_lacks == lacks
 
 
 def test_driving_is_no_jump_but_a_reset_is() -> None:
