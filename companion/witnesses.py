@@ -32,7 +32,8 @@ class Witnesses:
         """The cells in which other sensors than the one of this scan have just seen something."""
         while self._seen and self._seen[0][0] < scan.time_s - BELIEVED_S:
             self._seen.popleft()
-        cells = [cells for _, voice, cells in self._seen if voice != scan.voice]
+        own = scan.voice
+        cells = [cells for _, voice, cells in self._seen if voice != own]
         return np.concatenate(cells) if cells else NONE
 
     def clear(self) -> None:
