@@ -48,7 +48,7 @@ class Source:
     ) -> Mission | None:
         """The mission; None when a signal came while it was being fetched. Raises MissionError, LinkError."""
         if self._file is not None:
-            return load_mission(self._file)
+            return load_mission(self._file, simulated=False)
         autopilot = AutopilotLink(self.link(), Codec(settings.link, signer=signer), settings.link)
         fetching = Fetching(autopilot, WallClock(), settings.link.tick_hz)
         stop.listener, shown = fetching, ""

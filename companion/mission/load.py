@@ -10,8 +10,8 @@ from companion.mission.qgc import SUFFIXES, load_qgc
 from companion.mission.toml_file import load as load_toml
 
 
-def load_mission(path: Path) -> Mission:
-    """Read a mission, ready to be driven; the suffix tells the format.
+def load_mission(path: Path, *, simulated: bool = True) -> Mission:
+    """Read a mission, ready to be driven; the suffix tells the format. ``simulated``: also what only the simulator needs.
 
     ``.toml`` is ours, ``.plan`` QGroundControl's, ``.waypoints``, ``.txt``, ``.mission`` and ``.wpl`` are QGC WPL files.
     Raises MissionError: one line with file, place and reason.
@@ -20,7 +20,7 @@ def load_mission(path: Path) -> Mission:
     if not path.is_file():
         raise MissionError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
     if suffix == ".toml":
-        return load_toml(path)
+        return load_toml(path, simulated=simulated)
     if suffix not in SUFFIXES:
         raise MissionError(f"{path}: suffix '{path.suffix}' is no mission format; known: .toml, {', '.join(SUFFIXES)}")
     mission = load_qgc(path)

@@ -210,9 +210,13 @@ class MissionTable(Table):
     sitl: SitlTable | None = None
 
 
-def load(path: Path) -> Mission:
-    """Read one of our mission files. Raises MissionError: one line with file, place and reason."""
-    mission = _mission(read_table(path, MissionTable, MissionError), path)
+def load(path: Path, *, simulated: bool = True) -> Mission:
+    """Read one of our mission files; ``simulated``: with the files of its ``[sitl]`` table, which a real rover does not need.
+
+    Raises MissionError: one line with file, place and reason.
+    """
+    table = read_table(path, MissionTable, MissionError)
+    mission = _mission(table if simulated else table.model_copy(update={"sitl": None}), path)
     check_mission(mission)
     return mission
 

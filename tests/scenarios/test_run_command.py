@@ -18,6 +18,9 @@ from companion.replay import replay
 from tests.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard
 from tests.served import finished, mission_path, process, served, wait_until
 
+SIMULATED = '[[target]]\nnorth_m = 3.0\neast_m = 0.0\n[sitl]\nworld = "none.png"\nsensors = "none.toml"\nparameters = "none.param"\n'
+"""A mission that has come to a rover without the simulator's files."""
+
 
 def assert_one_line(text: str) -> None:
     assert len(text.strip().splitlines()) == 1 and "Traceback" not in text
@@ -33,11 +36,24 @@ def assert_one_line(text: str) -> None:
         ({"settings": "[safety]\nstale_s = -2.0\n"}, ["settings.toml", "safety.stale_s", "greater than 0"]),
         ({"connect": "bluetooth:1"}, ["bluetooth:1", "udpin:HOST:PORT"]),
         ({"connect": "udpin:127.0.0.1:no"}, ["'no' is not a port"]),
+        ({"text": SIMULATED, "connect": "udpin:127.0.0.1:no"}, ["'no' is not a port"]),
         ({"connect": "tcp:no.such.host.invalid:5760"}, ["no.such.host.invalid", "check the name"]),
         ({"connect": "serial:/dev/none:57600"}, ["/dev/none"]),
         ({"record": "yard.toml/record"}, ["yard.toml/record", "cannot record here", "choose"]),
     ],
-    ids=["mission", "mission key", "not toml", "settings key", "value", "link", "port", "host", "device", "record"],
+    ids=[
+        "mission",
+        "mission key",
+        "not toml",
+        "settings key",
+        "value",
+        "link",
+        "port",
+        "simulator's files",
+        "host",
+        "device",
+        "record",
+    ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path, change: dict[str, str], said: list[str]) -> None:
     path = mission_path(yard(tmp_path))
