@@ -17,6 +17,7 @@ from companion.mission.as_json import to_json
 from companion.mission.mission import Mission
 from companion.navigator import Decision
 from companion.provenance import versions
+from companion.reading import refuse_pipe
 from companion.recorded_files import Copied, RecordError, copied, in_record
 from companion.rounds import Mark, Round
 from companion.settings import Settings
@@ -114,12 +115,13 @@ class Recorder:
             self._meta = _meta(mission, settings, seed, arm, self._start_us, inputs)
             self._write_meta(None)
             for name in (PACKETS, ROUNDS, DECISIONS):
+                refuse_pipe(self.directory / name)
                 self._files[name] = (self.directory / name).open("wb")
                 self._sums[name] = (0, 0)
         except OSError as error:
             self.close()
             raise RecordError(
-                f"{self.directory}: cannot record here: {error.strerror or error}; choose a directory that can be written"
+                f"{error.filename or self.directory}: cannot record here: {error.strerror or error}; choose a directory that can be written"
             ) from error
 
     def begin(self, time_s: float, mark: Mark) -> None:
