@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import hashlib
 import importlib.util
 import io
 import os
@@ -55,7 +56,15 @@ def run(name: str, target: Target, corpus: Path, limits: list[str]) -> None:
         (corpus / f"{number}").write_bytes(example)
         target.read(example)  # compiles what has to be; later it would count as a hang
     always = ["-timeout=10", "-rss_limit_mb=2500", "-max_len=65536", "-print_final_stats=1"]
-    atheris.Setup([name, *always, *limits, f"-artifact_prefix={FOUND}/{name}-", str(corpus)], target.read)
+
+    def read(data: bytes) -> None:
+        try:
+            target.read(data)
+        except BaseException:
+            (FOUND / f"{name}-{hashlib.sha256(data).hexdigest()[:16]}").write_bytes(data)
+            raise
+
+    atheris.Setup([name, *always, *limits, f"-artifact_prefix={FOUND}/{name}-", str(corpus)], read)
     atheris.Fuzz()
 
 
