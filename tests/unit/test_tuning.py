@@ -14,6 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.beside import Patience
 from companion.commands import TellParameter
 from companion.disk import OsDisk
 from companion.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
@@ -312,7 +313,7 @@ class HangingDisk(OsDisk):
 
 def test_a_disk_that_hangs_keeps_nobody_from_ending(tmp_path: Path) -> None:
     disk = HangingDisk()
-    saver = Saver(disk, close_s=0.01)
+    saver = Saver(disk, Patience(0.01))
     saver.save(tmp_path / "tuned.toml", b"new")
     writers = [thread for thread in threading.enumerate() if thread.name == "saver"]
     saver.close()
