@@ -26,8 +26,7 @@ bench: $(KERNELS)
 	$(BIN)/python -m pytest tests/bench --override-ini addopts= -q -s --benchmark-columns=median,min,max,rounds
 
 # Each reader of bytes from outside for a minute, guided by what of the program the bytes reach.
-fuzz: $(READY)
-	@$(BIN)/python -c 'import atheris' 2>/dev/null || $(BIN)/python -m pip install -q -c constraints.txt -e '.[fuzz]'
+fuzz: $(KERNELS)
 	$(BIN)/python -m tests.fuzz all --seconds 60
 
 results: $(KERNELS)

@@ -6,15 +6,38 @@ import queue
 import threading
 from collections.abc import Callable
 
+from companion.clock import Clock, WallClock
+
 Job = Callable[[], None]
+PATIENCE_S = 0.5
+"""A program that is told to end has a second for everything."""
+
+
+class Patience:
+    """How long the end of a program waits for its disks in all: who waits takes from what the others have."""
+
+    def __init__(self, seconds: float = PATIENCE_S, clock: Clock | None = None) -> None:
+        self._left_s = seconds
+        self._clock = clock or WallClock()
+
+    def extend(self, seconds: float) -> None:
+        """There is no hurry: wait so much longer in all."""
+        self._left_s += seconds
+
+    def wait(self, thread: threading.Thread) -> bool:
+        """Whether a thread has ended, now or within the time that is left."""
+        began_s = self._clock.now_s()
+        thread.join(max(0.0, self._left_s))
+        self._left_s -= self._clock.now_s() - began_s
+        return not thread.is_alive()
 
 
 class Beside:
     """Does jobs in order in a thread of its own, which ends with the program, whatever the disk does. Jobs must not raise."""
 
-    def __init__(self, name: str, close_s: float = 0.5) -> None:
-        """``close_s``: how long ``close`` waits for what is left."""
-        self._close_s = close_s
+    def __init__(self, name: str, patience: Patience | None = None) -> None:
+        """``patience``: how long ``close`` waits for what is left; its own, if it shares none."""
+        self._patience = patience or Patience()
         self._jobs: queue.SimpleQueue[Job | None] = queue.SimpleQueue()
         self._given = self._done = 0
         self._thread = threading.Thread(target=self._run, name=name, daemon=True)
@@ -41,8 +64,7 @@ class Beside:
         if not self._given:
             return True
         self._jobs.put(None)
-        self._thread.join(self._close_s)
-        return not self._thread.is_alive()
+        return self._patience.wait(self._thread)
 
     def _run(self) -> None:
         while (job := self._jobs.get()) is not None:

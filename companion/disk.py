@@ -53,7 +53,8 @@ class OsDisk:
 
     def create(self, path: Path) -> int:
         """See Disk."""
-        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC, self._mode)
+        # With O_NONBLOCK a pipe of that name is an error and not waited for.
+        return os.open(path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC | os.O_NONBLOCK | os.O_CLOEXEC, self._mode)
 
     def write(self, handle: int, data: bytes) -> int:
         """See Disk."""

@@ -125,10 +125,16 @@ def _read_grey(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_] | Non
     Colours are averaged with equal shares, as map_server does, not by how bright they look.
     """
     try:
-        with warnings.catch_warnings():
+        file = open_file(path)
+    except FileNotFoundError:
+        raise MapError(f"{path}: no such file") from None
+    except OSError as error:
+        raise MapError(f"{path}: cannot be read: {error.strerror}; name a PNG, PGM or BMP picture") from error
+    try:
+        with file, warnings.catch_warnings():
             # Pillow warns of large pictures; the limit here is lower than that of its error.
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            with Image.open(path, formats=("PNG", "PPM", "BMP")) as image:
+            with Image.open(file, formats=("PNG", "PPM", "BMP")) as image:
                 _check_size(path, image.width, image.height)
                 if image.mode in ("I", "I;16", "I;16B"):
                     return np.asarray(image, dtype=np.float32) / np.float32(65535.0), None
@@ -139,8 +145,6 @@ def _read_grey(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_] | Non
         raise MapError(f"{path}: size: more than {MAX_FIELDS} fields") from None
     except UnidentifiedImageError:
         raise MapError(f"{path}: header: not a PNG, PGM or BMP picture") from None
-    except FileNotFoundError:
-        raise MapError(f"{path}: no such file") from None
     except (OSError, ValueError, SyntaxError, EOFError, OverflowError) as error:
         raise MapError(f"{path}: picture: {_one_line(error)}") from error
     shade = pixels[:, :, :3].sum(axis=2, dtype=np.uint16).astype(np.float32) / np.float32(765.0)

@@ -1,4 +1,4 @@
-"""Opening the files that people name: only what is a file, because a pipe would keep the program waiting and a device has no end."""
+"""The files that people name: only what is a file is opened, because a pipe would keep the program waiting and a device has no end."""
 
 from __future__ import annotations
 
@@ -28,3 +28,13 @@ def read_at_most(path: Path, limit: int) -> bytes:
         if os.fstat(file.fileno()).st_size > limit:
             raise OSError(errno.EFBIG, f"larger than {limit} bytes", str(path))
         return file.read(limit)
+
+
+def refuse_pipe(path: Path) -> None:
+    """To be asked before a file is written. Raises OSError if there is a pipe, a socket or a disk; what is not there yet is fine."""
+    try:
+        mode = path.stat().st_mode
+    except FileNotFoundError:
+        return
+    if stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or stat.S_ISBLK(mode):
+        raise OSError(errno.EINVAL, "not a file", str(path))

@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from companion.mission.files import files_of
 from companion.mission.mission import Mission
+from companion.reading import open_file, refuse_pipe
 
 INPUTS = "inputs"
 
@@ -47,7 +48,9 @@ def in_record(entries: list[Copied], source: Path) -> str:
 
 
 def _copy(directory: Path, kind: str, place: Path, path: Path) -> Copied:
-    data = path.read_bytes()
+    with open_file(path) as file:
+        data = file.read()
     (directory / place).parent.mkdir(parents=True, exist_ok=True)
+    refuse_pipe(directory / place)
     (directory / place).write_bytes(data)
     return Copied(kind, place.as_posix(), str(path), hashlib.sha256(data).hexdigest())

@@ -8,15 +8,18 @@ import struct
 import zlib
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import IO, Protocol
 
+from companion.beside import Beside, Job
 from companion.clock import unix_time_us
 from companion.disk import write_whole
 from companion.mission.as_json import to_json
 from companion.mission.mission import Mission
 from companion.navigator import Decision
 from companion.provenance import versions
+from companion.reading import refuse_pipe
 from companion.recorded_files import Copied, RecordError, copied, in_record
 from companion.rounds import Mark, Round
 from companion.settings import Settings
@@ -29,6 +32,9 @@ META, MISSION, PACKETS, ROUNDS, DECISIONS = "meta.json", "mission.json", "link.t
 STATE = "state"
 """The kind of input file that an earlier run has left."""
 FLUSH_S = 1.0
+MOST_WAITING_BYTES = 20_000_000
+"""An hour of driving, for a disk that does not answer."""
+NO_ANSWER = "the disk does not answer"
 
 
 class DecisionLog(Protocol):
@@ -79,6 +85,7 @@ class Recorder:
 
     A directory that has a record keeps it: the new one goes to the same name with a number, see ``directory``. ``files`` are further files that
     the run follows from, by what they are (None: there is none); they are copied.
+    What comes is written once a second; with ``beside`` by a thread, which ``close`` ends, and no round waits for the disk.
     ``start_us`` is the beginning in microseconds since 1970, by default now. Raises RecordError if the directory cannot be written. Later a full
     disk ends the record, never the run: see ``problem``.
     """
@@ -93,12 +100,17 @@ class Recorder:
         arm: bool = False,
         files: Mapping[str, Path | None] | None = None,
         start_us: int | None = None,
+        beside: Beside | None = None,
     ) -> None:
         self.directory = unused(directory)
         self.problem = ""
         """Why the record ends early; empty while all is well."""
         self._files: dict[str, IO[bytes]] = {}
+        self._waiting: dict[str, bytearray] = {}
         self._sums: dict[str, tuple[int, int]] = {}
+        self._given = self._taken = 0
+        self._closed = False
+        self._beside = beside
         self._clock_at_start_s: float | None = None
         self._flushed_s = 0.0
         self._start_us = unix_time_us() if start_us is None else start_us
@@ -114,12 +126,13 @@ class Recorder:
             self._meta = _meta(mission, settings, seed, arm, self._start_us, inputs)
             self._write_meta(None)
             for name in (PACKETS, ROUNDS, DECISIONS):
-                self._files[name] = (self.directory / name).open("wb")
-                self._sums[name] = (0, 0)
+                refuse_pipe(self.directory / name)
+                self._files[name] = (self.directory / name).open("wb", buffering=0)
+                self._waiting[name], self._sums[name] = bytearray(), (0, 0)
         except OSError as error:
-            self.close()
+            self._close_files()
             raise RecordError(
-                f"{self.directory}: cannot record here: {error.strerror or error}; choose a directory that can be written"
+                f"{error.filename or self.directory}: cannot record here: {error.strerror or error}; choose a directory that can be written"
             ) from error
 
     def begin(self, time_s: float, mark: Mark) -> None:
@@ -133,7 +146,8 @@ class Recorder:
         for raw in packets:
             self._packet(time_s, raw)
         if time_s - self._flushed_s >= FLUSH_S:
-            self._flush(time_s)
+            self._flushed_s = time_s
+            self._hand_over()
 
     def said(self, time_s: float, raw: bytes) -> None:
         """One packet of ours."""
@@ -151,21 +165,15 @@ class Recorder:
         self._write(DECISIONS, decision_line(time_s, target, decision).encode() + b"\n")
 
     def close(self) -> None:
-        """Write what is left, and that it is all; more than once is fine."""
-        if not self._files:
+        """Write what is left, and that it is all, but give up on a disk that hangs; more than once is fine."""
+        if self._closed:
             return
         self._end_round()
-        for file in self._files.values():
-            try:
-                file.close()
-            except OSError as error:
-                self.problem = self.problem or self._ended(error)
-        self._files = {}
-        if not self.problem:
-            try:
-                self._write_meta({name: {"bytes": size, "crc32": crc} for name, (size, crc) in self._sums.items()})
-            except OSError as error:
-                self.problem = self._ended(error)
+        self._hand_over()
+        self._closed = True
+        self._do(self._finish)
+        if self._beside is not None and not self._beside.close():
+            self.problem = self.problem or self._ended(NO_ANSWER)
 
     def _packet(self, time_s: float, raw: bytes) -> None:
         """Microseconds since 1970, big-endian, then the bytes, as ground stations write it."""
@@ -180,30 +188,56 @@ class Recorder:
             self._write(ROUNDS, ended.packed())
 
     def _write(self, name: str, data: bytes) -> None:
-        if name not in self._files:
+        if self._closed or self.problem:
             return
-        try:
-            self._files[name].write(data)
-        except OSError as error:
-            self._end_early(error)
-            return
+        self._waiting[name] += data
         size, crc = self._sums[name]
         self._sums[name] = (size + len(data), zlib.crc32(data, crc))
 
-    def _flush(self, time_s: float) -> None:
-        self._flushed_s = time_s
+    def _hand_over(self) -> None:
+        """What waits goes to the disk; unless too much is on its way already: memory has an end as well."""
+        batch = {name: bytes(data) for name, data in self._waiting.items() if data}
+        for data in self._waiting.values():
+            data.clear()
+        size = sum(len(data) for data in batch.values())
+        if self._given + size - self._taken > MOST_WAITING_BYTES:
+            self.problem = self.problem or self._ended(NO_ANSWER)
+        if batch and not self.problem:
+            self._given += size
+            self._do(partial(self._take, batch))
+
+    def _do(self, job: Job) -> None:
+        job() if self._beside is None else self._beside.put(job)
+
+    def _take(self, batch: Mapping[str, bytes]) -> None:
+        """Write; after a problem nothing more. Must not raise."""
         try:
-            for file in self._files.values():
-                file.flush()
+            for name, data in batch.items():
+                view = memoryview(data)
+                while view and not self.problem:
+                    view = view[self._files[name].write(view) :]
         except OSError as error:
-            self._end_early(error)
+            self.problem = self._ended(error.strerror or str(error))
+        self._taken += sum(len(data) for data in batch.values())
 
-    def _end_early(self, error: OSError) -> None:
-        self.problem = self._ended(error)
-        self.close()
+    def _finish(self) -> None:
+        """Close the files; say that they are whole, if they are. Must not raise."""
+        self._close_files()
+        if not self.problem:
+            try:
+                self._write_meta({name: {"bytes": size, "crc32": crc} for name, (size, crc) in self._sums.items()})
+            except OSError as error:
+                self.problem = self._ended(error.strerror or str(error))
 
-    def _ended(self, error: OSError) -> str:
-        return f"{self.directory}: the record has ended: {error.strerror or error}"
+    def _close_files(self) -> None:
+        for file in self._files.values():
+            try:
+                file.close()
+            except OSError as error:
+                self.problem = self.problem or self._ended(error.strerror or str(error))
+
+    def _ended(self, reason: str) -> str:
+        return f"{self.directory}: the record has ended: {reason}"
 
     def _write_meta(self, end: dict[str, dict[str, int]] | None) -> None:
         meta = {**self._meta, "end": end}

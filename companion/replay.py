@@ -18,12 +18,13 @@ from companion.mavlink.signing import Recorded, without_signature
 from companion.memory import Memory
 from companion.mission.mission import MissionError
 from companion.navigator import Decision, NavState
+from companion.reading import read_at_most
 from companion.record import Heard, Record
 from companion.recorded_files import RecordError
 from companion.recorder import STATE, decision_line
 from companion.resuming import Kept
 from companion.rounds import Mark, Round
-from companion.state.format import StateError, decoded
+from companion.state.format import MAX_FILE_BYTES, StateError, decoded
 from companion.state.writer import Update
 from companion.stepping import StepCall
 
@@ -254,7 +255,9 @@ def _memory(record: Record, tape: Tape) -> Memory:
     if file is None:
         return Memory(record.mission, _NoWriter(tape))
     try:
-        return Memory(record.mission, _NoWriter(tape), Kept(*decoded(file.read_bytes())))
+        return Memory(record.mission, _NoWriter(tape), Kept(*decoded(read_at_most(file, MAX_FILE_BYTES))))
+    except OSError as error:
+        raise RecordError(f"{file}: cannot be read: {error.strerror}; the run cannot be replayed without it") from error
     except StateError as error:
         raise RecordError(f"{file}: {error}") from error
 

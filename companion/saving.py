@@ -5,20 +5,20 @@ from __future__ import annotations
 import threading
 from pathlib import Path
 
-from companion.beside import Beside, Job
+from companion.beside import Beside, Job, Patience
 from companion.disk import Disk, OsDisk, replace_file
 
 
 class Saver:
     """Writes whole files beside the loop, in order; of those that wait for the same file only the newest."""
 
-    def __init__(self, disk: Disk | None = None, close_s: float = 0.5) -> None:
+    def __init__(self, disk: Disk | None = None, patience: Patience | None = None) -> None:
         self.problem = ""
         """Why the last file could not be written; empty while all is well."""
         self._disk = disk or OsDisk()
         self._waiting: dict[Path, tuple[bytes, Job | None]] = {}
         self._lock = threading.Lock()
-        self._beside = Beside("saver", close_s)
+        self._beside = Beside("saver", patience)
 
     def save(self, path: Path, data: bytes, done: Job | None = None) -> None:
         """Have a file written; returns at once. ``done`` is called when it is on the disk, or could not be written."""

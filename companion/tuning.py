@@ -121,7 +121,7 @@ def as_toml(base: Settings, tuned: Settings) -> str:
 
 
 def with_tuned(base: Settings, path: Path) -> Settings:
-    """The settings with what was set from a ground station in earlier runs; a file that is not there changes nothing.
+    """The settings with what was set from a ground station in earlier runs, in the bounds that hold for it; no file changes nothing.
 
     Raises SettingsError (one line: file, place, reason, remedy).
     """
@@ -140,9 +140,15 @@ def with_tuned(base: Settings, path: Path) -> Settings:
         inside = values.get(section)
         values[section] = inside | entries if isinstance(inside, dict) and isinstance(entries, dict) else entries
     try:
-        return Settings.model_validate(values)
+        tuned = Settings.model_validate(values)
     except ValidationError as error:
         raise SettingsError(f"{path}: {describe_first(error, Settings)}; {remedy}") from error
+    for parameter in TABLE:
+        value, inside = parameter.value(tuned), told.get(parameter.section)
+        if inside and parameter.key in inside and not parameter.low <= value <= parameter.high:
+            place, bounds = f"{parameter.section}.{parameter.key}", f"{parameter.low:g}..{parameter.high:g}"
+            raise SettingsError(f"{path}: {place}: {value:g} not in {bounds} ({parameter.name}); {remedy}")
+    return tuned
 
 
 def differences(base: Settings, tuned: Settings) -> list[str]:

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from companion.reading import open_file
 from sitl.autopilot.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT, functions_of, is_skid
 from sitl.autopilot.params import DEFAULTS, INT8, INT16, INT32, REAL32
 from sitl.parameter_ranges import outside
@@ -117,9 +118,7 @@ def _some(names: Sequence[str]) -> str:
 def load_parameters(path: Path) -> ParameterFile:
     """Read a parameter file. Raises ParameterFileError."""
     try:
-        if path.exists() and not path.is_file():
-            raise ParameterFileError(f"{path}: not a file; name a parameter file")
-        with path.open("rb") as file:
+        with open_file(path) as file:
             data = file.read(MOST_BYTES + 1)
     except OSError as error:
         raise ParameterFileError(f"{path}: cannot be read: {error.strerror or error}; check the name") from error

@@ -81,9 +81,12 @@ def wait_until(done: Callable[[], bool], limit_s: float) -> None:
 
 
 @contextmanager
-def process(module: str, *arguments: object) -> Iterator[subprocess.Popen[str]]:
-    """``rover-companion`` (module companion) or ``rover-sitl`` (module sitl); killed in the end. Its default place for states is its own."""
-    code = f"from {module}.cli.main import main; main()"
+def process(module: str, *arguments: object, first: str = "") -> Iterator[subprocess.Popen[str]]:
+    """``rover-companion`` (module companion) or ``rover-sitl`` (module sitl); killed in the end. Its default place for states is its own.
+
+    ``first``: code that the process runs before anything else.
+    """
+    code = f"{first}\nfrom {module}.cli.main import main; main()"
     command = [sys.executable, "-c", code, *map(str, arguments)]
     with (
         tempfile.TemporaryDirectory() as states,

@@ -6,6 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.grid import Cell
+from companion.reading import read_at_most
+
+MOST_BYTES = 100_000_000
 
 
 class ScenarioFileError(ValueError):
@@ -27,8 +30,10 @@ class Scenario:
 def read_scenarios(file: Path) -> list[Scenario]:
     """All problems of a ``.scen`` file. Raises ScenarioFileError."""
     try:
-        lines = file.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
+        lines = read_at_most(file, MOST_BYTES).decode("utf-8").splitlines()
+    except OSError as error:
+        raise ScenarioFileError(f"{file}: cannot be read: {error.strerror}; name a MovingAI scenario file") from error
+    except UnicodeDecodeError as error:
         raise ScenarioFileError(f"{file}: cannot be read as text: {error}") from error
     if not lines or not lines[0].lower().startswith("version"):
         raise ScenarioFileError(f"{file}: line 1: not a MovingAI scenario file, it does not begin with a version")

@@ -12,6 +12,7 @@ from companion.bench.cases import PAPER_MAPS, Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import Entry, Limits
 from companion.bench.report import head, rows, runs_explained, where
+from companion.reading import refuse_pipe
 
 PICTURE = "benchmarks.png"
 
@@ -22,6 +23,8 @@ def write_page(
     """Write page and picture; gives the files written."""
     page, picture = folder / "benchmarks.md", folder / "images" / PICTURE
     picture.parent.mkdir(parents=True, exist_ok=True)
+    for file in (page, picture):
+        refuse_pipe(file)
     page.write_text(_page(command, entries, contestants, cases, limits), encoding="utf-8")
     plot(picture, entries, contestants)
     return [page, picture]

@@ -59,6 +59,7 @@ def bench(
     try:
         settings = usable_settings(settings_file)
         writable(json_file)
+        writable(docs and docs / "benchmarks.md")
         cases = _cases(map_files or [], sizes, maps, problems)
         contestants = _contestants(planners, settings, console, peers=peers)
         limits = Limits(seeds, seed, cell_s)
@@ -71,26 +72,20 @@ def bench(
     for table in _tables(entries, contestants, cases):
         console.print(table)
     console.print("\n" + " ".join(runs_explained(limits)).replace("*", "").replace("`", ""), highlight=False)
-    if json_file is not None:
-        try:
-            with written(json_file):
-                json_file.write_text(
-                    json.dumps(as_json(entries, cases, limits, settings), indent=2) + "\n", encoding="utf-8"
-                )
-        except OutputError as error:
-            typer.echo(str(error), err=True)
-            raise typer.Exit(EXIT_BAD_INPUT) from error
-    if docs is not None:
-        names = "".join(f"{file.name} " for file in map_files or [])
-        command = f"rover-companion bench {names}--sizes {sizes} --seeds {seeds} --seed {seed} --cell-s {cell_s:g} --docs docs"
-        for file in write_page(docs, command, entries, contestants, cases, limits):
-            console.print(f"written: {file}")
-
-
-def _write_figures(file: Path, figures: dict[str, object]) -> None:
+    names = "".join(f"{file.name} " for file in map_files or [])
+    command = (
+        f"rover-companion bench {names}--sizes {sizes} --seeds {seeds} --seed {seed} --cell-s {cell_s:g} --docs docs"
+    )
     try:
-        with written(file):
-            file.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+        if json_file is not None:
+            with written(json_file):
+                figures = as_json(entries, cases, limits, settings)
+                json_file.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
+        if docs is not None:
+            with written(docs):
+                files = write_page(docs, command, entries, contestants, cases, limits)
+            for file in files:
+                console.print(f"written: {file}")
     except OutputError as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error

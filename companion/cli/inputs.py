@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from companion.planning.registry import UnknownPlannerError, make_planner
+from companion.reading import refuse_pipe
 from companion.settings import Settings, SettingsError, load_settings
 
 
@@ -43,6 +44,7 @@ def writable(path: Path | None, suffix: str = "") -> None:
     path = path.with_name(path.name + suffix)
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
+        refuse_pipe(path)
         existed = path.exists()
         with path.open("ab"):
             pass
@@ -54,6 +56,7 @@ def writable(path: Path | None, suffix: str = "") -> None:
 def written(path: Path) -> Iterator[None]:
     """Whatever goes wrong in here went wrong while ``path`` (a file, or the folder of several) was written: raises OutputError."""
     try:
+        refuse_pipe(path)
         yield
     except OSError as error:
         place = error.filename if path.is_dir() and error.filename else path

@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from companion.beside import Patience
 from companion.disk import OsDisk
 from companion.itinerary import TargetStatus
 from companion.memory import Memory
@@ -62,10 +63,10 @@ class Keeping:
         names = (target.name for target in self._mission.targets)
         return list(zip(names, self.kept.state.progress.statuses, strict=True))
 
-    def start(self) -> None:
+    def start(self, patience: Patience | None = None) -> None:
         """From now on the state is written."""
         if self._place is not None:
-            writer = ThreadWriter(StateFile(self._place.file, OsDisk()))
+            writer = ThreadWriter(StateFile(self._place.file, OsDisk()), patience)
             self.memory = Memory(self._mission, writer, self.kept)
 
     def close(self) -> None:

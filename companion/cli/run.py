@@ -13,6 +13,7 @@ from typing import Annotated
 import typer
 
 from companion.app import Companion, Status
+from companion.beside import Beside, Patience
 from companion.cli.inputs import OutputError, usable_settings
 from companion.cli.keeping import Keeping
 from companion.cli.levels import ERROR, INFO, Reader, levelled, reader_of
@@ -46,6 +47,8 @@ BAD_INPUT = (
     OutputError,
     SigningKeyError,
 )
+UNHURRIED_S = 10.0
+"""A run that ends by itself waits so long for a slow disk."""
 EXIT_REACHED, EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED = 0, 2, 3, 130
 
 
@@ -84,7 +87,8 @@ def run(
 
     try:
         with _StopSignals() as stop, contextlib.ExitStack() as ends:
-            files = StateFiles(state)
+            patience = Patience()
+            files = StateFiles(state, patience)
             ends.callback(files.close)
             settings = files.settings(usable_settings(settings_file), say)
             signer = files.signer(signing_key)
@@ -98,7 +102,11 @@ def run(
             if keeping.ended:
                 raise typer.Exit(_told(keeping.statuses))
             given = {"settings": settings_file, STATE: keeping.file if keeping.kept else None}
-            recorder = Recorder(record, mission, settings, seed, arm=arm, files=given) if record else NullRecorder()
+            recorder = (
+                Recorder(record, mission, settings, seed, arm=arm, files=given, beside=Beside("record", patience))
+                if record
+                else NullRecorder()
+            )
             link = source.link()
             with console.status("compiling the planner (once a machine) ..."):
                 warm_up(settings, mission.rover.turning_radius_m)
@@ -107,10 +115,10 @@ def run(
             place = recorder.directory if isinstance(recorder, Recorder) else None
             if place != record:
                 say(f"{record} has a record already; this one goes to {place}")
-            keeping.start()
+            keeping.start(patience)
             autopilot = AutopilotLink(link, Codec(settings.link, signer=signer), settings.link, recorder)
             live = Live(console, mission.name, reader)
-            outfit = _Outfit(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop)
+            outfit = _Outfit(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, patience)
             code = _drive(outfit, seed=seed, arm=arm)
     except BAD_INPUT as error:
         typer.echo(levelled(str(error), ERROR, reader) if reader is Reader.JOURNAL else str(error), err=True)
@@ -134,6 +142,7 @@ class _Outfit:
     files: StateFiles
     live: Live
     stop: _StopSignals
+    patience: Patience
 
 
 def _drive(outfit: _Outfit, *, seed: int, arm: bool) -> int:
@@ -162,6 +171,8 @@ def _drive(outfit: _Outfit, *, seed: int, arm: bool) -> int:
     try:
         with outfit.live:
             companion.run(show)
+        if not outfit.stop.asked:
+            outfit.patience.extend(UNHURRIED_S)
     finally:
         service.stopping()
         companion.close()
@@ -180,7 +191,7 @@ def _ended(companion: Companion, outfit: _Outfit) -> int:
             if line:
                 typer.echo(line, err=True)
         if outfit.place is not None:
-            _save_map(companion, outfit.place)
+            _save_map(companion, outfit.place, outfit.patience)
             if outfit.recorder.problem:
                 typer.echo(outfit.recorder.problem, err=True)
     return code
@@ -195,13 +206,24 @@ def _told(statuses: list[tuple[str, TargetStatus]], broken_off: str = "") -> int
     return EXIT_REACHED if all(status is TargetStatus.REACHED for _, status in statuses) else EXIT_MISSED
 
 
-def _save_map(companion: Companion, directory: Path) -> None:
-    """What was mapped, as ``map.yaml`` and ``map.pgm``; a full disk does not spoil the run's own result."""
-    try:
-        if companion.save_map(directory / "map"):
-            typer.echo(f"map: {directory / 'map.yaml'}")
-    except MapError as error:
-        typer.echo(str(error), err=True)
+def _save_map(companion: Companion, directory: Path, patience: Patience) -> None:
+    """What was mapped, as ``map.yaml`` and ``map.pgm``; a full disk, or one that hangs, does not spoil the run's own result."""
+    place = directory / "map.yaml"
+    told: list[tuple[str, bool]] = []
+
+    def save() -> None:
+        try:
+            if companion.save_map(directory / "map"):
+                told.append((f"map: {place}", False))
+        except MapError as error:
+            told.append((str(error), True))
+
+    beside = Beside("map", patience)
+    beside.put(save)
+    if not beside.close():
+        told.append((f"{place}: not written: the disk does not answer", True))
+    for line, err in told:
+        typer.echo(line, err=err)
 
 
 class _StopSignals:

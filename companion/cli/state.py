@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+from companion.beside import Patience
 from companion.cli.inputs import OutputError, writable
 from companion.mavlink.signing import Signer, load_key
 from companion.mavlink.signing_time import TimeFile
@@ -23,10 +24,10 @@ SIGNING_TIME = "signing-time"
 class StateFiles:
     """The small files of a state directory; the default one, if none is named."""
 
-    def __init__(self, named: Path | None) -> None:
+    def __init__(self, named: Path | None, patience: Patience | None = None) -> None:
         """Raises OutputError if nothing can be written in a directory that was named."""
         self._directory = named or default_directory(os.environ)
-        self._saver = Saver()
+        self._saver = Saver(patience=patience)
         self._base = Settings()
         if named is not None and named.exists() and not named.is_dir():
             raise OutputError(f"{named}: is a file; --state takes a directory")

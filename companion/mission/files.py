@@ -8,6 +8,7 @@ from pathlib import Path
 import yaml
 
 from companion.mission.mission import Mission, SitlSpec
+from companion.reading import read_at_most
 
 MAX_BYTES = 5_000_000
 NAMES_ANOTHER = {".yaml": "image", ".yml": "image", ".toml": "base"}
@@ -30,12 +31,12 @@ def files_of(mission: Mission) -> tuple[Path, ...]:
 def _named_in(path: Path) -> Path | None:
     """The file that a map or world names; None if there is none, or the file is not what it seems (its reader will say so)."""
     key = NAMES_ANOTHER.get(path.suffix.lower())
-    if key is None or path.stat().st_size > MAX_BYTES:
+    if key is None:
         return None
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_at_most(path, MAX_BYTES).decode("utf-8")
         content = tomllib.loads(text) if path.suffix.lower() == ".toml" else yaml.safe_load(text)
-    except (ValueError, yaml.YAMLError, RecursionError):
+    except (OSError, ValueError, yaml.YAMLError, RecursionError):
         return None
     name = content.get(key) if isinstance(content, dict) else None
     return path.parent / name if isinstance(name, str) and name and "\0" not in name else None

@@ -6,6 +6,7 @@ import hashlib
 from dataclasses import replace
 
 from companion.mission.mission import Mission, MissionError
+from companion.reading import open_file
 
 
 def fingerprint(mission: Mission) -> str:
@@ -18,7 +19,8 @@ def fingerprint(mission: Mission) -> str:
     digest = hashlib.sha256(repr(plain).encode())
     if mission.prior_map is not None:
         try:
-            digest.update(mission.prior_map.read_bytes())
+            with open_file(mission.prior_map) as file:
+                digest.update(file.read())
         except OSError as error:
             raise MissionError(f"prior_map: {mission.prior_map}: cannot be read: {error.strerror}") from error
     return digest.hexdigest()

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from companion.settings.planners import PlannerSettings
 from companion.settings.section import Section
@@ -148,6 +148,14 @@ class GuidanceSettings(Section):
     back_out_m: float = Field(0.8, ge=0.0, description="how far to back out")
     back_out_speed_m_s: float = Field(0.4, gt=0.0, description="how fast to back out")
     arrival_m: float = Field(0.5, gt=0.0, description="a target is reached within this distance")
+
+    @model_validator(mode="after")
+    def _slowest_below_fastest(self) -> Self:
+        if self.min_speed_m_s > self.max_speed_m_s:
+            raise ValueError(
+                f"min_speed_m_s {self.min_speed_m_s:g} lies above max_speed_m_s {self.max_speed_m_s:g}; lower the one or raise the other"
+            )
+        return self
 
 
 class SteeringSettings(Section):

@@ -55,6 +55,11 @@ def parse_settings(data: dict[str, object], source: str) -> Settings:
 
 def describe_first(error: ValidationError, model: type[BaseModel]) -> str:
     """The first fault of a validation as one line: place, reason, and for an unknown key one that is spelt nearly so, else all."""
+    # Keys in quotes may hold anything.
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in _described(error, model))
+
+
+def _described(error: ValidationError, model: type[BaseModel]) -> str:
     fault = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in fault["loc"]) or "file"
     if fault["type"] == "missing":

@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Protocol
 
-from companion.beside import Beside
+from companion.beside import Beside, Patience
 from companion.disk import Disk, replace_file
 from companion.state.format import BandPlace, Raster, deflated, encoded
 from companion.state.snapshot import Snapshot, saved_state
@@ -101,10 +101,11 @@ class InlineWriter:
 class ThreadWriter:
     """Writes beside the loop."""
 
-    def __init__(self, file: StateFile, close_s: float = 0.5) -> None:
+    def __init__(self, file: StateFile, patience: Patience | None = None) -> None:
         self._file = file
         self._newest: Snapshot | None = None
-        self._beside = Beside("state", close_s)
+        self._beside = Beside("state", patience)
+        self._is_late = False
 
     @property
     def busy(self) -> bool:
@@ -114,7 +115,8 @@ class ThreadWriter:
     @property
     def problem(self) -> str:
         """See Writer."""
-        return self._file.problem
+        late = f"{self._file.path}: the state is not saved yet: the disk does not answer"
+        return late if self._is_late else self._file.problem
 
     def put(self, update: Update) -> None:
         """See Writer."""
@@ -122,7 +124,7 @@ class ThreadWriter:
 
     def close(self) -> None:
         """See Writer; gives up after a while."""
-        self._beside.close()
+        self._is_late = not self._beside.close()
 
     def _take(self, update: Update) -> None:
         """Of snapshots that have piled up behind a slow disk only the newest is written."""

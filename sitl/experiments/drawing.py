@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from companion.grid import OBSTACLE, Cell, Grid
+from companion.reading import refuse_pipe
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0072b2", "#d1495b", "#009e73", "#e69f00", "#8a8f98"
 WALL, UNSEEN, GROUND = (0.20, 0.22, 0.26), (0.78, 0.80, 0.83), (0.985, 0.985, 0.975)
@@ -29,6 +30,7 @@ def four_panels(width_in: float, height_in: float) -> tuple[Figure, list[Any]]:
 def save(figure: Figure, file: Path) -> Path:
     """Write the picture (the format follows from the suffix), without the date and version that would change it."""
     file.parent.mkdir(parents=True, exist_ok=True)
+    refuse_pipe(file)
     figure.savefig(file, metadata={"Software": None})
     return file
 

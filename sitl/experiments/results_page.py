@@ -8,6 +8,10 @@ from pathlib import Path
 from rich import box
 from rich.table import Table
 
+from companion.reading import read_at_most
+
+MOST_BYTES = 10_000_000
+
 HEAD = """# Results
 
 Tables and pictures on this page are written by the commands named in each section (`make results` runs them
@@ -19,7 +23,7 @@ def write_section(folder: Path, name: str, text: str, file: str = "results.md") 
     """Put a section into ``folder``/``file``, in place of its former self or at the end."""
     page = folder / file
     folder.mkdir(parents=True, exist_ok=True)
-    before = page.read_text(encoding="utf-8") if page.exists() else HEAD
+    before = read_at_most(page, MOST_BYTES).decode("utf-8") if page.exists() else HEAD
     begin, end = f"<!-- begin {name} -->", f"<!-- end {name} -->"
     section = f"{begin}\n{text.strip()}\n{end}\n"
     if begin in before and end in before:

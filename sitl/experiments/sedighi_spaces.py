@@ -13,8 +13,10 @@ import numpy as np
 
 from companion.grid import BASE_WEIGHT, OBSTACLE, Cell, Weights
 from companion.planning.problem import PlanningProblem
+from companion.reading import read_at_most
 from sitl.experiments.experiment import ExperimentError
 
+MOST_BYTES = 10_000_000
 DRAWINGS = {
     "SPSet01": """
         ..........
@@ -147,7 +149,7 @@ def given_spaces(folder: Path) -> dict[str, PlanningProblem]:
     spaces = {}
     for file in sorted(folder.glob("*.txt")):
         try:
-            first, *rows = file.read_text(encoding="utf-8").split()
+            first, *rows = read_at_most(file, MOST_BYTES).decode("utf-8").split()
         except (OSError, ValueError):
             continue
         square = first.isdecimal() and int(first) == len(rows) > 0 and all(len(row) == len(rows) for row in rows)

@@ -1,35 +1,95 @@
 """Coverage-guided fuzzing with atheris: ``python -m tests.fuzz TARGET... --seconds N`` (TARGET ``all``: every one in turn).
 
-Needs the extra ``fuzz`` (`pip install -e '.[fuzz]'`). A find stops the target, prints its traceback and leaves its bytes in the directory
-``out/fuzz``; once mended it goes into ``finds.py``, and every test run reads it again.
+A find stops the target, prints its traceback and leaves its bytes in the directory ``out/fuzz``; once mended it goes into ``finds.py``,
+and every test run reads it again. ``--runs N`` stops after as many tries; ``--seed N`` tries the same ones again.
 """
 
 from __future__ import annotations
 
 import argparse
-import subprocess
+import contextlib
+import hashlib
+import importlib.util
+import io
+import os
+import re
 import sys
 import tempfile
+import traceback
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+if TYPE_CHECKING:
+    from tests.fuzz.targets import Target
+
+ROOT = Path(__file__).resolve().parents[2]
 FOUND = Path("out/fuzz")
+WATCHED = ("companion", "tomllib", "yaml", "json", "pymavlink")
+"""Packages that are looked into: which of their branches are taken."""
+SAID = ("stat::number_of_executed_units", "Done ")
 
 
-def one(name: str, seconds: int) -> None:
+def compiled_modules() -> list[str]:
+    """The companion's modules that numba compiles: it would have to compile what atheris puts into them to watch their branches."""
+    files = (ROOT / "companion").rglob("*.py")
+    found = [path for path in files if re.search(r"^(from|import) numba\b", path.read_text(), re.MULTILINE)]
+    return sorted(".".join(path.relative_to(ROOT).with_suffix("").parts) for path in found)
+
+
+def watched_targets() -> Mapping[str, Target]:
+    """All targets, with the program watched."""
+    import atheris
+
+    quiet = contextlib.redirect_stderr(io.StringIO())  # a line for each module
+    with quiet, atheris.instrument_imports(include=WATCHED, exclude=compiled_modules()):
+        from tests.fuzz.targets import targets
+
+        return targets()
+
+
+def run(name: str, target: Target, corpus: Path, limits: list[str]) -> None:
     """Fuzz one target in this process, which ends with it."""
     import atheris
 
-    with atheris.instrument_imports(include=["companion", "tomllib", "yaml", "json", "pymavlink"]):
-        from tests.fuzz.targets import targets
+    for number, example in enumerate(target.examples):
+        (corpus / f"{number}").write_bytes(example)
+        target.read(example)  # compiles what has to be; later it would count as a hang
+    always = ["-timeout=10", "-rss_limit_mb=2500", "-max_len=65536", "-print_final_stats=1"]
 
-        target = targets()[name]
-    FOUND.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory() as corpus:
-        for number, example in enumerate(target.examples):
-            (Path(corpus) / f"{number}").write_bytes(example)
-        limits = [f"-max_total_time={seconds}", "-timeout=10", "-rss_limit_mb=2500", "-max_len=65536"]
-        atheris.Setup([name, *limits, f"-artifact_prefix={FOUND}/{name}-", "-print_final_stats=1", corpus], target.read)
-        atheris.Fuzz()
+    def read(data: bytes) -> None:
+        try:
+            target.read(data)
+        except BaseException:
+            (FOUND / f"{name}-{hashlib.sha256(data).hexdigest()[:16]}").write_bytes(data)
+            raise
+
+    atheris.Setup([name, *always, *limits, f"-artifact_prefix={FOUND}/{name}-", str(corpus)], read)
+    atheris.Fuzz()
+
+
+def is_clean(name: str, target: Target, limits: list[str]) -> bool:
+    """Fuzz one target in a process of its own and tell what came of it; whether nothing was found."""
+    with tempfile.TemporaryDirectory(prefix="fuzz") as folder:
+        log, corpus = Path(folder) / "log", Path(folder) / "corpus"
+        corpus.mkdir()
+        child = os.fork()
+        if not child:
+            try:
+                with log.open("wb") as file:
+                    os.dup2(file.fileno(), 1)
+                    os.dup2(file.fileno(), 2)
+                run(name, target, corpus, limits)
+            except BaseException:
+                traceback.print_exc()
+            os._exit(1)  # libFuzzer ends its process itself
+        clean = os.waitpid(child, 0)[1] == 0
+        lines = log.read_text(errors="replace").splitlines()
+    figures = " ".join(line for line in lines if line.startswith(SAID))
+    print(f"{name}: {'nothing found' if clean else 'FOUND'} {figures}", flush=True)
+    if not clean:
+        print("\n".join(lines[-60:]), flush=True)
+    return clean
 
 
 def main() -> None:
@@ -37,25 +97,19 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="tests.fuzz")
     parser.add_argument("targets", nargs="+")
     parser.add_argument("--seconds", type=int, default=60)
-    parser.add_argument("--here", action="store_true")
+    parser.add_argument("--runs", type=int, default=-1)
+    parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
-    if given.here:
-        one(given.targets[0], given.seconds)
-        return
-    from tests.fuzz.targets import targets
-
-    names = list(targets()) if given.targets == ["all"] else given.targets
-    found = 0
-    for name in names:
-        command = [sys.executable, "-m", "tests.fuzz", name, "--here", "--seconds", str(given.seconds)]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        lines = done.stderr.splitlines()
-        runs = [line for line in lines if line.startswith(("stat::number_of_executed_units", "Done "))]
-        print(f"{name}: {'nothing found' if done.returncode == 0 else 'FOUND'} {' '.join(runs)}", flush=True)
-        if done.returncode:
-            found += 1
-            print("\n".join(line for line in (done.stdout + done.stderr).splitlines()[-60:]), flush=True)
-    raise SystemExit(1 if found else 0)
+    if importlib.util.find_spec("atheris") is None:
+        sys.exit("atheris is not installed; there are builds of it for Linux on x86-64 only: pip install -e '.[fuzz]'")
+    known = watched_targets()
+    names = list(known) if given.targets == ["all"] else given.targets
+    if unknown := sorted(set(names) - known.keys()):
+        sys.exit(f"{unknown[0]}: no such target; there are {', '.join(known)}")
+    FOUND.mkdir(parents=True, exist_ok=True)
+    limits = [f"-max_total_time={given.seconds}", f"-runs={given.runs}", f"-seed={given.seed}"]
+    results = [is_clean(name, known[name], limits) for name in names]
+    sys.exit(0 if all(results) else 1)
 
 
 if __name__ == "__main__":

@@ -5,4 +5,6 @@ FINDS: tuple[tuple[str, bytes], ...] = (
     ("mission-toml", b"name = " + b"9" * 5000),
     ("settings", b"a = " + b"9" * 5000),
     ("settings", b"a = " + b"[" * 5000),
+    ("settings", b'[planner.prm]\n"samples\\u0001" = 1\n'),
+    ("settings", b'"two\\nlines" = 1\n'),
 )

@@ -39,6 +39,8 @@ HEADER_BYTES = 10
 ROVER, STATION = 0, 5
 """Senders as ``_packets`` reads them."""
 PART_BYTES = 512
+LONG_ON_S = 40.0
+"""The rover has been switched on for so long, and knows where it is."""
 HOME = GeoPoint(53.0, 23.0)
 
 
@@ -194,7 +196,7 @@ def link_contents(data: bytes) -> None:
 def driving(data: bytes) -> None:
     """Packets whose frame is right, among those of a rover that is being driven: to parameters, errands, fence and all else that listens."""
     with tempfile.TemporaryDirectory() as folder:
-        rig = Rig(yard(Path(folder)))
+        rig = Rig(yard(Path(folder)), late_s=LONG_ON_S)
     rig.until_driven(0.2)
     stream = _packets(data)
     parts = [stream[at : at + PART_BYTES] for at in range(0, len(stream), PART_BYTES)]

@@ -13,6 +13,8 @@ from typer.testing import CliRunner
 
 from companion.cli.commands import app
 from companion.mission.fingerprint import fingerprint
+from companion.record import load_record
+from companion.replay import replay
 from companion.state.format import decoded, encoded
 from companion.state.model import SavedProgress
 from tests.rig import GATE, HOLD, yard
@@ -65,6 +67,39 @@ def test_sigterm_stops_the_rover_saves_and_is_gone_within_a_second(tmp_path: Pat
             assert any("Resumed with its map" in line for line in iter(run.stderr.readline, ""))
             run.send_signal(signal.SIGTERM)
             assert finished(run, 10.0)[0] == 130
+
+
+HANGING = """
+import os, sys, time
+synced = os.fsync
+def hang(handle):
+    while os.path.exists({flag!r}):
+        time.sleep(0.05)
+    return synced(handle)
+os.fsync = hang
+"""
+
+
+def test_sigterm_is_obeyed_within_a_second_by_a_run_whose_disk_hangs(tmp_path: Path) -> None:
+    """A second, and one more for this machine, which does other things as well."""
+    mission = yard(tmp_path, TWO)
+    flag = tmp_path / "hangs"
+    kept = ("--state", tmp_path / "state", "--record", tmp_path / "record")
+    with served(mission) as world:
+        command = ("run", mission_path(mission), "--arm", "--connect", world.url, *kept)
+        with process("companion", *command, first=HANGING.format(flag=str(flag))) as run:
+            wait_until(lambda: world.simulator.driven_m > 3.0, 60.0)
+            flag.touch()
+            wait_until(lambda: world.simulator.driven_m > 5.0, 60.0)
+            run.send_signal(signal.SIGTERM)
+            began_s = time.monotonic()
+            code, _, err = finished(run, 10.0)
+            took_s = time.monotonic() - began_s
+        assert code == 130 and took_s < 2.0, (took_s, err)
+        assert world.mode() == HOLD
+    assert err.count("the disk does not answer") == 3 and "Traceback" not in err  # state, map, record
+    cut = load_record(tmp_path / "record")
+    assert not cut.whole and replay(cut).differences == []
 
 
 @pytest.mark.parametrize(

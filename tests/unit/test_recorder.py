@@ -111,10 +111,13 @@ class FullDisk(io.BytesIO):
 
 def test_a_full_disk_ends_the_record_but_not_the_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     recorder = Recorder(tmp_path / "run", None, Settings(), 0)
+    recorder.begin(0.0, Mark.BEGIN)
     recorder.said(0.0, b"before")
+    recorder.heard(1.0, [])
     recorder._files["decisions.jsonl"].close()
     monkeypatch.setitem(recorder._files, "decisions.jsonl", FullDisk())
-    recorder.write_decision(0.1, "x", DECISION)
+    recorder.write_decision(1.1, "x", DECISION)
+    recorder.heard(2.0, [])
     assert "No space left" in recorder.problem and str(tmp_path / "run") in recorder.problem
     recorder.heard(0.2, [b"packet"])
     recorder.write_decision(0.3, "x", DECISION)

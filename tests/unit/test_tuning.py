@@ -14,13 +14,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.beside import Patience
 from companion.commands import TellParameter
 from companion.disk import OsDisk
 from companion.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
 from companion.mavlink.codec import Codec
 from companion.parameters import ANSWER_S, MOST_OPEN, ParameterServer
 from companion.saving import Saver
-from companion.settings import Settings, SettingsError
+from companion.settings import Settings, SettingsError, load_settings
 from companion.tuning import BY_NAME, LONGEST_NAME, TABLE, RefusedError, as_toml, changed, differences, with_tuned
 from tests.mavlink_vehicle import Station
 
@@ -98,6 +99,44 @@ def test_however_it_is_tuned_a_rover_that_creeps_stops_within_what_was_measured(
     guidance = tuned.guidance
     assert guidance.min_speed_m_s <= min(0.5, guidance.max_speed_m_s)
     assert guidance.deceleration_m_s2 <= 1.5 and guidance.brake_delay_s >= 0.2
+
+
+CROSSED = "[guidance]\nmin_speed_m_s = 2.0\nmax_speed_m_s = 0.1\n"
+ABOVE = "guidance: min_speed_m_s 2 lies above max_speed_m_s 0.1; lower the one or raise the other"
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (CROSSED, ABOVE),
+        ("[guidance]\nmin_speed_m_s = 0.6\n", "guidance.min_speed_m_s: 0.6 not in 0.05..0.5 (CMP_SPD_MIN)"),
+        ("[safety]\nstale_s = 50\n", "safety.stale_s: 50 not in 0.3..3 (CMP_STALE)"),
+        ("[navigator]\nbetter_every_fields = 101\n", "navigator.better_every_fields: 101 not in 1..100 (CMP_BETTER)"),
+    ],
+)
+def test_what_no_ground_station_could_have_set_is_refused_when_it_is_read(
+    tmp_path: Path, text: str, reason: str
+) -> None:
+    path = tmp_path / "tuned.toml"
+    path.write_text(text)
+    with pytest.raises(SettingsError) as caught:
+        with_tuned(Settings(), path)
+    remedy = "put it right, or delete it to go back to the settings file"
+    assert str(caught.value) == f"{path}: {reason}; {remedy}"
+
+
+def test_a_settings_file_may_say_more_but_not_a_slowest_speed_above_the_fastest(tmp_path: Path) -> None:
+    path = tmp_path / "settings.toml"
+    path.write_text(CROSSED)
+    with pytest.raises(SettingsError) as caught:
+        load_settings(path)
+    assert str(caught.value) == f"{path}: {ABOVE}"
+    path.write_text("[guidance]\nmin_speed_m_s = 0.6\n[safety]\nstale_s = 50\n")
+    base = load_settings(path)
+    assert with_tuned(base, tmp_path / "none") == base
+    (tmp_path / "tuned.toml").write_text("[guidance]\nmax_speed_m_s = 0.5\n")
+    with pytest.raises(SettingsError, match=r"min_speed_m_s 0\.6 lies above max_speed_m_s 0\.5"):
+        with_tuned(base, tmp_path / "tuned.toml")
 
 
 def test_half_a_doubt_is_refused() -> None:
@@ -312,7 +351,7 @@ class HangingDisk(OsDisk):
 
 def test_a_disk_that_hangs_keeps_nobody_from_ending(tmp_path: Path) -> None:
     disk = HangingDisk()
-    saver = Saver(disk, close_s=0.01)
+    saver = Saver(disk, Patience(0.01))
     saver.save(tmp_path / "tuned.toml", b"new")
     writers = [thread for thread in threading.enumerate() if thread.name == "saver"]
     saver.close()
