@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
-from companion.app import Status
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import OutputError, usable_settings
 from companion.clock import WallClock
@@ -20,19 +19,19 @@ from companion.settings import SettingsError
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_untold
 from sitl.cli.drive_outputs import outputs, print_summary
+from sitl.cli.drive_progress import Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.cli.equipment import equipped, simulated
 from sitl.cli.pace import Pace
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.fault_file import FaultFileError
-from sitl.lockstep import Drive, Report
+from sitl.lockstep import Drive
 from sitl.scenario import ScenarioError
 
 EXIT_BAD_INPUT = 2
 BAD_INPUT = (
     SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
 )  # fmt: skip
-LINE_EVERY_S = 60.0
 RECORD_START_US = 1_577_836_800_000_000
 """2020-01-01: simulated time begins at no date, and the same run shall give the same record."""
 
@@ -61,7 +60,7 @@ def drive(
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
-    4: collision; 2: bad input; 130: stopped by Ctrl-C.
+    4: collision; 2: bad input; 130: stopped by Ctrl-C. A run that waits for a person for a minute of its time is ended: nobody is there.
     """
     console, wanted = Console(), outputs(image, map_stem, json_file)
     recorder: Recorder | NullRecorder = NullRecorder()
@@ -85,9 +84,9 @@ def drive(
         with console.status("compiling (once a machine) ..."):
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
         if screen is None:
-            report = _run_with_progress(run, console, pace)
+            report = run_with_progress(run, console, pace)
         else:
-            report, viewer = run_with_view(run, screen, pace.wait)
+            report, viewer = run_with_view(run, screen, _paced(run, pace))
     except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -122,40 +121,11 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
     return f"stopped by Ctrl-C: {what}; {kept}"
 
 
-def _run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:
-    """Show one line that changes; where there is no terminal (a log file, CI), a new line now and then instead."""
-    if not console.is_terminal:
-        return _run_with_lines(run, console, pace)
-    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
-    with Progress(*columns, console=console) as progress:
-        task = progress.add_task(run.mission.name, total=None, state="")
+def _paced(run: Drive, pace: Pace) -> Callable[[float], None]:
+    unattended = Unattended(run, lambda _: None)  # the view shows what is waited for
 
-        def observe(status: Status) -> None:
-            progress.update(task, state=_state(run, status))
-            pace.wait(status.time_s)
+    def wait(time_s: float) -> None:
+        unattended.look(run.companion.status())
+        pace.wait(time_s)
 
-        report = run.run(observe)
-        progress.update(task, total=1, completed=1, state=report.outcome)
-    return report
-
-
-def _run_with_lines(run: Drive, console: Console, pace: Pace) -> Report:
-    next_s = 0.0
-
-    def observe(status: Status) -> None:
-        nonlocal next_s
-        if status.time_s >= next_s:
-            next_s = status.time_s + LINE_EVERY_S
-            console.print(f"{run.mission.name}: {_state(run, status)}", soft_wrap=True, markup=False, highlight=False)
-        pace.wait(status.time_s)
-
-    return run.run(observe)
-
-
-def _state(run: Drive, status: Status) -> str:
-    part = status.decision.part.value if status.decision else "-"
-    state = f"{status.time_s:6.1f} s  {status.doing}  {status.target}  part {part}  step {status.steps}"
-    goal = run.companion.itinerary.goal if run.companion.itinerary else None
-    if goal is not None and status.pose is not None:
-        state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
-    return state
+    return wait

@@ -68,3 +68,16 @@ def test_two_equal_drives_give_the_same_record_byte_for_byte(mission: Path, tmp_
         records.append({path.relative_to(tmp_path / name): path.read_bytes() for path in files})
     assert {"link.tlog", "rounds.bin", "decisions.jsonl", "meta.json"} <= {str(path) for path in records[0]}
     assert records[0] == records[1]
+
+
+def test_texts_are_told_as_they_come_and_a_run_that_waits_for_a_person_is_ended(mission: Path) -> None:
+    plan = mission.with_name("plan.toml")
+    plan.write_text('[[fault]]\nkind = "pilot"\nsince = "driving"\nstart_s = 0.5\nmode = "HOLD"\n')
+    result = CliRunner().invoke(app, ["drive", str(mission), "--faults", str(plan)])
+    assert result.exit_code == 3
+    lines = [line.split(" s  ", 1)[-1] for line in result.stdout.splitlines() if line.startswith("yard: ")]
+    heading = next(index for index, line in enumerate(lines) if line.startswith("Heading for "))
+    silent = lines.index("Companion silent: mode is not GUIDED")
+    ended = lines.index("ended: nobody is here to do what the companion waits for")
+    assert heading < silent < ended and len(lines) < 12
+    assert "outcome: incomplete" in result.stdout

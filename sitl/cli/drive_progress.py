@@ -1,0 +1,109 @@
+"""What ``drive`` shows without a view: where the run is, and every text of the companion as it is said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+from companion.app import Status
+from sitl.cli.pace import Pace
+from sitl.lockstep import Drive, Report
+
+LINE_EVERY_S = 60.0
+NOBODY_S = 60.0
+"""Nobody is there to do what a companion waits for: after so long the run is ended."""
+WAITS = "waiting for a person"
+
+
+class Unattended:
+    """Ends a run that waits for a person, for in lock-step there is none (but those of a plan of faults)."""
+
+    def __init__(self, run: Drive, say: Callable[[str], None]) -> None:
+        self._run = run
+        self._say = say
+        self._since_s: float | None = None
+        self._ended = False
+
+    def look(self, status: Status) -> None:
+        """To be called often."""
+        if WAITS not in status.doing:
+            self._since_s = None
+            return
+        self._since_s = status.time_s if self._since_s is None else self._since_s
+        if status.time_s - self._since_s >= NOBODY_S and not self._ended:
+            self._ended = True
+            self._say(f"{status.time_s:6.1f} s  ended: nobody is here to do what the companion waits for")
+            self._run.companion.stop()
+
+
+class Telling:
+    """Prints the companion's texts as they come."""
+
+    def __init__(self, run: Drive, console: Console) -> None:
+        self._run = run
+        self._console = console
+        self._last: list[str] = []
+
+    def tell(self, status: Status) -> None:
+        """Those said since the last call."""
+        said = self._run.companion.outcome.said
+        old = len(self._last) if said[: len(self._last)] == self._last else 0
+        for text in said[old:]:
+            self.line(f"{status.time_s:6.1f} s  {text}")
+        self._last = list(said)
+
+    def line(self, text: str) -> None:
+        """One line of this run."""
+        name = self._run.mission.name
+        self._console.print(f"{name}: {text}", soft_wrap=True, markup=False, highlight=False)
+
+
+def run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:
+    """Drive to the end. One line changes; where there is no terminal (a log file, CI) a new one comes now and then instead."""
+    if not console.is_terminal:
+        return _run_with_lines(run, console, pace)
+    columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task(run.mission.name, total=None, state="")
+        telling = Telling(run, progress.console)
+        unattended = Unattended(run, telling.line)
+
+        def observe(status: Status) -> None:
+            telling.tell(status)
+            progress.update(task, state=_state(run, status))
+            unattended.look(status)
+            pace.wait(status.time_s)
+
+        report = run.run(observe)
+        telling.tell(run.companion.status())
+        progress.update(task, total=1, completed=1, state=report.outcome)
+    return report
+
+
+def _run_with_lines(run: Drive, console: Console, pace: Pace) -> Report:
+    telling, next_s = Telling(run, console), 0.0
+    unattended = Unattended(run, telling.line)
+
+    def observe(status: Status) -> None:
+        nonlocal next_s
+        telling.tell(status)
+        if status.time_s >= next_s:
+            next_s = status.time_s + LINE_EVERY_S
+            telling.line(_state(run, status))
+        unattended.look(status)
+        pace.wait(status.time_s)
+
+    report = run.run(observe)
+    telling.tell(run.companion.status())
+    return report
+
+
+def _state(run: Drive, status: Status) -> str:
+    part = status.decision.part.value if status.decision else "-"
+    state = f"{status.time_s:6.1f} s  {status.doing}  {status.target}  part {part}  step {status.steps}"
+    goal = run.companion.itinerary.goal if run.companion.itinerary else None
+    if goal is not None and status.pose is not None:
+        state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
+    return state
