@@ -19,7 +19,7 @@ from companion.mission.mission import Mission, MissionError
 from companion.provenance import versions
 from companion.reading import open_file, read_at_most
 from companion.recorded_files import RecordError
-from companion.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS, run_sum, settings_sum
+from companion.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS, STATE, run_sum, settings_sum
 from companion.rounds import Round, unpacked
 from companion.settings import Settings, SettingsError, parse_settings
 
@@ -105,7 +105,7 @@ def load_record(directory: Path) -> Record:
     notes = [f"{directory}: recorded with {line}; differences may come from that" for line in _other_versions(meta)]
     for entry in meta.inputs:
         _check_input(directory, entry)
-        if entry.name != MISSION and _is_other(Path(entry.source), entry.sha256):
+        if entry.name not in (MISSION, STATE) and _is_other(Path(entry.source), entry.sha256):
             notes.append(f"{entry.source}: changed since the run; its copy in the record is used")
     try:
         mission = from_json(read_at_most(directory / MISSION, MAX_META_BYTES), str(directory / MISSION))

@@ -22,6 +22,9 @@ from companion.steering import Helm
 from companion.tracking import Tracker
 from companion.yielding import first_near, least_room_m
 
+COMPILING = "compiling, once on this machine: about a minute, several on a Raspberry Pi"
+"""For people, before a ``warm_up`` of kernels that are not warm."""
+
 
 def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     """Run every compiled kernel that a drive of such a rover with these settings uses once, with the types it uses."""

@@ -33,7 +33,7 @@ from companion.recorder import STATE, NullRecorder, Recorder, RecordError
 from companion.settings import Settings, SettingsError
 from companion.state.place import StatePlaceError
 from companion.stepping import ThreadRunner
-from companion.warmup import settle, warm_up
+from companion.warmup import COMPILING, kernels_warm, settle, warm_up
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 STDERR = 2
@@ -108,8 +108,10 @@ def run(
                 else NullRecorder()
             )
             link = source.link()
-            with console.status("compiling the planner (once a machine) ..."):
-                warm_up(settings, mission.rover.turning_radius_m)
+            with console.status("loading the planner ..."):
+                if not kernels_warm(settings, mission.rover.turning_radius_m):
+                    say(COMPILING)
+                    warm_up(settings, mission.rover.turning_radius_m)
                 settle()
             link.read()  # what piled up meanwhile is old
             place = recorder.directory if isinstance(recorder, Recorder) else None

@@ -16,6 +16,7 @@ from companion.mapfiles import MapError
 from companion.mission.mission import MissionError
 from companion.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
+from companion.warmup import COMPILING, kernels_warm
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_untold
 from sitl.cli.drive_outputs import outputs, print_summary
@@ -81,7 +82,9 @@ def drive(
             files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
             recorder = Recorder(record, mission, settings, seed, arm=True, files=files, start_us=RECORD_START_US)
         wanted.check()
-        with console.status("compiling (once a machine) ..."):
+        with console.status("loading the planner ..."):
+            if not kernels_warm(settings, mission.rover.turning_radius_m):
+                typer.echo(COMPILING, err=True)
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
         if screen is None:
             report = run_with_progress(run, console, pace)
