@@ -16,6 +16,7 @@ from companion.errands import Errands
 from companion.events.event import Event
 from companion.events.targets import TargetAsked
 from companion.events.vehicle import RangeSeen, RoverMode, TextSeen
+from companion.frames import GeoPoint
 from companion.guidance import STANDSTILL
 from companion.handover import HandOver
 from companion.itinerary import Itinerary, TargetStatus
@@ -128,6 +129,11 @@ class Companion:
     def itinerary(self) -> Itinerary | None:
         """Progress through the targets; None before the mission has begun."""
         return None if self._pursuit is None else self._pursuit.itinerary
+
+    @property
+    def origin(self) -> GeoPoint | None:
+        """What map and targets count from, in metres; None before the mission has begun."""
+        return None if self._pursuit is None else self._pursuit.laid.origin
 
     def save_map(self, path_without_suffix: Path) -> bool:
         """Write what has been mapped as a ROS map (.yaml and .pgm), its place in metres from home.

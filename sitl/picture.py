@@ -112,12 +112,12 @@ def _draw_special(axes: Axes, world: World, ended_s: float) -> None:
 
 def _draw_map(axes: Axes, run: Drive) -> None:
     """What the companion has seen: free ground tinted, obstacles dark."""
-    evidence = run.companion.evidence
-    if evidence is None:
+    evidence, origin = run.companion.evidence, run.companion.origin
+    if evidence is None or origin is None:
         return
     grid = evidence.grid
-    start = run.scenario.start
-    left, low = grid.south_west.east_m + start.east_m, grid.south_west.north_m + start.north_m
+    north_m, east_m = run.scenario.start.place_of(origin)
+    left, low = grid.south_west.east_m + east_m, grid.south_west.north_m + north_m
     extent = (left, left + grid.width * grid.resolution_m, low, low + grid.height * grid.resolution_m)
     picture: NDArray[np.float64] = np.zeros((grid.height, grid.width, 4))
     picture[known_fields(evidence)] = (0.85, 0.93, 0.82, 0.6)
@@ -163,11 +163,14 @@ def _draw_track(axes: Axes, north: NDArray[np.float64], east: NDArray[np.float64
 def _draw_places(axes: Axes, run: Drive) -> None:
     start = run.scenario.start
     axes.plot(start.east_m, start.north_m, "o", color="#2e7d32", markersize=9, label="start")
-    itinerary = run.companion.itinerary
-    for i, target in enumerate(itinerary.targets if itinerary else ()):
-        place = (target.point.east_m + start.east_m, target.point.north_m + start.north_m)
+    itinerary, origin = run.companion.itinerary, run.companion.origin
+    if itinerary is None or origin is None:
+        return
+    north_m, east_m = start.place_of(origin)
+    for i, target in enumerate(itinerary.targets):
+        place = (target.point.east_m + east_m, target.point.north_m + north_m)
         axes.plot(*place, "*", color="#d32f2f", markersize=14, label="target" if i == 0 else None)
-        if itinerary is not None and len(itinerary.targets) > 1:
+        if len(itinerary.targets) > 1:
             # Towards the middle, where there is room for it.
             left = place[0] > sum(axes.get_xlim()) / 2.0
             aside, towards = ((-8, 8), "right") if left else ((8, 8), "left")

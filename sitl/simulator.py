@@ -206,12 +206,13 @@ class Simulator:
             self._send()
 
     @property
-    def _is_off(self) -> bool:
+    def is_off(self) -> bool:
+        """Whether the autopilot has no power at this moment."""
         return self._off_until_s > 0.0
 
     def _meet_faults(self) -> None:
         """Begin and end what the plan says; a failure of the autopilot's power, and its return."""
-        if self._is_off and self.time_s >= self._off_until_s - 1e-6:
+        if self.is_off and self.time_s >= self._off_until_s - 1e-6:
             self._off_until_s = 0.0
             self._reboot()
         if self.time_s >= self._player.due_s - 1e-6:
@@ -223,7 +224,7 @@ class Simulator:
     def _receive(self) -> None:
         for link in self._links:
             data = link.pass_in(self._player, self.time_s) if link.inbox or link.ways else b""
-            if data and not self._is_off:
+            if data and not self.is_off:
                 self._autopilot.receive(link.channel, data)
                 link.pass_out(self._player, self.time_s)
         if self._vehicle.rebooting:
@@ -265,7 +266,7 @@ class Simulator:
 
     def _fault_due_s(self) -> float:
         """When a fault begins or ends, power returns, or a packet that is late comes through."""
-        due_s = min(self._player.due_s, self._off_until_s) if self._is_off else self._player.due_s
+        due_s = min(self._player.due_s, self._off_until_s) if self.is_off else self._player.due_s
         for link in self._links:
             if link.ways is not None:
                 due_s = min(due_s, link.ways[0].next_due_s(), link.ways[1].next_due_s())
@@ -290,7 +291,7 @@ class Simulator:
             self._collisions.append(collision_of(rover, world.movers, self.time_s))
 
     def _send(self) -> None:
-        if not self._is_off:
+        if not self.is_off:
             self._speak()
         if self._player.touches_links:
             for link in self._links:

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
+from sitl import geodesy
+
 
 class GeoPlace(Protocol):
     """Anything with latitude and longitude in degrees."""
@@ -33,6 +35,13 @@ class SimStart:
     east_m: float
     heading_rad: float
     home: GeoPlace
+
+    def place_of(self, place: GeoPlace) -> tuple[float, float]:
+        """North and east in the world frame, metres, of a place on earth."""
+        home = (geodesy.to_units(self.home.lat_deg), geodesy.to_units(self.home.lon_deg))
+        there = (geodesy.to_units(place.lat_deg), geodesy.to_units(place.lon_deg))
+        north_m, east_m = geodesy.offset_m(home, there)
+        return self.north_m + north_m, self.east_m + east_m
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from array import array
 from collections import deque
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sitl.autopilot.control import LEG, WAYPOINT
+from sitl.autopilot.vehicle import Vehicle
 from sitl.simulator import Simulator
 from sitl.sketch import Disc, Kind, Layer, Place, Scene
 from sitl.view import Fact, Section, View
@@ -43,6 +45,29 @@ class Rates:
         return rates
 
 
+class _Being:
+    """The autopilot at a moment: which of its lives it is in, and what it has said of mode and arming."""
+
+    def __init__(self, vehicle: Vehicle, is_off: bool) -> None:
+        self._vehicle = vehicle
+        self._is_off = is_off
+        self._mode = vehicle.mode.name
+        self._armed = "armed" if vehicle.armed else "disarmed"
+
+    def news_since(self, was: _Being) -> Iterator[str]:
+        """What has changed, a line each."""
+        if self._is_off:
+            if not was._is_off:
+                yield "the autopilot's power has failed"
+        elif was._is_off or was._vehicle is not self._vehicle:
+            yield f"the autopilot has booted: {self._mode}, {self._armed}"
+        else:
+            if self._mode != was._mode:
+                yield f"mode {self._mode}, was {was._mode}"
+            if self._armed != was._armed:
+                yield self._armed
+
+
 @dataclass
 class Watching:
     """Keeps what a single look at the simulator cannot show: its track, the rates of its links, what was told."""
@@ -53,6 +78,7 @@ class Watching:
     _track: array[float] = field(default_factory=lambda: array("d"))
     _rates: Rates = field(default_factory=Rates)
     _began: tuple[float, float] | None = None
+    _was: _Being | None = None
 
     def tell(self, line: str) -> None:
         """A line for the news."""
@@ -66,7 +92,7 @@ class Watching:
     def scene(self) -> Scene:
         """The truth: world, rover and track."""
         simulator, truth = self.simulator, self.simulator.truth
-        self.note_track()
+        self.note()
         world = simulator.world
         start = Place("start", simulator.start.north_m, simulator.start.east_m, "start")
         return Scene(
@@ -84,8 +110,16 @@ class Watching:
         """Where the rover has been, shape (n, 2)."""
         return np.array(self._track).reshape(-1, 2)
 
-    def note_track(self) -> None:
-        """Remember where the rover is, if it has moved."""
+    def note(self) -> None:
+        """Remember where the rover is, and tell of its mode and power, whoever has changed them. To be called often."""
+        self._note_track()
+        simulator = self.simulator
+        was, now = self._was, _Being(simulator.vehicle, simulator.is_off)
+        self._was = now
+        for line in now.news_since(was) if was else ():
+            self.tell(f"{simulator.time_s:.0f} s: {line}")
+
+    def _note_track(self) -> None:
         truth = self.simulator.truth
         here = (truth.north_m, truth.east_m)
         if not self._track or math.dist(self._track[-2:], here) >= TRACK_STEP_M:

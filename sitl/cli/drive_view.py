@@ -55,24 +55,34 @@ class DriveView:
         self._viewer = viewer
         self._watching = Watching(run.mission.name, run.simulator)
         self._decided: Decision | None = None
+        self._said: list[str] = []
 
     def observe(self, status: Status) -> None:
         """A new moment of the run; drawn if the last picture is old enough."""
-        self._watching.note_track()
-        for text in (news.text for news in status.news):
+        self._take_in(status)
+        now_s = stopwatch_s()
+        if self._viewer.is_due(now_s):
+            self._viewer.show(self._view(status, now_s))
+
+    def _take_in(self, status: Status) -> None:
+        self._watching.note()
+        said = self._run.companion.outcome.said.copy()
+        texts = new_texts(self._said, said)
+        self._said = said
+        # The status knows this tick's news only, but also the autopilot's texts.
+        for text in (*texts, *(news.text for news in status.news if news.text not in texts)):
             self._watching.tell(f"{status.time_s:.0f} s: {text}")
         decision = status.decision
         if decision is not None and decision is not self._decided and decision.part is not Part.EXPLORE:
             # Going on along the path is no news: the panel says it all the time.
             self._watching.tell(f"{status.time_s:.0f} s: {decision.reason}")
         self._decided = decision
-        now_s = stopwatch_s()
-        if self._viewer.is_due(now_s):
-            self._viewer.show(self._view(status, now_s))
 
     def finish(self) -> None:
         """The last moment, which is always drawn."""
-        self._viewer.show(self._view(self._run.companion.status(), stopwatch_s()))
+        status = self._run.companion.status()
+        self._take_in(status)
+        self._viewer.show(self._view(status, stopwatch_s()))
 
     def _view(self, status: Status, now_s: float) -> View:
         watching = self._watching
@@ -81,17 +91,25 @@ class DriveView:
 
     def _scene(self) -> Scene:
         """The truth faintly, and over it what the companion knows."""
-        scene, simulator, start = self._watching.scene(), self._run.simulator, self._run.scenario.start
-        evidence, itinerary = self._run.companion.evidence, self._run.companion.itinerary
+        scene, simulator, companion = self._watching.scene(), self._run.simulator, self._run.companion
+        evidence, itinerary = companion.evidence, companion.itinerary
         layers = world_layers(simulator.world, simulator.time_s, Kind.HIDDEN)
         places = [place for place in scene.places if place.state == "start"]
-        if evidence is not None:
-            layers += seen_layers(evidence, start.north_m, start.east_m)
-        if itinerary is not None:
+        if evidence is not None and itinerary is not None and companion.origin is not None:
+            # An autopilot that has rebooted counts from where it did so, and with it the companion.
+            north_m, east_m = self._run.scenario.start.place_of(companion.origin)
+            layers += seen_layers(evidence, north_m, east_m)
             for target, state in zip(itinerary.targets, itinerary.statuses, strict=True):
-                north_m, east_m = target.point.north_m + start.north_m, target.point.east_m + start.east_m
-                places.append(Place(target.name, north_m, east_m, STATES[state]))
+                there = (target.point.north_m + north_m, target.point.east_m + east_m)
+                places.append(Place(target.name, *there, STATES[state]))
         return replace(scene, layers=layers, places=tuple(places))
+
+
+def new_texts(before: list[str], now: list[str]) -> list[str]:
+    """What was said since then; of a list whose oldest texts go when it is full only what can be told apart from before."""
+    if len(now) > len(before):
+        return now[len(before) :]
+    return now[-1:] if now[-1:] != before[-1:] else []
 
 
 def seen_layers(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[Layer, ...]:

@@ -118,6 +118,7 @@ def _viewed(console: Console | None, watching: Watching, clock: WallClock) -> It
 
         def observe() -> None:
             now_s = clock.now_s()
+            watching.note()
             if viewer.is_due(now_s):
                 viewer.show(watching.view(now_s))
 

@@ -1,0 +1,116 @@
+"""What ``drive --view`` shows of a drive that others interrupt: everything where it really is, and who did what."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+from matplotlib.axes import Axes
+from rich.console import Console
+
+from companion.app import Status
+from companion.recorder import NullRecorder
+from companion.settings import Settings
+from sitl.cli.drive_view import DriveView, new_texts
+from sitl.cli.viewer import Viewer
+from sitl.faults import FaultPlan, PilotTakesOver, Reboot
+from sitl.lockstep import Drive
+from sitl.picture import save_picture
+from sitl.scenario import scenario_from_mission, with_faults
+from sitl.sketch import Kind
+from sitl.view import View
+from tests.rig import yard
+
+GATE_M = (7.5, 15.5)
+"""North and east in the world, from the map's south-west corner: the middle of field 15, 7."""
+PLAN = FaultPlan((PilotTakesOver(3.0, 5.0, "driving", mode="HOLD"), Reboot(9.0, 12.0, "driving")))
+
+
+class Kept(Viewer):
+    """Draws nothing and keeps what was to be drawn."""
+
+    def __init__(self) -> None:
+        super().__init__(Console(file=io.StringIO()))
+        self.views: list[View] = []
+
+    def is_due(self, now_s: float) -> bool:
+        return True
+
+    def show(self, view: View) -> None:
+        self.views.append(view)
+
+
+@dataclass
+class Driven:
+    """A drive to a field behind a wall, which the pilot interrupts and then a power failure of the autopilot ends."""
+
+    run: Drive
+    views: list[View] = field(default_factory=list)
+    statuses: list[Status] = field(default_factory=list)
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
+    mission = yard(tmp_path_factory.mktemp("yard"))
+    scenario = with_faults(scenario_from_mission(mission), PLAN)
+    run, viewer = Drive(mission, scenario, Settings(), 0, NullRecorder(), 120.0), Kept()
+    shown, statuses = DriveView(run, viewer), []
+
+    def observe(status: Status) -> None:
+        statuses.append(status)
+        shown.observe(status)
+
+    run.run(observe)
+    shown.finish()
+    assert any("EKF origin moved" in text for text in run.companion.outcome.said)
+    yield Driven(run, viewer.views, statuses)
+
+
+def test_targets_and_walls_stay_where_they_are_when_the_autopilot_counts_from_elsewhere(driven: Driven) -> None:
+    origin, start = driven.run.companion.origin, driven.run.scenario.start
+    assert origin is not None and driven.run.mission.targets
+    moved_m = [there - here for there, here in zip(start.place_of(origin), (start.north_m, start.east_m), strict=True)]
+    assert max(map(abs, moved_m)) > 2.0
+    for view in (view for view in driven.views if len(view.scene.places) > 1):
+        gate = view.scene.places[-1]
+        assert (gate.north_m, gate.east_m) == pytest.approx(GATE_M, abs=0.1)
+        seen = next(layer for layer in view.scene.layers if layer.kind is Kind.SEEN)
+        # Its fields are the mission's own, laid from the new origin: they lie elsewhere by less than a field.
+        assert (seen.south_m, seen.west_m) == pytest.approx((0.0, 0.0), abs=1.0)
+
+
+def test_the_picture_has_the_target_there_too(driven: Driven, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    stars: list[tuple[float, float]] = []
+    plot = Axes.plot
+
+    def noted(axes: Axes, *args: object, **more: object) -> object:
+        if "*" in args:
+            stars.append((args[1], args[0]))  # type: ignore[arg-type]
+        return plot(axes, *args, **more)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(Axes, "plot", noted)
+    save_picture(driven.run, tmp_path / "yard.png")
+    assert stars == [pytest.approx(GATE_M, abs=0.1)]
+
+
+def test_the_news_tell_what_pilot_and_power_did(driven: Driven) -> None:
+    told = [text.partition(" s: ")[2] for text in driven.views[-1].news]
+    expected = ["mode HOLD, was GUIDED", "mode GUIDED, was HOLD", "the autopilot's power has failed"]
+    expected.append("the autopilot has booted: MANUAL, disarmed")
+    assert [text for text in told if text in expected] == expected
+
+
+def test_the_news_tell_all_that_the_companion_said(driven: Driven) -> None:
+    told = [text.partition(" s: ")[2] for text in driven.views[-1].news]
+    said = driven.run.companion.outcome.said
+    assert len(said) > 5 and any("mode is not GUIDED" in text for text in said)
+    assert [text for text in told if text in said] == said
+
+
+def test_texts_are_new_once_even_when_old_ones_are_forgotten() -> None:
+    assert new_texts(["a"], ["a", "b", "a"]) == ["b", "a"]
+    assert new_texts(["a", "b"], ["a", "b"]) == [] == new_texts([], [])
+    assert new_texts(["a", "b"], ["b", "c"]) == ["c"]
