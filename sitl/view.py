@@ -194,12 +194,17 @@ def _states_shown(scene: Scene, frame: Frame) -> list[tuple[str, str]]:
 
 
 def _facts(view: View, columns: int, rows: int) -> Table:
-    """All sections, then as much of the news as there is room for."""
+    """All sections, long facts whole where there is room for more than a line each, then as much of the news as still fits."""
     table = Table.grid()
     table.add_column(width=columns, no_wrap=True, overflow="ellipsis")
     room = rows
+    spare = rows - sum(1 + len(section.facts) for section in view.sections)
     for section in view.sections:
-        lines = [Text(section.title, "bold"), *(_line(fact, columns) for fact in section.facts)]
+        lines = [Text(section.title, "bold")]
+        for fact in section.facts:
+            told = _told(fact, columns, max(spare, 0) + 1)
+            spare -= len(told) - 1
+            lines += told
         for line in lines[: max(room, 0)]:
             table.add_row(line)
         room -= len(lines)
@@ -211,10 +216,22 @@ def _facts(view: View, columns: int, rows: int) -> Table:
 
 
 def _line(fact: Fact, columns: int) -> Text:
-    line = Text(fact.name.ljust(NAME_COLUMNS), "dim", no_wrap=True)
-    line.append(fact.value, "bold not dim #ff5f5f" if fact.alarm else "not dim")
-    line.truncate(columns, overflow="ellipsis")
-    return line
+    return _told(fact, columns, 1)[0]
+
+
+def _told(fact: Fact, columns: int, most: int) -> list[Text]:
+    """A fact in so many lines at most, the later ones under the value; what does not fit ends in dots."""
+    style = "bold not dim #ff5f5f" if fact.alarm else "not dim"
+    values = _broken(fact.value, max(columns - NAME_COLUMNS, 1))
+    if len(values) > most:
+        values[most - 1 :] = [f"{values[most - 1]} {values[most]}"]  # which is too long, and cut below
+    lines = []
+    for number, value in enumerate(values):
+        line = Text((fact.name if number == 0 else "").ljust(NAME_COLUMNS), "dim", no_wrap=True)
+        line.append(value, style)
+        line.truncate(columns, overflow="ellipsis")
+        lines.append(line)
+    return lines
 
 
 def _newest(news: Iterable[str], columns: int, rows: int) -> list[Text]:
@@ -229,12 +246,17 @@ def _newest(news: Iterable[str], columns: int, rows: int) -> list[Text]:
 
 
 def _wrapped(text: str, columns: int) -> list[Text]:
-    """Lines of a text, the later ones set in by a space; words longer than a line are cut through."""
+    """Lines of a text, the later ones set in by a space."""
+    return [Text(line, no_wrap=True) for line in _broken(text, columns, " ")]
+
+
+def _broken(text: str, columns: int, indent: str = "") -> list[str]:
+    """A text in lines of at most so many characters, at least one; words longer than a line are cut through."""
     lines = [""]
     for word in text.split():
         if lines[-1].strip() and len(lines[-1]) + 1 + len(word) > columns:
-            lines.append(" ")
+            lines.append(indent)
         lines[-1] += word if not lines[-1].strip() else f" {word}"
         while len(lines[-1]) > columns:
-            lines[-1:] = [lines[-1][:columns], " " + lines[-1][columns:]]
-    return [Text(line, no_wrap=True) for line in lines]
+            lines[-1:] = [lines[-1][:columns], indent + lines[-1][columns:]]
+    return lines

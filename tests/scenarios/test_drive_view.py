@@ -23,6 +23,7 @@ from sitl.scenario import scenario_from_mission, with_faults
 from sitl.sketch import Kind
 from sitl.view import View
 from tests.rig import yard
+from tests.unit.test_sitl_view import screen
 
 GATE_M = (7.5, 15.5)
 """North and east in the world, from the map's south-west corner: the middle of field 15, 7."""
@@ -114,3 +115,15 @@ def test_texts_are_new_once_even_when_old_ones_are_forgotten() -> None:
     assert new_texts(["a"], ["a", "b", "a"]) == ["b", "a"]
     assert new_texts(["a", "b"], ["a", "b"]) == [] == new_texts([], [])
     assert new_texts(["a", "b"], ["b", "c"]) == ["c"]
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(80, 40), (140, 30)])
+def test_what_is_waited_for_can_be_read(driven: Driven, columns: int, rows: int) -> None:
+    status = driven.statuses[-1]
+    assert len(status.doing) > 44
+    lines = screen(driven.views[-1], columns, rows)
+    assert len(lines) <= rows
+    panel = [line.rsplit("│", 2)[1] for line in lines if line.count("│") > 2]
+    first = next(number for number, line in enumerate(panel) if line.strip().startswith("doing"))
+    words = " ".join(" ".join(line.strip().removeprefix("doing") for line in panel[first:]).split())
+    assert words.startswith(status.doing)
