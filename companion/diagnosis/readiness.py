@@ -74,8 +74,11 @@ def arming(seen: Examined) -> Iterator[Finding]:
 
 
 def rates(seen: Examined) -> Iterator[Finding]:
-    """Which messages come too seldom."""
+    """Which messages come too seldom. Without a position of the EKF there is none to be sent, whatever the line carries."""
+    no_position = seen.vehicle.ekf is not None and seen.vehicle.ekf_lacks == "position"
     for message in seen.slow:
+        if message.name == "LOCAL_POSITION_NED" and no_position:
+            continue
         vital = message.name in ("LOCAL_POSITION_NED", "ATTITUDE", "EKF_STATUS_REPORT") and message.measured_hz < 1.5
         says = f"{message.name} comes at {message.measured_hz:.1f} Hz though {message.wanted_hz:g} Hz were asked for."
         remedy = "a faster baud rate (115200), or keep ground stations from setting their own rates on this port"

@@ -144,7 +144,9 @@ def test_a_parameter_that_is_set_wrong(tmp_path: Path, values: dict[str, float],
 
 
 def test_just_switched_on(tmp_path: Path) -> None:
-    findings = Case(tmp_path, on_s=3.0, seconds=5.0).findings()
+    case = Case(tmp_path, on_s=3.0, seconds=7.5)
+    findings = case.findings()
+    assert "LOCAL_POSITION_NED" in {one.name for one in case.result.slow} and "rate" not in findings
     assert {"ekf", "origin", "pre-arm"} <= findings.keys()
     assert set(findings.values()) >= {S}
 

@@ -167,6 +167,15 @@ def test_why_it_would_not_arm_is_told_and_what_is_over_is_not() -> None:
     assert diagnose(replace(WELL, texts=texts)) == []
 
 
+def test_a_position_that_there_is_not_is_no_matter_of_the_line() -> None:
+    slow = (SlowMessage("LOCAL_POSITION_NED", 10.0, 0.0), SlowMessage("ATTITUDE", 20.0, 8.0))
+    waiting = replace(with_state(ekf=EkfStatusSeen(0.0, 167), position=None), slow=slow)
+    assert [(one.name, one.says[:8]) for one in diagnose(waiting)] == [("ekf", "The EKF "), ("rate", "ATTITUDE")]
+    assert [one.says[:8] for one in diagnose(replace(WELL, slow=slow))] == ["LOCAL_PO", "ATTITUDE"]
+    silent = replace(with_state(ekf=None), slow=slow)
+    assert [one.name for one in diagnose(silent)] == ["ekf", "rate", "rate"]
+
+
 def test_cold_kernels() -> None:
     assert [one.level for one in kernels(cold=True)] == [W]
     assert kernels(cold=False) == []
