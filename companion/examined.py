@@ -66,6 +66,10 @@ class Examined:
     texts: tuple[str, ...] = ()
     fence_breached: bool = False
     signing: str = ""
-    refused: int = 0
+    """What is wrong with signatures, and"""
+    signing_remedy: str = ""
+    """what to do about it."""
+    unbelieved: int | None = None
+    """The system id of a rover that is heard, but not believed: its packets are not signed with our key."""
     lost: int = 0
     packets: int = 0

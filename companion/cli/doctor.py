@@ -65,7 +65,7 @@ def doctor(
         typer.echo(json.dumps({"heard": _summary(seen), "findings": [asdict(one) for one in findings]}, indent=2))
     else:
         _show(seen, findings)
-    if not seen.rover_heard:
+    if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
 
@@ -75,6 +75,7 @@ def _summary(seen: Examined) -> dict[str, object]:
     return {
         "place": seen.place,
         "rover": seen.rover_heard,
+        "unbelieved": seen.unbelieved,
         "system": seen.system if seen.rover_heard else None,
         "version": None if seen.version is None else ".".join(map(str, seen.version)),
         "parameters": dict(seen.parameters),
@@ -87,6 +88,9 @@ def _show(seen: Examined, findings: list[Finding]) -> None:
     if seen.rover_heard:
         version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"
         console.print(f"rover: system {seen.system}{version}, on {seen.place}", soft_wrap=True, markup=False)
+    elif seen.unbelieved is not None:
+        what = f"rover: system {seen.unbelieved}, on {seen.place}, heard but not believed"
+        console.print(what, soft_wrap=True, markup=False)
     table = Table("", "finding", "what to do", show_lines=True)
     for one in findings:
         value = "" if one.value is None or not one.parameter else f" ({one.parameter} is {one.value:g})"

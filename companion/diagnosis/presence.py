@@ -19,7 +19,7 @@ def nobody(seen: Examined) -> Iterator[Finding]:
     """No rover was heard: what was, if anything."""
     strangers = [one for one in seen.autopilots if (one.make, one.kind) not in ((ARDUPILOT, ROVER), (ARDUPILOT, BOAT))]
     if seen.signing:
-        yield Finding("signing", Level.STOP, seen.signing, "give --signing-key the key that the autopilot has")
+        yield Finding("signing", Level.STOP, seen.signing, seen.signing_remedy)
     elif strangers:
         one = strangers[0]
         says = f"System {one.system} is a vehicle of type {one.kind} (autopilot {one.make}), no ArduPilot rover."

@@ -17,7 +17,7 @@ from companion.mavlink.codec import Codec
 from companion.mavlink.decode import AUTOPILOT
 from companion.mavlink.framing import Packet
 from companion.mavlink.rates import RateKeeper, wanted_rates
-from companion.mavlink.signing import Signer
+from companion.mavlink.signing import Signer, remedy
 from companion.settings import LinkSettings
 from companion.vehicle import VehicleState, fold
 
@@ -31,6 +31,7 @@ TRIES = 5
 """and so often, if no answer comes."""
 WARNING = 4
 MOST_TEXTS, MOST_SOURCES, MOST_SYSTEMS = 32, 64, 32
+ROVERS = (mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT)
 GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 ASKED = (
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
@@ -65,6 +66,7 @@ class Examination:
         self._sources: dict[tuple[int, int, int], list[Any]] = {}
         self._texts: dict[str, None] = {}
         self._packets = 0
+        self._unbelieved: int | None = None
         self._now_s = 0.0
 
     @property
@@ -77,7 +79,9 @@ class Examination:
         self._now_s = now_s
         for packet in self._codec.packets(self._link.read()):
             self._packets += 1
-            if self._codec.accepts(packet):
+            if not self._codec.accepts(packet):
+                self._overhear(packet)
+            else:
                 self._look(packet)
                 for event in self._codec.decode_packet(packet, now_s):
                     self._vehicle = fold(self._vehicle, event)
@@ -92,7 +96,6 @@ class Examination:
     def result(self) -> Examined:
         """What has been learned so far."""
         counters = self._codec.counters
-        refused = counters.refused
         slow = tuple(SlowMessage(fault.name, fault.wanted_hz, fault.measured_hz) for fault in self._rates.faults)
         return Examined(
             place=self._link.description,
@@ -111,7 +114,8 @@ class Examination:
             texts=tuple(self._texts),
             fence_breached=self._breached,
             signing=self._codec.signing_trouble,
-            refused=refused.unsigned + refused.wrong + refused.old,
+            signing_remedy=remedy(counters.refused),
+            unbelieved=self._unbelieved,
             lost=counters.lost,
             packets=self._packets,
         )
@@ -168,6 +172,13 @@ class Examination:
                 self._breached = bool(watched and not status.onboard_control_sensors_health & GEOFENCE)
             case _:
                 pass
+
+    def _overhear(self, packet: Packet) -> None:
+        """A rover that is not believed is there all the same."""
+        if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and packet.component_id == AUTOPILOT:
+            message = self._message(packet)
+            if message.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and message.type in ROVERS:
+                self._unbelieved = packet.system_id
 
     def _heartbeat(self, packet: Packet) -> None:
         message = self._message(packet)

@@ -227,3 +227,14 @@ def trouble(refused: Refused, vehicle_known: bool) -> str:
     if refused.old:
         return "Ignoring packets that were signed too long ago, or are heard again"
     return "Ignoring unsigned packets" if refused.unsigned else ""
+
+
+def remedy(refused: Refused) -> str:
+    """What to do when nothing is believed; empty when nothing was refused."""
+    if refused.wrong:
+        return "name with --signing-key the key that the autopilot was given, or give it this one (docs/signing.md)"
+    if refused.old:
+        return "set this computer's clock"
+    return (
+        "give the autopilot the key (docs/signing.md says how), or leave --signing-key out" if refused.unsigned else ""
+    )

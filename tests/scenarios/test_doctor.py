@@ -194,9 +194,18 @@ def test_a_key_that_is_missing_or_another_one(tmp_path: Path) -> None:
     setup = said(mavlink.MAVLink_setup_signing_message(1, 1, list(KEY), TIME))
     assert Case(tmp_path, before=setup, port=1).findings()["signing"] is W
     other = Signer(b"o" * 32, lambda: TIME)
-    assert Case(tmp_path, before=setup, port=1, signer=other).findings() == {"signing": S}
+    wrong = Case(tmp_path, before=setup, port=1, signer=other)
+    assert wrong.findings() == {"signing": S} and wrong.result.unbelieved == 1
+    assert "name with --signing-key the key that the autopilot was given" in diagnose(wrong.result)[0].remedy
     right = Case(tmp_path, before=setup, port=1, signer=Signer(KEY, lambda: TIME + 2 * 6_000_000))
     assert right.findings() == {"gcs-failsafe": N}
+
+
+def test_a_key_that_only_we_have(tmp_path: Path) -> None:
+    case = Case(tmp_path, port=1, signer=Signer(KEY, lambda: TIME))
+    assert case.findings() == {"signing": S} and case.result.unbelieved == 1
+    (finding,) = diagnose(case.result)
+    assert finding.remedy.startswith("give the autopilot the key") and "leave --signing-key out" in finding.remedy
 
 
 @needs_shared
@@ -284,6 +293,27 @@ def test_a_parameter_file_with_faults_as_people_see_them(tmp_path: Path) -> None
     findings = {one["name"]: one for one in json.loads(out)["findings"]}
     assert (findings["oa-type"]["parameter"], findings["oa-type"]["wanted"]) == ("OA_TYPE", 0.0)
     assert {"avoid-enable", "wp-radius"} <= findings.keys()
+
+
+@pytest.mark.parametrize("as_json", [True, False])
+def test_a_rover_that_is_not_believed_has_been_heard(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, as_json: bool
+) -> None:
+    key = tmp_path / "key"
+    key.write_text("words\n")
+    key.chmod(0o600)
+    near, far = MemoryLink.pair()
+    far.write(Station(3, 1).heartbeat())
+    monkeypatch.setattr("companion.cli.doctor.open_link", lambda url: near)
+    options = ["--connect", "here", "--seconds", "1", "--signing-key", str(key), "--state", str(tmp_path / "state")]
+    answer = CliRunner().invoke(app, ["doctor", *options, *(["--json"] if as_json else [])])
+    assert answer.exit_code == 3
+    if as_json:
+        heard = json.loads(answer.output)["heard"]
+        assert (heard["rover"], heard["unbelieved"]) == (False, 3)
+    else:
+        assert answer.output.startswith("rover: system 3, on ") and "heard but not believed" in answer.output
+        assert "give the autopilot" in answer.output and "--signing-key out" in answer.output
 
 
 def test_nobody_there(tmp_path: Path) -> None:

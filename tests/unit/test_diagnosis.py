@@ -123,7 +123,7 @@ CASES: list[tuple[str, Level, Examined]] = [
     ("several-autopilots", W, replace(WELL, autopilots=(Autopilot(1, 10, 3), Autopilot(2, 10, 3)))),
     ("two-companions", S, replace(WELL, companion_heard=True)),
     ("signing", W, replace(WELL, signing="The autopilot signs")),
-    ("signing", S, replace(WELL, rover_heard=False, signing="Heard only unsigned packets")),
+    ("signing", S, replace(WELL, rover_heard=False, signing="Heard only unsigned packets", signing_remedy="so")),
     ("not-a-rover", S, replace(WELL, rover_heard=False, autopilots=(Autopilot(1, 2, 3),))),
     ("no-autopilot", S, replace(WELL, rover_heard=False, autopilots=())),
     ("no-autopilot", S, Examined(place="memory")),
