@@ -22,7 +22,7 @@ from PIL import Image, UnidentifiedImageError
 from companion.disk import write_whole
 from companion.frames import NedPoint
 from companion.grid import BASE_WEIGHT, OBSTACLE, Grid, Weights
-from companion.reading import open_file
+from companion.reading import open_file, why_no_file
 
 MAX_FIELDS = 25_000_000
 """Larger maps are refused before memory is asked for (5000 x 5000 fields are 200 MB of weights)."""
@@ -106,7 +106,7 @@ def _read_bytes(path: Path, limit: int) -> bytes:
         with open_file(path) as file:
             data = file.read(limit + 1)
     except OSError as error:
-        raise MapError(f"{path}: cannot be read: {error.strerror}") from error
+        raise MapError(f"{path}: cannot be read: {error.strerror}; check the path") from error
     if len(data) > limit:
         raise MapError(f"{path}: larger than {limit} bytes")
     return data
@@ -127,7 +127,7 @@ def _read_grey(path: Path) -> tuple[NDArray[np.float32], NDArray[np.bool_] | Non
     try:
         file = open_file(path)
     except FileNotFoundError:
-        raise MapError(f"{path}: no such file") from None
+        raise MapError(f"{path}: no such file; check the path") from None
     except OSError as error:
         raise MapError(f"{path}: cannot be read: {error.strerror}; name a PNG, PGM or BMP picture") from error
     try:
@@ -190,8 +190,8 @@ def _load_ros(path: Path) -> Grid:
         )
     shades = _shades(path, fields)
     picture = path.parent / image
-    if not picture.is_file():
-        raise MapError(f"{path}: image: no such file: {picture}")
+    if fault := why_no_file(picture):
+        raise MapError(f"{path}: image: {picture}: {fault}")
     return Grid(_weights_of(*_read_grey(picture), shades), resolution_m, NedPoint(north_m, east_m))
 
 

@@ -38,3 +38,16 @@ def refuse_pipe(path: Path) -> None:
         return
     if stat.S_ISFIFO(mode) or stat.S_ISSOCK(mode) or stat.S_ISBLK(mode):
         raise OSError(errno.EINVAL, "not a file", str(path))
+
+
+def why_no_file(path: Path) -> str:
+    """Why a name is not that of an ordinary file, and what to do; empty if it is."""
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError, ValueError):
+        return "no such file; check the path"
+    except OSError as error:
+        return f"cannot be read: {error.strerror}; check the path"
+    if stat.S_ISREG(mode):
+        return ""
+    return "is a folder, not a file; add a file's name" if stat.S_ISDIR(mode) else "not a file; name one"

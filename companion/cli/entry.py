@@ -20,7 +20,7 @@ HERE = Path(__file__).parents[1]
 
 
 class StoppedError(Exception):
-    """Ctrl-C has ended a command that has more to say about it; the text is one line."""
+    """Ctrl-C or SIGTERM has ended a command that has more to say about it; the text is one line, without which of the two it was."""
 
 
 def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
@@ -41,7 +41,10 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
     try:
         return _run(name, load())
     except KeyboardInterrupt:
-        print(f"{name}: stopped by {'SIGTERM' if terminated.asked else 'Ctrl-C'}", file=sys.stderr)
+        print(f"{name}: stopped by {terminated.what}", file=sys.stderr)
+        return EXIT_STOPPED
+    except StoppedError as stopped:
+        print(f"stopped by {terminated.what}: {stopped}", file=sys.stderr)
         return EXIT_STOPPED
     finally:
         signal.signal(signal.SIGTERM, before)
@@ -53,6 +56,11 @@ class _Terminated:
     def __init__(self) -> None:
         self.asked = False
         self._process = os.getpid()
+
+    @property
+    def what(self) -> str:
+        """What has interrupted."""
+        return "SIGTERM" if self.asked else "Ctrl-C"
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
         if os.getpid() != self._process:
@@ -81,9 +89,6 @@ def _run(name: str, commands: Callable[..., object]) -> int:
         _let_go_of_output()  # a command that goes on when nobody reads has its own exit code
     except typer.Abort:  # what older typers make of an interrupt
         raise KeyboardInterrupt from None
-    except StoppedError as stopped:
-        print(stopped, file=sys.stderr)
-        return EXIT_STOPPED
     except usage_error as error:
         where = error.ctx.command_path if error.ctx is not None else name
         print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)

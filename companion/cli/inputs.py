@@ -31,7 +31,7 @@ PICTURES = (".png", ".jpg", ".jpeg")
 def picture(path: Path | None) -> None:
     """Like ``writable``, for a picture, whose suffix tells its format. Raises OutputError."""
     if path is not None and path.suffix.lower() not in PICTURES:
-        raise OutputError(f"{path}: not a suffix of a picture format, use .png")
+        raise OutputError(f"{path}: suffix '{path.suffix}' is no picture format; known: {', '.join(PICTURES)}")
     writable(path)
 
 

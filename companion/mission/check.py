@@ -7,6 +7,7 @@ import shapely
 from companion.frames import GeoPoint
 from companion.grid import Cell
 from companion.mission.mission import Area, HomePoint, Mission, MissionError, Place
+from companion.reading import why_no_file
 
 MAX_GRID_FIELDS = 4_000_000
 """Larger grids are refused: the companion keeps several rasters of that size."""
@@ -102,7 +103,7 @@ def _check_files(mission: Mission) -> None:
     if sitl is not None:
         files += [("sitl.world", sitl.world), ("sitl.parameters", sitl.parameters)]
     for what, path in files:
-        if path is not None and not path.is_file():
-            raise MissionError(f"{what}: no such file: {path}")
+        if path is not None and (fault := why_no_file(path)):
+            raise MissionError(f"{what}: {path}: {fault}")
     if sitl is not None and sitl.start is not None and sitl.world is None:
         _check_place(mission, "sitl.start", sitl.start)

@@ -22,5 +22,7 @@ def fingerprint(mission: Mission) -> str:
             with open_file(mission.prior_map) as file:
                 digest.update(file.read())
         except OSError as error:
-            raise MissionError(f"prior_map: {mission.prior_map}: cannot be read: {error.strerror}") from error
+            raise MissionError(
+                f"prior_map: {mission.prior_map}: cannot be read: {error.strerror}; check the path"
+            ) from error
     return digest.hexdigest()

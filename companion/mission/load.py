@@ -8,6 +8,7 @@ from companion.mission.check import check_mission
 from companion.mission.mission import Mission, MissionError
 from companion.mission.qgc import SUFFIXES, load_qgc
 from companion.mission.toml_file import load as load_toml
+from companion.reading import why_no_file
 
 
 def load_mission(path: Path, *, simulated: bool = True) -> Mission:
@@ -17,8 +18,8 @@ def load_mission(path: Path, *, simulated: bool = True) -> Mission:
     Raises MissionError: one line with file, place and reason.
     """
     suffix = path.suffix.lower()
-    if not path.is_file():
-        raise MissionError(f"{path}: {'not a file' if path.exists() else 'no such file'}")
+    if fault := why_no_file(path):
+        raise MissionError(f"{path}: {fault}")
     if suffix == ".toml":
         return load_toml(path, simulated=simulated)
     if suffix not in SUFFIXES:

@@ -14,7 +14,7 @@ def read_text(path: Path, limit: int) -> str:
         with open_file(path) as file:
             data = file.read(limit + 1)
     except OSError as error:
-        raise MissionError(f"{path}: cannot be read: {error.strerror}") from error
+        raise MissionError(f"{path}: cannot be read: {error.strerror}; check the path") from error
     if len(data) > limit:
         raise MissionError(f"{path}: larger than {limit} bytes")
     try:

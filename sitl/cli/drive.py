@@ -61,7 +61,7 @@ def drive(
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
-    4: collision; 2: bad input; 130: stopped by Ctrl-C. A run that waits for a person for a minute of its time is ended: nobody is there.
+    4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person for a minute of its time is ended: nobody is there.
     """
     console, wanted = Console(), outputs(image, map_stem, json_file)
     recorder: Recorder | NullRecorder = NullRecorder()
@@ -113,7 +113,7 @@ def _file(sensors: str | None) -> Path | None:
 
 
 def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
-    """What Ctrl-C has ended, and where the record of it lies."""
+    """What an interrupt has ended, and where the record of it lies."""
     if run is None:
         what = "before the first metre"
     else:
@@ -121,7 +121,7 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
         targets = f"{reached} of {len(run.mission.targets)} targets reached"
         what = f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}"
     kept = f"record so far: {recorder.directory}" if isinstance(recorder, Recorder) else "nothing was written"
-    return f"stopped by Ctrl-C: {what}; {kept}"
+    return f"{what}; {kept}"
 
 
 def _paced(run: Drive, pace: Pace) -> Callable[[float], None]:

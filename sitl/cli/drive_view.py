@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -30,20 +29,16 @@ PARTS = {"A": "returning", "B": "exploring", "C": "new path"}
 
 
 def run_with_view(run: Drive, console: Console, pace: Callable[[float], None]) -> tuple[Report, Viewer]:
-    """Drive to the end while a picture of it is shown; ``pace`` waits until a simulated time may come. SIGTERM counts as Ctrl-C."""
-    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
-    try:
-        with Viewer(console) as viewer:
-            shown = DriveView(run, viewer)
+    """Drive to the end while a picture of it is shown; ``pace`` waits until a simulated time may come."""
+    with Viewer(console) as viewer:
+        shown = DriveView(run, viewer)
 
-            def observe(status: Status) -> None:
-                shown.observe(status)
-                pace(status.time_s)
+        def observe(status: Status) -> None:
+            shown.observe(status)
+            pace(status.time_s)
 
-            report = run.run(observe)
-            shown.finish()
-    finally:
-        signal.signal(signal.SIGTERM, before)
+        report = run.run(observe)
+        shown.finish()
     return report, viewer
 
 

@@ -18,7 +18,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Mission, SitlSpec
 from companion.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.experiments.experiment import Advance, ExperimentError, Options
+from sitl.experiments.experiment import Advance, Options, shipped_missions
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
@@ -217,10 +217,4 @@ def with_suite(mission: Mission, suite: str) -> Mission:
 
 def shipped(options: Options) -> list[Mission]:
     """All missions that ship with the project."""
-    folder = options.maps.parent if options.maps else Path(__file__).parents[2] / "missions"
-    for name in MISSIONS:
-        if not (folder / name).is_file():
-            raise ExperimentError(
-                f"{folder / name}: no such mission; this experiment needs the source's missions folder"
-            )
-    return [load_mission(folder / name) for name in MISSIONS]
+    return [load_mission(file) for file in shipped_missions(options.maps, MISSIONS)]

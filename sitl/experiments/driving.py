@@ -18,7 +18,14 @@ from companion.mission.mission import Mission
 from companion.recorder import NullRecorder
 from companion.warmup import warm_up
 from sitl.experiments import drawing
-from sitl.experiments.experiment import Advance, ExperimentError, Options, planners_of, where_measured
+from sitl.experiments.experiment import (
+    Advance,
+    ExperimentError,
+    Options,
+    planners_of,
+    shipped_missions,
+    where_measured,
+)
 from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
 from sitl.ground import mission_on_map
@@ -249,13 +256,7 @@ def drive(mission: Mission, planner: str, seed: int) -> Report:
 
 
 def _shipped(options: Options) -> dict[str, Mission]:
-    folder = options.maps.parent if options.maps else Path(__file__).parents[2] / "missions"
-    missing = [name for name in MISSIONS if not (folder / name).is_file()]
-    if missing:
-        raise ExperimentError(
-            f"{folder / missing[0]}: no such mission; this experiment needs the source's missions folder"
-        )
-    return {Path(name).stem: load_mission(folder / name) for name in MISSIONS}
+    return {file.stem: load_mission(file) for file in shipped_missions(options.maps, MISSIONS)}
 
 
 def _given(options: Options) -> dict[str, Mission]:

@@ -15,6 +15,7 @@ from rich.table import Table
 from companion.grid import Cell, Grid
 from companion.mapfiles import load_map
 from companion.planning.registry import UnknownPlannerError, make_planner
+from companion.reading import why_no_file
 from companion.settings import PlannerSettings
 
 START, TARGET = Cell(0, 24), Cell(98, 24)
@@ -96,14 +97,29 @@ def load_maps(folder: Path | None, names: tuple[str, ...]) -> dict[str, Grid]:
     maps = {}
     for name in names:
         file = given / f"{name}.png"
-        if not file.is_file():
-            raise ExperimentError(f"{file}: no such map; this experiment needs {', '.join(names)} (.png) in --maps")
+        if fault := why_no_file(file):
+            fault = fault.partition(";")[0]
+            raise ExperimentError(f"{file}: {fault}; this experiment needs {', '.join(names)} (.png) in --maps")
         grid = load_map(file)
         for what, cell in (("start", START), ("target", TARGET)):
             if grid.is_obstacle(cell):
                 raise ExperimentError(f"{file}: the {what} {tuple(cell)} is outside the map or an obstacle")
         maps[name] = grid
     return maps
+
+
+def shipped_missions(maps: Path | None, names: tuple[str, ...]) -> list[Path]:
+    """The files of the missions that ship with the project: they lie beside the folder of maps. Raises ExperimentError."""
+    source = Path(__file__).parents[2] / "missions" / "maps"
+    folder = source if maps is None else maps
+    if maps is not None and not maps.is_dir():
+        raise ExperimentError(f"{maps}: no such folder of maps; name one with --maps (missions/maps of the source)")
+    files = [folder.resolve().parent / name for name in names]
+    for file in files:
+        if not file.is_file():
+            says = f"{folder}: {file.name} does not lie beside this folder"
+            raise ExperimentError(f"{says}; this experiment needs missions/maps of the source in --maps")
+    return files
 
 
 def where_measured() -> str:

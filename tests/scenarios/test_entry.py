@@ -29,7 +29,10 @@ def command(name: str, *arguments: str) -> list[str]:
         (("rover-sitl",), "Missing command"),
         (("rover-companion", "run", "missions/open.toml"), "Missing option '--connect'"),
         (("rover-sitl", "drive", "missions/open.toml", "--sensors", "none"), "does not drive without range data"),
-        (("rover-sitl", "drive", "missions/open.toml", "--image", "open.doc"), "not a suffix of a picture format"),
+        (
+            ("rover-sitl", "drive", "missions/open.toml", "--image", "open.doc"),
+            "open.doc: suffix '.doc' is no picture format; known: .png, ",
+        ),
     ],
 )
 def test_wrong_usage_gets_one_line_and_exit_code_2(arguments: tuple[str, ...], what: str) -> None:
@@ -73,12 +76,12 @@ def test_an_interrupt_of_a_command_that_says_nothing_itself_is_told(capsys: pyte
 
     @app.command()
     def talkative() -> None:
-        raise StoppedError("stopped: half of it is done")
+        raise StoppedError("half of it is done")
 
     code = start("script", lambda: partial(app, ["interrupted"]))
     assert (code, capsys.readouterr().err) == (130, "script: stopped by Ctrl-C\n")
     code = start("script", lambda: partial(app, ["talkative"]))
-    assert (code, capsys.readouterr().err) == (130, "stopped: half of it is done\n")
+    assert (code, capsys.readouterr().err) == (130, "stopped by Ctrl-C: half of it is done\n")
 
 
 @pytest.mark.parametrize("name", SCRIPTS)
@@ -87,12 +90,15 @@ def test_the_version_is_told(name: str) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, f"{name} {version('rover-companion')}\n", "")
 
 
-def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("number", "word"), [(signal.SIGINT, "Ctrl-C"), (signal.SIGTERM, "SIGTERM")])
+def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
+    tmp_path: Path, number: signal.Signals, word: str
+) -> None:
     record = tmp_path / "record"
     with process("sitl", "drive", "missions/rooms.toml", "--sensors", "beams", "--record", record) as child:
         assert child.stdout is not None and child.stdout.readline().startswith("Rooms")
-        child.send_signal(signal.SIGINT)
+        child.send_signal(number)
         code, _, errors = finished(child, 20.0)
     assert code == 130 and errors.count("\n") == 1
-    assert errors.startswith("stopped by Ctrl-C: Rooms after ") and "0 of 1 targets reached" in errors
+    assert errors.startswith(f"stopped by {word}: Rooms after ") and "0 of 1 targets reached" in errors
     assert errors.endswith(f"record so far: {record}\n") and (record / "link.tlog").stat().st_size > 0

@@ -20,10 +20,11 @@ from companion.mavlink.signing import SigningKeyError, load_key
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.mission.resolve import resolve
-from companion.reading import open_file, read_at_most
+from companion.reading import open_file, read_at_most, why_no_file
 from companion.settings import Settings, SettingsError, load_settings
 from companion.state.place import StatePlace, StatePlaceError
 from companion.tuning import with_tuned
+from sitl.cli.commands import app as sitl
 from sitl.fault_file import FaultFileError, load_faults
 from sitl.paramfile import MOST_BYTES, ParameterFileError, load_parameters
 from tests.rig import yard
@@ -88,6 +89,43 @@ def test_a_record_of_pipes_is_not_replayed(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "meta.json")
     result = CliRunner().invoke(app, ["replay", str(tmp_path)])
     assert result.exit_code == 2 and "meta.json: cannot be read: not a file" in result.output
+
+
+def test_why_something_is_no_file(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    os.mkfifo(tmp_path / "pipe")
+    assert why_no_file(tmp_path / "file") == ""
+    assert why_no_file(tmp_path / "pipe") == "not a file; name one"
+    assert why_no_file(tmp_path) == "is a folder, not a file; add a file's name"
+    for name in ("none", "file/none", "no\0ne"):
+        assert why_no_file(tmp_path / name) == "no such file; check the path"
+
+
+def test_a_folder_is_no_mission(tmp_path: Path) -> None:
+    (tmp_path / "m.toml").mkdir()
+    with pytest.raises(MissionError, match=r"m\.toml: is a folder, not a file; add a file's name"):
+        load_mission(tmp_path / "m.toml")
+
+
+@pytest.mark.parametrize("key", ["prior_map", "sitl.world"])
+@pytest.mark.parametrize("what", ["folder", "pipe"])
+def test_what_a_mission_names_and_is_no_file(tmp_path: Path, key: str, what: str) -> None:
+    yard(tmp_path)
+    (tmp_path / "map.png").mkdir() if what == "folder" else os.mkfifo(tmp_path / "map.png")
+    mission = tmp_path / "yard.toml"
+    text = mission.read_text()
+    mission.write_text(text.replace("yard.png", "map.png") if key == "sitl.world" else f'prior_map = "map.png"\n{text}')
+    with pytest.raises(MissionError, match=rf"{key}: .*map.png: .*not a file; \w") as caught:
+        load_mission(mission)
+    assert "no such file" not in str(caught.value)
+
+
+@pytest.mark.parametrize("name", ["driving", "dead-companion"])
+def test_an_experiment_names_the_folder_that_was_given(tmp_path: Path, name: str) -> None:
+    for folder, reason in ((tmp_path / "none", "no such folder of maps"), (tmp_path, "open.toml does not lie beside")):
+        result = CliRunner().invoke(sitl, ["experiment", name, "--runs", "1", "--maps", str(folder)])
+        assert result.exit_code == 2 and result.stderr.startswith(f"{folder}: {reason}")
+        assert "missions/maps of the source" in result.stderr and len(result.stderr.splitlines()) == 1
 
 
 def far(folder: Path) -> None:

@@ -278,7 +278,7 @@ def test_driving_gives_the_terminal_back_when_it_is_ended(tmp_path: Path) -> Non
     mission.write_text(MISSION.replace("20, 20", "2000, 20").replace("9, 9", "1990, 9"))
     code, written = on_a_terminal(["drive", str(mission), "--view"], b"GUIDED", signal.SIGTERM)
     assert code == 130 and written.rindex(LEAVE) > written.rindex(ENTER)
-    assert b"stopped by Ctrl-C" in written[written.rindex(LEAVE) :] and b"Traceback" not in written
+    assert b"stopped by SIGTERM" in written[written.rindex(LEAVE) :] and b"Traceback" not in written
 
 
 def test_the_last_picture_of_a_drive_stays_on_the_terminal(tmp_path: Path) -> None:

@@ -183,7 +183,7 @@ def test_a_ros_map_says_how_large_its_fields_are(tmp_path: Path) -> None:
         (SIZE + "resolution_m = 0.01\nsize_m = 3", "not valid TOML"),
         ("size_m = [2000.0, 2000.0]\n", "choose larger ones"),
         ('base = "gone.png"\n', "world.toml: base: "),
-        ('base = "gone.png"\n', "gone.png: no such file; name a map"),
+        ('base = "gone.png"\n', "gone.png: no such file; check the path"),
         ('base = "world.toml"\n', "it must be a map"),
         ('base = "map.png"\nresolution_m = 0.3\n', "does not divide"),
         ('base = "map.png"\n' + SIZE, "says how large the world is"),
