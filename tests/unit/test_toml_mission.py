@@ -148,7 +148,7 @@ def test_the_least_that_is_a_mission(tmp_path: Path) -> None:
         (GRID + TARGET + "hold_s = -1\n", "target 1.hold_s"),
         (GRID + TARGET + "on_blocked = 'cry'\n", "target 1.on_blocked: input should be 'skip', 'wait', 'return' or 'hold'"),
         (GRID + TARGET + 'name = "a\\nb"\n', "target 1.name"),
-        (GRID + TARGET + '[grid."a\\nb"]\n', "grid.a b: unknown key"),
+        (GRID + TARGET + '[grid."a\\nb"]\n', "grid.a\\nb: unknown key"),
         (GRID + "[[target]]\nname = 'x'\n", "target 1: has no place"),
         (GRID + "[[target]]\nnorth_m = 1\n", "target 1: north_m and east_m are both needed"),
         (GRID + "[[target]]\nlat_deg = 1\n", "target 1: lat_deg and lon_deg are both needed"),
