@@ -131,8 +131,11 @@ class Recorder:
                 self._waiting[name], self._sums[name] = bytearray(), (0, 0)
         except OSError as error:
             self._close_files()
+            remedy = "choose a directory that can be written"
+            if isinstance(error, FileExistsError):
+                raise RecordError(f"{error.filename}: is a file, no directory; {remedy}") from error
             raise RecordError(
-                f"{error.filename or self.directory}: cannot record here: {error.strerror or error}; choose a directory that can be written"
+                f"{error.filename or self.directory}: cannot record here: {error.strerror or error}; {remedy}"
             ) from error
 
     def begin(self, time_s: float, mark: Mark) -> None:

@@ -77,7 +77,7 @@ def run(
         Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
     ] = None,
 ) -> None:
-    """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 130: stopped by a signal."""
+    """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 1: error in the program; 130: stopped by a signal."""
     console = LiveConsole(stderr=True)
 
     reader = reader_of(STDERR, os.environ)

@@ -94,6 +94,8 @@ def _reason(error: Exception) -> str:
     text = str(error)
     if isinstance(error, FileNotFoundError) or "No such file" in text:
         return "there is no such device; check the cable and `ls /dev/tty*`"
+    if "Is a directory" in text:
+        return "it is a directory, no serial port; see `ls /dev/tty*`"
     if isinstance(error, PermissionError) or "Permission denied" in text:
         return "no permission; add yourself to the group 'dialout'"
     if "lock" in text or "busy" in text.lower():

@@ -61,20 +61,21 @@ class PlaceTable(Table):
 
     def place(self) -> Place | None:
         """The place, or None if none is given. Raises ValueError when it is ambiguous or half given."""
-        places: list[Place] = []
+        metres = self.north_m is not None or self.east_m is not None
+        degrees = self.lat_deg is not None or self.lon_deg is not None
+        if (self.field is not None) + metres + degrees > 1:
+            raise ValueError("a place is given twice; use one of field, north_m and east_m, lat_deg and lon_deg")
         if self.field is not None:
-            places.append(Cell(*self.field))
-        if self.north_m is not None or self.east_m is not None:
+            return Cell(*self.field)
+        if metres:
             if self.north_m is None or self.east_m is None:
                 raise ValueError("north_m and east_m are both needed")
-            places.append(HomePoint(self.north_m, self.east_m))
-        if self.lat_deg is not None or self.lon_deg is not None:
+            return HomePoint(self.north_m, self.east_m)
+        if degrees:
             if self.lat_deg is None or self.lon_deg is None:
                 raise ValueError("lat_deg and lon_deg are both needed")
-            places.append(GeoPoint(self.lat_deg, self.lon_deg))
-        if len(places) > 1:
-            raise ValueError("a place is given twice; use one of field, north_m and east_m, lat_deg and lon_deg")
-        return places[0] if places else None
+            return GeoPoint(self.lat_deg, self.lon_deg)
+        return None
 
 
 class TargetTable(PlaceTable):

@@ -11,7 +11,7 @@ VIEWED_SPEEDUP = 10.0
 """Fast enough not to be waited for, slow enough to be followed."""
 
 MissionFile = Annotated[
-    Path | None, typer.Argument(metavar="[MISSION]", help="TOML, .plan or .waypoints file.", show_default=False)
+    Path | None, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.", show_default=False)
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Of planner and simulator: the same seed gives the same run.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")]
@@ -21,7 +21,10 @@ MapStem = Annotated[
     Path | None, typer.Option("--map", metavar="STEM", help="Write what was mapped as STEM.yaml and STEM.pgm.")
 ]
 JsonFile = Annotated[Path | None, typer.Option("--json", help="Write the result as JSON.")]
-Sensors = Annotated[str | None, typer.Option(help="lidar-90, lidar-360, beams or a TOML file; default: the mission's.")]
+Sensors = Annotated[
+    str | None,
+    typer.Option(help="lidar-90, lidar-360, beams or a TOML file (none: only for serve); default: the mission's."),
+]
 World = Annotated[Path | None, typer.Option(help="The ground: image, ROS yaml, MovingAI .map or TOML world.")]
 Start = Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to start from.")]
 Target = Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to reach.")]

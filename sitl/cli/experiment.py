@@ -49,7 +49,7 @@ def experiment(
     runs: Annotated[
         int,
         typer.Option(
-            min=1, help="Runs, with seeds that count up, on each map or mission. kwasniewski-table1: 3 at least."
+            min=1, help="Runs, with seeds that count up, on each map or mission. kwasniewski-table1 makes 3 at least."
         ),
     ] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones count up.")] = 0,
@@ -70,7 +70,8 @@ def experiment(
     ] = "",
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
-        Path | None, typer.Option(help="Folder whose results.md and images/ are brought up to date.")
+        Path | None,
+        typer.Option(help="Folder whose results.md and images/ are brought up to date; made if there is none."),
     ] = None,
 ) -> None:
     """Make the experiment NAME and print its tables. Exit code 2: bad input; 3: soak, dead-companion: something touched or failed."""

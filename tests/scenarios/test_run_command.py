@@ -40,6 +40,7 @@ def assert_one_line(text: str) -> None:
         ({"connect": "tcp:no.such.host.invalid:5760"}, ["no.such.host.invalid", "check the name"]),
         ({"connect": "serial:/dev/none:57600"}, ["/dev/none"]),
         ({"record": "yard.toml/record"}, ["yard.toml/record", "cannot record here", "choose"]),
+        ({"record": "yard.toml"}, ["yard.toml: is a file, no directory; choose a directory"]),
     ],
     ids=[
         "mission",
@@ -53,6 +54,7 @@ def assert_one_line(text: str) -> None:
         "host",
         "device",
         "record",
+        "record is a file",
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path: Path, change: dict[str, str], said: list[str]) -> None:

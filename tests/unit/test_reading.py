@@ -149,6 +149,10 @@ REMEDIES: dict[str, tuple[Callable[[Path], object], str]] = {
     "a state that is a file": (state_is_a_file, "file: is a file; --state takes a directory"),
     "a state that is a folder": (state_is_a_folder, "Is a directory; remove it, or start without --resume"),
     "no serial port": (lambda folder: SerialLink("/etc/passwd", 57600, WallClock()), "it is no serial port; see `ls"),
+    "a folder for a port": (
+        lambda folder: SerialLink(str(folder), 57600, WallClock()),
+        ": cannot be opened: it is a directory, no serial port; see `ls /dev/tty*`",
+    ),
     "no key": (lambda folder: load_key(folder / "nokey"), "No such file or directory; name a file with the passphrase"),
     "settings in a folder": (load_settings, "Is a directory; name a TOML file, or leave --settings out"),
     "a mission that says no resolution": (far, "If they are, write a TOML mission with a larger resolution_m"),

@@ -182,6 +182,7 @@ def test_the_least_that_is_a_mission(tmp_path: Path) -> None:
         (GRID + TARGET + "[[corridor]]\nline_m = [[0, 0], [5, 5]]\nwidth_m = 1\n", "corridor 1.weight: field required"),
         (GRID + TARGET + "[[corridor]]\nweight = 0\nline_m = [[0, 0], [5, 5]]\n", "corridor 1: a line needs"),
         (GRID + TARGET + "[[corridor]]\nweight = 0\nline_m = [[0, 0]]\nwidth_m = 1\n", "corridor 1: a line needs at least two"),
+        ("[[target]]\nnorth_m = 1\nlat_deg = 50\n", "a place is given twice; use one of field"),
         ("prior_map = 'gone.yaml'\n" + GRID + TARGET, "gone.yaml: no such file; check the path"),
         ("fence = 'gone.plan'\n" + GRID + TARGET, "gone.plan: cannot be read"),
         (GRID + TARGET + "[sitl]\nworld = 'gone.png'\n", "gone.png: no such file; check the path"),
