@@ -202,6 +202,33 @@ def test_way_target_and_collisions_are_shown() -> None:
     assert any(place.name == "target" and place.north_m == pytest.approx(8.0, abs=0.1) for place in view.scene.places)
 
 
+def test_after_a_reboot_the_destination_is_where_the_rover_goes_and_the_news_tell() -> None:
+    simulator = open_ground()
+    watching = Watching("Open", simulator)
+    origin_m = 0.0
+    for leg in range(2):
+        client = Client(simulator)
+        client.run_for(READY_S)
+        watching.note()
+        client.set_mode(15)
+        client.arm()
+        client.drive_to(8.0, 0.0)
+        client.run_for(1.0)
+        (target,) = (place for place in watching.scene().places if place.name == "target")
+        assert target.north_m - simulator.start.north_m == pytest.approx(origin_m + 8.0, abs=0.1)
+        if leg == 0:
+            client.run_for(6.0)
+            origin_m = simulator.truth.north_m - simulator.start.north_m
+            assert origin_m > 4.0
+            client.command(400, 0.0)
+            client.command(246, 1.0)
+            simulator.advance_to_s(simulator.time_s + 0.5)
+            watching.note()
+    told = [text.partition(" s: ")[2] for text in watching.news]
+    begun = ["mode GUIDED, was MANUAL", "armed"]
+    assert told == [*begun, "the autopilot has booted: MANUAL, disarmed", *begun]
+
+
 def test_rates_count_since_a_while_ago() -> None:
     rates = Rates()
     for tenth in range(100):
