@@ -19,7 +19,7 @@ from companion.settings import SafetySettings, Settings
 from companion.vehicle import VehicleState
 
 ASK_AGAIN_S = 3.0
-"""A command that has not worked is given again after so long,"""
+"""The next command is given after so long, and one that has not worked again,"""
 AGAIN_RESUMED_S = 1.0
 """and by a run that is to go on as soon as the autopilot lets itself be armed, after so long."""
 TAKEN_S = 0.5
@@ -167,8 +167,12 @@ class StartUp:
         return SetMode(RoverMode.HOLD)
 
     def _due(self, command: Command | None, now_s: float) -> Command | None:
-        again_s = ASK_AGAIN_S if self._kept is None else AGAIN_RESUMED_S
-        if command is None or (command == self._asked and now_s - self._asked_s <= again_s):
+        """The command, if it is not too soon; a run that is taken up waits only with one that has just been given."""
+        if self._kept is None:
+            soon = now_s - self._asked_s <= ASK_AGAIN_S
+        else:
+            soon = command == self._asked and now_s - self._asked_s <= AGAIN_RESUMED_S
+        if command is None or soon:
             return None
         self._asked, self._asked_s = command, now_s
         return command
