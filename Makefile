@@ -13,8 +13,9 @@ CANDIDATES := python3.11 python3.12 python3.13 python3.14 python3 python
 demo: $(KERNELS)
 	@$(BIN)/rover-sitl drive missions/rooms.toml --image out/rooms.png --map out/rooms-map
 
+# One worker more than processors: many tests wait for real time.
 test: $(KERNELS) lint
-	$(BIN)/python -m pytest -n 2 --dist loadgroup
+	$(BIN)/python -m pytest -n 3 --dist loadgroup
 
 lint: $(READY)
 	$(BIN)/ruff check .

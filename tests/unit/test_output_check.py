@@ -252,7 +252,7 @@ def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, 
             points.append((east_m, north_m))
             north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
             course_rad += 0.02 * curvature_m
-        way = shapely.LineString([*points, (east_m, north_m)])
+        way = shapely.LineString([(here.east_m, here.north_m), *points, (east_m, north_m)])
     assert bound.shape.buffer(0.02).covers(way)
 
 
