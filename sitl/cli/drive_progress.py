@@ -9,6 +9,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.app import Status
 from sitl.cli.pace import Pace
+from sitl.cli.said import Said
 from sitl.lockstep import Drive, Report
 
 LINE_EVERY_S = 60.0
@@ -42,22 +43,18 @@ class Telling:
     """Prints the companion's texts as they come."""
 
     def __init__(self, run: Drive, console: Console) -> None:
-        self._run = run
+        self._name = run.mission.name
+        self._said = Said(run)
         self._console = console
-        self._last: list[str] = []
 
     def tell(self, status: Status) -> None:
         """Those said since the last call."""
-        said = self._run.companion.outcome.said
-        old = len(self._last) if said[: len(self._last)] == self._last else 0
-        for text in said[old:]:
+        for text in self._said.news():
             self.line(f"{status.time_s:6.1f} s  {text}")
-        self._last = list(said)
 
     def line(self, text: str) -> None:
         """One line of this run."""
-        name = self._run.mission.name
-        self._console.print(f"{name}: {text}", soft_wrap=True, markup=False, highlight=False)
+        self._console.print(f"{self._name}: {text}", soft_wrap=True, markup=False, highlight=False)
 
 
 def run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:

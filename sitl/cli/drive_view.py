@@ -13,6 +13,7 @@ from companion.grid import OBSTACLE
 from companion.itinerary import TargetStatus
 from companion.mapping import EvidenceMap, known_fields
 from companion.navigator import Decision, Part
+from sitl.cli.said import Said
 from sitl.cli.viewer import Viewer
 from sitl.lockstep import Drive, Report
 from sitl.sketch import Kind, Layer, Place, Scene
@@ -50,7 +51,7 @@ class DriveView:
         self._viewer = viewer
         self._watching = Watching(run.mission.name, run.simulator)
         self._decided: Decision | None = None
-        self._said: list[str] = []
+        self._said = Said(run)
 
     def observe(self, status: Status) -> None:
         """A new moment of the run; drawn if the last picture is old enough."""
@@ -61,9 +62,7 @@ class DriveView:
 
     def _take_in(self, status: Status) -> None:
         self._watching.note()
-        said = self._run.companion.outcome.said.copy()
-        texts = new_texts(self._said, said)
-        self._said = said
+        texts = self._said.news()
         # The status knows this tick's news only, but also the autopilot's texts.
         for text in (*texts, *(news.text for news in status.news if news.text not in texts)):
             self._watching.tell(f"{status.time_s:.0f} s: {text}")
@@ -98,13 +97,6 @@ class DriveView:
                 there = (target.point.north_m + north_m, target.point.east_m + east_m)
                 places.append(Place(target.name, *there, STATES[state]))
         return replace(scene, layers=layers, places=tuple(places))
-
-
-def new_texts(before: list[str], now: list[str]) -> list[str]:
-    """What was said since then; of a list whose oldest texts go when it is full only what can be told apart from before."""
-    if len(now) > len(before):
-        return now[len(before) :]
-    return now[-1:] if now[-1:] != before[-1:] else []
 
 
 def seen_layers(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[Layer, ...]:

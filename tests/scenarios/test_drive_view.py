@@ -14,7 +14,8 @@ from rich.console import Console
 from companion.app import Status
 from companion.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.cli.drive_view import DriveView, new_texts
+from sitl.cli.drive_view import DriveView
+from sitl.cli.said import new_texts
 from sitl.cli.viewer import Viewer
 from sitl.faults import FaultPlan, PilotTakesOver, Reboot
 from sitl.lockstep import Drive
