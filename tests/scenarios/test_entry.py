@@ -95,7 +95,10 @@ def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
     tmp_path: Path, number: signal.Signals, word: str
 ) -> None:
     record = tmp_path / "record"
-    with process("sitl", "drive", "missions/rooms.toml", "--sensors", "beams", "--record", record) as child:
+    command = ("drive", "missions/rooms.toml", "--sensors", "beams", "--record", record)
+    # A shell's job in the background would ignore Ctrl-C, and all that it starts.
+    heeded = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
+    with process("sitl", *command, first=heeded) as child:
         assert child.stdout is not None and child.stdout.readline().startswith("Rooms")
         child.send_signal(number)
         code, _, errors = finished(child, 20.0)
