@@ -7,47 +7,47 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.attendant import Attendant
-from companion.auto_legs import AutoLegs
-from companion.clock import Clock, stopwatch_s
-from companion.commands import SetMode
-from companion.driver import Driver
-from companion.errands import Errands
-from companion.events.event import Event
-from companion.events.targets import TargetAsked
-from companion.events.vehicle import RangeSeen, RoverMode, TextSeen
-from companion.frames import GeoPoint
-from companion.guidance import STANDSTILL
-from companion.handover import HandOver
-from companion.itinerary import Itinerary, TargetStatus
-from companion.laying import from_home
-from companion.mapfiles import save_ros_map
-from companion.mapping import EvidenceMap, known_fields
+from companion.checkpoint.checkpointer import Memory
+from companion.control.point_controller import STANDSTILL
+from companion.control.setpoint_check import OutputCheck
+from companion.core.clock import Clock, stopwatch_s
+from companion.core.frames import GeoPoint
+from companion.core.rounds import Mark
+from companion.executive.auto_mode_legs import AutoLegs
+from companion.executive.goal_driver import Driver
+from companion.executive.goal_requests import Errands
+from companion.executive.mission_executor import Pursuit
+from companion.executive.mission_layout import from_home
+from companion.executive.mission_progress import Itinerary, TargetStatus
+from companion.executive.outbox import Outbox
+from companion.executive.plan_watch import PlanWatch
+from companion.executive.speaking import Speaker
+from companion.mapping.evidence_map import EvidenceMap, known_fields
+from companion.mapping.map_files import save_ros_map
 from companion.mavlink.autopilot_link import AutopilotLink
-from companion.memory import Memory
 from companion.mission.mission import Mission
-from companion.newest import newest_ranges
-from companion.outbox import Outbox
-from companion.output_check import OutputCheck
-from companion.oversight import Oversight
-from companion.overview import status_of, statuses_of
-from companion.plan_watch import PlanWatch
-from companion.pursuit import Pursuit
-from companion.recorder import DecisionLog
-from companion.reporting import Outcome, Reporter, Status
-from companion.rounds import Mark
-from companion.safety import Control, Reaction, Verdict, Watch, awaited, check, latched
-from companion.setting_out import SettingOut
+from companion.navigation.step_runner import NotedRunner, StepRunner
+from companion.operator.attendant import Attendant
+from companion.operator.overview import status_of, statuses_of
+from companion.operator.reporting import Outcome, Reporter, Status
+from companion.operator.telling import Teller
+from companion.perception.moving_obstacles import announced
+from companion.perception.newest_scans import newest_ranges
+from companion.recording.recorder import DecisionLog
+from companion.safety.mode_latch import Control, Reaction, Verdict, Watch, awaited, check, latched
+from companion.safety.watchdogs import Watchdogs
 from companion.settings import Settings
-from companion.speaking import Speaker
-from companion.startup import StartUp
-from companion.stepping import NotedRunner, StepRunner
-from companion.sticks import Sticks
-from companion.telling import Teller
-from companion.traffic import announced
-from companion.vehicle import VehicleState, fold
-from companion.watchdogs import Watchdogs
-from companion.whereabouts import Whereabouts
+from companion.supervision.localization_monitor import Whereabouts
+from companion.supervision.mission_limits import Oversight
+from companion.supervision.setting_out import SettingOut
+from companion.supervision.shutdown import HandOver
+from companion.supervision.startup import StartUp
+from companion.vehicle.commands import SetMode
+from companion.vehicle.events.event import Event
+from companion.vehicle.events.targets import TargetAsked
+from companion.vehicle.events.vehicle import RangeSeen, RoverMode, TextSeen
+from companion.vehicle.rc_input import Sticks
+from companion.vehicle.state import VehicleState, fold
 
 __all__ = ["Companion", "Outcome", "Status"]
 

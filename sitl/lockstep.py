@@ -10,15 +10,15 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from companion.app import Companion, Status
-from companion.clock import stopwatch_s
+from companion.core.clock import stopwatch_s
+from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
 from companion.mission.mission import Mission
-from companion.recorder import NullRecorder, Recorder
+from companion.navigation.step_runner import InlineRunner
+from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
-from companion.stepping import InlineRunner
-from companion.warmup import warm_up
 from sitl.scenario import Scenario
 from sitl.sim_link import SimLink
 from sitl.simulator import Simulator

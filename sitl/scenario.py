@@ -6,21 +6,21 @@ import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from companion.frames import GeoPoint
-from companion.grid import Cell
+from companion.core.frames import GeoPoint
+from companion.core.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
 from sitl.autopilot.params import DEFAULTS, REAL32, steered_wheels
-from sitl.faults import FaultPlan, SensorFault
-from sitl.motion import NoiseSettings
-from sitl.paramfile import ParameterFile, ParameterFileError, load_parameters
-from sitl.physics import Physics
-from sitl.sensors import SensorSuite, suite_named
+from sitl.faults.plan import FaultPlan, SensorFault
+from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
+from sitl.firmware.physics import Physics
+from sitl.plant.main_loop import NoiseSettings
+from sitl.sensors.range_sensors import SensorSuite, suite_named
+from sitl.sensors.suites import suite_of
 from sitl.simulator import Simulator
-from sitl.suites import suite_of
-from sitl.truth import SimStart
-from sitl.world import World
-from sitl.worldfile import load_world, movers_of
+from sitl.world.truth import SimStart
+from sitl.world.world import World
+from sitl.world.world_file import load_world, movers_of
 
 SOMEWHERE = GeoPoint(53.1325, 23.1688)
 """Where the rover stands on earth when no place in the mission says."""

@@ -11,7 +11,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from sitl import geodesy
 from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.control import LOOP_HZ
 from sitl.autopilot.lidar import LidarComponent
@@ -20,15 +19,16 @@ from sitl.autopilot.signing import SECURE_PORT, StoredKey
 from sitl.autopilot.traffic import Traffic
 from sitl.autopilot.vehicle import Vehicle
 from sitl.autopilot.warmup import begin_every_drive
-from sitl.fault_player import FaultPlayer
-from sitl.faults import FaultPlan
-from sitl.link_faults import Way
-from sitl.motion import NOISE_COLUMNS, NoiseSettings, run_loops
-from sitl.rover import new_rover
-from sitl.sensors import RangeSensing, SensorSuite, suite_named
+from sitl.faults.link_faults import Way
+from sitl.faults.plan import FaultPlan
+from sitl.faults.player import FaultPlayer
+from sitl.plant.main_loop import NOISE_COLUMNS, NoiseSettings, run_loops
+from sitl.plant.rover import new_rover
+from sitl.sensors.range_sensors import RangeSensing, SensorSuite, suite_named
 from sitl.sim_link import SimLink
-from sitl.truth import Collision, SimStart, Truth, collision_of
-from sitl.world import World
+from sitl.world import geodesy
+from sitl.world.truth import Collision, SimStart, Truth, collision_of
+from sitl.world.world import World
 
 NOISE_ROWS = 500
 REHEARSAL_S = 4.0

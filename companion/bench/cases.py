@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from companion.bench.movingai import read_scenarios, scenario_file, spread
-from companion.grid import Cell, Weights
-from companion.mapfiles import MapError, load_map
+from companion.core.grid import Cell, Weights
+from companion.mapping.map_files import MapError, load_map
 
 PAPER_MAPS = ("one-obstacle", "clutter", "rooms", "complex")
 START, TARGET = Cell(0, 24), Cell(98, 24)

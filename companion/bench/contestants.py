@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from numpy.random import Generator
 
-from companion.grid import Cell, Weights
+from companion.core.grid import Cell, Weights
 from companion.planning.planner import Planner
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.raster import CellArray

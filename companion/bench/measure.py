@@ -12,8 +12,8 @@ import numpy as np
 
 from companion.bench.cases import Case
 from companion.bench.contestants import Contestant, Found
-from companion.clock import stopwatch_s
-from companion.grid import OBSTACLE
+from companion.core.clock import stopwatch_s
+from companion.core.grid import OBSTACLE
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.raster import FAULTS, CellArray, cells_cost, first_fault, plain
 from companion.planning.registry import make_planner

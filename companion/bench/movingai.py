@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from companion.grid import Cell
-from companion.reading import read_at_most
+from companion.core.grid import Cell
+from companion.storage.reading import read_at_most
 
 MOST_BYTES = 100_000_000
 

@@ -15,7 +15,7 @@ from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.bench.contestants import Contestant, Found
-from companion.grid import OBSTACLE, Cell, Weights
+from companion.core.grid import OBSTACLE, Cell, Weights
 from companion.planning.raster import polyline
 
 SLOW_FIELDS = 100_000

@@ -10,8 +10,8 @@ from os import cpu_count
 from companion.bench.cases import Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import DETERMINISTIC_RUNS, Entry, Limits
-from companion.provenance import made_with
 from companion.settings import Settings
+from companion.settings.versions import made_with
 
 PACKAGES = (
     "rover-companion",

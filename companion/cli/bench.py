@@ -20,9 +20,9 @@ from companion.bench.page import write_page
 from companion.bench.peers import installed_peers
 from companion.bench.report import as_json, head, rows, runs_explained
 from companion.cli.inputs import OutputError, usable_settings, writable, written
-from companion.mapfiles import MapError
+from companion.mapping.map_files import MapError
+from companion.navigation.search_budget import budget_of
 from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
-from companion.searching import budget_of
 from companion.settings import Settings, SettingsError
 
 EXIT_BAD_INPUT = 2

@@ -13,16 +13,16 @@ from rich.table import Table
 
 from companion.cli.inputs import OutputError, usable_settings
 from companion.cli.state import StateFiles
-from companion.clock import WallClock
+from companion.core.clock import WallClock
 from companion.diagnosis.diagnose import diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
 from companion.diagnosis.parameters import PARAMETERS
-from companion.examined import Examined
+from companion.executive.warm_up import kernels_warm
 from companion.mavlink.examination import Examination
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import LinkError, open_link
 from companion.settings import SettingsError
-from companion.warmup import kernels_warm
+from companion.vehicle.survey import Examined
 
 STEP_S = 0.05
 EXIT_FINE, EXIT_BAD_INPUT, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 2, 3, 4

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from companion.planning.registry import UnknownPlannerError, make_planner
-from companion.reading import refuse_pipe
 from companion.settings import Settings, SettingsError, load_settings
+from companion.storage.reading import refuse_pipe
 
 
 class OutputError(Exception):

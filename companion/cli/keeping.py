@@ -6,14 +6,14 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.beside import Patience
-from companion.disk import OsDisk
-from companion.itinerary import TargetStatus
-from companion.memory import Memory
+from companion.checkpoint.checkpointer import Memory
+from companion.checkpoint.place import StatePlace, StatePlaceError, default_directory
+from companion.checkpoint.resume import Kept
+from companion.checkpoint.writer import StateFile, ThreadWriter
+from companion.executive.mission_progress import TargetStatus
 from companion.mission.mission import Mission
-from companion.resuming import Kept
-from companion.state.place import StatePlace, StatePlaceError, default_directory
-from companion.state.writer import StateFile, ThreadWriter
+from companion.storage.beside import Patience
+from companion.storage.disk import OsDisk
 
 
 class Keeping:

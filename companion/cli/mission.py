@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from companion.frames import GeoPoint, LocalFrame, NedPoint
-from companion.grid import OBSTACLE, Cell, Grid
-from companion.mapfiles import MapError, load_map
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
+from companion.core.grid import OBSTACLE, Cell, Grid
+from companion.mapping.map_files import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, Mission, MissionError, MoverSpec, Place
 from companion.mission.resolve import resolve

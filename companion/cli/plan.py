@@ -13,12 +13,12 @@ from rich.console import Console
 from companion.cli.inputs import OutputError, picture, usable_settings
 from companion.cli.plan_answer import Answer, as_table, as_text, flipped
 from companion.cli.plan_image import save_image
-from companion.clock import stopwatch_s
-from companion.grid import Cell, Grid
-from companion.mapfiles import MapError, load_map
+from companion.core.clock import stopwatch_s
+from companion.core.grid import Cell, Grid
+from companion.mapping.map_files import MapError, load_map
+from companion.navigation.search_budget import budget_of
 from companion.planning.problem import Motion, PlanningProblem, PlanStatus
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
-from companion.searching import budget_of
 from companion.settings import Settings, SettingsError
 
 EXIT_FOUND, EXIT_BAD_INPUT, EXIT_NO_PATH = 0, 2, 3

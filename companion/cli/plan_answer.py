@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.table import Table
 
-from companion.grid import Cell, Grid
+from companion.core.grid import Cell, Grid
 from companion.planning.problem import Motion, Path, PlanResult, PlanStatus
-from companion.provenance import made_with
 from companion.settings import Settings
+from companion.settings.versions import made_with
 
 EFFORT = {
     "sedighi": ("generations", "chromosomes"),

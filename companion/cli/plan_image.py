@@ -8,7 +8,7 @@ import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
 from companion.cli.inputs import written
-from companion.grid import OBSTACLE, Cell, Grid
+from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.planning.problem import Path
 
 SIDE_PIXELS = 1000

@@ -9,12 +9,12 @@ import typer
 
 from companion.cli.inputs import OutputError, picture
 from companion.cli.why_image import save_why
-from companion.mapfiles import MapError
-from companion.record import Record, load_record
-from companion.recorded_files import RecordError
-from companion.replay import Replayed
-from companion.replay import replay as run_again
-from companion.why import Watcher, in_words
+from companion.mapping.map_files import MapError
+from companion.recording.reader import Record, load_record
+from companion.recording.recorded_files import RecordError
+from companion.replay.explain import Watcher, in_words
+from companion.replay.replay import Replayed
+from companion.replay.replay import replay as run_again
 
 EXIT_SAME, EXIT_DIFFERENT, EXIT_BAD_INPUT = 0, 1, 2
 SHOWN = 20

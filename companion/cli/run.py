@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from companion.app import Companion, Status
-from companion.beside import Beside, Patience
+from companion.checkpoint.place import StatePlaceError
 from companion.cli.inputs import OutputError, usable_settings
 from companion.cli.keeping import Keeping
 from companion.cli.levels import ERROR, INFO, Reader, levelled, reader_of
@@ -21,19 +21,19 @@ from companion.cli.live import Live, LiveConsole
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
 from companion.cli.state import StateFiles
-from companion.clock import WallClock
-from companion.itinerary import TargetStatus
-from companion.mapfiles import MapError
+from companion.core.clock import WallClock
+from companion.executive.mission_progress import TargetStatus
+from companion.executive.warm_up import COMPILING, kernels_warm, settle, warm_up
+from companion.mapping.map_files import MapError
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError
 from companion.mission.mission import Mission, MissionError
-from companion.recorder import STATE, NullRecorder, Recorder, RecordError
+from companion.navigation.step_runner import ThreadRunner
+from companion.recording.recorder import STATE, NullRecorder, Recorder, RecordError
 from companion.settings import Settings, SettingsError
-from companion.state.place import StatePlaceError
-from companion.stepping import ThreadRunner
-from companion.warmup import COMPILING, kernels_warm, settle, warm_up
+from companion.storage.beside import Beside, Patience
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 STDERR = 2

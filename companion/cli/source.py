@@ -6,8 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
-from companion.clock import WallClock
-from companion.fetching import Fetching
+from companion.core.clock import WallClock
+from companion.executive.fetching import Fetching
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import Signer

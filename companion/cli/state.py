@@ -6,14 +6,14 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.beside import Patience
+from companion.checkpoint.place import default_directory
 from companion.cli.inputs import OutputError, writable
 from companion.mavlink.signing import Signer, load_key
 from companion.mavlink.signing_time import TimeFile
-from companion.saving import Saver
 from companion.settings import Settings
-from companion.state.place import default_directory
-from companion.tuning import as_toml, differences, with_tuned
+from companion.settings.tunable_parameters import as_toml, differences, with_tuned
+from companion.storage.beside import Patience
+from companion.storage.saving import Saver
 
 TUNED = "tuned.toml"
 """Settings that a ground station has changed."""

@@ -11,8 +11,8 @@ from PIL import Image, ImageDraw, ImageFont
 
 from companion.cli.inputs import OutputError
 from companion.cli.plan_image import OBSTACLE_COLOUR, SIDE_PIXELS, START_COLOUR, TARGET_COLOUR
-from companion.grid import OBSTACLE
-from companion.why import Candidate, Explanation, cost_in_words
+from companion.core.grid import OBSTACLE
+from companion.replay.explain import Candidate, Explanation, cost_in_words
 
 UNSEEN_TINT = np.array([0.86, 0.9, 1.0])
 UNSEEN_COLOUR = (160, 167, 185)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from companion.diagnosis import eyes, parameters, presence, readiness
 from companion.diagnosis.finding import Finding, Level
-from companion.examined import Examined
+from companion.vehicle.survey import Examined
 
 PARTS = (
     presence.others,

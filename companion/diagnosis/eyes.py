@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from companion.diagnosis.finding import Finding, Level, to_set
-from companion.examined import Examined
+from companion.vehicle.survey import Examined
 
 MAVLINK_SOURCE = 2
 """PRX1_TYPE that takes OBSTACLE_DISTANCE."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from companion.diagnosis.finding import Finding, Level, to_set
-from companion.examined import Examined
+from companion.vehicle.survey import Examined
 
 S_CURVES = 64
 """Bit of GUID_OPTIONS."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.diagnosis.parameters import STATIONS, station_of
-from companion.examined import Examined
+from companion.vehicle.survey import Examined
 
 FIRMWARE = (4, 7)
 """ArduRover's version that all this was written for and measured with."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from companion.diagnosis.finding import Finding, Level
-from companion.events.vehicle import RoverMode
-from companion.examined import Examined
-from companion.vehicle import EKF_CONST_POSITION, EKF_POSITION
+from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION
+from companion.vehicle.survey import Examined
 
 EKF_UNINITIALISED, EKF_GPS_GLITCH = 1024, 32768
 

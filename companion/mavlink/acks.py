@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from companion.commands import Arm, ChangeSpeed, Command, SetMode
-from companion.events.vehicle import AckSeen, HeartbeatSeen
 from companion.mavlink.encode import command_number
+from companion.vehicle.commands import Arm, ChangeSpeed, Command, SetMode
+from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen
 
 TIMEOUT_S = 1.0
 TRIES = 3

@@ -8,8 +8,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.commands import AnswerTarget
-from companion.events.targets import TargetAnswer, TargetForm
+from companion.vehicle.commands import AnswerTarget
+from companion.vehicle.events.targets import TargetAnswer, TargetForm
 
 COMMAND_RESULTS: Mapping[TargetAnswer, int] = MappingProxyType(
     {

@@ -8,18 +8,18 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.commands import AskTime, Command, Heartbeat, RequestMessage, TellFigure
-from companion.events.event import Event
-from companion.events.vehicle import AckSeen, HeartbeatSeen, HomeSeen, TargetSeen
-from companion.latency import TimeAnswered
+from companion.core.rounds import Mark
 from companion.mavlink.acks import AckKeeper
 from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec, Packet
 from companion.mavlink.download import Downloads
 from companion.mavlink.rates import RateFault, RateKeeper, wanted_rates
 from companion.mavlink.readback import ReadBack
-from companion.rounds import Mark
 from companion.settings import LinkSettings
+from companion.vehicle.commands import AskTime, Command, Heartbeat, RequestMessage, TellFigure
+from companion.vehicle.events.event import Event
+from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen, HomeSeen, TargetSeen
+from companion.vehicle.link_latency import TimeAnswered
 
 HEARTBEAT_S = 1.0
 PLACES_S = 2.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from companion.events.plan import BatterySeen
+from companion.vehicle.events.plan import BatterySeen
 
 NO_CELL_MV = 65535
 OF_SYS_STATUS = -1

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from companion.commands import Command
-from companion.events.event import Event
-from companion.frames import GeoPoint
+from companion.core.frames import GeoPoint
+from companion.core.rounds import Mark
 from companion.mavlink.decode import AUTOPILOT, MISSION_ACK_COMMAND, Decoder
 from companion.mavlink.encode import EncodeError, Encoder, command_number
 from companion.mavlink.framing import MAGIC_V2, SIGNED, Framer, Packet
 from companion.mavlink.signing import Recorded, Refused, Signer, trouble
-from companion.rounds import Mark
 from companion.settings import LinkSettings
+from companion.vehicle.commands import Command
+from companion.vehicle.events.event import Event
 
 __all__ = ["MISSION_ACK_COMMAND", "Codec", "EncodeError", "LinkCounters", "Packet", "command_number"]
 

@@ -8,10 +8,16 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events.event import Event
-from companion.events.plan import FenceStatusSeen, PlanChangedSeen, PlanCountSeen, PlanItemSeen
-from companion.events.targets import ItemCurrentSeen, ItemReachedSeen, LegSeen
-from companion.events.vehicle import (
+from companion.core.frames import GeoPoint
+from companion.mavlink import batteries, live_ranges, others, parameter_requests, requests
+from companion.mavlink.framing import Packet
+from companion.mavlink.live_ranges import LiveRanges
+from companion.mavlink.places import point_of
+from companion.mavlink.texts import TextAssembler
+from companion.vehicle.events.event import Event
+from companion.vehicle.events.plan import FenceStatusSeen, PlanChangedSeen, PlanCountSeen, PlanItemSeen
+from companion.vehicle.events.targets import ItemCurrentSeen, ItemReachedSeen, LegSeen
+from companion.vehicle.events.vehicle import (
     AckSeen,
     AttitudeSeen,
     EkfStatusSeen,
@@ -26,14 +32,8 @@ from companion.events.vehicle import (
     TargetSeen,
     TextSeen,
 )
-from companion.frames import GeoPoint
-from companion.latency import TimeAnswered
-from companion.mavlink import batteries, live_ranges, others, parameter_requests, requests
-from companion.mavlink.framing import Packet
-from companion.mavlink.live_ranges import LiveRanges
-from companion.mavlink.places import point_of
-from companion.mavlink.texts import TextAssembler
-from companion.sticks import SticksSeen
+from companion.vehicle.link_latency import TimeAnswered
+from companion.vehicle.rc_input import SticksSeen
 
 AUTOPILOT = 1
 """Component id of the autopilot: only it speaks for the vehicle."""

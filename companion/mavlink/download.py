@@ -6,12 +6,12 @@ import math
 from collections import deque
 from dataclasses import dataclass, field
 
-from companion.commands import Command, EndTransfer, RequestItem, RequestList
-from companion.events.event import Event
-from companion.events.plan import PlanCountSeen, PlanItemSeen, PlanKind
-from companion.events.vehicle import AckSeen
 from companion.mavlink.decode import MISSION_ACK_COMMAND
 from companion.mission.items import Item
+from companion.vehicle.commands import Command, EndTransfer, RequestItem, RequestList
+from companion.vehicle.events.event import Event
+from companion.vehicle.events.plan import PlanCountSeen, PlanItemSeen, PlanKind
+from companion.vehicle.events.vehicle import AckSeen
 
 ANSWER_S = 0.8
 """A request that is not answered for so long is repeated: a slow radio needs about half of it there and back."""

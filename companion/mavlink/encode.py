@@ -7,7 +7,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.commands import (
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
+from companion.mavlink.answers import answer_message
+from companion.mavlink.signing import Signer
+from companion.mavlink.texts import chunks_of
+from companion.vehicle.commands import (
     AnswerTarget,
     Arm,
     AskPrearm,
@@ -29,10 +33,6 @@ from companion.commands import (
     TellFigure,
     TellParameter,
 )
-from companion.frames import GeoPoint, LocalFrame, NedPoint
-from companion.mavlink.answers import answer_message
-from companion.mavlink.signing import Signer
-from companion.mavlink.texts import chunks_of
 
 POSITION_ONLY = 0x0DFC
 """Type mask 3580: x and y count, nothing else does (height included)."""

@@ -8,9 +8,6 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.commands import AskPrearm, Command, ReadParameter, RequestMessage
-from companion.events.vehicle import ParameterSeen, TextSeen
-from companion.examined import Autopilot, Examined, RangeSource, SlowMessage
 from companion.mavlink import ranges
 from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec
@@ -19,7 +16,10 @@ from companion.mavlink.framing import Packet
 from companion.mavlink.rates import RateKeeper, wanted_rates
 from companion.mavlink.signing import Signer, remedy
 from companion.settings import LinkSettings
-from companion.vehicle import VehicleState, fold
+from companion.vehicle.commands import AskPrearm, Command, ReadParameter, RequestMessage
+from companion.vehicle.events.vehicle import ParameterSeen, TextSeen
+from companion.vehicle.state import VehicleState, fold
+from companion.vehicle.survey import Autopilot, Examined, RangeSource, SlowMessage
 
 OTHER_COMPONENT = 192
 """The examiner's own, so that a companion that runs is not disturbed by a twin; it sends no heartbeat, lest the autopilot take

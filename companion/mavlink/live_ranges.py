@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.scan import RangeScan
 from companion.mavlink import ranges
-from companion.newest import MOST_SCANS, Sensor, sensor_of
-from companion.scan import RangeScan
+from companion.perception.newest_scans import MOST_SCANS, Sensor, sensor_of
 
 AUTOPILOT = 1
 """Its component id."""

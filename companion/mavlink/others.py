@@ -9,8 +9,8 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events.vehicle import OtherSeen
 from companion.mavlink.places import point_of
+from companion.vehicle.events.vehicle import OtherSeen
 
 RECEIVED = (mavlink.MAVLINK_MSG_ID_ADSB_VEHICLE, mavlink.MAVLINK_MSG_ID_AIS_VESSEL)
 """These come from components of our own vehicle too and yet speak of others."""

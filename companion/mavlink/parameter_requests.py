@@ -7,7 +7,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events.parameters import ParameterAsked, ParameterChangeAsked, ParameterRequest, ParametersAsked
+from companion.vehicle.events.parameters import ParameterAsked, ParameterChangeAsked, ParameterRequest, ParametersAsked
 
 EVERYBODY = 0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.frames import GeoPoint
+from companion.core.frames import GeoPoint
 
 
 def point_of(lat_e7: int, lon_e7: int) -> GeoPoint | None:

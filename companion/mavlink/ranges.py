@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from companion.scan import RangeScan
+from companion.core.scan import RangeScan
 
 UNKNOWN_CM = 65535
 INVALID_QUALITY = 1

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.commands import RequestRate
 from companion.settings import LinkSettings
+from companion.vehicle.commands import RequestRate
 
 WINDOW_S = 3.0
 """Rates are measured over so long."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 
-from companion.commands import Command, GuidedHeading, GuidedPosition, GuidedVelocity
-from companion.events.vehicle import TargetSeen
-from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
+from companion.vehicle.commands import Command, GuidedHeading, GuidedPosition, GuidedVelocity
+from companion.vehicle.events.vehicle import TargetSeen
 
 TOLERANCE_M = 0.5
 LAG_S = 2.0

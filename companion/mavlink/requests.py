@@ -7,9 +7,9 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.events.targets import Asker, TargetAnswer, TargetAsked, TargetForm
-from companion.frames import GeoPoint
+from companion.core.frames import GeoPoint
 from companion.mavlink.places import point_of
+from companion.vehicle.events.targets import Asker, TargetAnswer, TargetAsked, TargetForm
 
 COMMANDS = (mavlink.MAVLINK_MSG_ID_COMMAND_INT, mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
 ITEMS = (mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT, mavlink.MAVLINK_MSG_ID_MISSION_ITEM)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import serial
 
-from companion.clock import Clock
+from companion.core.clock import Clock
 from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, LinkError, OutBuffer
 
 

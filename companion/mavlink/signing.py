@@ -14,10 +14,10 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.clock import unix_time_us
+from companion.core.clock import unix_time_us
+from companion.core.rounds import Mark
 from companion.mavlink.framing import CHECKSUM, MAGIC_V2, SIGNATURE, SIGNED, Packet
-from companion.reading import open_file
-from companion.rounds import Mark
+from companion.storage.reading import open_file
 
 TICKS_PER_S = 100_000
 """Signing timestamps count 10 microseconds since the beginning of 2015 (UTC)."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from companion.mavlink.signing import LAST_TICK, SigningKeyError
-from companion.reading import open_file
-from companion.saving import Saver
+from companion.storage.reading import open_file
+from companion.storage.saving import Saver
 
 
 class TimeFile:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import select
 import socket
 
-from companion.clock import Clock
+from companion.core.clock import Clock
 from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, OutBuffer
 from companion.mavlink.udp import cannot_listen, resolve
 

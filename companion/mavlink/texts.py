@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from companion.events.vehicle import TextSeen
+from companion.vehicle.events.vehicle import TextSeen
 
 CHUNK_BYTES = 50
 LATE_S = 1.0

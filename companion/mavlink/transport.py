@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.clock import Clock, WallClock
+from companion.core.clock import Clock, WallClock
 from companion.mavlink.byte_link import ByteLink, LinkError, MemoryLink
 from companion.mavlink.serial_port import SerialLink
 from companion.mavlink.tcp import TcpLink, TcpServerLink

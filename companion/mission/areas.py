@@ -10,8 +10,8 @@ import shapely
 from numpy.typing import NDArray
 from shapely.geometry.base import BaseGeometry
 
-from companion.frames import GeoPoint, LocalFrame, NedPoint
-from companion.grid import Cell, Grid
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
+from companion.core.grid import Cell, Grid
 from companion.mission.mission import Area, Place
 
 Mask = NDArray[np.bool_]

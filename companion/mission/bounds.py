@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import shapely
 from shapely.geometry.base import BaseGeometry
 
-from companion.frames import LocalFrame, NedPoint
-from companion.grid import Cell, Grid
+from companion.core.frames import LocalFrame, NedPoint
+from companion.core.grid import Cell, Grid
 from companion.mission.areas import CIRCLE_QUARTER, Mask, Places, covered, middles_in, shape_of, touched
 from companion.mission.fence import AutopilotFence
 from companion.mission.mission import Area, Mission

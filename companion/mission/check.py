@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import shapely
 
-from companion.frames import GeoPoint
-from companion.grid import Cell
+from companion.core.frames import GeoPoint
+from companion.core.grid import Cell
 from companion.mission.mission import Area, HomePoint, Mission, MissionError, Place
-from companion.reading import why_no_file
+from companion.storage.reading import why_no_file
 
 MAX_GRID_FIELDS = 4_000_000
 """Larger grids are refused: the companion keeps several rasters of that size."""

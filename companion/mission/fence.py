@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from companion.frames import GeoPoint
+from companion.core.frames import GeoPoint
 from companion.mission.fence_items import FenceAreas, fence_areas
 from companion.mission.items import Item
 from companion.mission.mission import Area

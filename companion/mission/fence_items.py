@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from companion.frames import GeoPoint
+from companion.core.frames import GeoPoint
 from companion.mission import mav_commands as mav
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
 from companion.mission.mission import Area, open_ring

@@ -8,7 +8,7 @@ from pathlib import Path
 import yaml
 
 from companion.mission.mission import Mission, SitlSpec
-from companion.reading import read_at_most
+from companion.storage.reading import read_at_most
 
 MAX_BYTES = 5_000_000
 NAMES_ANOTHER = {".yaml": "image", ".yml": "image", ".toml": "base"}

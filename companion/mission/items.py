@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from companion.frames import GeoPoint
+from companion.core.frames import GeoPoint
 from companion.mission import mav_commands as mav
 
 MAX_ITEMS = 100_000

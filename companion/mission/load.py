@@ -7,8 +7,8 @@ from pathlib import Path
 from companion.mission.check import check_mission
 from companion.mission.mission import Mission, MissionError
 from companion.mission.qgc import SUFFIXES, load_qgc
-from companion.mission.toml_file import load as load_toml
-from companion.reading import why_no_file
+from companion.mission.toml_reader import load as load_toml
+from companion.storage.reading import why_no_file
 
 
 def load_mission(path: Path, *, simulated: bool = True) -> Mission:

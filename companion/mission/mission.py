@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
-from companion.frames import GeoPoint
-from companion.grid import Cell
+from companion.core.frames import GeoPoint
+from companion.core.grid import Cell
 from companion.mission.sensor_tables import Sensors
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.grid import OBSTACLE, Grid
+from companion.core.grid import OBSTACLE, Grid
 
 EDGE = 1e-6
 """Fields that share less than this part of a map's field are neighbours, not overlapping: rounding, no more."""

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from companion.mission.mission import Mission
-from companion.mission.qgc_plan import load as load_plan
-from companion.mission.qgc_wpl import load as load_wpl
+from companion.mission.plan_reader import load as load_plan
+from companion.mission.waypoints_reader import load as load_wpl
 
 SUFFIXES = (".plan", ".waypoints", ".txt", ".mission", ".wpl")
 

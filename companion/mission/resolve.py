@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.frames import LocalFrame, NedPoint
-from companion.grid import OBSTACLE, Cell, Grid, empty_grid
-from companion.mapfiles import MapError, load_map
+from companion.core.frames import LocalFrame, NedPoint
+from companion.core.grid import OBSTACLE, Cell, Grid, empty_grid
+from companion.mapping.map_files import MapError, load_map
 from companion.mission.areas import Mask, Places, shape_of, touched
 from companion.mission.bounds import OURS, Bound, Bounds, autopilot_bounds, mission_bounds
 from companion.mission.check import MAX_GRID_FIELDS

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from companion.mission.check import check_mission
+from companion.mission.item_meaning import understand
 from companion.mission.items import Item, ItemError
 from companion.mission.mission import Mission, MissionError
-from companion.mission.qgc_wpl import home_of
-from companion.mission.walk import understand
+from companion.mission.waypoints_reader import home_of
 
 NAME = "the autopilot's mission"
 

@@ -10,8 +10,8 @@ from typing import Annotated, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from companion.reading import open_file
 from companion.settings import describe_first
+from companion.storage.reading import open_file
 
 MAX_BYTES = 5_000_000
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from companion.mission.mission import MissionError
-from companion.reading import open_file
+from companion.storage.reading import open_file
 
 
 def read_text(path: Path, limit: int) -> str:

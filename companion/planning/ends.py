@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.grid import OBSTACLE
+from companion.core.grid import OBSTACLE
 from companion.planning.problem import Path, PlanningProblem, PlanResult, PlanStatus
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
-from companion.planning.astar import Astar
-from companion.planning.bspline_ga import BsplineGa
+from companion.planning.bspline_ga.planner import BsplineGa
+from companion.planning.graph_search.astar import Astar
 from companion.planning.planner import Capabilities, Planner
 from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult
 from companion.planning.raster import cells_cost, plain

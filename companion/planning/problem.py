@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.grid import Cell, Weights, as_array, as_cells
+from companion.core.grid import Cell, Weights, as_array, as_cells
 
 MIN_WEIGHT = 0.01
 """The least that a field costs: on ground of weight 0 a detour must still cost something."""

@@ -13,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.grid import OBSTACLE, Cell, Weights, as_array
+from companion.core.grid import OBSTACLE, Cell, Weights, as_array
 from companion.planning.problem import MIN_WEIGHT
 
 CellArray = NDArray[np.int64]

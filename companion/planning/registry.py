@@ -6,20 +6,20 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from companion.grid import BASE_WEIGHT, OBSTACLE, Cell
-from companion.planning.astar import Astar
-from companion.planning.bspline_ga import BsplineGa
-from companion.planning.dijkstra import Dijkstra
-from companion.planning.dstar_lite import DstarLite
+from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell
+from companion.planning.bspline_ga.planner import BsplineGa
+from companion.planning.graph_search.astar import Astar
+from companion.planning.graph_search.dijkstra import Dijkstra
+from companion.planning.graph_search.dstar_lite import DstarLite
+from companion.planning.graph_search.theta_star import ThetaStar
 from companion.planning.hybrid import Hybrid
-from companion.planning.monotone_ga import geisler, hermanu, sedighi
+from companion.planning.papers.achour_ga import SegmentGa
+from companion.planning.papers.prm import Prm
+from companion.planning.papers.sedighi_ga import geisler, hermanu, sedighi
+from companion.planning.papers.wang_ga import vertex, vertex_plus
 from companion.planning.planner import Planner, PlannerFactory
-from companion.planning.prm import Prm
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.raster import cells_cost
-from companion.planning.segment_ga import SegmentGa
-from companion.planning.theta_star import ThetaStar
-from companion.planning.vertex_ga import vertex, vertex_plus
 from companion.settings import PlannerSettings, alike
 
 PLANNERS: dict[str, PlannerFactory] = {

@@ -13,10 +13,10 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.grid import OBSTACLE, Cell, Weights
+from companion.core.grid import OBSTACLE, Cell, Weights
+from companion.planning.graph_search.theta_star import any_angle
 from companion.planning.problem import MIN_WEIGHT
 from companion.planning.raster import CellArray, cells_cost, first_fault, polyline, without_loops
-from companion.planning.theta_star import any_angle
 
 ROUNDING_FIELDS = (6.0, 4.0, 2.5, 1.5, 0.75)
 """How far from a corner its rounding begins, tried in turn."""

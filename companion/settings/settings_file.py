@@ -8,9 +8,9 @@ from typing import get_args
 
 from pydantic import BaseModel, ValidationError
 
-from companion.reading import open_file
 from companion.settings.section import SettingsError, alike
 from companion.settings.settings import Settings
+from companion.storage.reading import open_file
 
 MAX_BYTES = 1_000_000
 

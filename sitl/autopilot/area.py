@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from sitl import geodesy
 from sitl.autopilot.items import FENCE_CIRCLE_IN, FENCE_CIRCLE_OUT, FENCE_POLYGON_IN, FENCE_POLYGON_OUT, Item
+from sitl.world import geodesy
 
 UNION = 2
 """Bit of FENCE_OPTIONS: it is enough to be inside one of the inclusion areas."""

@@ -6,7 +6,6 @@ import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl import geodesy
 from sitl.autopilot import items
 from sitl.autopilot.area import distance_m
 from sitl.autopilot.circle import begin_circle
@@ -24,6 +23,7 @@ from sitl.autopilot.ways import (
     drive_to,
     stand,
 )
+from sitl.world import geodesy
 
 SMALLEST_CIRCLE_M = 0.5
 STAY, LOITER, ACRO, MANUAL = 0, 1, 2, 3

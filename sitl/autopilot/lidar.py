@@ -6,7 +6,7 @@ from sitl.autopilot.link import new_codec, packed
 from sitl.autopilot.proximity import take_in
 from sitl.autopilot.scanner import OBSTACLE_AVOIDANCE, Scanner
 from sitl.autopilot.vehicle import Vehicle
-from sitl.sensors import Lidar, RangeSensing
+from sitl.sensors.range_sensors import Lidar, RangeSensing
 
 OWN_CHANNEL = -1
 """The scanner's place in the router: packets for it are not for the autopilot, and it answers none."""

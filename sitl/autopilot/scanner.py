@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl.autopilot.framing import Framer
 from sitl.autopilot.link import new_codec, packed
 from sitl.autopilot.routing import AUTOPILOT
-from sitl.sensors import Lidar, RangeSensing
+from sitl.sensors.range_sensors import Lidar, RangeSensing
 
 OBSTACLE_AVOIDANCE = 196
 HEARTBEAT_US = 1_000_000

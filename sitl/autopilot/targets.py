@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from sitl import geodesy
 from sitl.autopilot.control import CIRCLE, HEADING, LEG, TURN_RATE, WAYPOINT
 from sitl.autopilot.guided import begin_target
 from sitl.autopilot.plan import Submode
 from sitl.autopilot.vehicle import DRIVEN_MODES, INFO, Mode, Vehicle
+from sitl.world import geodesy
 
 LOCAL_NED, LOCAL_OFFSET, BODY, BODY_OFFSET = 1, 7, 8, 9
 LOCAL_FRAMES = {LOCAL_NED, LOCAL_OFFSET, BODY, BODY_OFFSET}

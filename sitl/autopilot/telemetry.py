@@ -8,7 +8,6 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl import geodesy
 from sitl.autopilot.boot import EKF_SEEN_S, LOCAL_POSITION_S
 from sitl.autopilot.control import LEG
 from sitl.autopilot.fence import fence_status
@@ -16,7 +15,8 @@ from sitl.autopilot.modes import base_mode
 from sitl.autopilot.proximity import echoes
 from sitl.autopilot.status import battery_readings, sys_status
 from sitl.autopilot.vehicle import ALTITUDE_M, AUTOPILOT_MODES, Mode, Vehicle
-from sitl.sensors import Reading
+from sitl.sensors.range_sensors import Reading
+from sitl.world import geodesy
 
 NAN = float("nan")
 GROUND_ROVER, SURFACE_BOAT = 10, 11

@@ -12,11 +12,11 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl import geodesy
 from sitl.autopilot.link import Channel, new_codec, packed
 from sitl.autopilot.routing import AUTOPILOT
 from sitl.autopilot.vehicle import ALTITUDE_M
-from sitl.world import World
+from sitl.world import geodesy
+from sitl.world.world import World
 
 FIRST_SYSTEM = 101
 """System id of the first mover that announces itself as a vehicle; the others count on."""

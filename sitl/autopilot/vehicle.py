@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl import geodesy
 from sitl.autopilot.battery import Battery, rest_volts
 from sitl.autopilot.boot import ATTITUDE_S, HOME_S, ORIGIN_S, POSITION_S, GpsLate
 from sitl.autopilot.control import CIRCLE, LEG, LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
@@ -21,7 +20,8 @@ from sitl.autopilot.params import Parameters
 from sitl.autopilot.plan import Plan, Storage, Submode, new_plan
 from sitl.autopilot.routing import Router
 from sitl.autopilot.signing import Signing
-from sitl.sensors import RangeSensing
+from sitl.sensors.range_sensors import RangeSensing
+from sitl.world import geodesy
 
 ALTITUDE_M = 120.0
 """Height of the ground everywhere, above sea level."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 
-from sitl import geodesy
 from sitl.autopilot.area import Place, distance_m, nearest, outside
 from sitl.autopilot.control import LEG, STOP
 from sitl.autopilot.guided import begin_guided
 from sitl.autopilot.legs import begin_leg
 from sitl.autopilot.plan import WayBack
 from sitl.autopilot.vehicle import INFO, Mode, Vehicle
+from sitl.world import geodesy
 
 CIRCLE_FENCE, POLYGON_FENCE = 2, 4
 """Bits of FENCE_TYPE: the circle round home, and what was uploaded."""

@@ -10,13 +10,13 @@ from rich.console import Console
 
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import OutputError, usable_settings
-from companion.clock import WallClock
-from companion.itinerary import TargetStatus
-from companion.mapfiles import MapError
+from companion.core.clock import WallClock
+from companion.executive.mission_progress import TargetStatus
+from companion.executive.warm_up import COMPILING, kernels_warm
+from companion.mapping.map_files import MapError
 from companion.mission.mission import MissionError
-from companion.recorder import NullRecorder, Recorder, RecordError
+from companion.recording.recorder import NullRecorder, Recorder, RecordError
 from companion.settings import SettingsError
-from companion.warmup import COMPILING, kernels_warm
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_untold
 from sitl.cli.drive_outputs import outputs, print_summary
@@ -25,7 +25,7 @@ from sitl.cli.drive_view import run_with_view
 from sitl.cli.equipment import equipped, simulated
 from sitl.cli.pace import Pace
 from sitl.cli.viewer import Viewer, ViewError, terminal
-from sitl.fault_file import FaultFileError
+from sitl.faults.fault_file import FaultFileError
 from sitl.lockstep import Drive
 from sitl.scenario import ScenarioError
 

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
-from sitl.ground import field_at, mission_in_world, mission_on_map
 from sitl.scenario import Scenario
-from sitl.worldfile import ground_grid
+from sitl.world.any_map import field_at, mission_in_world, mission_on_map
+from sitl.world.world_file import ground_grid
 
 
 @dataclass(frozen=True, slots=True)

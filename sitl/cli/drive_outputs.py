@@ -11,11 +11,11 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.cli.inputs import OutputError, picture, writable, written
-from companion.mapfiles import MapError
-from companion.provenance import made_with
-from companion.recorder import NullRecorder, Recorder
+from companion.mapping.map_files import MapError
+from companion.recording.recorder import NullRecorder, Recorder
+from companion.settings.versions import made_with
 from sitl.lockstep import Drive, Report
-from sitl.picture import save_picture
+from sitl.view.picture import save_picture
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,17 +8,17 @@ from dataclasses import replace
 from rich.console import Console
 
 from companion.app import Status
-from companion.clock import stopwatch_s
-from companion.grid import OBSTACLE
-from companion.itinerary import TargetStatus
-from companion.mapping import EvidenceMap, known_fields
-from companion.navigator import Decision, Part
+from companion.core.clock import stopwatch_s
+from companion.core.grid import OBSTACLE
+from companion.executive.mission_progress import TargetStatus
+from companion.mapping.evidence_map import EvidenceMap, known_fields
+from companion.navigation.field_step import Decision, Part
 from sitl.cli.said import Said
 from sitl.cli.viewer import Viewer
 from sitl.lockstep import Drive, Report
-from sitl.sketch import Kind, Layer, Place, Scene
-from sitl.view import Fact, Section, View
-from sitl.watching import Watching, world_layers
+from sitl.view.sketch import Kind, Layer, Place, Scene
+from sitl.view.view import Fact, Section, View
+from sitl.view.watching import Watching, world_layers
 
 STATES = {
     TargetStatus.PENDING: "pending",

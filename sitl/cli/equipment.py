@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from companion.mission.mission import Mission
-from sitl.fault_file import load_faults
+from sitl.faults.fault_file import load_faults
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_parameter_file, with_sensors
 
 

@@ -11,9 +11,9 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.cli.inputs import OutputError, writable, written
-from companion.mapfiles import MapError
-from companion.provenance import made_with
+from companion.mapping.map_files import MapError
 from companion.settings import Settings
+from companion.settings.versions import made_with
 from sitl.experiments import (
     achour_table1,
     adaptive_control_points,

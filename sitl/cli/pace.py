@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.clock import Clock
+from companion.core.clock import Clock
 
 
 class Pace:

@@ -10,20 +10,20 @@ import typer
 from rich.console import Console
 
 from companion.cli.inputs import OutputError, writable, written
-from companion.clock import WallClock
-from companion.mapfiles import MapError
+from companion.core.clock import WallClock
+from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from sitl.cli.equipment import equipped
 from sitl.cli.serve import BAD_INPUT, say, stop_signals
-from sitl.endpoints import ListenError
-from sitl.endpoints.client import FORMS, ClientLink, open_link
-from sitl.endpoints.told import ToldLink
-from sitl.firmware_parameters import firmware_parameters, parameter_file
-from sitl.paramfile import ParameterFileError
-from sitl.physics import Physics
-from sitl.physics_news import PhysicsNews, summary
-from sitl.physics_server import open_port, run
+from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
+from sitl.firmware.parameter_files import ParameterFileError
+from sitl.firmware.physics import Physics
+from sitl.firmware.physics_news import PhysicsNews, summary
+from sitl.firmware.physics_server import open_port, run
+from sitl.network import ListenError
+from sitl.network.client import FORMS, ClientLink, open_link
+from sitl.network.told import ToldLink
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission
 
 

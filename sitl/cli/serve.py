@@ -12,18 +12,18 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from companion.clock import WallClock
-from companion.mapfiles import MapError
+from companion.core.clock import WallClock
+from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from sitl.cli.equipment import equipped, simulated
 from sitl.cli.viewer import Viewer, ViewError, terminal
-from sitl.endpoints import FORMS, Endpoint, ListenError, open_endpoint
-from sitl.fault_file import FaultFileError
-from sitl.news import News
+from sitl.faults.fault_file import FaultFileError
+from sitl.network import FORMS, Endpoint, ListenError, open_endpoint
+from sitl.network.news import News
+from sitl.network.server import serve as run_server
 from sitl.scenario import Scenario, ScenarioError
-from sitl.server import serve as run_server
-from sitl.watching import Watching
+from sitl.view.watching import Watching
 
 DEFAULT_LISTEN = ["udpout:127.0.0.1:14550", "tcp:127.0.0.1:5760"]
 BAD_INPUT = 2

@@ -12,7 +12,7 @@ from types import FrameType, TracebackType
 from rich.console import Console, RenderableType
 from rich.live import Live
 
-from sitl.view import View, render
+from sitl.view.view import View, render
 
 FRAMES_HZ = 5.0
 """Often enough to see it drive, seldom enough for a slow connection."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from companion.grid import BASE_WEIGHT, OBSTACLE, Cell
+from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell
 from companion.planning.problem import PlanningProblem
 
 Place = tuple[float, float]

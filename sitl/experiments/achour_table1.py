@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.table import Table
 
-from companion.grid import Grid
+from companion.core.grid import Grid
 from companion.planning.problem import PlanningProblem
 from companion.planning.registry import warm_up
 from sitl.experiments import drawing

@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.clock import stopwatch_s
-from companion.planning.chance import draw_seed, seeded
-from companion.planning.prm import queried
+from companion.core.clock import stopwatch_s
+from companion.planning.line_of_sight import free_samples, shortened
+from companion.planning.papers.achour_ga import walked
+from companion.planning.papers.prm import queried
 from companion.planning.problem import Budget, PlanningProblem
+from companion.planning.random_numbers import draw_seed, seeded
 from companion.planning.raster import CellArray, plain
 from companion.planning.registry import make_planner
-from companion.planning.segment_ga import walked
-from companion.planning.sight import free_samples, shortened
 from companion.settings import PlannerSettings
 from companion.settings.planners import AchourSettings
 from sitl.experiments.achour_environments import FIELDS_A_METRE

@@ -11,7 +11,7 @@ from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 from rich.table import Table
 
-from companion.clock import stopwatch_s
+from companion.core.clock import stopwatch_s
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import make_planner, warm_up
 from companion.settings import PlannerSettings

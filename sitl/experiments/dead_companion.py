@@ -16,7 +16,7 @@ from rich.table import Table
 
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, SitlSpec
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.experiments.experiment import Advance, Options, shipped_missions
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section

@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from companion.grid import OBSTACLE, Cell, Grid
-from companion.reading import refuse_pipe
+from companion.core.grid import OBSTACLE, Cell, Grid
+from companion.storage.reading import refuse_pipe
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0072b2", "#d1495b", "#009e73", "#e69f00", "#8a8f98"
 WALL, UNSEEN, GROUND = (0.20, 0.22, 0.26), (0.78, 0.80, 0.83), (0.985, 0.985, 0.975)

@@ -12,11 +12,11 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from companion.bench.movingai import ScenarioFileError, read_scenarios, scenario_file, spread
-from companion.mapfiles import load_map
+from companion.executive.warm_up import warm_up
+from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
-from companion.recorder import NullRecorder
-from companion.warmup import warm_up
+from companion.recording.recorder import NullRecorder
 from sitl.experiments import drawing
 from sitl.experiments.experiment import (
     Advance,
@@ -28,9 +28,9 @@ from sitl.experiments.experiment import (
 )
 from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
-from sitl.ground import mission_on_map
 from sitl.lockstep import Drive, Report
 from sitl.scenario import scenario_from_mission
+from sitl.world.any_map import mission_on_map
 
 NAME = "driving"
 MISSIONS = (

@@ -12,11 +12,11 @@ from typing import Protocol, runtime_checkable
 
 from rich.table import Table
 
-from companion.grid import Cell, Grid
-from companion.mapfiles import load_map
+from companion.core.grid import Cell, Grid
+from companion.mapping.map_files import load_map
 from companion.planning.registry import UnknownPlannerError, make_planner
-from companion.reading import why_no_file
 from companion.settings import PlannerSettings
+from companion.storage.reading import why_no_file
 
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""

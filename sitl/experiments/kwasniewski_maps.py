@@ -18,13 +18,13 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 from rich.table import Table
 
-from companion.grid import Grid
+from companion.core.grid import Grid
 from companion.planning import registry
 from companion.settings import Settings, parse_settings
 from sitl.experiments import drawing
 from sitl.experiments.experiment import START, TARGET, Advance, Options, load_maps, where_measured
+from sitl.experiments.field_level import LAYERS, STEP_LIMIT, FieldRobot, FieldRun, Outcome, drive_fields
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
-from sitl.field_level import LAYERS, STEP_LIMIT, FieldRobot, FieldRun, Outcome, drive_fields
 
 NAME = "kwasniewski-maps"
 Profile = Literal["default", "paper"]

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.table import Table
 
-from companion.clock import stopwatch_s
-from companion.grid import Grid
+from companion.core.clock import stopwatch_s
+from companion.core.grid import Grid
 from companion.planning import problem as planning
 from companion.planning.planner import Planner
 from companion.planning.problem import Budget, PlanningProblem

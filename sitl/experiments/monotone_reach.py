@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.grid import OBSTACLE
+from companion.core.grid import OBSTACLE
 from companion.planning.problem import PlanningProblem
 
 ROWS, COLUMNS = 0, 1

@@ -16,7 +16,7 @@ from rich.table import Table
 
 from companion.bench.cases import Case, map_case
 from companion.bench.movingai import ScenarioFileError
-from companion.grid import Cell, Grid
+from companion.core.grid import Cell, Grid
 from companion.planning import registry
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import PLANNERS, make_planner
@@ -32,8 +32,8 @@ from sitl.experiments.experiment import (
     planners_of,
     where_measured,
 )
+from sitl.experiments.field_level import STEP_LIMIT, FieldRun, Outcome, drive_fields
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
-from sitl.field_level import STEP_LIMIT, FieldRun, Outcome, drive_fields
 
 NAME = "navigation"
 MAPS = ("one-obstacle", "clutter", "rooms", "complex")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import heapq
 import math
 
-from companion.grid import OBSTACLE, Cell, Weights
+from companion.core.grid import OBSTACLE, Cell, Weights
 from companion.planning.problem import MIN_WEIGHT
 
 MOVES = [(x, y) for x in (-1, 0, 1) for y in (-1, 0, 1) if x or y]

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.grid import BASE_WEIGHT, OBSTACLE, Cell, Weights
+from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Weights
 from companion.planning.problem import PlanningProblem
-from companion.reading import read_at_most
+from companion.storage.reading import read_at_most
 from sitl.experiments.experiment import ExperimentError
 
 MOST_BYTES = 10_000_000

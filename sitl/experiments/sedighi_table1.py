@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.table import Table
 
-from companion.clock import stopwatch_s
-from companion.grid import Grid, empty_grid
+from companion.core.clock import stopwatch_s
+from companion.core.grid import Grid, empty_grid
 from companion.planning.problem import Budget, Path, PlanningProblem
 from companion.planning.registry import make_planner, warm_up
 from companion.settings import PlannerSettings

@@ -18,7 +18,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from rich.table import Table
 
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.autopilot.modes import arm, arming_faults, set_mode
 from sitl.autopilot.vehicle import Mode
@@ -27,7 +27,7 @@ from sitl.experiments.experiment import Advance, Options, where_measured
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
 from sitl.lockstep import Drive
 from sitl.scenario import SOMEWHERE, Scenario
-from sitl.truth import SimStart
+from sitl.world.truth import SimStart
 
 NAME = "soak"
 PAGE = "safety.md"

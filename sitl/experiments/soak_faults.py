@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from sitl.faults import (
+from sitl.faults.plan import (
     BatteryLow,
     Fault,
     FaultPlan,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from companion.grid import OBSTACLE, Cell, inflated
+from companion.core.grid import OBSTACLE, Cell, inflated
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, SitlSpec, Target
-from sitl.world import Obstacles, World
+from sitl.world.world import Obstacles, World
 
 WIDTH_M, HEIGHT_M = 60, 44
 FINE_M = 0.5

@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 from numpy.typing import NDArray
 
-from companion.grid import BASE_WEIGHT, OBSTACLE, Cell, Weights
+from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Weights
 from companion.planning.problem import Mover
 
 Track = NDArray[np.float64]

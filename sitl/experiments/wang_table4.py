@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.table import Table
 
-from companion.grid import Grid
+from companion.core.grid import Grid
 from companion.planning.registry import warm_up
 from companion.settings.planners import VertexSettings
 from sitl.experiments import drawing

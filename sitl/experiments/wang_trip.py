@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.clock import stopwatch_s
-from companion.grid import Cell
+from companion.core.clock import stopwatch_s
+from companion.core.grid import Cell
+from companion.planning.papers.wang_ga import Plan, planned
 from companion.planning.problem import Motion, Mover, PlanningProblem
 from companion.planning.raster import polyline
-from companion.planning.vertex_ga import Plan, planned
 from companion.settings.planners import VertexSettings
 from sitl.experiments.wang_environments import Environment
 

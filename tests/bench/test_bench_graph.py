@@ -10,7 +10,7 @@ from companion.bench.peers import installed_peers
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import make_planner, warm_up
 from companion.settings import PlannerSettings
-from tests.planning_maps import one_obstacle
+from tests.support.planning_maps import one_obstacle
 
 GRAPH = ("astar", "dijkstra", "theta-star", "dstar-lite")
 PEERS = {"nano_astar": "nano-astar", "tcod": "tcod", "skimage": "scikit-image"}

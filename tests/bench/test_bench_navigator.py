@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 
 from companion.bench.cases import paper_cases
-from companion.clock import stopwatch_s
-from companion.evidence import soften
-from companion.frames import Pose
-from companion.grid import OBSTACLE, Cell, Grid
-from companion.mapping import MAX_SOFT_WEIGHT
-from companion.navigator import SearchKind
+from companion.core.clock import stopwatch_s
+from companion.core.frames import Pose
+from companion.core.grid import OBSTACLE, Cell, Grid
+from companion.mapping.evidence_map import MAX_SOFT_WEIGHT
+from companion.mapping.kernels import soften
+from companion.navigation.field_step import SearchKind
+from companion.navigation.search_budget import Searcher
+from companion.navigation.turning_cost import with_turning_cost
 from companion.planning.problem import PlanStatus
 from companion.planning.registry import make_planner, warm_up
-from companion.searching import Searcher
 from companion.settings import Settings
-from companion.turning import with_turning_cost
 from sitl.experiments.experiment import START, TARGET, load_maps
+from sitl.experiments.field_level import Outcome, drive_fields
 from sitl.experiments.kwasniewski_maps import PROFILES, TITLES, profile_settings
-from sitl.field_level import Outcome, drive_fields
 
 RUNS = 100
 PLANNING_LIMIT_MS = 20.0

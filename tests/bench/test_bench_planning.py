@@ -12,7 +12,7 @@ from scipy.sparse.csgraph import dijkstra as scipy_dijkstra
 from companion.planning.problem import MIN_WEIGHT, Budget
 from companion.planning.registry import PLANNERS, make_planner, warm_up
 from companion.settings import PlannerSettings
-from tests.planning_maps import one_obstacle
+from tests.support.planning_maps import one_obstacle
 
 FACTORS = (1, 4, 10, 40)
 

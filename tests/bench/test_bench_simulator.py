@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from sitl.simulator import Simulator
-from sitl.truth import SimStart
-from sitl.world import World
-from tests.sitl_client import HOME, Client, ready
+from sitl.world.truth import SimStart
+from sitl.world.world import World
+from tests.support.sitl_client import HOME, Client, ready
 
 STREAMED = (30, 32, 33, 62, 74, 87, 132, 193)
 """ATTITUDE, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, NAV_CONTROLLER_OUTPUT, VFR_HUD, the read-back, ranges, EKF_STATUS_REPORT."""

@@ -10,11 +10,11 @@ import psutil
 import pytest
 
 from companion.mission.load import load_mission
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.lockstep import Drive, Report
 from sitl.scenario import scenario_from_mission
-from tests.served import process, served, wait_until
+from tests.support.served import process, served, wait_until
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 SEEDS = 20

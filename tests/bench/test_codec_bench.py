@@ -4,7 +4,7 @@ from typing import Any
 
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
-from tests.mavlink_vehicle import Station
+from tests.support.mavlink_vehicle import Station
 
 SECONDS = 10
 

@@ -14,12 +14,12 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
+from companion.executive.warm_up import warm_up
 from companion.settings import Settings
-from companion.warmup import warm_up
 from tests.clients.program import PATIENCE_S, Program, program
-from tests.rig import GUIDED, yard
-from tests.served import mission_path
-from tests.unit.test_sitl_server import free_port
+from tests.sitl.network.test_server import free_port
+from tests.support.rig import GUIDED, yard
+from tests.support.served import mission_path
 
 SPEEDUP = 5
 CRUISE_M_S = 0.4

@@ -11,11 +11,11 @@ from pathlib import Path
 import pytest
 from pymavlink import mavwp
 
-from companion.tuning import TABLE
+from companion.settings.tunable_parameters import TABLE
 from tests.clients.program import Program, installed, program
 from tests.clients.scene import HOME_DEG, PLACES, Scene, metres_from_home, scene
-from tests.rig import GUIDED, HOLD
 from tests.scenarios.test_mavwp import send
+from tests.support.rig import GUIDED, HOLD
 
 AROUND = ((-1e-3, -1e-3), (1e-3, -1e-3), (1e-3, 1e-3), (-1e-3, 1e-3))
 CORNERS = [(HOME_DEG[0] + north, HOME_DEG[1] + east) for north, east in AROUND]

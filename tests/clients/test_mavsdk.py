@@ -13,7 +13,7 @@ import pytest
 
 from tests.clients.program import PATIENCE_S, installed
 from tests.clients.scene import CRUISE_M_S, HOME_DEG, PLACES, Scene, metres_from_home, scene
-from tests.rig import HOLD
+from tests.support.rig import HOLD
 
 WAYPOINT, RELATIVE = 16, 3
 

@@ -12,17 +12,17 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.rounds import Mark
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
-from companion.navigator import Decision
-from companion.recorder import NullRecorder
-from companion.rounds import Mark
+from companion.navigation.field_step import Decision
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.fault_file import load_faults
-from sitl.faults import FaultPlan
+from sitl.faults.fault_file import load_faults
+from sitl.faults.plan import FaultPlan
 from sitl.lockstep import Drive
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
-from tests.mission_client import at, do, in_auto
+from tests.support.mission_client import at, do, in_auto
 
 TIME_LIMIT_S = 100.0
 WAYPOINT, RETURN = 16, 20

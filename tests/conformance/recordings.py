@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.sensors import Beam, SensorSuite
+from sitl.sensors.range_sensors import Beam, SensorSuite
 from sitl.simulator import Simulator
-from sitl.truth import SimStart
-from sitl.world import World
-from tests.shared_data import SHARED
-from tests.sitl_client import HOME, Client
+from sitl.world.truth import SimStart
+from sitl.world.world import World
+from tests.support.shared_data import SHARED
+from tests.support.sitl_client import HOME, Client
 
 TRANSCRIPTS = SHARED / "data" / "ardurover-4.7-transcripts"
 AUTOPILOT = (1, 1)

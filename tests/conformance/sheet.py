@@ -25,9 +25,9 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.simulator import Simulator
-from sitl.truth import SimStart
-from sitl.world import World
-from tests.sitl_client import HOME, Client
+from sitl.world.truth import SimStart
+from sitl.world.world import World
+from tests.support.sitl_client import HOME, Client
 
 SHEET = Path(__file__).with_name("sheet.txt")
 READY_S = 43.2

@@ -7,16 +7,16 @@ from typing import Any
 
 import pytest
 
-from companion.frames import GeoPoint
-from sitl import geodesy
+from companion.core.frames import GeoPoint
 from sitl.simulator import Simulator
-from sitl.truth import SimStart
-from sitl.world import World
+from sitl.world import geodesy
+from sitl.world.truth import SimStart
+from sitl.world.world import World
 from tests.conformance.recordings import RECORDINGS
 from tests.conformance.recordings import replay as replayed
-from tests.mission_client import FENCE, MISSION, RALLY, Row, download, place_m, rows_of_file, run_until, upload
-from tests.shared_data import SHARED, needs_shared
-from tests.sitl_client import Client, open_ground, ready
+from tests.support.mission_client import FENCE, MISSION, RALLY, Row, download, place_m, rows_of_file, run_until, upload
+from tests.support.shared_data import SHARED, needs_shared
+from tests.support.sitl_client import Client, open_ground, ready
 
 FILES = SHARED / "data" / "missions"
 PLACED = {16, 17, 18, 19, 22}

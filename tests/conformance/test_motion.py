@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.sitl_client import open_ground, ready
+from tests.support.sitl_client import open_ground, ready
 
 
 def test_ten_metres_from_rest() -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from tests.conformance.comparison import differences
 from tests.conformance.recordings import RECORDINGS, Heard, Replay, replay
 from tests.conformance.tolerated import ROWS, TOLERATED
-from tests.shared_data import needs_shared
+from tests.support.shared_data import needs_shared
 
 pytestmark = needs_shared
 NAMES = [recording.name for recording in RECORDINGS]

@@ -2,7 +2,7 @@
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from tests.sitl_client import Client, open_ground, ready
+from tests.support.sitl_client import Client, open_ground, ready
 
 
 def test_after_a_reboot_all_begins_anew() -> None:

@@ -10,8 +10,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from companion.frames import GeoPoint, LocalFrame, NedPoint
-from companion.mapfiles import MapError, load_map
+from companion.checkpoint.format import SUM_BYTES, StateError, decoded, encoded
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
+from companion.core.rounds import Round
+from companion.mapping.map_files import MapError, load_map
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.framing import MAGIC_V2
@@ -20,16 +22,14 @@ from companion.mavlink.transport import MemoryLink
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.mission.resolve import resolve
-from companion.record import load_record
-from companion.recorded_files import RecordError
-from companion.rounds import Round
+from companion.recording.reader import load_record
+from companion.recording.recorded_files import RecordError
 from companion.settings import Settings, SettingsError, load_settings
-from companion.state.format import SUM_BYTES, StateError, decoded, encoded
-from companion.tuning import with_tuned
-from companion.vehicle import VehicleState, fold
-from tests.mavlink_vehicle import Station
-from tests.rig import Rig, yard
-from tests.states import a_state
+from companion.settings.tunable_parameters import with_tuned
+from companion.vehicle.state import VehicleState, fold
+from tests.support.mavlink_vehicle import Station
+from tests.support.rig import Rig, yard
+from tests.support.states import a_state
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 A_MISSION = b'{"name": "m", "targets": [{"name": "t", "place": [1, 2]}]}'
@@ -279,7 +279,7 @@ def state_examples() -> tuple[bytes, ...]:
 def record_examples() -> tuple[bytes, ...]:
     """Heads as the recorder writes them, at the end of a run and before."""
     with tempfile.TemporaryDirectory() as folder:
-        from companion.recorder import Recorder
+        from companion.recording.recorder import Recorder
 
         recorder = Recorder(Path(folder) / "r", None, Settings(), 0)
         recorder.close()

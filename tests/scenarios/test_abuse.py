@@ -15,10 +15,10 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.pursuit import Pursuit
-from companion.vehicle import PARAMETERS_KEPT
-from tests.rig import Rig, yard
-from tests.served import mission_path, served
+from companion.executive.mission_executor import Pursuit
+from companion.vehicle.state import PARAMETERS_KEPT
+from tests.support.rig import Rig, yard
+from tests.support.served import mission_path, served
 
 MEMORY_BYTES = 600_000_000
 """What a program may take beyond its libraries, which reserve much more than they use."""

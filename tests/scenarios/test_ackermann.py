@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from companion.commands import GuidedHeading
 from companion.mission.load import load_mission
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
+from companion.vehicle.commands import GuidedHeading
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 

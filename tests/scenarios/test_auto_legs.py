@@ -10,10 +10,10 @@ import pytest
 
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
-from tests.asker import Asker
 from tests.clients.scene import HOME_DEG
-from tests.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, SET_MODE, without, yard
 from tests.scenarios.test_errands import low_battery
+from tests.support.asker import Asker
+from tests.support.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, SET_MODE, without, yard
 
 WAYPOINT, GUIDED_ENABLE, LIMITS, DELAY = 16, 92, 222, 93
 ON = (1.0, 0.0, 0.0, 0.0)

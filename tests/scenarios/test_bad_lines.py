@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from companion.mission.load import load_mission
-from tests.rig import GUIDED, HOLD, Rig, yard
+from tests.support.rig import GUIDED, HOLD, Rig, yard
 
 
 def assert_reached(rig: Rig) -> None:

@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from companion.mission.load import load_mission
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.lockstep import Drive
-from sitl.picture import save_picture
-from sitl.rover import TOP_SPEED_M_S
+from sitl.plant.rover import TOP_SPEED_M_S
 from sitl.scenario import scenario_from_mission, with_sensors
-from sitl.world import ground_under
+from sitl.view.picture import save_picture
+from sitl.world.world import ground_under
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 

@@ -24,13 +24,13 @@ from companion.mavlink.examination import Examination
 from companion.mavlink.signing import Signer
 from companion.settings import Settings
 from sitl.scenario import scenario_from_mission
-from tests.mavlink_vehicle import Station
-from tests.party import KEY, TIME
-from tests.rig import yard
-from tests.served import finished, mission_path, process
-from tests.shared_data import SHARED, needs_shared
-from tests.tlog import raw_packets
-from tests.unit.test_sitl_server import free_port
+from tests.sitl.network.test_server import free_port
+from tests.support.mavlink_vehicle import Station
+from tests.support.party import KEY, TIME
+from tests.support.rig import yard
+from tests.support.served import finished, mission_path, process
+from tests.support.shared_data import SHARED, needs_shared
+from tests.support.tlog import raw_packets
 
 READY_S = 50.0
 HARMLESS = {511, 512, 401}

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from companion.mission.load import load_mission
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import parse_settings
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission

@@ -12,19 +12,19 @@ from matplotlib.axes import Axes
 from rich.console import Console
 
 from companion.app import Status
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.cli.drive_view import DriveView
 from sitl.cli.said import new_texts
 from sitl.cli.viewer import Viewer
-from sitl.faults import FaultPlan, PilotTakesOver, Reboot
+from sitl.faults.plan import FaultPlan, PilotTakesOver, Reboot
 from sitl.lockstep import Drive
-from sitl.picture import save_picture
 from sitl.scenario import scenario_from_mission, with_faults
-from sitl.sketch import Kind
-from sitl.view import View
-from tests.rig import yard
-from tests.unit.test_sitl_view import screen
+from sitl.view.picture import save_picture
+from sitl.view.sketch import Kind
+from sitl.view.view import View
+from tests.sitl.view.test_view import screen
+from tests.support.rig import yard
 
 GATE_M = (7.5, 15.5)
 """North and east in the world, from the map's south-west corner: the middle of field 15, 7."""

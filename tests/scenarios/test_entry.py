@@ -12,7 +12,7 @@ import pytest
 import typer
 
 from companion.cli.entry import StoppedError, start
-from tests.served import finished, process
+from tests.support.served import finished, process
 
 SCRIPTS = {"rover-companion": "companion", "rover-sitl": "sitl"}
 

@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.errands import REPEAT_S
-from companion.frames import GeoPoint, LocalFrame, NedPoint
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
+from companion.executive.goal_requests import REPEAT_S
 from companion.settings import parse_settings
-from tests.asker import COMPANION, NAN, Asker
-from tests.rig import MANUAL, yard
 from tests.scenarios.test_safety import Frame
+from tests.support.asker import COMPANION, NAN, Asker
+from tests.support.rig import MANUAL, yard
 
 ACCEPTED, NOT_NOW, DENIED = 0, 1, 2
 

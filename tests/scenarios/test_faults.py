@@ -13,11 +13,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.mission.load import load_mission
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.cli.commands import app
-from sitl.fault_file import load_faults
-from sitl.faults import (
+from sitl.faults.fault_file import load_faults
+from sitl.faults.plan import (
     BatteryLow,
     Fault,
     FaultPlan,

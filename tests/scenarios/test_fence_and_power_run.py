@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from tests.rig import HOLD, yard
-from tests.served import finished, mission_path, process, served, wait_until
+from tests.support.rig import HOLD, yard
+from tests.support.served import finished, mission_path, process, served, wait_until
 
 GATE = '[[target]]\nname = "gate"\nfield = [15, 7]\n'
 

@@ -13,9 +13,9 @@ from PIL import Image
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.settings import Settings, parse_settings
-from tests.asker import Asker
-from tests.rig import ARM, GUIDED, HOLD, SET_MODE, Rig, yard
-from tests.stored import CIRCLE_IN, CIRCLE_OUT, KEEP_IN, KEEP_OUT, POLYGONS, Person, box, stored
+from tests.support.asker import Asker
+from tests.support.rig import ARM, GUIDED, HOLD, SET_MODE, Rig, yard
+from tests.support.stored import CIRCLE_IN, CIRCLE_OUT, KEEP_IN, KEEP_OUT, POLYGONS, Person, box, stored
 
 ALL = box(KEEP_IN, -6.0, -2.4, 7.0, 20.0)
 """Round the whole yard: the rover begins at 0, 0, a wall stands across its way at 6 m east, the target is at 13 m east."""

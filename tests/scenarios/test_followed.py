@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from companion.telling import NOT_FOLLOWED_S
-from tests.rig import GUIDED, HOLD, Rig, yard
+from companion.operator.telling import NOT_FOLLOWED_S
+from tests.support.rig import GUIDED, HOLD, Rig, yard
 
 ANOTHER = "The autopilot follows another target than the one sent"
 

@@ -15,14 +15,14 @@ from typer.testing import CliRunner
 
 from companion.cli.commands import app
 from companion.cli.source import refuse_arming
-from companion.fetching import TRIES, Fetching
+from companion.executive.fetching import TRIES, Fetching
+from companion.executive.plan_watch import AGAIN_S
 from companion.mission.mission import Mission, MissionError, RoverSpec
 from companion.mission.stored import mission_of
-from companion.plan_watch import AGAIN_S
-from tests.asker import Asker
-from tests.rig import ARM, AUTO, SET_MODE, yard
 from tests.scenarios.test_auto_legs import GUIDED_ENABLE, NONE, ON, WAYPOINT, Row, place_deg
-from tests.served import finished, process, served, wait_until
+from tests.support.asker import Asker
+from tests.support.rig import ARM, AUTO, SET_MODE, yard
+from tests.support.served import finished, process, served, wait_until
 
 LAND, DELAY = 21, 93
 ROUND: list[Row] = [(WAYPOINT, NONE, (15, 7)), (DELAY, (1.0, 0.0, 0.0, 0.0), None), (WAYPOINT, NONE, (20, 3))]

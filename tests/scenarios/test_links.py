@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from companion.clock import WallClock
-from tests.rig import yard
-from tests.served import Served, finished, mission_path, process
-from tests.unit.test_sitl_server import free_port
+from companion.core.clock import WallClock
+from tests.sitl.network.test_server import free_port
+from tests.support.rig import yard
+from tests.support.served import Served, finished, mission_path, process
 
 KEY = bytes(range(1, 33))
 TEXT = "from the companion"

@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 from pymavlink import mavutil, mavwp
 
-from tests.served import process
-from tests.shared_data import SHARED, needs_shared
-from tests.unit.test_sitl_server import free_port
+from tests.sitl.network.test_server import free_port
+from tests.support.served import process
+from tests.support.shared_data import SHARED, needs_shared
 
 FILES = SHARED / "data" / "missions"
 OPEN = Path(__file__).parents[2] / "missions" / "open.toml"

@@ -17,11 +17,11 @@ from typer.testing import CliRunner
 
 from companion.mission.load import load_mission
 from sitl.cli.commands import app
-from sitl.physics_server import received
+from sitl.firmware.physics_server import received
 from sitl.scenario import scenario_from_mission, with_sensors
-from tests.firmware import Firmware, frame
-from tests.served import process
-from tests.unit.test_sitl_server import free_port
+from tests.sitl.network.test_server import free_port
+from tests.support.firmware import Firmware, frame
+from tests.support.served import process
 
 ROOT = Path(__file__).resolve().parents[2]
 MISSION = ROOT / "missions" / "one-obstacle.toml"

@@ -9,24 +9,24 @@ from typing import Any, cast
 import pytest
 
 from companion.app import Companion
+from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
 from companion.mission.load import load_mission
-from companion.recorder import NullRecorder
+from companion.navigation.step_runner import InlineRunner
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
-from companion.stepping import InlineRunner
-from companion.warmup import warm_up
 from sitl.autopilot.params import steered_wheels
+from sitl.firmware.physics import Physics
 from sitl.lockstep import LockstepClock
-from sitl.physics import Physics
 from sitl.scenario import scenario_from_mission
-from sitl.sensors import SUITES
+from sitl.sensors.range_sensors import SUITES
 from sitl.simulator import Simulator
-from sitl.truth import SimStart
-from sitl.world import World
-from tests.sitl_client import HOME, open_ground, ready
-from tests.split_vehicle import SplitVehicle
+from sitl.world.truth import SimStart
+from sitl.world.world import World
+from tests.support.sitl_client import HOME, open_ground, ready
+from tests.support.split_vehicle import SplitVehicle
 
 ROOT = Path(__file__).resolve().parents[2]
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from companion.itinerary import TargetStatus
+from companion.executive.mission_progress import TargetStatus
 from companion.mission.mission import Mission
 from companion.settings import Settings, parse_settings
-from tests.rig import ARM, HOLD, SET_MODE, Change, Rig, yard
-from tests.stored import POLYGONS, box, stored
+from tests.support.rig import ARM, HOLD, SET_MODE, Change, Rig, yard
+from tests.support.stored import POLYGONS, box, stored
 
 AFTER_S = 1.0
 """Below a threshold for so long: the yard is small."""

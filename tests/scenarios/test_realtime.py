@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from companion.mapfiles import load_map
-from companion.record import load_record
-from companion.replay import replay
-from tests.rig import yard
-from tests.served import finished, mission_path, process
-from tests.unit.test_sitl_server import free_port
+from companion.mapping.map_files import load_map
+from companion.recording.reader import load_record
+from companion.replay.replay import replay
+from tests.sitl.network.test_server import free_port
+from tests.support.rig import yard
+from tests.support.served import finished, mission_path, process
 
 
 @pytest.mark.slow

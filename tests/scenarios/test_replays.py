@@ -21,25 +21,25 @@ from typer.testing import CliRunner
 from companion.app import Companion
 from companion.cli.commands import app
 from companion.cli.why_image import FREE_COLOUR
+from companion.core.rounds import CHECKED, Mark, unpacked
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import Signer
 from companion.mavlink.transport import MemoryLink
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
-from companion.navigator import Decision, NavState
-from companion.record import Record, load_record
-from companion.recorded_files import RecordError
-from companion.recorder import Recorder, run_sum
-from companion.replay import replay
-from companion.rounds import CHECKED, Mark, unpacked
+from companion.navigation.field_step import Decision, NavState
+from companion.navigation.step_runner import InlineRunner, StepCall
+from companion.recording.reader import Record, load_record
+from companion.recording.recorded_files import RecordError
+from companion.recording.recorder import Recorder, run_sum
+from companion.replay.replay import replay
 from companion.settings import Settings
-from companion.stepping import InlineRunner, StepCall
 from sitl.cli.commands import app as sitl_app
-from sitl.fault_file import load_faults
+from sitl.faults.fault_file import load_faults
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
-from tests.rig import Rig, kept_in, repacked, yard
+from tests.support.rig import Rig, kept_in, repacked, yard
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 FILES = ("link.tlog", "rounds.bin", "decisions.jsonl")

@@ -10,16 +10,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.grid import Cell
+from companion.checkpoint.format import decoded
+from companion.checkpoint.model import SavedState
+from companion.checkpoint.resume import Kept
+from companion.core.grid import Cell
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
-from companion.resuming import Kept
-from companion.safety import Control
-from companion.startup import LEFT_S
-from companion.state.format import decoded
-from companion.state.model import SavedState
-from tests.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, without, yard
+from companion.safety.mode_latch import Control
+from companion.supervision.startup import LEFT_S
 from tests.scenarios.test_safety_pilot import hold_sticks
+from tests.support.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, without, yard
 
 TWO = GATE + 'hold_s = 1.0\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
 UP_S = 45.0

@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from companion.checkpoint.format import decoded, encoded
+from companion.checkpoint.model import SavedProgress
 from companion.cli.commands import app
-from companion.mission.fingerprint import fingerprint
-from companion.record import load_record
-from companion.replay import replay
-from companion.state.format import decoded, encoded
-from companion.state.model import SavedProgress
-from tests.rig import GATE, HOLD, yard
-from tests.served import finished, mission_path, process, served, wait_until
-from tests.states import a_state
+from companion.mission.identity import fingerprint
+from companion.recording.reader import load_record
+from companion.replay.replay import replay
+from tests.support.rig import GATE, HOLD, yard
+from tests.support.served import finished, mission_path, process, served, wait_until
+from tests.support.states import a_state
 
 TWO = GATE + 'hold_s = 0.5\n[[target]]\nname = "corner"\nfield = [4, 3]\n'
 

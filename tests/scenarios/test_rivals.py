@@ -9,9 +9,9 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
 from companion.mission.mission import Mission
-from companion.recorder import NullRecorder
-from companion.stepping import InlineRunner
-from tests.rig import GATE, HOLD, Rig, yard
+from companion.navigation.step_runner import InlineRunner
+from companion.recording.recorder import NullRecorder
+from tests.support.rig import GATE, HOLD, Rig, yard
 
 ELSEWHERE = '[[target]]\nname = "corner"\nfield = [4, 1]\n[[target]]\nname = "edge"\nfield = [20, 2]\n'
 DRIVES = "another companion drives this rover"

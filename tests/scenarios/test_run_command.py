@@ -11,12 +11,12 @@ import pytest
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
-from companion.mapfiles import load_map
+from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
-from companion.record import load_record
-from companion.replay import replay
-from tests.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard
-from tests.served import finished, mission_path, process, served, wait_until
+from companion.recording.reader import load_record
+from companion.replay.replay import replay
+from tests.support.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard
+from tests.support.served import finished, mission_path, process, served, wait_until
 
 SIMULATED = '[[target]]\nnorth_m = 3.0\neast_m = 0.0\n[sitl]\nworld = "none.png"\nsensors = "none.toml"\nparameters = "none.param"\n'
 """A mission that has come to a rover without the simulator's files."""

@@ -13,7 +13,7 @@ import pytest
 
 from companion.mission.load import load_mission
 from companion.settings import Settings, parse_settings
-from tests.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, REBOOT, RTL, SET_MODE, Rig, Sent, without, yard
+from tests.support.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, REBOOT, RTL, SET_MODE, Rig, Sent, without, yard
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 TICK_S = 0.05

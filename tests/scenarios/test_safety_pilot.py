@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.navigator import Part
-from tests.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, Rig, without, yard
+from companion.navigation.field_step import Part
+from tests.support.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, Rig, without, yard
 
 HEADING_ONLY, POSITION_ONLY = 2559, 3580
 """Type masks."""

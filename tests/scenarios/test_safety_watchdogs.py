@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
+from companion.navigation.step_runner import InlineRunner
 from companion.settings import parse_settings
-from companion.stepping import InlineRunner
-from tests.rig import HOLD, SET_MODE, Rig, without, yard
-from tests.served import finished, mission_path, process, served, wait_until
+from tests.support.rig import HOLD, SET_MODE, Rig, without, yard
+from tests.support.served import finished, mission_path, process, served, wait_until
 
 TICK_S = 0.05
 

@@ -3,9 +3,9 @@
 from dataclasses import replace
 from pathlib import Path
 
-from companion.mapfiles import load_map
+from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from tests.served import finished, process, wait_until
-from tests.unit.test_sitl_server import free_port
+from tests.sitl.network.test_server import free_port
+from tests.support.served import finished, process, wait_until
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])

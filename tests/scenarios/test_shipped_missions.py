@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from companion.mission.load import load_mission
 from companion.mission.mission import SitlSpec
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import Settings, parse_settings
 from sitl.cli.commands import app
 from sitl.lockstep import Drive, Report

@@ -12,12 +12,12 @@ from companion.cli.commands import app
 from companion.mavlink.signing import MINUTE, TICKS_PER_S, Signer
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
-from companion.record import load_record
-from companion.recorder import Recorder
-from companion.replay import replay
-from tests.party import KEY, TIME, Party
-from tests.rig import GUIDED, Rig, yard
-from tests.served import mission_path
+from companion.recording.reader import load_record
+from companion.recording.recorder import Recorder
+from companion.replay.replay import replay
+from tests.support.party import KEY, TIME, Party
+from tests.support.rig import GUIDED, Rig, yard
+from tests.support.served import mission_path
 
 RADIO_PORT = 1
 """Of the vehicle: on its first one it believes anybody."""

@@ -9,9 +9,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
-from companion.tuning import TABLE
-from tests.rig import Rig, yard
-from tests.served import mission_path
+from companion.settings.tunable_parameters import TABLE
+from tests.support.rig import Rig, yard
+from tests.support.served import mission_path
 
 LIST_S = 1.5
 

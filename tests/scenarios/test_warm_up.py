@@ -16,7 +16,7 @@ import json, sys
 from pathlib import Path
 from numba.core.dispatcher import Dispatcher
 from companion.mission.load import load_mission
-from companion.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder
 from companion.settings import parse_settings
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
@@ -122,7 +122,7 @@ def test_a_vehicle_that_is_served_compiles_nothing(mission: str, sensors: str) -
 WARM = """
 import sys
 from companion.settings import Settings
-from companion.warmup import kernels_warm, warm_up
+from companion.executive.warm_up import kernels_warm, warm_up
 if sys.argv[1] == "warm":
     warm_up(Settings())
 print(kernels_warm(Settings()))

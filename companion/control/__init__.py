@@ -1,0 +1,1 @@
+"""From a path to a setpoint: controllers, and what keeps the rover from touching anything."""

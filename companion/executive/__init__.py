@@ -1,0 +1,1 @@
+"""Executes the mission: the next goal, the way there, what is sent to the autopilot."""

@@ -1,0 +1,94 @@
+"""The mission laid out on the ground: once when it begins, and again whenever the autopilot moves the origin of its local frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
+from companion.core.grid import OBSTACLE, Grid, inflated
+from companion.executive.mission_progress import Itinerary, plan_itinerary, relaid
+from companion.mapping.evidence_map import EvidenceMap, new_map, rebase
+from companion.mission.bounds import Bounds
+from companion.mission.fence import NO_FENCE, AutopilotFence
+from companion.mission.mission import Mission, OnBlocked
+from companion.mission.resolve import ResolvedMission, ResolvedTarget, resolve
+from companion.settings import MappingSettings
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Laid:
+    """Where the mission lies. ``home`` is the place its metres and fields count from: home as it was when the mission began."""
+
+    origin: GeoPoint
+    home: GeoPoint
+    evidence: EvidenceMap
+    itinerary: Itinerary
+    fence: AutopilotFence
+    bounds: Bounds
+    refused: Mapping[int, str]
+    """What is wrong with targets behind the autopilot's fence, by their number from 0."""
+
+
+def lay(
+    mission: Mission,
+    settings: MappingSettings,
+    origin: GeoPoint,
+    home: GeoPoint,
+    pose: Pose,
+    fence: AutopilotFence = NO_FENCE,
+) -> Laid:
+    """Lay the mission out; the rover returns to ``pose`` when it has to. Raises MissionError."""
+    frame = LocalFrame(origin)
+    resolved = resolve(mission, frame, frame.to_ned(home), fence)
+    start = _start(pose.point, resolved.ground)
+    evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
+    itinerary = plan_itinerary(resolved.targets, start)
+    return Laid(origin, home, evidence, itinerary, fence, resolved.bounds, resolved.refused)
+
+
+def lay_again(laid: Laid, itinerary: Itinerary, mission: Mission, settings: MappingSettings, origin: GeoPoint) -> Laid:
+    """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
+    frame = LocalFrame(origin)
+    resolved = resolve(mission, frame, frame.to_ned(laid.home), laid.fence)
+    before = LocalFrame(laid.origin)
+    start = frame.to_ned(before.to_geo(itinerary.home.point))
+    errand = itinerary.errand
+    if errand is not None:
+        point = frame.to_ned(before.to_geo(errand.point))
+        errand = replace(errand, point=point, cell=resolved.ground.cell_at(point))
+    evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
+    itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.ground), errand)
+    return Laid(origin, laid.home, evidence, itinerary, laid.fence, resolved.bounds, resolved.refused)
+
+
+def fenced_again(laid: Laid, itinerary: Itinerary, mission: Mission, fence: AutopilotFence) -> Laid:
+    """The same ground and all that has been seen of it, with another fence of the autopilot. Raises MissionError."""
+    frame = LocalFrame(laid.origin)
+    resolved = resolve(mission, frame, frame.to_ned(laid.home), fence)
+    rebase(laid.evidence, _base(mission, resolved))
+    return replace(laid, itinerary=itinerary, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
+
+
+def from_home(laid: Laid) -> Grid:
+    """The map as it is, with its place in metres from home: what ``prior_map`` expects of a saved map."""
+    grid = laid.evidence.grid
+    home, corner = LocalFrame(laid.origin).to_ned(laid.home), grid.south_west
+    return Grid(grid.weights, grid.resolution_m, NedPoint(corner.north_m - home.north_m, corner.east_m - home.east_m))
+
+
+def apart_m(here: GeoPoint, there: GeoPoint) -> float:
+    """Metres between two places that are near each other."""
+    return LocalFrame(here).to_ned(there).distance_m(NedPoint(0.0, 0.0))
+
+
+def _start(point: NedPoint, grid: Grid) -> ResolvedTarget:
+    return ResolvedTarget("start", point, grid.cell_at(point), 0.0, OnBlocked.HOLD, None)
+
+
+def _base(mission: Mission, resolved: ResolvedMission) -> Grid:
+    """Known ground and fences in fields grow by the rover's radius, which the other fences have in them already."""
+    ground = resolved.ground
+    weights = inflated(ground.weights, mission.rover.radius_m / ground.resolution_m)
+    weights[resolved.closed] = OBSTACLE
+    return ground.with_weights(weights)

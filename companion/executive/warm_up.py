@@ -1,0 +1,93 @@
+"""Compiles every hot loop before the rover may move, so that no compilation falls into a drive."""
+
+from __future__ import annotations
+
+import gc
+
+import numpy as np
+from numba.core import event
+
+from companion.control.arc_controller import Helm
+from companion.control.collision_avoidance import first_near, least_room_m
+from companion.control.motion_prediction import steered
+from companion.control.reference_path import Route
+from companion.control.setpoint_check import Output, Surroundings, velocity_stops_in_time
+from companion.core.frames import NedPoint, Pose
+from companion.core.grid import empty_grid
+from companion.core.rover_limits import RoverLimits
+from companion.core.scan import RangeScan
+from companion.mapping.evidence_map import clearance_m, integrate, look_along, new_map, penalise, unseen_beside
+from companion.perception.object_tracker import Tracker
+from companion.planning import registry
+from companion.settings import Settings
+from companion.vehicle.commands import GuidedVelocity
+
+COMPILING = "compiling, once on this machine: about a minute, several on a Raspberry Pi"
+"""For people, before a ``warm_up`` of kernels that are not warm."""
+
+
+def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
+    """Run every compiled kernel that a drive of such a rover with these settings uses once, with the types it uses."""
+    registry.warm_up((settings.navigator.planner,), settings.planner)
+    evidence = new_map(empty_grid(8, 8), 0.35, settings.mapping)
+    bearings = np.array([0.0, 0.5])
+    scan = RangeScan(0.0, bearings, np.array([2.0, np.inf]), 0.2, 4.0, 0.1, "warm-up")
+    integrate(evidence, Pose(4.0, 4.0, 0.0, 0.0), scan, 1)
+    penalise(evidence, evidence.base.cell_at(NedPoint(1.0, 1.0)), 0.1)
+    look_along(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.5)
+    unseen_beside(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.3, 0.5)
+    clearance_m(evidence, NedPoint(4.0, 4.0), 1.0)
+    view = RangeScan(0.0, np.linspace(-0.5, 0.5, 8), np.full(8, 2.0), 0.2, 4.0, 0.1, "warm-up")
+    Tracker(evidence, settings.traffic).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
+    places = np.zeros((2, 2))
+    least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]), 5.0)
+    steered(0.0, 0.0, 0.0, places, np.zeros(2), np.zeros(1))
+    first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
+    known = Surroundings(evidence, RoverLimits(0.35, 2.0, 4.0), settings)
+    velocity_stops_in_time(Output(GuidedVelocity(0.2, 0.1), Pose(4.0, 4.0, 0.0, 0.0), 0.2), known)
+    if turning_radius_m > 0.0:
+        _steer(settings)
+
+
+def settle() -> None:
+    """For a process that drives once: what lives now lives to the end.
+
+    A collection that walks through it would stall a tick for a tenth of a second.
+    """
+    gc.collect()
+    gc.freeze()
+
+
+class _ColdError(Exception):
+    """A kernel would have to be compiled."""
+
+
+class _NoCompiler(event.Listener):
+    """Is told by the compiler before it begins, and does not let it."""
+
+    def on_start(self, event: event.Event) -> None:
+        """A kernel is not in the cache."""
+        raise _ColdError
+
+    def on_end(self, event: event.Event) -> None:
+        """It never comes to this."""
+
+
+def kernels_warm(settings: Settings, turning_radius_m: float = 0.0) -> bool:
+    """Whether ``warm_up`` has nothing to compile on this machine: all kernels are loaded, none is compiled; about a second."""
+    try:
+        with event.install_listener("numba:compile", _NoCompiler()):
+            warm_up(settings, turning_radius_m)
+    except _ColdError:
+        return False
+    return True
+
+
+def _steer(settings: Settings) -> None:
+    """To a place behind, standing and rolling, as rovers do that cannot turn on the spot."""
+    evidence = new_map(empty_grid(16, 16), 0.35, settings.mapping)
+    route = Route(np.column_stack((np.linspace(8.0, 2.0, 25), np.full(25, 8.0))))
+    helm = Helm(evidence, settings)
+    for tick in range(8):
+        rover = RoverLimits(0.35, 2.0, 8.0, turning_radius_m=1.0)
+        helm.guide(route, Pose(8.0 + 0.05 * tick, 8.0, 0.0, 0.05 * tick), 1.0 if tick > 4 else 0.0, rover)

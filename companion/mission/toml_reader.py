@@ -1,0 +1,292 @@
+"""Our own mission files: TOML, every key checked, units in the names.
+
+Places are fields ``[x, y]`` (x east, y north, from the south-west corner), metres north and east of home, or latitude
+and longitude in degrees. Lists of places say which by their name: ``polygon_fields``, ``polygon_m``, ``polygon_deg``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field
+
+from companion.core.frames import GeoPoint
+from companion.core.grid import Cell
+from companion.mission.check import check_mission
+from companion.mission.mission import (
+    Area,
+    GridSpec,
+    HomePoint,
+    Mission,
+    MissionError,
+    MoverSpec,
+    OnBlocked,
+    Place,
+    RoverSpec,
+    SitlSpec,
+    Target,
+    WeightedArea,
+    open_ring,
+)
+from companion.mission.qgc import load_qgc
+from companion.mission.sensor_tables import SensorsTable, sensors_from, sensors_given
+from companion.mission.tables import (
+    Field2,
+    FileName,
+    Lat,
+    LatLon,
+    Lon,
+    Metres,
+    Name,
+    Pair,
+    Positive,
+    T,
+    Table,
+    named,
+    read_table,
+)
+
+
+class PlaceTable(Table):
+    """One place: a field, metres from home, or latitude and longitude."""
+
+    field: Field2 | None = None
+    north_m: Metres | None = None
+    east_m: Metres | None = None
+    lat_deg: Lat | None = None
+    lon_deg: Lon | None = None
+
+    def place(self) -> Place | None:
+        """The place, or None if none is given. Raises ValueError when it is ambiguous or half given."""
+        metres = self.north_m is not None or self.east_m is not None
+        degrees = self.lat_deg is not None or self.lon_deg is not None
+        if (self.field is not None) + metres + degrees > 1:
+            raise ValueError("a place is given twice; use one of field, north_m and east_m, lat_deg and lon_deg")
+        if self.field is not None:
+            return Cell(*self.field)
+        if metres:
+            if self.north_m is None or self.east_m is None:
+                raise ValueError("north_m and east_m are both needed")
+            return HomePoint(self.north_m, self.east_m)
+        if degrees:
+            if self.lat_deg is None or self.lon_deg is None:
+                raise ValueError("lat_deg and lon_deg are both needed")
+            return GeoPoint(self.lat_deg, self.lon_deg)
+        return None
+
+
+class TargetTable(PlaceTable):
+    """``[[target]]``."""
+
+    name: Name | None = None
+    hold_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    on_blocked: Literal["skip", "wait", "return", "hold"] = "skip"
+    speed_m_s: Positive | None = None
+
+    def target(self, number: int) -> Target:
+        """The target; without a name it is called after its number, counted from 1."""
+        place = self.place()
+        if place is None:
+            raise ValueError("has no place; use one of field, north_m and east_m, lat_deg and lon_deg")
+        name = self.name or f"target {number}"
+        return Target(name, place, self.hold_s, OnBlocked(self.on_blocked), self.speed_m_s)
+
+
+class AreaTable(PlaceTable):
+    """``[[keep_out]]`` and ``[[keep_in]]``: a polygon, or a circle round a place."""
+
+    polygon_fields: list[Field2] | None = None
+    polygon_m: list[Pair] | None = None
+    polygon_deg: list[LatLon] | None = None
+    radius_m: Positive | None = None
+
+    def area(self) -> Area:
+        """The area. Raises ValueError unless it is exactly one polygon or one circle."""
+        shapes = [*self.shapes()]
+        middle = self.place()
+        if (middle is None) != (self.radius_m is None):
+            raise ValueError("a circle needs a place (field, north_m and east_m, or lat_deg and lon_deg) and radius_m")
+        if middle is not None:
+            shapes.append(Area((middle,), radius_m=self.radius_m))
+        if len(shapes) != 1:
+            raise ValueError(f"exactly one shape is needed, not {len(shapes)}")
+        return shapes[0]
+
+    def shapes(self) -> list[Area]:
+        """The shapes given as lists of places."""
+        lists = (self.polygon_fields, self.polygon_m, self.polygon_deg)
+        return [Area(open_ring(places)) for places in _places(*lists)]
+
+
+class CorridorTable(AreaTable):
+    """``[[corridor]]``: ground with a weight of its own; also a line with a width."""
+
+    weight: Annotated[float, Field(ge=0.0, lt=1.0)]
+    line_fields: list[Field2] | None = None
+    line_m: list[Pair] | None = None
+    line_deg: list[LatLon] | None = None
+    width_m: Positive | None = None
+
+    def shapes(self) -> list[Area]:
+        """The shapes given as lists of places."""
+        lines = _places(self.line_fields, self.line_m, self.line_deg)
+        if bool(lines) != (self.width_m is not None):
+            raise ValueError("a line needs line_fields, line_m or line_deg, and width_m")
+        return [*super().shapes(), *(Area(line, width_m=self.width_m) for line in lines)]
+
+
+class GridTable(Table):
+    """``[grid]``."""
+
+    resolution_m: Annotated[float, Field(ge=0.01, le=1000.0)] = 1.0
+    size: Annotated[tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]], Field(strict=False)] | None = None
+    home: Field2 | None = None
+    margin_m: Annotated[float, Field(ge=0.0, le=1e6)] | None = None
+
+
+class RoverTable(Table):
+    """``[rover]``."""
+
+    radius_m: Annotated[float, Field(gt=0.0, le=20.0)] = RoverSpec().radius_m
+    cruise_speed_m_s: Annotated[float, Field(gt=0.0, le=50.0)] = RoverSpec().cruise_speed_m_s
+    turning_radius_m: Annotated[float, Field(ge=0.0, le=100.0)] = RoverSpec().turning_radius_m
+
+
+class GeoTable(Table):
+    """Latitude and longitude."""
+
+    lat_deg: Lat
+    lon_deg: Lon
+
+
+class MoverTable(Table):
+    """``[[sitl.movers]]``: a disc that moves in the simulator's world."""
+
+    name: Name | None = None
+    radius_m: Annotated[float, Field(gt=0.0, le=20.0)]
+    speed_m_s: Annotated[float, Field(gt=0.0, le=50.0)]
+    route_m: Annotated[list[Pair], Field(max_length=1000)]
+    start_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    repeat: bool = False
+    announce: Literal["vehicle", "adsb", "ais"] | None = None
+
+    def mover(self, number: int) -> MoverSpec:
+        """The mover. Raises ValueError when it has nowhere to go."""
+        route = tuple(HomePoint(*pair) for pair in self.route_m)
+        if len(set(route)) < 2:
+            raise ValueError("route_m needs at least two different places")
+        name = self.name or f"mover {number}"
+        return MoverSpec(name, self.radius_m, self.speed_m_s, route, self.start_s, self.repeat, self.announce)
+
+
+class SitlTable(Table):
+    """``[sitl]``: a real rover ignores it."""
+
+    world: FileName | None = None
+    resolution_m: Positive | None = None
+    start: Field2 | None = None
+    heading_deg: Annotated[float, Field(ge=-360.0, le=360.0)] = SitlSpec().heading_deg
+    sensors: Annotated[SensorsTable | FileName, BeforeValidator(sensors_given)] = "lidar-90"
+    home: GeoTable | None = None
+    movers: Annotated[list[MoverTable], Field(max_length=100, default_factory=list)]
+    steering: Literal["skid", "ackermann"] | None = None
+    parameters: FileName | None = None
+
+
+class MissionTable(Table):
+    """The whole file."""
+
+    name: Name | None = None
+    prior_map: FileName | None = None
+    fence: FileName | None = None
+    grid: GridTable = GridTable()
+    rover: RoverTable = RoverTable()
+    target: list[TargetTable] = Field(default_factory=list)
+    keep_out: list[AreaTable] = Field(default_factory=list)
+    keep_in: list[AreaTable] = Field(default_factory=list)
+    corridor: list[CorridorTable] = Field(default_factory=list)
+    sitl: SitlTable | None = None
+
+
+def load(path: Path, *, simulated: bool = True) -> Mission:
+    """Read one of our mission files; ``simulated``: with the files of its ``[sitl]`` table, which a real rover does not need.
+
+    Raises MissionError: one line with file, place and reason.
+    """
+    table = read_table(path, MissionTable, MissionError)
+    mission = _mission(table if simulated else table.model_copy(update={"sitl": None}), path)
+    check_mission(mission)
+    return mission
+
+
+def _mission(table: MissionTable, path: Path) -> Mission:
+    folder = path.parent
+    fences = load_qgc(folder / table.fence) if table.fence else None
+    keep_out = tuple(_named(path, "keep_out", i, item.area) for i, item in enumerate(table.keep_out, 1))
+    keep_in = tuple(_named(path, "keep_in", i, item.area) for i, item in enumerate(table.keep_in, 1))
+    return Mission(
+        name=table.name or path.stem,
+        targets=tuple(_named(path, "target", i, partial(item.target, i)) for i, item in enumerate(table.target, 1)),
+        grid=GridSpec(
+            table.grid.resolution_m,
+            table.grid.size,
+            None if table.grid.home is None else Cell(*table.grid.home),
+            table.grid.margin_m,
+        ),
+        rover=RoverSpec(table.rover.radius_m, table.rover.cruise_speed_m_s, table.rover.turning_radius_m),
+        keep_out=keep_out + (fences.keep_out if fences else ()),
+        keep_in=keep_in + (fences.keep_in if fences else ()),
+        weighted=tuple(
+            WeightedArea(_named(path, "corridor", i, item.area), item.weight)
+            for i, item in enumerate(table.corridor, 1)
+        ),
+        prior_map=folder / table.prior_map if table.prior_map else None,
+        sitl=None if table.sitl is None else _sitl(table.sitl, path),
+        source=path,
+        notes=(f"fences taken from {table.fence}; its targets, if any, are not used",) if fences else (),
+        also_read=tuple(folder / name for name in _also_read(table)),
+    )
+
+
+def _also_read(table: MissionTable) -> tuple[str, ...]:
+    """The files whose content is in the mission itself."""
+    sensors = table.sitl.sensors if table.sitl is not None else None
+    names = (table.fence, sensors if isinstance(sensors, str) and sensors.endswith(".toml") else None)
+    return tuple(name for name in names if name is not None)
+
+
+def _sitl(table: SitlTable, path: Path) -> SitlSpec:
+    return SitlSpec(
+        world=path.parent / table.world if table.world else None,
+        resolution_m=table.resolution_m,
+        start=None if table.start is None else Cell(*table.start),
+        heading_deg=table.heading_deg,
+        sensors=sensors_from(table.sensors, path.parent, MissionError),
+        home=None if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
+        movers=tuple(
+            _named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)
+        ),
+        steering=table.steering,
+        parameters=path.parent / table.parameters if table.parameters else None,
+    )
+
+
+def _places(
+    fields: list[Field2] | None, metres: list[Pair] | None, degrees: list[LatLon] | None
+) -> list[tuple[Place, ...]]:
+    """The lists of places that are given, each in its own kind."""
+    lists: list[tuple[Place, ...]] = []
+    if fields is not None:
+        lists.append(tuple(Cell(*pair) for pair in fields))
+    if metres is not None:
+        lists.append(tuple(HomePoint(*pair) for pair in metres))
+    if degrees is not None:
+        lists.append(tuple(GeoPoint(*pair) for pair in degrees))
+    return lists
+
+
+def _named(path: Path, kind: str, number: int, make: Callable[[], T]) -> T:
+    return named(path, kind, number, make, MissionError)

@@ -1,0 +1,1 @@
+"""The navigator: the field step (parts A, B, C), its searches and who runs them."""

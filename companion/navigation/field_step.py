@@ -1,0 +1,273 @@
+"""The obstacle avoidance of Kwasniewski & Gosiewski 2018, section 4: one pure ``step`` per field entered.
+
+Part A goes back along the past path and searches every second or third field, part B follows the current path and looks for a
+better one every few fields, part C searches thoroughly when the current path is blocked or missing (figures 10 to 14).
+
+Where the paper is silent: the retraced tail of the past path is dropped while returning, so it is always a walk from the
+start to here; "better" compares with what remains of the current path; a blocked past path is mended with a search for
+the nearest past field that can still be reached; at the start a last thorough search comes before "unreachable".
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+import numpy as np
+
+from companion.core.grid import Cell, Grid
+from companion.planning.problem import Path, PlanResult, PlanStatus
+from companion.planning.raster import CellArray, cells_cost, plain
+
+BACKTRACK_TRIES = 8
+NEVER = 2**62
+
+
+class Part(StrEnum):
+    """The three parts of the step function (section 4.2)."""
+
+    RETURN = "A"
+    EXPLORE = "B"
+    SEARCH = "C"
+
+
+class SearchKind(StrEnum):
+    """How a part wants the planner to search: quickly (A, B) or for quality (C)."""
+
+    RETURN = "return"
+    BETTER = "better"
+    THOROUGH = "thorough"
+
+
+class Action(StrEnum):
+    """What the rover is to do next."""
+
+    FOLLOW = "follow"
+    BACKTRACK = "backtrack"
+    REACHED = "reached"
+    UNREACHABLE = "unreachable"
+
+
+Search = Callable[[SearchKind, Cell, Cell], PlanResult]
+"""Find a path from the first field to the second."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class NavState:
+    """The navigator's memory on the way to one target.
+
+    ``past``: the walk from the start to the field last entered. ``current`` with ``index``: the path followed, and how far.
+    ``until_search``: fields until the next search in return mode. ``draws`` seeds its random choice of two or three.
+    """
+
+    target: Cell
+    past: tuple[Cell, ...]
+    current: Path | None = None
+    index: int = 0
+    returning: bool = False
+    until_search: int = 0
+    since_better: int = 0
+    draws: int = 0
+    better_every: int = 5
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Decision:
+    """What to do and why. ``path`` leads from the field entered (or one beside it) onward; empty when there is nowhere to go."""
+
+    action: Action
+    part: Part
+    path: tuple[Cell, ...]
+    new_path: Path | None
+    reason: str
+    searches: tuple[SearchKind, ...] = ()
+    proved: bool = False
+    """True when the last search proved that no path exists on the map as known."""
+
+
+def begin(start: Cell, target: Cell, seed: int = 0, better_every: int = 5) -> NavState:
+    """The state before the first step towards a target."""
+    return NavState(target=target, past=(start,), draws=seed, better_every=better_every)
+
+
+def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavState, Decision]:
+    """The step function (figure 11), to be called on entering a field, or in the same field when the path ahead gets blocked."""
+    entered = cell != state.past[-1]
+    state = _arrive(state, cell)
+    if cell == state.target:
+        return state, Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
+    if state.returning:
+        return _return(state, grid, search, entered=entered)
+    if state.current is not None and is_clear(grid, state.current.cell_array[state.index :]):
+        return _explore(state, grid, search, entered=entered)
+    return _search(state, grid, search)
+
+
+def retrace(state: NavState, way: tuple[Cell, ...]) -> NavState:
+    """Follow fields that lead from here to the target and were driven before, as long as they stay clear; no better path is looked for."""
+    return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER)
+
+
+def abandon_path(state: NavState) -> NavState:
+    """Forget the current path (the rover could not follow it), so that the next step searches anew."""
+    return replace(state, current=None)
+
+
+def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...]) -> bool:
+    """Whether none of these fields but the first (where the rover is) is an obstacle, and no step cuts a corner."""
+    if len(cells) < 2:
+        return True
+    x, y = np.asarray(cells).T
+    if x.min() < 0 or y.min() < 0 or x.max() >= grid.width or y.max() >= grid.height:
+        return False
+    ahead = grid.weights[y[1:], x[1:]]
+    corners = np.maximum(grid.weights[y[:-1], x[1:]], grid.weights[y[1:], x[:-1]])
+    diagonal = (x[1:] != x[:-1]) & (y[1:] != y[:-1])
+    return not bool((ahead >= 1.0).any() or (corners[diagonal] >= 1.0).any())
+
+
+def simplified(past: tuple[Cell, ...]) -> tuple[Cell, ...]:
+    """The past path without its loops (section 4.6): from each field on, jump to where it was last visited."""
+    last = {cell: i for i, cell in enumerate(past)}
+    result = []
+    i = 0
+    while i < len(past):
+        result.append(past[i])
+        i = last[past[i]] + 1
+    return tuple(result)
+
+
+def _return(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tuple[NavState, Decision]:
+    """Part A (figure 12): search if it is due, else one more field back."""
+    searches: tuple[SearchKind, ...] = ()
+    at_start = len(state.past) == 1
+    due = state.until_search - (1 if entered else 0)
+    proved = False
+    if due <= 0 or at_start:
+        kind = SearchKind.THOROUGH if at_start else SearchKind.RETURN
+        result = search(kind, state.past[-1], state.target)
+        searches = (kind,)
+        proved = result.status is PlanStatus.NO_PATH
+        if result.path is not None:
+            return _take(state, result.path, Part.RETURN, searches, "path found on the way back")
+        draws, due = _two_or_three(state.draws)
+        state = replace(state, draws=draws)
+    state = replace(state, until_search=due)
+    if at_start:
+        reason = "back at the start, and no path is known to be left"
+        return state, Decision(Action.UNREACHABLE, Part.RETURN, (), None, reason, searches, proved)
+    if not is_clear(grid, state.past[:-3:-1]):
+        return _mend_past(state, grid, search, searches)
+    return state, Decision(
+        Action.BACKTRACK, Part.RETURN, state.past[::-1], None, "going back along the past path", searches, proved
+    )
+
+
+def _explore(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tuple[NavState, Decision]:
+    """Part B (figure 13): follow the current path; every few fields take a better one if there is one."""
+    assert state.current is not None
+    ahead = state.current.cell_array[state.index :]
+    passed = state.since_better + (1 if entered else 0)
+    if passed < state.better_every:
+        return replace(state, since_better=passed), _follow(state, "following the current path", ())
+    state = replace(state, since_better=0)
+    result = search(SearchKind.BETTER, state.past[-1], state.target)
+    searches = (SearchKind.BETTER,)
+    if result.path is not None and result.path.cost < cells_cost(plain(grid.weights), ahead) - 1e-9:
+        return _take(state, result.path, Part.EXPLORE, searches, "a better path")
+    return state, _follow(state, "no better path", searches)
+
+
+def _search(state: NavState, grid: Grid, search: Search) -> tuple[NavState, Decision]:
+    """Part C (figure 14): search thoroughly; in vain: simplify the past path and go on with part A in this same step."""
+    had_path = state.current is not None
+    result = search(SearchKind.THOROUGH, state.past[-1], state.target)
+    if result.path is not None:
+        reason = "current path blocked: new path" if had_path else "new path"
+        return _take(state, result.path, Part.SEARCH, (SearchKind.THOROUGH,), reason)
+    draws, due = _two_or_three(state.draws)
+    state = replace(state, current=None, past=simplified(state.past), returning=True, draws=draws, until_search=due)
+    state, decision = _return(state, grid, search, entered=False)
+    return state, replace(
+        decision,
+        searches=(SearchKind.THOROUGH, *decision.searches),
+        proved=decision.proved or result.status is PlanStatus.NO_PATH,
+    )
+
+
+def _mend_past(
+    state: NavState, grid: Grid, search: Search, searches: tuple[SearchKind, ...]
+) -> tuple[NavState, Decision]:
+    """The way back is blocked: search for the nearest past field that can be reached, and go back through there."""
+    here = state.past[-1]
+    free = [i for i in range(len(state.past) - 2, -1, -1) if not grid.is_obstacle(state.past[i])]
+    tries = free[:2] + free[2 :: max(1, len(free) // BACKTRACK_TRIES)] + free[-1:]
+    for i in dict.fromkeys(tries):
+        result = search(SearchKind.THOROUGH, here, state.past[i])
+        searches = (*searches, SearchKind.THOROUGH)
+        if result.path is not None:
+            past = state.past[:i] + result.path.cells[::-1]
+            state = replace(state, past=past)
+            return state, Decision(
+                Action.BACKTRACK, Part.RETURN, past[::-1], None, "past path blocked: going back another way", searches
+            )
+    return state, Decision(Action.UNREACHABLE, Part.RETURN, (), None, "shut in: no way back either", searches)
+
+
+def _take(
+    state: NavState, path: Path, part: Part, searches: tuple[SearchKind, ...], reason: str
+) -> tuple[NavState, Decision]:
+    state = replace(state, current=path, index=0, returning=False, since_better=0, until_search=0)
+    return state, Decision(Action.FOLLOW, part, path.cells, path, reason, searches)
+
+
+def _follow(state: NavState, reason: str, searches: tuple[SearchKind, ...]) -> Decision:
+    assert state.current is not None
+    return Decision(Action.FOLLOW, Part.EXPLORE, state.current.cells[state.index :], None, reason, searches)
+
+
+def _arrive(state: NavState, cell: Cell) -> NavState:
+    """Book the field entered: on the past path (its retraced tail is dropped in return mode) and on the current one."""
+    if cell == state.past[-1]:
+        return state
+    if state.returning:
+        return replace(state, past=_retraced(state.past, cell))
+    past = state.past + fields_between(state.past[-1], cell) + (cell,)
+    if state.current is None:
+        return replace(state, past=past)
+    index = _place_on(state.current.cell_array, state.index, cell)
+    return replace(state, past=past, index=index, current=None if index < 0 else state.current)
+
+
+def _retraced(past: tuple[Cell, ...], cell: Cell) -> tuple[Cell, ...]:
+    """The past path up to the field nearest to where the rover is now, and from there to here."""
+    gaps = [max(abs(p.x - cell.x), abs(p.y - cell.y)) for p in past[:-1]]
+    nearest = min(range(len(gaps)), key=lambda i: (gaps[i], -i), default=0)
+    if not gaps:
+        return (*past, *fields_between(past[-1], cell), cell)
+    if gaps[nearest] == 0:
+        return past[: nearest + 1]
+    return (*past[: nearest + 1], *fields_between(past[nearest], cell), cell)
+
+
+def _place_on(cells: CellArray, index: int, cell: Cell) -> int:
+    """Where on the path the field is: itself, else the first neighbour at or after ``index``; -1 when the path is lost."""
+    gaps = np.abs(cells[index:] - cell).max(axis=1, initial=0)
+    for reach in (0, 1):
+        near = np.flatnonzero(gaps <= reach)
+        if len(near) > 0:
+            return index + int(near[0])
+    return -1
+
+
+def fields_between(a: Cell, b: Cell) -> tuple[Cell, ...]:
+    """The fields strictly between two, 8-connected along the straight line (none when they are neighbours)."""
+    n = max(abs(b.x - a.x), abs(b.y - a.y))
+    return tuple(Cell(a.x + round((b.x - a.x) * i / n), a.y + round((b.y - a.y) * i / n)) for i in range(1, n))
+
+
+def _two_or_three(draws: int) -> tuple[int, int]:
+    """The next random state, and two or three (section 4.3) with equal chance; a multiplicative congruential draw."""
+    draws = (draws * 6364136223846793005 + 1442695040888963407) % 2**64
+    return draws, 2 + (draws >> 33) % 2

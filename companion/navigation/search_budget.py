@@ -1,0 +1,70 @@
+"""The navigator's searches: which budget each kind gets, what the planner is told of the rover, and what they have cost."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.random import Generator
+
+from companion.core.clock import stopwatch_s
+from companion.core.frames import Pose, wrap_pi_rad
+from companion.core.grid import Cell, Weights
+from companion.core.rover_limits import RoverLimits
+from companion.navigation.field_step import SearchKind
+from companion.planning.planner import Planner
+from companion.planning.problem import Budget, Motion, Mover, PlanningProblem, PlanResult
+from companion.settings import NavigatorSettings, SearchSettings, Settings
+
+
+def budget_of(settings: SearchSettings) -> Budget:
+    """The planner's budget for one kind of search."""
+    return Budget(settings.min_epochs, settings.max_epochs, settings.control_points, settings.population)
+
+
+def motion_of(pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, resolution_m: float) -> Motion:
+    """As a planner is told it: where the rover points, how tightly it can turn and how fast it may be planned to go."""
+    fastest_m_s = min(fastest_m_s, settings.guidance.max_speed_m_s)
+    slowest_m_s = min(settings.guidance.min_speed_m_s, fastest_m_s)
+    return Motion(
+        heading_rad=wrap_pi_rad(0.5 * math.pi - pose.heading_rad),
+        turning_radius_fields=rover.turning_radius_m * settings.steering.planned_radius / resolution_m,
+        speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m),
+    )
+
+
+@dataclass
+class Searcher:
+    """Asks the planner, and keeps count. ``seconds`` has one entry per search."""
+
+    planner: Planner
+    settings: NavigatorSettings
+    rng: Generator
+    seconds: list[float] = field(default_factory=list)
+
+    def search(
+        self,
+        weights: Weights,
+        kind: SearchKind,
+        start: Cell,
+        target: Cell,
+        movers: tuple[Mover, ...] = (),
+        motion: Motion = Motion(),  # noqa: B008 - frozen
+        settings: NavigatorSettings | None = None,
+    ) -> PlanResult:
+        """One search over ``weights`` (not changed). The field the rover stands in is free, whatever the map says.
+
+        ``settings``: as they were when the step began, which may run in a thread.
+        """
+        began_s = stopwatch_s()
+        if weights[start.y, start.x] >= 1.0:
+            weights = np.array(weights)
+            weights[start.y, start.x] = 0.9
+        settings = settings or self.settings
+        budget = budget_of(settings.thorough if kind is SearchKind.THOROUGH else settings.quick)
+        result = self.planner.plan(
+            PlanningProblem(weights, start, target, movers=movers, motion=motion), budget, self.rng
+        )
+        self.seconds.append(stopwatch_s() - began_s)
+        return result

@@ -1,0 +1,41 @@
+"""What turning costs, told to the planner in its own coin: the fields behind the rover are dearer.
+
+A rover stops and pivots for a place behind it, which takes as long as several fields of straight driving; without this, two ways
+round an obstacle of equal length make it turn to and fro with every new piece of wall it sees. Who cannot turn on the spot has
+farther to drive until he comes round.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.core.frames import Pose
+from companion.core.grid import OBSTACLE, Grid
+from companion.settings import GuidanceSettings
+
+MAX_WEIGHT = 0.97
+"""Dear, but never an obstacle."""
+REACH_RADII = 3.0
+"""For a rover that cannot turn on the spot the dear fields reach at least so many turning radii back."""
+
+
+def with_turning_cost(grid: Grid, pose: Pose, settings: GuidanceSettings, turning_radius_m: float = 0.0) -> Grid:
+    """A copy of the grid in which free fields behind the rover, up to ``turn_reach_m``, cost up to ``turn_cost`` more."""
+    weights = grid.weights.copy()
+    cell = grid.cell_at(pose.point)
+    reach = round(max(settings.turn_reach_m, REACH_RADII * turning_radius_m) / grid.resolution_m)
+    rows = slice(max(0, cell.y - reach), max(0, cell.y + reach + 1))
+    columns = slice(max(0, cell.x - reach), max(0, cell.x + reach + 1))
+    window = weights[rows, columns]
+    if window.size == 0:
+        return grid.with_weights(weights)
+    north = np.arange(rows.start, rows.start + window.shape[0])[:, None] - cell.y
+    east = np.arange(columns.start, columns.start + window.shape[1])[None, :] - cell.x
+    distance = np.hypot(north, east)
+    forward = north * np.cos(pose.heading_rad) + east * np.sin(pose.heading_rad)
+    behind = np.where(
+        (distance > 0.0) & (distance <= reach), np.clip(-forward / np.maximum(distance, 1e-9), 0.0, 1.0), 0.0
+    )
+    raised = np.maximum(np.minimum(window + settings.turn_cost * behind, MAX_WEIGHT), window)
+    weights[rows, columns] = np.where(window >= OBSTACLE, window, raised)
+    return grid.with_weights(weights)

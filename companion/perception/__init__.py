@@ -1,0 +1,1 @@
+"""What range sensors show before it becomes map: newest scans, stuck sensors, moving objects."""

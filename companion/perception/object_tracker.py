@@ -1,0 +1,216 @@
+"""Which of the things that the range sensors see are moving, and where to.
+
+What stands was never seen free. So only readings count that end on ground which had been seen free all round; such readings that lie together are one
+thing, and a thing whose place changes evenly from scan to scan moves. The map knows nothing of this: there it is evidence like any
+other, and is forgotten behind it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from companion.core.frames import NedPoint, Pose
+from companion.core.scan import RangeScan
+from companion.mapping.evidence_map import EvidenceMap
+from companion.perception.moving_obstacles import Moving
+from companion.settings import TrafficSettings
+
+Points = NDArray[np.float64]
+
+FREE_AT = -0.5
+"""Log-odds from which ground counts as seen free."""
+ROUND_M = 0.7
+"""Ground must have been free so far round a reading, and half the beam's width more: neither is where it seems to be."""
+TOGETHER_M = 0.8
+"""Readings nearer to each other than this are of one thing; a thing is found again within this of where it is expected."""
+WIDEST_M = 3.0
+"""What is wider is no thing that moves but ground seen askew."""
+WINDOW_S = 1.0
+LEAST_S = 0.5
+LEAST_SIGHTINGS = 5
+LOST_S = 1.0
+LEAST_RADIUS_M = 0.4
+STRAY_M = 0.15
+"""Sightings of a thing that moves evenly lie this near to a line, on average, and half a beam's width more."""
+SURE = 2.5
+"""A velocity counts when it is so many times its own standard error."""
+DOUBT_M = 0.25
+"""Added to the radius of what is only seen: neither its place nor its size is exact."""
+LEAST_BEAMS = 8
+"""A few thin beams cannot tell what moves from what the rover passes."""
+MAX_YAW_RATE_RAD_S = math.radians(45.0)
+"""Faster than this, readings are too far from where they seem to be."""
+
+
+@njit(cache=True, nogil=True)
+def free_all_round(free: NDArray[np.bool_], places: Points, reaches: Points) -> NDArray[np.bool_]:
+    """Which places (rows of row and column, in cells) have nothing but free cells round them, in eight directions and on the way there."""
+    height, width = free.shape
+    result = np.ones(len(places), np.bool_)
+    for i in range(len(places)):
+        for k in range(25):
+            reach = reaches[i] * ((k + 7) // 8) / 3.0
+            angle = k * 0.25 * math.pi
+            row = math.floor(places[i, 0] + reach * math.cos(angle))
+            column = math.floor(places[i, 1] + reach * math.sin(angle))
+            if not (0 <= row < height and 0 <= column < width and free[row, column]):
+                result[i] = False
+                break
+    return result
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """A thing in one scan."""
+
+    time_s: float
+    north_m: float
+    east_m: float
+    radius_m: float
+    blur_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A thing over the last second."""
+
+    number: int
+    sightings: tuple[Sighting, ...]
+
+    def motion(self) -> tuple[Moving, bool] | None:
+        """Its place and velocity by least squares, and whether that is to be believed; None before it has been seen long enough."""
+        time_s = np.array([one.time_s for one in self.sightings])
+        if len(time_s) < LEAST_SIGHTINGS or time_s[-1] - time_s[0] < LEAST_S:
+            return None
+        places = np.array([(one.north_m, one.east_m) for one in self.sightings])
+        since = time_s - time_s.mean()
+        velocity = since @ places / (since @ since)
+        fitted = places.mean(axis=0) + since[:, None] * velocity
+        stray_m = float(np.sqrt(((places - fitted) ** 2).sum(axis=1).mean()))
+        newest = NedPoint(float(fitted[-1, 0]), float(fitted[-1, 1]))
+        radius_m = max(one.radius_m for one in self.sightings) + DOUBT_M
+        blur_m = sum(one.blur_m for one in self.sightings) / len(self.sightings)
+        error_m_s = max(stray_m, 0.03) / math.sqrt(float(since @ since))
+        north_m_s, east_m_s = (float(part) for part in velocity)
+        moving = Moving(f"seen {self.number}", float(time_s[-1]), newest, north_m_s, east_m_s, radius_m)
+        return moving, stray_m <= STRAY_M + blur_m and moving.speed_m_s >= SURE * error_m_s
+
+
+class Tracker:
+    """Remembers which ground has been seen free, and follows what enters it."""
+
+    def __init__(self, evidence: EvidenceMap, settings: TrafficSettings) -> None:
+        self._evidence = evidence
+        self._settings = settings
+        self._free = np.zeros(evidence.log_odds.shape, np.bool_)
+        self._tracks: tuple[Track, ...] = ()
+        self._numbers = 0
+
+    def retune(self, settings: TrafficSettings) -> None:
+        """Other settings from now on."""
+        self._settings = settings
+
+    def take(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
+        """Look through a scan that has not been taken into the map yet."""
+        if abs(yaw_rate_rad_s) > MAX_YAW_RATE_RAD_S or len(scan.bearing_rad) < LEAST_BEAMS:
+            return
+        ends, range_m = _ends(pose, scan)
+        hits = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
+        if len(hits) or self._tracks:
+            self._follow(pose.time_s, _things(hits, pose, scan.beam_width_rad))
+
+    def remember(self, pose: Pose, reach_m: float) -> None:
+        """Note what a scan just taken into the map has shown to be free."""
+        rows, columns = self._window(pose, reach_m)
+        self._free[rows, columns] |= self._evidence.log_odds[rows, columns] <= FREE_AT
+
+    def moving(self, now_s: float) -> tuple[Moving, ...]:
+        """What moves now."""
+        found = []
+        for track in self._tracks:
+            motion = track.motion()
+            if motion is not None and now_s - motion[0].time_s <= LOST_S:
+                moving, believed = motion
+                if believed and moving.speed_m_s >= self._settings.moving_m_s:
+                    found.append(moving)
+        return tuple(found)
+
+    def _window(self, pose: Pose, reach_m: float) -> tuple[slice, slice]:
+        corner, cell_m = self._evidence.base.south_west, self._evidence.evidence_m
+        row = math.floor((pose.north_m - corner.north_m) / cell_m)
+        column = math.floor((pose.east_m - corner.east_m) / cell_m)
+        reach = math.ceil(reach_m / cell_m) + 1
+        return slice(max(row - reach, 0), max(row + reach, 0)), slice(max(column - reach, 0), max(column + reach, 0))
+
+    def _on_free_ground(self, points: Points, round_m: Points) -> Points:
+        """Those with ground round them that had all been seen free."""
+        corner, scale = self._evidence.base.south_west, 1.0 / self._evidence.evidence_m
+        cells = (points - (corner.north_m, corner.east_m)) * scale
+        return points[free_all_round(self._free, cells, round_m * scale)]
+
+    def _follow(self, time_s: float, things: list[Sighting]) -> None:
+        """Give every thing to the track that expects it nearest; what nobody expects begins a new one."""
+        tracks = []
+        for track in self._tracks:
+            expected = _expected(track, time_s)
+            nearest = min(things, key=lambda one: math.dist((one.north_m, one.east_m), expected), default=None)
+            if nearest is None or math.dist((nearest.north_m, nearest.east_m), expected) > TOGETHER_M:
+                if time_s - track.sightings[-1].time_s <= LOST_S:
+                    tracks.append(track)
+                continue
+            things.remove(nearest)
+            kept = tuple(one for one in track.sightings if time_s - one.time_s <= WINDOW_S)
+            tracks.append(Track(track.number, (*kept, nearest)))
+        for one in things:
+            self._numbers += 1
+            tracks.append(Track(self._numbers, (one,)))
+        self._tracks = tuple(tracks)
+
+
+def _expected(track: Track, time_s: float) -> tuple[float, float]:
+    """Where the next sighting should be."""
+    motion = track.motion()
+    last = track.sightings[-1]
+    if motion is None:
+        return last.north_m, last.east_m
+    there = motion[0].at(time_s)
+    return there.north_m, there.east_m
+
+
+def _ends(pose: Pose, scan: RangeScan) -> tuple[Points, Points]:
+    """Where the readings that hit something ended, shape (n, 2): north and east; and their ranges."""
+    hit = np.isfinite(scan.range_m)
+    bearing_rad, range_m = pose.heading_rad + scan.bearing_rad[hit], scan.range_m[hit]
+    north_m, east_m = pose.north_m + range_m * np.cos(bearing_rad), pose.east_m + range_m * np.sin(bearing_rad)
+    return np.column_stack((north_m, east_m)), range_m
+
+
+def _things(points: Points, pose: Pose, beam_width_rad: float) -> list[Sighting]:
+    """Readings that lie together, as discs: their middle lies behind what is seen of them."""
+    groups: list[list[Points]] = []
+    for point in points:
+        for group in groups:
+            if math.dist(group[-1], point) <= TOGETHER_M or math.dist(group[0], point) <= TOGETHER_M:
+                group.append(point)
+                break
+        else:
+            groups.append([point])
+    things = []
+    for group in groups:
+        middle = np.mean(group, axis=0)
+        extent_m = 2.0 * float(max(math.dist(point, middle) for point in group))
+        if extent_m > WIDEST_M:
+            continue
+        radius_m = max(extent_m / 2.0, LEAST_RADIUS_M)
+        away_rad = math.atan2(middle[1] - pose.east_m, middle[0] - pose.north_m)
+        behind_m = 0.7 * radius_m
+        north_m = float(middle[0]) + behind_m * math.cos(away_rad)
+        east_m = float(middle[1]) + behind_m * math.sin(away_rad)
+        blur_m = 0.5 * beam_width_rad * math.dist(middle, (pose.north_m, pose.east_m))
+        things.append(Sighting(pose.time_s, north_m, east_m, radius_m, blur_m))
+    return things

@@ -1,0 +1,1 @@
+"""Graph searches over the fields: Dijkstra, A*, Theta*, D* Lite."""

@@ -1,0 +1,171 @@
+"""Wang, Sillitoe & Mulvaney 2007: paths from obstacle corner to obstacle corner, with speeds, among moving obstacles.
+
+``vertex++`` is the paper's planner. ``vertex`` is its forerunner for static environments: no speeds, no moving obstacles, shortest
+path. A plan on the way is a new plan from where the robot is then, with the obstacles' new motion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numba import njit
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from companion.planning.ends import answered_at_once
+from companion.planning.papers.polygons import Polygons, polygons_of
+from companion.planning.papers.wang_kernel import GroundValues, search
+from companion.planning.papers.wang_movers import fleet_of
+from companion.planning.planner import Capabilities
+from companion.planning.problem import Budget, Mover, Path, PlanningProblem, PlanResult, PlanStatus
+from companion.planning.random_numbers import draw_seed
+from companion.planning.raster import CellArray, cells_cost, plain, polyline
+from companion.settings import PlannerSettings
+from companion.settings.planners import VertexSettings
+
+Ints = NDArray[np.int64]
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Plan:
+    """A search and what came of it.
+
+    ``corners``: shape (n, 2), the vertices of the path, columns x and y; no rows if nothing was found. ``speeds_fields_s``: shape
+    (n - 1,). ``value``: equation 1, or 3 plus the constant of equation 4. ``first_feasible``: the generation, -1 if there was none.
+    """
+
+    corners: Ints
+    speeds_fields_s: Floats
+    value: float
+    first_feasible: int
+    generations: int
+    evaluations: int
+
+
+def planned(
+    problem: PlanningProblem, settings: VertexSettings, seed: int, *, timed: bool, first_only: bool = False
+) -> Plan:
+    """One search from a free start to another free field; ``timed``: with speeds and moving obstacles (``vertex++``).
+
+    ``first_only`` stops at the first feasible path.
+    """
+    height, width = problem.weights.shape
+    polygons = _polygons_for(problem, settings)
+    movers = problem.movers if timed else ()
+    start, target = problem.start.y * width + problem.start.x, problem.target.y * width + problem.target.x
+    corner_fields = _numbered(polygons.corners, width, height)
+    around = _numbered(_mover_corners(movers, settings), width, height)
+    pool = np.unique(np.concatenate((corner_fields, around[polygons.owner.ravel()[around] == 0])))
+    pool = pool[(pool >= 0) & (pool != start) & (pool != target)]
+    low, high = problem.motion.speeds_fields_s
+    speeds = np.linspace(low, high, settings.speed_levels) if timed and high > low else np.array([high])
+    weights = (settings.length_weight, settings.time_weight) if timed else (1.0, 0.0)
+    fields, levels, value, first, generations, evaluations = search(
+        _ground(polygons, corner_fields, len(pool), problem.corner_cutting),
+        fleet_of(movers, settings.mover_safe_fields, settings.mover_timing_s),
+        (
+            *weights,
+            settings.population,
+            settings.generations,
+            settings.populations,
+            settings.most_genes,
+            settings.shorter_side,
+            settings.straight_line,
+            first_only,
+        ),
+        speeds,
+        pool,
+        start,
+        target,
+        seed,
+    )
+    return Plan(
+        np.column_stack((fields % width, fields // width)), speeds[levels[:-1]], value, first, generations, evaluations
+    )
+
+
+def _polygons_for(problem: PlanningProblem, settings: VertexSettings) -> Polygons:
+    """The obstacles enlarged by the safe distance, or by less if start or target would lie inside them."""
+    weights = plain(problem.weights)
+    for share in (1.0, 0.5, 0.0):
+        polygons = polygons_of(weights, settings.safe_fields * share)
+        if not any(polygons.owner[cell.y, cell.x] for cell in (problem.start, problem.target)):
+            break
+    return polygons
+
+
+def _numbered(corners: Ints, width: int, height: int) -> Ints:
+    """Field numbers; -1 outside the map."""
+    x, y = corners[:, 0], corners[:, 1]
+    inside = (x >= 0) & (x < width) & (y >= 0) & (y < height)
+    return np.where(inside, y * width + x, -1)
+
+
+def _mover_corners(movers: tuple[Mover, ...], settings: VertexSettings) -> Ints:
+    """The corners of squares around moving obstacles where their segments begin and end: vertices like any other."""
+    corners = [
+        (round(x + right * reach), round(y + up * reach))
+        for mover in movers
+        for _, x, y in mover.track[:: max(1, len(mover.track) // settings.mover_corner_rows)]
+        for right, up in product((-1, 1), repeat=2)
+        for reach in (mover.radius_fields + settings.mover_safe_fields + 1.0,)
+    ]
+    return np.array(corners, np.int64).reshape(-1, 2)
+
+
+def _ground(polygons: Polygons, corner_fields: Ints, vertices: int, corner_cutting: bool) -> GroundValues:
+    size = 1024
+    while size < min(4 * vertices * vertices, 1 << 18):
+        size *= 2
+    return (
+        polygons.owner,
+        corner_fields,
+        polygons.rings,
+        polygons.obstacle_rings,
+        corner_cutting,
+        np.full(size, -1, np.int64),
+        np.empty(size, np.int32),
+    )
+
+
+class VertexGa:
+    """Both planners; they never prove that there is no path."""
+
+    def __init__(self, settings: PlannerSettings, timed: bool) -> None:
+        self._settings = settings.vertex
+        self._timed = timed
+        self.name = "vertex++" if timed else "vertex"
+        self.capabilities = Capabilities(random=True, any_angle=True, moving_obstacles=timed, speeds=timed)
+
+    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
+        """See ``Planner.plan``. FOUND or BUDGET_SPENT; population and generations are the planner's own settings."""
+        del budget
+        seed = draw_seed(rng)
+        if (answer := answered_at_once(problem, self.name)) is not None:
+            return answer
+        plan = planned(problem, self._settings, seed, timed=self._timed)
+        if len(plan.corners) == 0:
+            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, plan.evaluations, plan.generations)
+        cells, cost = _drawn(plain(problem.weights), plan.corners)
+        speeds = plan.speeds_fields_s if self._timed else None
+        path = Path(cells, cost, plan.corners.astype(np.float64), speeds)
+        return PlanResult(PlanStatus.FOUND, path, self.name, plan.evaluations, plan.generations)
+
+
+@njit(cache=True, nogil=True)
+def _drawn(weights: Floats, corners: Ints) -> tuple[CellArray, float]:
+    cells = polyline(corners)
+    return cells, cells_cost(weights, cells)
+
+
+def vertex(settings: PlannerSettings) -> VertexGa:
+    """The planner for static environments."""
+    return VertexGa(settings, timed=False)
+
+
+def vertex_plus(settings: PlannerSettings) -> VertexGa:
+    """The planner with speeds and moving obstacles, ``vertex++``."""
+    return VertexGa(settings, timed=True)

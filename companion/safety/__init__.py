@@ -1,0 +1,1 @@
+"""Who may drive, and whether it is safe to."""

@@ -1,0 +1,104 @@
+"""Whether there is power left to go on: thresholds for charge and voltage, each believed only after a while. Pure but for ``Power``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from enum import IntEnum
+
+from companion.settings import PowerSettings
+from companion.vehicle.events.event import Event
+from companion.vehicle.events.plan import BatterySeen
+
+STALE_S = 10.0
+"""A reading older than this says nothing; SYS_STATUS counts only while no BATTERY_STATUS is younger."""
+LOW, CRITICAL, FAILED = 2, 3, 5
+"""MAV_BATTERY_CHARGE_STATE: low, and from critical to failed; what comes after that is no matter of charge."""
+
+
+class Level(IntEnum):
+    """How far it has come. It never goes back: a battery that recovers at rest is still empty."""
+
+    FINE = 0
+    RETURN = 1
+    HOLD = 2
+
+
+@dataclass(frozen=True, slots=True)
+class PowerState:
+    """The newest of each battery, since when it has been below which threshold, and what followed (with the reason in words)."""
+
+    batteries: Mapping[int, BatterySeen] = field(default_factory=dict)
+    since_s: Mapping[Level, float] = field(default_factory=dict)
+    level: Level = Level.FINE
+    reason: str = ""
+
+
+def with_battery(state: PowerState, seen: BatterySeen) -> PowerState:
+    """One more reading."""
+    return replace(state, batteries={**state.batteries, seen.number: seen})
+
+
+def judged(state: PowerState, now_s: float, settings: PowerSettings) -> PowerState:
+    """The state at this moment: a level is reached when a reading has asked for it for ``after_s`` without a break."""
+    if not state.batteries:
+        return state
+    reasons = {level: _reason(level, _known(state.batteries, now_s), settings) for level in (Level.RETURN, Level.HOLD)}
+    since_s = {level: state.since_s.get(level, now_s) for level, reason in reasons.items() if reason}
+    state = replace(state, since_s=since_s)
+    for level, began_s in since_s.items():
+        if level > state.level and now_s - began_s >= settings.after_s:
+            state = replace(state, level=level, reason=reasons[level])
+    return state
+
+
+def _known(batteries: Mapping[int, BatterySeen], now_s: float) -> list[BatterySeen]:
+    """The batteries that have been heard of lately; the short form only where there is no other."""
+    fresh = [seen for seen in batteries.values() if now_s - seen.time_s <= STALE_S]
+    return [seen for seen in fresh if seen.number >= 0] or fresh
+
+
+def _reason(level: Level, batteries: list[BatterySeen], settings: PowerSettings) -> str:
+    """Why this level is asked for, by the first battery that does; empty if none does."""
+    percent, volts = settings.return_percent, settings.return_volts
+    states = range(LOW, FAILED + 1)
+    if level is Level.HOLD:
+        percent, volts = settings.hold_percent, settings.hold_volts
+        states = range(CRITICAL, FAILED + 1)
+    for seen in batteries:
+        name = "battery" if seen.number <= 0 else f"battery {seen.number + 1}"
+        if seen.percent is not None and seen.percent < percent:
+            return f"{name} at {seen.percent} %"
+        if seen.volts is not None and seen.volts < volts:
+            return f"{name} at {seen.volts:.1f} V"
+        if settings.heed_autopilot and seen.charge_state in states:
+            return f"{name} {'low' if seen.charge_state == LOW else 'critical'} for the autopilot"
+    return ""
+
+
+class Power:
+    """Keeps the state for the companion."""
+
+    def __init__(self, settings: PowerSettings) -> None:
+        self.state = PowerState()
+        self._settings = settings
+
+    def take_in(self, event: Event) -> None:
+        """One more event."""
+        if isinstance(event, BatterySeen):
+            self.state = with_battery(self.state, event)
+
+    def level(self, now_s: float) -> Level:
+        """How far it has come by now."""
+        self.state = judged(self.state, now_s, self._settings)
+        return self.state.level
+
+    def hindrance(self, now_s: float) -> str:
+        """What a rover that has not begun yet waits for; empty for nothing. Unlike a level this ends when the battery is another one."""
+        reason = _reason(Level.RETURN, _known(self.state.batteries, now_s), self._settings)
+        return f"a charged battery ({reason})" if reason else ""
+
+    @property
+    def reason(self) -> str:
+        """Why, in words."""
+        return self.state.reason

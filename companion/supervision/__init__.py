@@ -1,0 +1,1 @@
+"""What may begin, bound or end a run: arming, localization, fences, batteries, shutdown."""

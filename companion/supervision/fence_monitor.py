@@ -1,0 +1,143 @@
+"""Keeps up with the autopilot's own fence and its rally points: read before the rover may be driven, and again and again after that."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from companion.core.frames import GeoPoint
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.download import Downloaded
+from companion.mission.fence import NO_FENCE, PARAMETERS, AutopilotFence, autopilot_fence
+from companion.mission.fence_items import rally_points
+from companion.mission.items import ItemError
+from companion.settings import FenceSettings
+from companion.vehicle.commands import ReadParameter
+from companion.vehicle.events.event import Event
+from companion.vehicle.events.plan import FenceStatusSeen, PlanChangedSeen, PlanKind
+from companion.vehicle.events.vehicle import ParameterSeen
+from companion.vehicle.state import VehicleState
+
+WARNING = 4
+PARAMETER_S, PARAMETER_TRIES = 1.0, 8
+"""A parameter of the fence is asked for so often; one that has not been told by then is one that this firmware has not."""
+FAILED_S = 2.0
+"""A list that could not be fetched is asked for again after so long."""
+STATUS_S, ON_S = 5.0, 30.0
+"""FENCE_STATUS comes once a second while a fence is switched on, by whatever means: one older than the first says nothing of a breach, but on
+a bad line the fence counts as on until the second."""
+TOTALS = {"FENCE_TOTAL": PlanKind.FENCE, "RALLY_TOTAL": PlanKind.RALLY}
+"""ArduPilot tells everybody these parameters when a list has got another length."""
+
+
+class Fencing:
+    """``fence`` is None until it is known; ``missing`` says what is awaited. ``tell`` says a text with its severity to the people."""
+
+    def __init__(self, autopilot: AutopilotLink, settings: FenceSettings, tell: Callable[[str, int], None]) -> None:
+        self.fence: AutopilotFence | None = NO_FENCE if settings.heed == "never" else None
+        self.rally: tuple[GeoPoint, ...] = ()
+        self._autopilot = autopilot
+        self._settings = settings
+        self._tell = tell
+        self._fault = ""
+        self._status: FenceStatusSeen | None = None
+        self._totals: dict[str, float] = {}
+        self._asked_s = dict.fromkeys((PlanKind.FENCE, PlanKind.RALLY), -math.inf)
+        self._parameters_s = -math.inf
+        self._tries = 0
+        self._known: tuple[object, ...] = ()
+        self._rally: Downloaded | None = None
+
+    @property
+    def missing(self) -> str:
+        """What is awaited before the rover may be driven; empty when nothing is."""
+        if self.fence is not None and (self._rally is not None or self._settings.heed == "never"):
+            return ""
+        return f"the autopilot's fence and rally points{f' ({self._fault})' if self._fault else ''}"
+
+    def breached(self, now_s: float) -> str:
+        """In words, that the autopilot sees its fence breached; empty when it does not."""
+        told = self._told_within(STATUS_S, now_s) and self._status is not None and self._status.breached
+        return "the autopilot's fence is breached" if told else ""
+
+    def take_in(self, event: Event) -> None:
+        """One more event: whatever tells that a list may have changed has it fetched anew."""
+        match event:
+            case FenceStatusSeen():
+                self._status = event
+            case PlanChangedSeen() if event.kind in self._asked_s:
+                self._asked_s[PlanKind(event.kind)] = -math.inf
+            case ParameterSeen() if event.name in TOTALS:
+                if self._totals.get(event.name) != event.value:
+                    self._asked_s[TOTALS[event.name]] = -math.inf
+                self._totals[event.name] = event.value
+            case _:
+                pass
+
+    def service(self, vehicle: VehicleState, now_s: float) -> None:
+        """To be called every tick: asks for what is missing or old, and puts together what has come."""
+        if vehicle.heartbeat is None or self._settings.heed == "never":
+            return
+        self._read_parameters(vehicle, now_s)
+        for kind in self._asked_s:
+            self._fetch(kind, now_s)
+        rally = self._autopilot.downloads.last(PlanKind.RALLY)
+        if rally is not None and rally is not self._rally:
+            self._take_rally(rally)
+        self._put_together(vehicle, now_s)
+
+    def _told_within(self, seconds: float, now_s: float) -> bool:
+        return self._status is not None and now_s - self._status.time_s <= seconds
+
+    def _read_parameters(self, vehicle: VehicleState, now_s: float) -> None:
+        """All of them every ``again_s``, and those that are missing every second for a while."""
+        missing = [name for name in PARAMETERS if name not in vehicle.parameters]
+        if now_s - self._parameters_s >= self._settings.again_s:
+            names: list[str] = list(PARAMETERS)
+        elif missing and self._tries < PARAMETER_TRIES and now_s - self._parameters_s >= PARAMETER_S:
+            names = missing
+        else:
+            return
+        self._parameters_s, self._tries = now_s, self._tries + 1
+        for name in names:
+            self._autopilot.send(ReadParameter(name), now_s)
+
+    def _fetch(self, kind: PlanKind, now_s: float) -> None:
+        downloads = self._autopilot.downloads
+        last = downloads.last(kind)
+        failed = last is not None and last.failure != ""
+        if not downloads.busy(kind) and now_s - self._asked_s[kind] >= (FAILED_S if failed else self._settings.again_s):
+            self._asked_s[kind] = now_s
+            downloads.ask(kind)
+
+    def _take_rally(self, rally: Downloaded) -> None:
+        """What cannot be had leaves the points known before: returning the way the rover came needs none."""
+        self._rally = rally
+        if rally.failure:
+            return
+        try:
+            self.rally = rally_points(rally.items)
+        except ItemError as error:
+            self._tell(f"The autopilot's rally points are not used: {error}", WARNING)
+
+    def _put_together(self, vehicle: VehicleState, now_s: float) -> None:
+        """The fence anew when anything of it is; what makes no sense, or could not be fetched, leaves the fence as it was."""
+        stored = self._autopilot.downloads.last(PlanKind.FENCE)
+        told = all(name in vehicle.parameters for name in PARAMETERS) or self._tries >= PARAMETER_TRIES
+        if stored is None or not told or vehicle.home is None:
+            return
+        if stored.failure:
+            self._fault = stored.failure
+            return
+        on = self._settings.heed == "stored" or self._told_within(ON_S, now_s)
+        values = tuple(vehicle.parameters.get(name) for name in PARAMETERS)
+        known = (stored, values, vehicle.home.point, on)
+        same, self._known = known == self._known, known
+        if same:
+            return
+        try:
+            self.fence = autopilot_fence(stored.items, vehicle.parameters, vehicle.home.point, enabled=on)
+            self._fault = ""
+        except ItemError as error:
+            self._fault = str(error)
+            self._tell(f"The autopilot's fence makes no sense: {error}", WARNING)

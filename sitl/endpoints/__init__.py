@@ -1,6 +1,0 @@
-"""Ways from the network, and from serial lines, to the simulated vehicle."""
-
-from sitl.endpoints.address import FORMS, open_endpoint
-from sitl.endpoints.endpoint import Endpoint, ListenError
-
-__all__ = ["FORMS", "Endpoint", "ListenError", "open_endpoint"]

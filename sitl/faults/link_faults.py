@@ -1,0 +1,108 @@
+"""What befalls packets on their way between a link and the autopilot: loss, delay, reordering, duplicates, damage, outage.
+
+Whole packets, in simulated time. Bytes that belong to no packet are treated as a packet of their own.
+"""
+
+from __future__ import annotations
+
+import heapq
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from sitl.autopilot.framing import BEGINNING, packet_size
+from sitl.faults.plan import Direction, LinkFault
+
+WORST_BYTES = 3
+"""A damaged packet has one to so many wrong bytes."""
+
+Active = tuple[LinkFault, np.random.Generator]
+
+
+class Packets:
+    """Cuts a stream of bytes into packets; what is not whole yet waits."""
+
+    def __init__(self) -> None:
+        """Nothing heard yet."""
+        self._rest = b""
+
+    def cut(self, data: bytes) -> list[bytes]:
+        """The whole packets, and what stands between them, in order."""
+        data, at, pieces = self._rest + data, 0, []
+        while at < len(data):
+            found = BEGINNING.search(data, at)
+            begin = found.start() if found else len(data)
+            if begin > at:
+                pieces.append(data[at:begin])
+            at = begin
+            size = packet_size(data, at) if found else None
+            if size is None or at + size > len(data):
+                break
+            pieces.append(data[at : at + size])
+            at += size
+        self._rest = data[at:]
+        return pieces
+
+
+@dataclass
+class Way:
+    """One direction of one link: packets under way, and how late the last one in order is."""
+
+    link: int
+    direction: Direction
+    packets: Packets = field(default_factory=Packets)
+    under_way: list[tuple[float, int, bytes]] = field(default_factory=list)
+    sent: int = 0
+    last_due_s: float = -math.inf
+
+    def pass_on(self, data: bytes, now_s: float, active: Callable[[LinkFault], bool], faults: list[Active]) -> None:
+        """Put what was sent now on its way, with whatever befalls it."""
+        if not data:
+            return
+        mine = [(fault, rng) for fault, rng in faults if active(fault) and fault.concerns(self.link, self.direction)]
+        for packet in self.packets.cut(data):
+            self._send(packet, now_s, mine)
+
+    def _send(self, packet: bytes, now_s: float, faults: list[Active]) -> None:
+        copies, lateness_s, overtaken_s = 1, 0.0, 0.0
+        for fault, rng in faults:
+            struck = bool(rng.random() < fault.probability)
+            if fault.what == "delay":
+                jitter_s = fault.jitter_s * float(rng.random())
+                lateness_s += fault.delay_s + jitter_s if struck else 0.0
+            elif not struck:
+                continue
+            elif fault.what in ("loss", "outage"):
+                return
+            elif fault.what == "duplicate":
+                copies += 1
+            elif fault.what == "reorder":
+                overtaken_s += fault.delay_s
+            else:
+                packet = damaged(packet, rng)
+        # A slow line keeps the order of what goes over it; only a packet that is told to is overtaken by others.
+        due_s = self.last_due_s = max(now_s + lateness_s, self.last_due_s)
+        for _ in range(copies):
+            heapq.heappush(self.under_way, (due_s + overtaken_s, self.sent, packet))
+            self.sent += 1
+
+    def arrived(self, now_s: float) -> bytes:
+        """What has come through by now."""
+        pieces = []
+        while self.under_way and self.under_way[0][0] <= now_s + 1e-9:
+            pieces.append(heapq.heappop(self.under_way)[2])
+        return b"".join(pieces)
+
+    def next_due_s(self) -> float:
+        """When the next packet comes through."""
+        return self.under_way[0][0] if self.under_way else math.inf
+
+
+def damaged(packet: bytes, rng: np.random.Generator) -> bytes:
+    """The packet with some of its bytes changed."""
+    data = bytearray(packet)
+    for at in rng.integers(0, len(data), size=int(rng.integers(1, WORST_BYTES + 1))):
+        data[at] ^= int(rng.integers(1, 256))
+    return bytes(data)

@@ -1,0 +1,248 @@
+"""Plays a plan of faults on the vehicle: which are there now, and what each does to it.
+
+Everything is a function of plan, seed and simulated time; each fault has a generator of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from sitl.autopilot.boot import HOME_S, ORIGIN_S, POSITION_S
+from sitl.autopilot.control import Record
+from sitl.autopilot.ekf import STEP_S
+from sitl.autopilot.modes import apply_sticks, set_mode, tell_of_ekf
+from sitl.autopilot.vehicle import Mode, Sticks, Vehicle
+from sitl.faults.link_faults import Active, Way
+from sitl.faults.plan import (
+    BatteryLow,
+    Fault,
+    FaultPlan,
+    GpsGlitch,
+    GpsLoss,
+    GpsNoise,
+    LinkFault,
+    PilotTakesOver,
+    Reboot,
+    SensorFault,
+    WheelSlip,
+)
+from sitl.sensors.range_sensors import Defect, RangeSensing
+
+DRIVING_M = 0.1
+"""A rover that has come so far has begun to drive."""
+ALIGN_S = 10.0
+"""The EKF wants to have seen a good GPS for so long before it begins to use it."""
+OWN_STREAM = 0x4641554C
+"""Keeps the faults' randomness apart from everything else that is drawn from the same seed."""
+
+
+class FaultPlayer:
+    """Which faults are there, and their effects on vehicle, sensors and wheels. Links ask it for theirs."""
+
+    def __init__(self, plan: FaultPlan, seed: int) -> None:
+        """``seed``: the simulator's own."""
+        seeds = np.random.SeedSequence([OWN_STREAM, seed, plan.seed]).spawn(len(plan.faults) + 1)
+        self._faults = [(fault, np.random.default_rng(one)) for fault, one in zip(plan.faults, seeds, strict=False)]
+        self._ekf_rng = np.random.default_rng(seeds[-1])
+        self._links: list[Active] = [(fault, rng) for fault, rng in self._faults if isinstance(fault, LinkFault)]
+        self.touches_links = bool(self._links)
+        """Whether any link fault is planned."""
+        self._has_gps = any(isinstance(fault, GpsLoss | GpsGlitch | GpsNoise) for fault in plan.faults)
+        self._awaits_driving = any(fault.since == "driving" for fault in plan.faults)
+        self._driving_s = math.inf
+        self._active: set[int] = set()
+        self._changes_s = 0.0
+        self._steps = 0
+        self._noise_m = {i: (0.0, 0.0) for i, (fault, _) in enumerate(self._faults) if isinstance(fault, GpsNoise)}
+        self._glitch_rad: dict[int, float] = {}
+        self._mode_before: dict[int, Mode] = {}
+        self._was_started = False
+        self.due_s = 0.0
+        """When ``step`` must be called next."""
+        self.reboot_until_s: float | None = None
+        """Set when the autopilot's power fails now: until when it is off. Whoever acts on it sets it back."""
+
+    # Time ------------------------------------------------------------------------------------------------------------
+
+    def is_active(self, fault: Fault, now_s: float) -> bool:
+        """Whether a fault is there."""
+        return fault.at(self._elapsed_s(fault, now_s))[0]
+
+    def _elapsed_s(self, fault: Fault, now_s: float) -> float:
+        return now_s if fault.since == "boot" else now_s - self._driving_s
+
+    def step(self, now_s: float, vehicle: Vehicle, rover: Record, sensing: RangeSensing) -> None:
+        """Begin and end what is due, and let the EKF take its step."""
+        if math.isinf(self._driving_s) and float(rover[0]["driven_m"]) >= DRIVING_M:
+            self._driving_s = self._changes_s = now_s
+        if now_s >= self._changes_s - 1e-6:
+            self._begin_and_end(now_s, vehicle)
+            self._apply(vehicle, rover, sensing)
+        while self._steps * STEP_S <= now_s + 1e-6:
+            self._steps += 1
+            if self._has_gps:
+                self._move_gps(vehicle)
+                self._step_ekf(vehicle)
+        steps = self._has_gps or (self._awaits_driving and math.isinf(self._driving_s))
+        self.due_s = min(self._changes_s, self._steps * STEP_S if steps else math.inf)
+
+    def rebooted(self, vehicle: Vehicle, rover: Record, sensing: RangeSensing) -> None:
+        """A fresh autopilot: it meets what goes on."""
+        self._was_started = False
+        self._mode_before.clear()
+        for number, fault in self._present():
+            if isinstance(fault, PilotTakesOver):  # the switch and the sticks are where they were
+                self._take_over(number, fault, vehicle)
+        self._apply(vehicle, rover, sensing)
+
+    def _begin_and_end(self, now_s: float, vehicle: Vehicle) -> None:
+        self._changes_s = math.inf
+        for number, (fault, rng) in enumerate(self._faults):
+            elapsed_s = self._elapsed_s(fault, now_s)
+            active, change_s = fault.at(elapsed_s)
+            self._changes_s = min(self._changes_s, change_s + now_s - elapsed_s)
+            if active and number not in self._active:
+                self._active.add(number)
+                self._begin(number, fault, rng, vehicle, change_s - elapsed_s + now_s)
+            elif not active and number in self._active:
+                self._active.remove(number)
+                self._end(number, fault, vehicle)
+
+    def _begin(self, number: int, fault: Fault, rng: np.random.Generator, vehicle: Vehicle, end_s: float) -> None:
+        match fault:
+            case Reboot():
+                self.reboot_until_s = end_s
+            case PilotTakesOver():
+                self._take_over(number, fault, vehicle)
+            case GpsGlitch():
+                drawn_rad = float(rng.uniform(0.0, 2.0 * math.pi))
+                given = fault.bearing_deg
+                self._glitch_rad[number] = drawn_rad if given is None else math.radians(given)
+            case _:
+                pass
+
+    def _take_over(self, number: int, fault: PilotTakesOver, vehicle: Vehicle) -> None:
+        self._mode_before[number] = vehicle.mode
+        _hold_sticks(vehicle, Sticks(fault.steering, fault.throttle))
+        set_mode(vehicle, Mode[fault.mode])
+
+    def _end(self, number: int, fault: Fault, vehicle: Vehicle) -> None:
+        if not isinstance(fault, PilotTakesOver):
+            return
+        before = self._mode_before.pop(number, None)
+        others = [(other, one) for other, one in self._present() if isinstance(one, PilotTakesOver)]
+        if others:  # one pilot, one switch: it stays where another fault has it
+            self._take_over(*others[-1], vehicle)
+        else:
+            _hold_sticks(vehicle, Sticks())
+        if before is not None and others:
+            self._mode_before[others[-1][0]] = before
+        elif before is not None:
+            set_mode(vehicle, before)
+
+    # Effects ---------------------------------------------------------------------------------------------------------
+
+    def _present(self) -> Iterable[tuple[int, Fault]]:
+        return ((number, self._faults[number][0]) for number in sorted(self._active))
+
+    def _apply(self, vehicle: Vehicle, rover: Record, sensing: RangeSensing) -> None:
+        """Everything that is simply there or not."""
+        grips = [1.0, 1.0]
+        lidar: Defect = ""
+        beams: dict[int, Defect] = {}
+        volts = math.inf
+        for _, fault in self._present():
+            match fault:
+                case WheelSlip():
+                    for side, name in enumerate(("left", "right")):
+                        grips[side] *= 1.0 - fault.share if fault.side in ("both", name) else 1.0
+                case SensorFault():
+                    lidar = lidar if fault.beams else fault.what
+                    numbers = [number - 1 for number in fault.beams] or sensing.numbers()
+                    beams |= dict.fromkeys(numbers, fault.what)
+                case BatteryLow():
+                    volts = min(volts, fault.volts)
+                case _:
+                    pass
+        if float(rover[0]["turning_radius_m"]) > 0.0:
+            # Steered wheels are driven together: what slips of one side is lost to both.
+            grips = [1.0, 0.5 * (grips[0] + grips[1])]
+        rover["grip_1"], rover["grip_3"] = grips
+        sensing.lidar_fault, sensing.beam_faults = lidar, beams
+        vehicle.battery.fault_v = volts if math.isfinite(volts) else None
+
+    # GPS -------------------------------------------------------------------------------------------------------------
+
+    def _move_gps(self, vehicle: Vehicle) -> None:
+        """How wrong the receiver is now: all glitches and what wanders, added up."""
+        north_m = east_m = 0.0
+        talks = True
+        for number, fault in self._present():
+            match fault:
+                case GpsLoss():
+                    talks = False
+                case GpsGlitch():
+                    north_m += fault.metres * math.cos(self._glitch_rad[number])
+                    east_m += fault.metres * math.sin(self._glitch_rad[number])
+                case GpsNoise():
+                    off_n, off_e = self._wander(number, fault)
+                    north_m, east_m = north_m + off_n, east_m + off_e
+                case _:
+                    pass
+        vehicle.ekf.gps.talks = talks
+        vehicle.ekf.gps.error_m = (north_m, east_m)
+
+    def _wander(self, number: int, fault: GpsNoise) -> tuple[float, float]:
+        keep = math.exp(-STEP_S / fault.time_s)
+        kick_n, kick_e = self._faults[number][1].normal(0.0, fault.metres * math.sqrt(1.0 - keep * keep), size=2)
+        before_n, before_e = self._noise_m[number]
+        self._noise_m[number] = keep * before_n + float(kick_n), keep * before_e + float(kick_e)
+        return self._noise_m[number]
+
+    def _step_ekf(self, vehicle: Vehicle) -> None:
+        ekf = vehicle.ekf
+        if not vehicle.is_started:
+            self._hold_up_start(vehicle)
+            return
+        if not self._was_started:
+            self._was_started = True
+            ekf.begin(vehicle.time_s)
+        before_m = vehicle.position_m()
+        changes = ekf.step(vehicle.time_s, vehicle.armed, self._ekf_rng)
+        shown_m = ekf.shown_m
+        vehicle.stale_m = before_m if shown_m is None else None
+        place_m = ekf.offset_m if shown_m is None else shown_m
+        estimate = vehicle.estimate
+        estimate["offset_n"], estimate["offset_e"] = place_m
+        estimate["offset_vn"], estimate["offset_ve"] = ekf.drift_m_s
+        tell_of_ekf(vehicle, changes)
+
+    def _hold_up_start(self, vehicle: Vehicle) -> None:
+        """Without a GPS those parts of the start-up wait that need it."""
+        gps, late, now_s = vehicle.ekf.gps, vehicle.gps_late, vehicle.time_s
+        if gps.talks:
+            gps.heard_s = now_s
+            return
+        next_s = now_s + 2.0 * STEP_S
+        if not vehicle.has_home:
+            late.home_s = max(late.home_s, next_s - HOME_S)
+        if not vehicle.has_origin:
+            late.origin_s = max(late.origin_s, next_s - ORIGIN_S)
+        late.position_s = max(late.position_s, next_s + ALIGN_S - POSITION_S)
+
+    # Links -----------------------------------------------------------------------------------------------------------
+
+    def pass_on(self, way: Way, data: bytes, now_s: float) -> None:
+        """Put bytes on their way through a link with its faults."""
+        way.pass_on(data, now_s, lambda fault: self.is_active(fault, now_s), self._links)
+
+
+def _hold_sticks(vehicle: Vehicle, sticks: Sticks) -> None:
+    """The transmitter's sticks; a ground station's override goes before them while it lasts."""
+    vehicle.transmitter = sticks
+    if vehicle.sticks.overridden_s is None:
+        vehicle.sticks = sticks
+    apply_sticks(vehicle)

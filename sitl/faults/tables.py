@@ -1,0 +1,265 @@
+"""What a fault plan may say: a table for each kind of fault, and how it becomes a value. The same in words is in docs/faults.md."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from sitl.faults.plan import (
+    BatteryLow,
+    Direction,
+    Fault,
+    GpsGlitch,
+    GpsLoss,
+    GpsNoise,
+    LinkFault,
+    PilotTakesOver,
+    Reboot,
+    SensorFault,
+    Since,
+    WheelSlip,
+)
+
+REBOOT_S = 3.0
+OVERTAKEN_S = 0.2
+
+PILOT_MODES = ("MANUAL", "ACRO", "STEERING", "HOLD", "LOITER", "AUTO", "RTL", "SMART_RTL", "GUIDED")
+
+Seconds = Annotated[float, Field(ge=0.0, le=1e6)]
+Span = Annotated[float, Field(gt=0.0, le=1e6)]
+Share = Annotated[float, Field(gt=0.0, le=1.0)]
+Metres = Annotated[float, Field(gt=0.0, le=1e5)]
+Stick = Annotated[float, Field(ge=-1.0, le=1.0)]
+Numbers = Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(min_length=1, max_length=100)]
+
+
+class FaultTable(BaseModel, ABC):
+    """``[[fault]]``: what all kinds have in common."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+
+    kind: str
+    start_s: Seconds
+    duration_s: Span | None = None
+    end_s: Span | None = None
+    since: Since = "boot"
+    repeat_s: Span | None = None
+
+    def window(self, duration_s: float = math.inf) -> dict[str, Any]:
+        """The times, with what a fault lasts that does not say. Raises ValueError when they contradict each other."""
+        if self.duration_s is not None and self.end_s is not None:
+            raise ValueError("duration_s and end_s are both given; use one of them")
+        if self.end_s is not None and self.end_s <= self.start_s:
+            raise ValueError(f"end_s {self.end_s:g} is not after start_s {self.start_s:g}; choose a later end_s")
+        end_s = self.start_s + (duration_s if self.duration_s is None else self.duration_s)
+        end_s = end_s if self.end_s is None else self.end_s
+        if self.repeat_s is not None and self.repeat_s <= end_s - self.start_s:
+            raise ValueError("repeat_s must be longer than the fault lasts; give it a duration_s shorter than repeat_s")
+        repeat_s = math.inf if self.repeat_s is None else self.repeat_s
+        return {"start_s": self.start_s, "end_s": end_s, "since": self.since, "repeat_s": repeat_s}
+
+    @abstractmethod
+    def fault(self) -> Fault:
+        """The fault as a value. Raises ValueError when what was said contradicts itself."""
+
+
+class OnLink(FaultTable):
+    """What befalls packets on links."""
+
+    direction: Direction = "both"
+    links: Numbers = [1]
+    """Replaced by all links where a plan names none."""
+
+    def link_fault(self, what: Any, **strength: Any) -> LinkFault:
+        """The fault on the links that are meant."""
+        links = tuple(self.links) if "links" in self.model_fields_set else ()
+        return LinkFault(**self.window(), what=what, direction=self.direction, links=links, **strength)
+
+
+class Loss(OnLink):
+    """``packet_loss``."""
+
+    probability: Share
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.link_fault("loss", probability=self.probability)
+
+
+class Delay(OnLink):
+    """``packet_delay``."""
+
+    delay_s: Annotated[float, Field(ge=0.0, le=3600.0)]
+    jitter_s: Annotated[float, Field(ge=0.0, le=3600.0)] = 0.0
+    probability: Share = 1.0
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.link_fault("delay", probability=self.probability, delay_s=self.delay_s, jitter_s=self.jitter_s)
+
+
+class Reorder(OnLink):
+    """``packet_reorder``."""
+
+    probability: Share
+    delay_s: Annotated[float, Field(gt=0.0, le=3600.0)] = OVERTAKEN_S
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.link_fault("reorder", probability=self.probability, delay_s=self.delay_s)
+
+
+class Duplicate(OnLink):
+    """``packet_duplicate``."""
+
+    probability: Share
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.link_fault("duplicate", probability=self.probability)
+
+
+class Corrupt(OnLink):
+    """``packet_corrupt``."""
+
+    probability: Share
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.link_fault("corrupt", probability=self.probability)
+
+
+class Outage(OnLink):
+    """``link_outage``."""
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.link_fault("outage")
+
+
+class RebootTable(FaultTable):
+    """``autopilot_reboot``."""
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return Reboot(**self.window(REBOOT_S))
+
+
+class PilotTable(FaultTable):
+    """``pilot``."""
+
+    mode: str
+    steering: Stick = 0.0
+    throttle: Stick = 0.0
+
+    def fault(self) -> Fault:
+        """As a value. Raises ValueError for a mode that is not on the switch, and for sticks that would do nothing."""
+        if self.mode not in PILOT_MODES:
+            raise ValueError(f"mode: unknown mode {self.mode!r:.40}; modes are {', '.join(PILOT_MODES)}")
+        if self.mode != "MANUAL" and (self.steering or self.throttle):
+            raise ValueError(f'steering and throttle do nothing in {self.mode}; use mode = "MANUAL" or leave them out')
+        return PilotTakesOver(**self.window(), mode=self.mode, steering=self.steering, throttle=self.throttle)
+
+
+class GpsLossTable(FaultTable):
+    """``gps_loss``."""
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return GpsLoss(**self.window())
+
+
+class GpsGlitchTable(FaultTable):
+    """``gps_glitch``."""
+
+    metres: Metres
+    bearing_deg: Annotated[float, Field(ge=-360.0, le=360.0)] | None = None
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return GpsGlitch(**self.window(), metres=self.metres, bearing_deg=self.bearing_deg)
+
+
+class GpsNoiseTable(FaultTable):
+    """``gps_noise``."""
+
+    metres: Metres
+    time_s: Annotated[float, Field(ge=0.1, le=3600.0)] = GpsNoise().time_s
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return GpsNoise(**self.window(), metres=self.metres, time_s=self.time_s)
+
+
+class Stuck(FaultTable):
+    """``sensor_stuck``; ``in_view``: only from the first reading on that shows something."""
+
+    beams: Numbers | None = None
+    in_view: bool = False
+
+    def fault(self) -> Fault:
+        """As a value."""
+        what: Literal["stuck", "stuck in view"] = "stuck in view" if self.in_view else "stuck"
+        return SensorFault(**self.window(), what=what, beams=tuple(self.beams or ()))
+
+
+class Silent(FaultTable):
+    """``sensor_silent``."""
+
+    beams: Numbers | None = None
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return SensorFault(**self.window(), what="silent", beams=tuple(self.beams or ()))
+
+
+class SlipTable(FaultTable):
+    """``wheel_slip``."""
+
+    share: Share
+    side: Literal["both", "left", "right"] = "both"
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return WheelSlip(**self.window(), share=self.share, side=self.side)
+
+
+class BatteryTable(FaultTable):
+    """``battery_low``."""
+
+    volts: Annotated[float, Field(gt=0.0, le=100.0)] = BatteryLow().volts
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return BatteryLow(**self.window(), volts=self.volts)
+
+
+KINDS: dict[str, type[FaultTable]] = {
+    "packet_loss": Loss,
+    "packet_delay": Delay,
+    "packet_reorder": Reorder,
+    "packet_duplicate": Duplicate,
+    "packet_corrupt": Corrupt,
+    "link_outage": Outage,
+    "autopilot_reboot": RebootTable,
+    "pilot": PilotTable,
+    "gps_loss": GpsLossTable,
+    "gps_glitch": GpsGlitchTable,
+    "gps_noise": GpsNoiseTable,
+    "sensor_stuck": Stuck,
+    "sensor_silent": Silent,
+    "wheel_slip": SlipTable,
+    "battery_low": BatteryTable,
+}
+
+
+class PlanTable(BaseModel):
+    """The whole file."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+
+    seed: Annotated[int, Field(ge=0, le=2**31)] = 0
+    fault: Annotated[list[dict[str, Any]], Field(max_length=1000)] = []

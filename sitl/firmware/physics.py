@@ -1,0 +1,262 @@
+"""The world behind the real firmware: servo outputs in, the rover's state out, one time step for each new frame.
+
+Plant, world and sensors are those of our own simulated vehicle; autopilot and estimator are the firmware's. Time passes only with
+answers: the firmware waits for each, and its clock is the answers' timestamp. So a run is a function of mission, seed and frames.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from sitl.autopilot.scanner import Scanner, ScannerPort
+from sitl.firmware.json_frames import COUNTS, RANGES_MOST, BodyState, ServoFrame, decode, encode
+from sitl.plant.main_loop import NoiseSettings
+from sitl.plant.rover import GRAVITY_M_S2, drive, meet_movers, new_rover
+from sitl.sensors.range_sensors import RangeSensing, SensorSuite
+from sitl.world.movers import Floats, Ints
+from sitl.world.truth import Collision, SimStart, collision_of
+from sitl.world.world import Ground, Obstacles, World
+
+PLANT_STEP_S = 0.005
+"""The plant's longest step, as in our own vehicle."""
+LONGEST_STEP_S = 0.09
+"""The firmware takes no step of 0.1 s or more for one; slower frame rates get this one."""
+RANGE_INTERVAL_S = 0.02
+"""How often rangefinders without a rate of their own measure: with every main loop of ArduRover."""
+MIDDLE_US, SPAN_US = 1500, 500
+NO_PULSE_US = (800, 2200)
+"""Outside of these a motor controller takes it for no signal and stops; 0 is an output that is off."""
+
+
+@njit(cache=True, nogil=True)
+def advance(
+    rovers: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
+    mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats,
+    time_s: float, servo_1: float, servo_3: float, steps: int, step_s: float,
+) -> None:  # fmt: skip
+    """Move the rover by some steps from ``time_s`` on, with servo outputs -1 to 1."""
+    rover = rovers[0]
+    for step in range(steps):
+        drive(rover, obstacles, south_m, west_m, resolution_m, ground, servo_1, servo_3, step_s)
+        if mover_radii_m.size > 0:
+            now_s = time_s + (step + 1) * step_s
+            meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)
+
+
+def servo_output(pwm_us: int) -> float:
+    """What a pulse asks for, -1 to 1."""
+    if not NO_PULSE_US[0] <= pwm_us <= NO_PULSE_US[1]:
+        return 0.0
+    return min(max((pwm_us - MIDDLE_US) / SPAN_US, -1.0), 1.0)
+
+
+def frame_step_s(rate_hz: int) -> float:
+    """How far a frame moves the world."""
+    return min(1.0 / rate_hz, LONGEST_STEP_S)
+
+
+@dataclass(slots=True)
+class Tally:
+    """What has come in so far, from all firmware starts."""
+
+    steps: int = 0
+    repeated: int = 0
+    """Frames asked for again, answered as before."""
+    lost: int = 0
+    """Frames that never came, by their numbers."""
+    late: int = 0
+    """Copies that came after newer frames; not answered."""
+    bad: int = 0
+    """Datagrams that are no frames; not answered."""
+    strangers: int = 0
+    """Frames from a second firmware; not answered."""
+    starts: int = 0
+    """Firmware starts."""
+
+
+class Motion(NamedTuple):
+    """Where the rover is and how it moves, world frame."""
+
+    north_m: float
+    east_m: float
+    heading_rad: float
+    vel_north_m_s: float
+    vel_east_m_s: float
+
+
+class Physics:
+    """Answers the firmware's frames."""
+
+    def __init__(
+        self, world: World, start: SimStart, suite: SensorSuite, seed: int = 0, rover_radius_m: float = 0.35,
+        turning_radius_m: float = 0.0, range_noise_m: float = NoiseSettings().range_m, *, scans: bool = False,
+    ) -> None:  # fmt: skip
+        """``scans``: whether the suite's lidar has a line of its own, see ``take``; ``turning_radius_m``: 0 for skid steering.
+
+        Raises ValueError for more rangefinders than the firmware takes.
+        """
+        if len(suite.beams) > RANGES_MOST:
+            raise ValueError(f"{len(suite.beams)} rangefinders: the firmware takes {RANGES_MOST} at most")
+        self.world, self.start, self.suite = world, start, suite
+        self.tally = Tally()
+        self._make = (seed, rover_radius_m, turning_radius_m, range_noise_m)
+        self._scans = scans
+        self._port = ScannerPort()
+        self._outbox = bytearray()
+        self._sender: object = None
+        self._last: ServoFrame | None = None
+        self._answer = b""
+        self._begin()
+
+    def _begin(self) -> None:
+        """The rover at its start, at rest, at time 0; the world as it is then."""
+        seed, rover_radius_m, turning_radius_m, noise_m = self._make
+        start, suite = self.start, self.suite
+        self.time_s = 0.0
+        self._port.begin()
+        self.collisions: tuple[Collision, ...] = ()
+        self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m)
+        rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
+        self._sensing = RangeSensing(suite, self.world, noise_m, rng)
+        self._scanner = Scanner(suite.lidar, self._sensing) if suite.lidar and self._scans else None
+        self._solid, self._doors_move_s = self.world.layers(0.0).solid, self.world.next_change_s(0.0)
+        self._ranges_m = [math.nan] * len(suite.beams)
+        self._measured = 0
+
+    def answer(self, datagram: bytes, sender: object = None) -> bytes:
+        """What to send back to ``sender``; nothing (empty) to what is no frame, or not this firmware's next one."""
+        frame = decode(datagram)
+        if frame is None:
+            self.tally.bad += 1
+            return b""
+        kind = self._kind(frame, sender)
+        if kind == "stranger":
+            self.tally.strangers += 1
+            return b""
+        if kind == "late":
+            self.tally.late += 1
+            return b""
+        self._sender = sender
+        if kind == "repeated":
+            self.tally.repeated += 1
+            return self._answer
+        if kind == "start":
+            self.tally.starts += 1
+            self._begin()
+        elif self._last is not None:
+            self.tally.lost += (frame.count - self._last.count) % COUNTS - 1
+        self._last = frame
+        self._answer = self._stepped(frame)
+        return self._answer
+
+    def _kind(self, frame: ServoFrame, sender: object) -> Literal["start", "next", "repeated", "late", "stranger"]:
+        """What a frame is after the last one. A firmware counts from 0, and one that goes on where it was may have moved."""
+        if self._last is None:
+            return "start"
+        ahead = (frame.count - self._last.count) % COUNTS
+        moved = sender != self._sender
+        if frame.count == 0 and ahead != 1 and (moved or ahead != 0):
+            return "start"
+        if ahead == 0:
+            return "repeated"
+        if moved and ahead != 1:
+            return "stranger"
+        return "next" if ahead <= COUNTS // 2 else "late"
+
+    def rehearse(self) -> None:
+        """Take one step and forget it: compiles what is not compiled yet, before anybody waits for an answer."""
+        self._move(0.0, 0.0, PLANT_STEP_S)
+        self._measure(self.motion)
+        self._outbox.clear()
+        self._port = ScannerPort()
+        self._begin()
+
+    @property
+    def system(self) -> int | None:
+        """Id of the autopilot that was heard on the lidar's line, if any."""
+        return self._port.system
+
+    def hear(self, data: bytes) -> None:
+        """Bytes from the lidar's line."""
+        self._port.hear(data)
+
+    def take(self) -> bytes:
+        """What the lidar has sent on its line since the last call: MAVLink, whole packets."""
+        data = bytes(self._outbox)
+        self._outbox.clear()
+        return data
+
+    @property
+    def motion(self) -> Motion:
+        """The truth."""
+        rover = self._rover[0]
+        heading_rad, speed_m_s, slide_m_s = float(rover["heading_rad"]), float(rover["speed_m_s"]), rover["slide_m_s"]
+        ahead_n, ahead_e = math.cos(heading_rad), math.sin(heading_rad)
+        return Motion(
+            float(rover["north_m"]),
+            float(rover["east_m"]),
+            heading_rad,
+            float(speed_m_s * ahead_n - slide_m_s * ahead_e),
+            float(speed_m_s * ahead_e + slide_m_s * ahead_n),
+        )
+
+    def _stepped(self, frame: ServoFrame) -> bytes:
+        step_s = frame_step_s(frame.rate_hz)
+        before = self.motion
+        self._move(servo_output(frame.pwm_us[0]), servo_output(frame.pwm_us[2]), step_s)
+        self.tally.steps += 1
+        now = self.motion
+        self._measure(now)
+        return encode(self._body(before, now, step_s), -GRAVITY_M_S2, self._ranges_m)
+
+    def _move(self, servo_1: float, servo_3: float, step_s: float) -> None:
+        world = self.world
+        if world.doors and self.time_s >= self._doors_move_s:
+            self._solid, self._doors_move_s = world.layers(self.time_s).solid, world.next_change_s(self.time_s)
+        contacts = int(self._rover[0]["contacts"])
+        steps = max(1, math.ceil(step_s / PLANT_STEP_S - 1e-6))
+        advance(
+            self._rover, self._solid, world.south_m, world.west_m, world.resolution_m, world.ground, *world.fleet,
+            self.time_s, servo_1, servo_3, steps, step_s / steps,
+        )  # fmt: skip
+        self.time_s += step_s
+        if int(self._rover[0]["contacts"]) > contacts:
+            self.collisions += (collision_of(self._rover[0], world.movers, self.time_s),)
+
+    def _body(self, before: Motion, now: Motion, step_s: float) -> BodyState:
+        """Mean turn rate and acceleration of the step: integrated, they give the heading and the velocity that are told.
+
+        That holds for a collision too, which stops the rover within the step.
+        """
+        turned_rad = (now.heading_rad - before.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
+        accel_n = (now.vel_north_m_s - before.vel_north_m_s) / step_s
+        accel_e = (now.vel_east_m_s - before.vel_east_m_s) / step_s
+        middle_rad = before.heading_rad + 0.5 * turned_rad
+        cosine, sine = math.cos(middle_rad), math.sin(middle_rad)
+        return BodyState(
+            self.time_s, now.north_m - self.start.north_m, now.east_m - self.start.east_m,
+            now.vel_north_m_s, now.vel_east_m_s, now.heading_rad, turned_rad / step_s,
+            accel_n * cosine + accel_e * sine, accel_e * cosine - accel_n * sine,
+        )  # fmt: skip
+
+    def _measure(self, now: Motion) -> None:
+        """Let every sensor whose time has come measure."""
+        sensing, here = self._sensing, now[:3]
+        sensing.time_s = self.time_s
+        if sensing.samples and self.time_s >= sensing.next_due_s() - 1e-9:
+            sensing.sample(*here)
+        if self._ranges_m and self.time_s >= self._measured * RANGE_INTERVAL_S - 1e-9:
+            self._measured = math.floor(self.time_s / RANGE_INTERVAL_S + 1e-6) + 1
+            self._ranges_m = [math.nan] * len(self.suite.beams)
+            for reading in sensing.wired(*here):
+                # What the firmware takes for out of range lies beyond its maximum.
+                seen_cm = reading.range_cm if reading.range_cm < reading.max_cm else reading.max_cm + 1
+                self._ranges_m[reading.number] = seen_cm / 100.0
+        time_us = round(self.time_s * 1e6)
+        if self._scanner is not None and time_us >= self._scanner.next_due_us():
+            self._outbox += self._port.packed(self._scanner.due(time_us, *here))

@@ -1,0 +1,61 @@
+"""What is worth a line while a simulator is served: clients that come and go, and collisions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from sitl.simulator import Simulator
+from sitl.world.truth import Collision, SimStart
+
+SILENT_S = 5.0
+"""A UDP partner that has said nothing for so long has gone: there is no other way to know."""
+COLLISIONS_EVERY_S = 1.0
+"""A rover that scrapes along a wall touches it many times; that is one line a second at most."""
+
+
+class News:
+    """Puts each happening into one line and gives it to ``tell``; ``now_s`` reads real seconds. By default nobody listens."""
+
+    def __init__(
+        self, tell: Callable[[str], None] = lambda line: None, now_s: Callable[[], float] = lambda: 0.0
+    ) -> None:
+        self._tell = tell
+        self._now_s = now_s
+        self._heard_s: dict[tuple[str, str], float] = {}
+        self._collisions = 0
+        self._collisions_told_s = -math.inf
+
+    def came(self, who: str, url: str) -> None:
+        """A client has connected."""
+        self._tell(f"{who} has come ({url})")
+
+    def left(self, who: str, url: str, *, dropped: bool) -> None:
+        """A client is gone, or has been ``dropped`` by the vehicle."""
+        self._tell(f"{who} has {'been dropped: the autopilot restarts' if dropped else 'left'} ({url})")
+
+    def heard(self, who: str, url: str) -> None:
+        """Somebody spoke on a connection that knows no coming and going."""
+        if (who, url) not in self._heard_s:
+            self.came(who, url)
+        self._heard_s[who, url] = self._now_s()
+
+    def look(self, simulator: Simulator) -> None:
+        """Who has fallen silent, and what the rover has touched since the last look."""
+        now_s = self._now_s()
+        for (who, url), last_s in list(self._heard_s.items()):
+            if now_s - last_s > SILENT_S:
+                del self._heard_s[who, url]
+                self._tell(f"{who} has been silent for {SILENT_S:g} s ({url})")
+        collisions = simulator.collisions
+        if len(collisions) > self._collisions and now_s - self._collisions_told_s >= COLLISIONS_EVERY_S:
+            self._collisions, self._collisions_told_s = len(collisions), now_s
+            self._tell(collision_line(collisions[-1], len(collisions), simulator.start))
+
+
+def collision_line(collision: Collision, count: int, start: SimStart) -> str:
+    """What was touched, when and where; the place counts from where the rover was switched on, as LOCAL_POSITION_NED does."""
+    north_m, east_m = collision.north_m - start.north_m, collision.east_m - start.east_m
+    what = "an obstacle" if collision.mover is None else collision.mover
+    where = f"north {north_m:.1f} m, east {east_m:.1f} m of its start"
+    return f"collision {count}: the rover touched {what} at {collision.time_s:.1f} s, {where}"

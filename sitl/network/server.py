@@ -1,0 +1,49 @@
+"""The simulator in real time, or so many times as fast, for whoever is at its endpoints."""
+
+from __future__ import annotations
+
+import select
+from collections.abc import Callable
+
+from sitl.network import Endpoint
+from sitl.network.news import News
+from sitl.simulator import Simulator
+
+STEP_S = 0.02
+LATE_S = 1.0
+"""When the machine cannot keep up, the clock is moved by what is later than this."""
+
+
+def serve(
+    simulator: Simulator,
+    endpoints: list[Endpoint],
+    now_s: Callable[[], float],
+    speedup: float,
+    running: Callable[[], bool],
+    news: News | None = None,
+    observe: Callable[[], None] = lambda: None,
+) -> None:
+    """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no.
+
+    ``news`` tells of it; ``observe`` is called in every round, and must not take long.
+    """
+    news = news or News()
+    began_s = now_s() - simulator.time_s / speedup
+    while running():
+        _exchange(simulator, endpoints, now_s())
+        goal_s = (now_s() - began_s) * speedup
+        if goal_s - simulator.time_s > LATE_S * max(speedup, 1.0):
+            began_s += (goal_s - simulator.time_s) / speedup
+            goal_s = simulator.time_s + STEP_S
+        simulator.advance_to_s(goal_s)
+        _exchange(simulator, endpoints, now_s())
+        news.look(simulator)
+        observe()
+        wait_s = (simulator.time_s + STEP_S) / speedup + began_s - now_s()
+        if wait_s > 0.0:
+            select.select([one for endpoint in endpoints for one in endpoint.descriptors()], [], [], wait_s)
+
+
+def _exchange(simulator: Simulator, endpoints: list[Endpoint], now_s: float) -> None:
+    for endpoint in endpoints:
+        endpoint.exchange(simulator, now_s)

@@ -1,0 +1,93 @@
+"""A line to a network that tells who is at its other end, and what it has carried."""
+
+from __future__ import annotations
+
+import math
+import socket
+from collections.abc import Callable
+from enum import Enum, auto
+
+from sitl.network.client import ClientLink
+from sitl.network.endpoint import packets
+from sitl.network.news import SILENT_S
+
+
+class State(Enum):
+    """How a line stands."""
+
+    BEGUN = auto()
+    NOBODY = auto()
+    CONNECTED = auto()
+    ANSWERED = auto()
+    SILENT = auto()
+
+
+class ToldLink:
+    """Passes everything on to ``link``; each change of it is a line for ``tell``. ``system``: the autopilot that was heard there, if any."""
+
+    def __init__(
+        self, link: ClientLink, url: str, tell: Callable[[str], None], system: Callable[[], int | None]
+    ) -> None:
+        self._link = link
+        self._url = url
+        self._tell = tell
+        self._system = system
+        self._known: tuple[State, int | None] = (State.BEGUN, None)
+        self._peer = ""
+        self._heard_s = -math.inf
+        self._sent = self._lost = 0
+
+    @property
+    def peer(self) -> str:
+        """Who is there; empty for nobody."""
+        return self._link.peer
+
+    def sockets(self) -> list[socket.socket]:
+        """What to wait on for input."""
+        return self._link.sockets()
+
+    def exchange(self, data: bytes, now_s: float) -> bytes:
+        """As the link does; whatever has changed is told."""
+        heard = self._link.exchange(data, now_s)
+        if data and self._link.peer:
+            self._sent += len(packets(data))
+        elif data:
+            self._lost += len(packets(data))
+        if heard:
+            self._heard_s = now_s
+        known = self._state(now_s), self._system()
+        if known != self._known:
+            if line := self._line(*known):
+                self._tell(line)
+            self._known, self._peer = known, self._link.peer
+        return heard
+
+    def close(self) -> None:
+        """Let go of all sockets, and say what was carried."""
+        self._link.close()
+        lost = f", {self._lost} lost with nobody there" if self._lost else ""
+        self._tell(f"{self._url}: {self._sent} packets of the lidar sent{lost}")
+
+    def _state(self, now_s: float) -> State:
+        if not self._link.peer:
+            self._heard_s = -math.inf
+            return State.NOBODY
+        if self._heard_s == -math.inf or self._system() is None:
+            return State.CONNECTED
+        return State.ANSWERED if now_s - self._heard_s <= SILENT_S else State.SILENT
+
+    def _line(self, state: State, system: int | None) -> str:
+        peer = self._link.peer
+        match state:
+            case State.NOBODY if self._known[0] is State.BEGUN:
+                return f"waiting for {self._url}"
+            case State.NOBODY if self._known[0] is not State.NOBODY:
+                return f"{self._peer}: link lost; waiting for {self._url}"
+            case State.CONNECTED:
+                return f"scans go to {peer}, where no autopilot was heard yet ({self._url})"
+            case State.ANSWERED:
+                return f"scans go to {peer} (system {system})"
+            case State.SILENT:
+                return f"{peer} has been silent for {SILENT_S:g} s ({self._url})"
+            case _:
+                return ""

@@ -1,0 +1,1 @@
+"""The rover's motion, and the compiled main loop that drives it."""

@@ -1,0 +1,118 @@
+"""The compiled main loop: estimate, controllers, plant, a batch of loops in one call."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from sitl.autopilot.battery import FULL_A, RESISTANCE_OHM
+from sitl.autopilot.control import LOOP_S
+from sitl.autopilot.loop import run_tasks
+from sitl.plant.rover import drive, meet_movers
+from sitl.world.movers import Floats, Ints
+from sitl.world.world import Ground, Obstacles
+
+SUBSTEPS = 4
+"""Steps of the plant in one main loop."""
+
+NOISE_COLUMNS = 5
+"""Normal variates per loop: velocity error north, east; position jitter north, east; heading error."""
+
+
+@dataclass(frozen=True, slots=True)
+class NoiseSettings:
+    """How far the autopilot's estimate and the sensors are from the truth (standard deviations)."""
+
+    position_bias_m: float = 0.12
+    position_jitter_m: float = 0.01
+    heading_bias_deg: float = 0.5
+    range_m: float = 0.02
+    bias_time_s: float = 20.0
+    """How slowly the position error wanders."""
+
+    @classmethod
+    def none(cls) -> NoiseSettings:
+        """Estimates and sensors that tell the truth."""
+        return cls(0.0, 0.0, 0.0, 0.0)
+
+    def as_array(self) -> NDArray[np.float64]:
+        """For the compiled loop: velocity error, its time, bias time, jitter, heading error, its time."""
+        drift_time_s = self.bias_time_s / 5.0
+        total_s = self.bias_time_s + drift_time_s
+        drift_m_s = self.position_bias_m / math.sqrt(drift_time_s * self.bias_time_s**2 / total_s)
+        heading_rad = math.radians(self.heading_bias_deg)
+        jitter_m = self.position_jitter_m
+        return np.array([drift_m_s, drift_time_s, self.bias_time_s, jitter_m, heading_rad, 2.0 * self.bias_time_s])
+
+
+@njit(cache=True, nogil=True)
+def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: Any) -> None:
+    """What the autopilot believes after one loop: the truth, a slowly wandering error, a little jitter."""
+    keep = math.exp(-LOOP_S / noise[1])
+    kick = noise[0] * math.sqrt(1.0 - keep * keep)
+    estimate.drift_n = keep * estimate.drift_n + kick * draw[0]
+    estimate.drift_e = keep * estimate.drift_e + kick * draw[1]
+    rate_n = estimate.drift_n - estimate.bias_n / noise[2]
+    rate_e = estimate.drift_e - estimate.bias_e / noise[2]
+    estimate.bias_n += rate_n * LOOP_S
+    estimate.bias_e += rate_e * LOOP_S
+    keep = math.exp(-LOOP_S / noise[5])
+    estimate.bias_heading = keep * estimate.bias_heading + noise[4] * math.sqrt(1.0 - keep * keep) * draw[4]
+    ahead_n, ahead_e = math.cos(rover.heading_rad), math.sin(rover.heading_rad)
+    side_m_s2 = rover.yaw_rate_rad_s * rover.speed_m_s
+    estimate.north_m = rover.north_m - origin[0] + estimate.bias_n + noise[3] * draw[2] + estimate.offset_n
+    estimate.east_m = rover.east_m - origin[1] + estimate.bias_e + noise[3] * draw[3] + estimate.offset_e
+    estimate.vel_n = rover.speed_m_s * ahead_n + rate_n + estimate.offset_vn
+    estimate.vel_e = rover.speed_m_s * ahead_e + rate_e + estimate.offset_ve
+    if rover.slide_m_s != 0.0:
+        estimate.vel_n -= rover.slide_m_s * ahead_e
+        estimate.vel_e += rover.slide_m_s * ahead_n
+    estimate.accel_n = rover.accel_m_s2 * ahead_n - side_m_s2 * ahead_e
+    estimate.accel_e = rover.accel_m_s2 * ahead_e + side_m_s2 * ahead_n
+    heading_rad = rover.heading_rad + estimate.bias_heading
+    estimate.heading_rad = (heading_rad + math.pi) % (2.0 * math.pi) - math.pi
+    estimate.yaw_rate_rad_s = rover.yaw_rate_rad_s
+
+
+@njit(cache=True, nogil=True)
+def draw_current(rover: Any, control: Any) -> None:
+    """Take one loop's current from the battery, and count it: by the motors' mean output, on steered wheels by the throttle."""
+    first, third = abs(control.servo_1), abs(control.servo_3)
+    control.amps = FULL_A * (third if rover.turning_radius_m > 0.0 else 0.5 * (first + third))
+    drawn_ah = control.amps * LOOP_S / 3600.0
+    rover.drawn_ah += drawn_ah
+    control.used_mah += 1000.0 * drawn_ah
+    control.used_wh += drawn_ah * (control.rest_v - RESISTANCE_OHM * control.amps)
+
+
+@njit(cache=True, nogil=True)
+def run_loops(
+    rovers: Any, estimates: Any, controls: Any, tunings: Any, origin: Any, noise: Any, draws: Any,
+    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
+    mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats, time_s: float,
+) -> int:  # fmt: skip
+    """Run main loops from ``time_s`` on, until the draws are used up or something happened that people must be told at once.
+
+    Returns how many loops were run (a target reached, a time-out, a new contact end the batch early).
+    """
+    rover, estimate, control, tuning = rovers[0], estimates[0], controls[0], tunings[0]
+    contacts = rover.contacts
+    for loop in range(draws.shape[0]):
+        control.tick += 1
+        update_estimate(estimate, rover, origin, noise, draws[loop])
+        run_tasks(control, tuning, estimate)
+        draw_current(rover, control)
+        first, third = control.servo_1 * rover.grip_1, control.servo_3 * rover.grip_3
+        for _ in range(SUBSTEPS):
+            drive(rover, obstacles, south_m, west_m, resolution_m, ground, first, third, LOOP_S / SUBSTEPS)
+        if mover_radii_m.size > 0:
+            now_s = time_s + (loop + 1) * LOOP_S
+            meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)
+        if control.arrived or control.timed_out or rover.contacts != contacts:
+            return loop + 1
+    return int(draws.shape[0])

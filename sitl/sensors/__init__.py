@@ -1,0 +1,1 @@
+"""Simulated range sensors and what is wrong with them."""

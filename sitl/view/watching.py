@@ -1,0 +1,218 @@
+"""From a running simulator to what ``--view`` shows of it."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sitl.autopilot.control import LEG, WAYPOINT
+from sitl.autopilot.vehicle import Vehicle
+from sitl.simulator import Simulator
+from sitl.view.sketch import Disc, Kind, Layer, Place, Scene
+from sitl.view.view import Fact, Section, View
+from sitl.world.world import World
+
+TRACK_STEP_M = 0.2
+TRACK_POINTS = 20_000
+NEWS_KEPT = 50
+RATE_SPAN_S = 2.0
+"""Rates are counted over so many seconds of the rover's time, at least."""
+
+
+@dataclass
+class Rates:
+    """How many messages a second each link carries, from counts that only grow."""
+
+    _seen: deque[tuple[float, dict[str, tuple[int, int]]]] = field(default_factory=deque)
+
+    def update(self, now_s: float, counts: dict[str, tuple[int, int]]) -> dict[str, tuple[float, float]]:
+        """Take in the counts of this moment (heard, sent, by link) and tell the rates since about ``RATE_SPAN_S`` ago."""
+        self._seen.append((now_s, counts))
+        while len(self._seen) > 2 and now_s - self._seen[1][0] >= RATE_SPAN_S:
+            self._seen.popleft()
+        then_s, before = self._seen[0]
+        span_s = max(now_s - then_s, 1e-3)
+        rates = {}
+        for name, (heard, sent) in counts.items():
+            heard_then, sent_then = before.get(name, (0, 0))
+            rates[name] = ((heard - heard_then) / span_s, (sent - sent_then) / span_s)
+        return rates
+
+
+class _Being:
+    """The autopilot at a moment: which of its lives it is in, and what it has said of mode and arming."""
+
+    def __init__(self, vehicle: Vehicle, is_off: bool) -> None:
+        self._vehicle = vehicle
+        self._is_off = is_off
+        self._mode = vehicle.mode.name
+        self._armed = "armed" if vehicle.armed else "disarmed"
+
+    def news_since(self, was: _Being) -> Iterator[str]:
+        """What has changed, a line each."""
+        if self._is_off:
+            if not was._is_off:
+                yield "the autopilot's power has failed"
+        elif was._is_off or was._vehicle is not self._vehicle:
+            yield f"the autopilot has booted: {self._mode}, {self._armed}"
+        else:
+            if self._mode != was._mode:
+                yield f"mode {self._mode}, was {was._mode}"
+            if self._armed != was._armed:
+                yield self._armed
+
+
+@dataclass
+class Watching:
+    """Keeps what a single look at the simulator cannot show: its track, the rates of its links, what was told."""
+
+    title: str
+    simulator: Simulator
+    news: deque[str] = field(default_factory=lambda: deque(maxlen=NEWS_KEPT))
+    _track: array[float] = field(default_factory=lambda: array("d"))
+    _rates: Rates = field(default_factory=Rates)
+    _began: tuple[float, float] | None = None
+    _was: _Being | None = None
+
+    def tell(self, line: str) -> None:
+        """A line for the news."""
+        self.news.append(line)
+
+    def view(self, now_s: float) -> View:
+        """What there is to see at a moment (real seconds)."""
+        sections = (self.vehicle_section(now_s), self.links_section())
+        return View(self.title, self.scene(), sections, tuple(self.news))
+
+    def scene(self) -> Scene:
+        """The truth: world, rover and track."""
+        simulator, truth = self.simulator, self.simulator.truth
+        self.note()
+        world = simulator.world
+        start = Place("start", simulator.start.north_m, simulator.start.east_m, "start")
+        return Scene(
+            layers=world_layers(world, simulator.time_s),
+            rover=Disc(truth.north_m, truth.east_m, simulator.rover_radius_m),
+            heading_rad=truth.heading_rad,
+            track=self.track,
+            movers=movers_of(world, simulator.time_s),
+            places=(start, *self._destination()),
+            bounds_m=bounds_of(world),
+        )
+
+    @property
+    def track(self) -> NDArray[np.float64]:
+        """Where the rover has been, shape (n, 2)."""
+        return np.array(self._track).reshape(-1, 2)
+
+    def note(self) -> None:
+        """Remember where the rover is, and tell of its mode and power, whoever has changed them. To be called often."""
+        self._note_track()
+        simulator = self.simulator
+        was, now = self._was, _Being(simulator.vehicle, simulator.is_off)
+        self._was = now
+        for line in now.news_since(was) if was else ():
+            self.tell(f"{simulator.time_s:.0f} s: {line}")
+
+    def _note_track(self) -> None:
+        truth = self.simulator.truth
+        here = (truth.north_m, truth.east_m)
+        if not self._track or math.dist(self._track[-2:], here) >= TRACK_STEP_M:
+            self._track.extend(here)
+            del self._track[: -2 * TRACK_POINTS]
+
+    def _destination(self) -> tuple[Place, ...]:
+        """Where the autopilot is driving to, if anywhere."""
+        vehicle = self.simulator.vehicle
+        goal = vehicle.control[0]
+        if not vehicle.has_target or int(goal["task"]) not in (WAYPOINT, LEG):
+            return ()
+        north_m, east_m = float(goal["dest_n"]) + vehicle.origin_m[0], float(goal["dest_e"]) + vehicle.origin_m[1]
+        return (Place("target", north_m, east_m),)
+
+    def vehicle_section(self, now_s: float) -> Section:
+        """Mode, motion and health."""
+        simulator, truth, vehicle = self.simulator, self.simulator.truth, self.simulator.vehicle
+        began = self._began = self._began or (now_s, simulator.time_s)
+        times = (simulator.time_s - began[1]) / max(now_s - began[0], 1e-3)
+        north_m, east_m = truth.north_m - simulator.start.north_m, truth.east_m - simulator.start.east_m
+        collisions = len(simulator.collisions)
+        facts = (
+            Fact("mode", f"{vehicle.mode.name}, {'armed' if vehicle.armed else 'disarmed'}"),
+            Fact("time", f"{simulator.time_s:.0f} s, {times:.1f} times"),
+            Fact("speed", f"{truth.speed_m_s:.2f} m/s"),
+            Fact("heading", f"{math.degrees(truth.heading_rad) % 360.0:.0f}° {arrow_word(truth.heading_rad)}"),
+            Fact("position", f"N {north_m:.1f}, E {east_m:.1f} m"),
+            *_health(simulator),
+            Fact("driven", f"{simulator.driven_m:.0f} m"),
+            Fact("collisions", f"{collisions}", alarm=collisions > 0),
+        )
+        return Section("Rover", facts)
+
+    def links_section(self) -> Section:
+        """Messages a second to and from each link."""
+        counts = {link.name: (link.heard.packets, link.sent.packets) for link in self.simulator.links}
+        rates = self._rates.update(self.simulator.time_s, counts)
+        facts = [Fact("nobody is connected", "")] if not rates else []
+        for name, (heard, sent) in rates.items():
+            facts.append(Fact(name, ""))
+            facts.append(Fact("", f"in {heard:.0f}/s, out {sent:.0f}/s"))
+        return Section("Links", tuple(facts))
+
+
+def _health(simulator: Simulator) -> tuple[Fact, ...]:
+    """GPS, EKF, and the battery where one is monitored."""
+    vehicle = simulator.vehicle
+    fix = vehicle.has_home and vehicle.ekf.gps_has_fix
+    position = "position known" if vehicle.has_position else "no position"
+    facts = [
+        Fact("GPS", "3D fix" if fix else "no fix", alarm=not fix),
+        Fact("EKF", position, alarm=not vehicle.has_position),
+    ]
+    if int(vehicle.parameters["BATT_MONITOR"]) != 0:
+        facts.append(Fact("battery", f"{vehicle.volts():.1f} V, {vehicle.battery_percent()} %"))
+    return tuple(facts)
+
+
+WORDS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
+
+
+def arrow_word(heading_rad: float) -> str:
+    """The nearest of eight points of the compass."""
+    return WORDS[round(heading_rad / (math.pi / 4.0)) % 8]
+
+
+def world_layers(world: World, time_s: float, standing: Kind = Kind.WALL) -> tuple[Layer, ...]:
+    """The truth at a moment; ``standing``: how its ordinary obstacles are shown."""
+    layers = []
+    for kind, ground in zip((Kind.SLIPPERY, Kind.ROUGH), world.ground, strict=True):
+        if ground.size:
+            layers.append((kind, ground < 1.0))
+    layers.append((standing, world.obstacles))
+    for kind, special in ((Kind.GLASS, world.glass), (Kind.BLACK, world.black)):
+        if special is not None:
+            layers.append((kind, special & world.obstacles))
+    layers += [(Kind.OPEN_DOOR if door.is_open(time_s) else Kind.DOOR, door.fields) for door in world.doors]
+    frame = (world.resolution_m, world.south_m, world.west_m)
+    return tuple(Layer(kind, where, *frame) for kind, where in layers)
+
+
+def movers_of(world: World, time_s: float) -> tuple[Disc, ...]:
+    """Where everything is that moves."""
+    places = (world.mover_at(number, time_s) for number in range(len(world.movers)))
+    return tuple(
+        Disc(north_m, east_m, mover.radius_m)
+        for mover, (north_m, east_m, _, _) in zip(world.movers, places, strict=True)
+    )
+
+
+def bounds_of(world: World) -> tuple[float, float, float, float] | None:
+    """South, west, north and east edge of a world that has something in it; None for open ground."""
+    if not (world.obstacles.any() or world.doors or world.ground.size):
+        return None
+    return (world.south_m, world.west_m, world.south_m + world.height_m, world.west_m + world.width_m)

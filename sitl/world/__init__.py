@@ -1,0 +1,1 @@
+"""The truth: obstacles, doors, what moves, where the rover is."""

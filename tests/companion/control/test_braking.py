@@ -1,0 +1,55 @@
+"""How far, how fast: the formulas, and what a late link does to them."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.control.braking import (
+    blind_distance_m,
+    counted_s,
+    farthest_m,
+    fastest_blind_m_s,
+    fastest_within_m,
+    for_link,
+    loop_latency_s,
+    stopping_distance_m,
+)
+from companion.settings import Settings, parse_settings
+
+SETTINGS = Settings()
+
+
+@given(st.floats(0.0, 50.0))
+def test_a_velocity_that_is_the_last_word_ends_within_the_distance(distance_m: float) -> None:
+    speed_m_s = fastest_blind_m_s(distance_m, SETTINGS.guidance)
+    assert blind_distance_m(speed_m_s, SETTINGS.guidance) == pytest.approx(distance_m, abs=1e-6)
+    assert speed_m_s <= fastest_within_m(distance_m, SETTINGS.guidance) + 1e-9
+
+
+def test_the_default_latency_is_what_the_loop_needs() -> None:
+    assert SETTINGS.guidance.latency_s == pytest.approx(loop_latency_s(SETTINGS))
+
+
+@given(st.floats(0.0, 3.0), st.floats(0.1, 20.0))
+def test_a_late_link_makes_slow(link_s: float, sight_m: float) -> None:
+    """v * latency + v² / 2a <= sight, with all of the latency."""
+    late = for_link(SETTINGS, link_s).guidance
+    speed_m_s = fastest_within_m(sight_m, late)
+    whole_s = 0.05 + 0.1 + SETTINGS.guidance.brake_delay_s + link_s
+    assert speed_m_s * whole_s + speed_m_s**2 / (2.0 * late.deceleration_m_s2) <= sight_m + 1e-6
+    assert late.brake_delay_s >= SETTINGS.guidance.brake_delay_s + link_s - 1e-6
+
+
+def test_steps_of_the_link_are_rounded_up_and_a_setting_may_ask_for_more() -> None:
+    assert counted_s(0.0) == 0.0 and counted_s(0.05) == pytest.approx(0.05) and counted_s(0.051) == pytest.approx(0.1)
+    cautious = parse_settings({"guidance": {"latency_s": 2.0}}, "test")
+    assert for_link(cautious, 0.3).guidance.latency_s == 2.0
+    slow = parse_settings({"link": {"tick_hz": 5.0, "range_rate_hz": 2.0}}, "test")
+    assert for_link(slow, 0.0).guidance.latency_s == pytest.approx(0.2 + 0.5 + 0.25)
+
+
+def test_the_farthest_target_is_horizon_and_stopping_distance() -> None:
+    guidance = SETTINGS.guidance
+    assert farthest_m(2.0, guidance) == guidance.horizon_m + stopping_distance_m(2.0, guidance)

@@ -1,0 +1,148 @@
+"""Making way: before what crosses, for what comes straight on, and not for what is no danger."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from companion.control.collision_avoidance import WayGiver, first_near, least_room_m, yielded
+from companion.control.point_controller import Guide, Motion
+from companion.control.reference_path import Route
+from companion.core.frames import NedPoint, Pose
+from companion.core.grid import empty_grid
+from companion.core.rover_limits import RoverLimits
+from companion.core.scan import RangeScan
+from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
+from companion.perception.moving_obstacles import Moving
+from companion.settings import Settings
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+
+SETTINGS = Settings()
+ROVER = RoverLimits(0.35, 2.0, 8.0)
+HERE = Pose(20.0, 20.0, 0.0, 100.0)
+ROUTE = Route(np.column_stack((np.linspace(20.0, 36.0, 65), np.full(65, 20.0))))
+DRIVE = Guide(Motion.DRIVE, GuidedPosition(NedPoint(28.0, 20.0)), 2.0)
+
+
+def open_ground(walls_m: float = math.inf) -> EvidenceMap:
+    """Ground seen free all round the rover; with walls so far beside it."""
+    evidence = new_map(empty_grid(40, 40), ROVER.radius_m, SETTINGS.mapping)
+    bearings = np.radians(np.arange(0.0, 360.0, 1.0))
+    side_m = walls_m / np.maximum(np.abs(np.sin(bearings)), 1e-9)
+    ranges = np.where(side_m < 8.0, side_m, np.inf)
+    for stamp in (1, 2, 3):
+        integrate(evidence, HERE, RangeScan(0.0, bearings, ranges, 0.1, 8.0, np.radians(1.0), "test"), stamp)
+    return evidence
+
+
+def crossing(east_m: float, east_m_s: float, north_m: float = 24.0) -> Moving:
+    return Moving("m", 100.0, NedPoint(north_m, 20.0 + east_m), 0.0, east_m_s, 0.5)
+
+
+def made(moving: Moving, speed_m_s: float = 1.5, ground: EvidenceMap | None = None, now: Guide = DRIVE) -> Guide:
+    evidence = ground if ground is not None else open_ground()
+    return yielded(now, ROUTE, HERE, speed_m_s, (moving,), evidence, ROVER, SETTINGS)[0]
+
+
+def test_it_stops_before_the_way_of_what_crosses() -> None:
+    # Both would be 4 m ahead at the same time.
+    assert made(crossing(-3.0, 1.2)).setpoint == GuidedVelocity(0.0, 0.0)
+
+
+def test_it_goes_on_while_it_can_still_stop_later() -> None:
+    far = Moving("m", 100.0, NedPoint(32.0, 12.0), 0.0, 1.2, 0.5)
+    assert made(far) is DRIVE
+
+
+def test_it_goes_on_when_the_other_has_passed() -> None:
+    assert made(crossing(2.0, 1.2), 0.0) is DRIVE
+
+
+@pytest.mark.parametrize("moving", [crossing(0.5, 0.0), crossing(-30.0, 1.0), crossing(-3.0, -1.2)])
+def test_what_stands_is_far_or_goes_away_is_no_reason(moving: Moving) -> None:
+    assert made(moving) is DRIVE
+
+
+def test_it_moves_aside_for_what_comes_straight_at_it() -> None:
+    towards = Moving("m", 100.0, NedPoint(26.0, 20.0), -1.0, 0.0, 0.5)
+    standing = Guide(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
+    guide, aside_rad = yielded(standing, ROUTE, HERE, 0.0, (towards,), open_ground(), ROVER, SETTINGS)
+    assert guide.motion is Motion.LOOK and aside_rad is not None
+    assert abs(math.sin(aside_rad)) > 0.6
+    # And it keeps to the side it has chosen.
+    again = yielded(standing, ROUTE, HERE, 0.0, (towards,), open_ground(), ROVER, SETTINGS, aside_rad)
+    assert again[1] == aside_rad
+
+
+def test_it_backs_off_between_walls() -> None:
+    towards = Moving("m", 100.0, NedPoint(22.0, 20.0), -0.35, 0.0, 0.5)
+    standing = Guide(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
+    guide = made(towards, 0.0, open_ground(1.0), standing)
+    assert isinstance(guide.setpoint, GuidedVelocity) and guide.setpoint.forward_m_s < 0.0
+
+
+@given(
+    st.floats(-6.0, 6.0), st.floats(-6.0, 6.0), st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(0.0, 3.0)
+)  # fmt: skip
+@settings(max_examples=60, deadline=None)
+def test_room_is_what_is_left_at_the_nearest_moment(
+    north_m: float, east_m: float, north_m_s: float, east_m_s: float, speed_m_s: float
+) -> None:
+    times_s = np.arange(0.0, 5.0, 0.2)
+    places = np.column_stack((speed_m_s * times_s, np.zeros_like(times_s)))
+    discs = np.array([[north_m, east_m, north_m_s, east_m_s, 0.8]])
+    gaps = np.hypot(north_m + north_m_s * times_s - places[:, 0], east_m + east_m_s * times_s) - 0.8
+    none = np.zeros_like(times_s)
+    assert least_room_m(places, discs, times_s, none, math.inf) == pytest.approx(float(gaps.min()))
+    first_s, least_m = first_near(places, discs, times_s, 0.1)
+    near = times_s[gaps < 0.1]
+    assert (first_s, least_m) == pytest.approx((near[0] if near.size else math.inf, gaps.min()))
+
+
+def test_a_plan_of_meeting_by_chance_is_never_driven_into() -> None:
+    """Played through: whatever crosses the rover's straight way at an even speed, a rover that obeys is never touched."""
+    chance = np.random.default_rng(7)
+    ground = open_ground()
+    for _ in range(60):
+        meets_s, pace_m_s = chance.uniform(2.0, 7.0), chance.uniform(0.5, 1.5) * chance.choice((-1.0, 1.0))
+        moving = Moving("m", 100.0, NedPoint(20.0 + 1.8 * meets_s, 20.0 - pace_m_s * meets_s), 0.0, pace_m_s, 0.5)
+        north_m, speed_m_s, gaps = 20.0, 1.5, []
+        for tick in range(200):
+            pose = Pose(north_m, 20.0, 0.0, 100.0 + 0.05 * tick)
+            route = Route(ROUTE.points, min(round((north_m - 20.0) / 0.25), 64))
+            guide = yielded(DRIVE, route, pose, speed_m_s, (moving,), ground, ROVER, SETTINGS)[0]
+            wanted_m_s = 2.0 if guide is DRIVE else 0.0
+            speed_m_s += min(max(wanted_m_s - speed_m_s, -0.8 * 0.05), 0.8 * 0.05)
+            north_m = min(north_m + speed_m_s * 0.05, 36.0)
+            gaps.append(moving.at(pose.time_s).distance_m(NedPoint(north_m, 20.0)) - 0.85)
+        assert min(gaps) > 0.0
+
+
+def test_it_looks_where_it_really_drives_and_not_where_the_route_is() -> None:
+    """The route goes round the other one, the place that the rover is told lies behind it: straight there they would meet."""
+    round_it = np.vstack(
+        (
+            np.column_stack((np.full(16, 20.0), np.arange(20.0, 24.0, 0.25))),
+            np.column_stack((np.arange(20.0, 36.0, 0.25), np.full(64, 24.0))),
+        )
+    )
+    other = Moving("m", 100.0, NedPoint(23.5, 22.2), -0.4, 0.0, 0.5)
+
+    def then(told: NedPoint) -> Guide:
+        now = Guide(Motion.DRIVE, GuidedPosition(told), 1.5)
+        made = yielded(now, Route(round_it), HERE, 1.0, (other,), open_ground(), ROVER, SETTINGS)[0]
+        return DRIVE if made is now else made
+
+    assert then(NedPoint(20.0, 22.0)) is DRIVE
+    assert then(NedPoint(25.0, 24.0)) is not DRIVE
+
+
+def test_who_makes_way_is_patient_for_a_while_and_anew_each_time() -> None:
+    giver = WayGiver(open_ground(), ROVER)
+    assert not giver.is_patient(0.0, 30.0, yields=False)
+    assert all(giver.is_patient(now_s, 30.0, yields=True) for now_s in (1.0, 10.0, 30.9))
+    assert not giver.is_patient(31.0, 30.0, yields=True)
+    assert not giver.is_patient(40.0, 30.0, yields=False)
+    assert giver.is_patient(41.0, 30.0, yields=True), "it has got on meanwhile"

@@ -1,0 +1,290 @@
+"""The last look at a setpoint, against a slow reading of the same map; and that it really stands before the line."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import settings as runs
+from hypothesis import strategies as st
+
+from companion.control.braking import farthest_m
+from companion.control.point_controller import STOP, Guide, Motion
+from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
+from companion.control.setpoint_check import Output, OutputCheck, Surroundings, fault_of, inside_borders
+from companion.core.frames import NedPoint, Pose
+from companion.core.grid import empty_grid
+from companion.core.rover_limits import RoverLimits
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mission.bounds import Bound, Bounds
+from companion.settings import Settings
+from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
+from tests.support.rig import Rig, yard
+from tests.support.stored import KEEP_IN, POLYGONS, box, stored
+
+SETTINGS = Settings()
+RADIUS_M = 0.35
+SIDE = 16
+MIDDLE = 0.5 * SIDE
+
+
+def open_ground() -> EvidenceMap:
+    """All of it seen free."""
+    evidence = new_map(empty_grid(SIDE, SIDE), RADIUS_M, SETTINGS.mapping)
+    evidence.log_odds.fill(-1.0)
+    return evidence
+
+
+def surroundings(evidence: EvidenceMap) -> Surroundings:
+    return Surroundings(evidence, RoverLimits(RADIUS_M, 2.0, 8.0), SETTINGS)
+
+
+def patched(evidence: EvidenceMap, north_m: float, east_m: float, size_m: float, value: float) -> None:
+    y, x = (round(v / evidence.evidence_m) for v in (north_m, east_m))
+    size = max(1, round(size_m / evidence.evidence_m))
+    evidence.log_odds[max(0, y) : y + size, max(0, x) : x + size] = value
+
+
+@st.composite
+def grounds(draw) -> EvidenceMap:
+    """Patches that nobody has seen, and some things that stand there."""
+    evidence, place = open_ground(), st.floats(0.0, SIDE - 1.0)
+    for value, most, size in ((0.0, 4, st.floats(0.3, 3.0)), (2.0, 6, st.floats(0.1, 0.8))):
+        for _ in range(draw(st.integers(0, most))):
+            patched(evidence, draw(place), draw(place), draw(size), value)
+    return evidence
+
+
+def outputs(setpoint: st.SearchStrategy[Setpoint]) -> st.SearchStrategy[Output]:
+    near = st.floats(MIDDLE - 2.0, MIDDLE + 2.0)
+    poses = st.builds(Pose, near, near, st.floats(-math.pi, math.pi), st.just(0.0))
+    return st.builds(Output, setpoint, poses, st.floats(0.0, 2.0))
+
+
+ANYWHERE = st.floats(-3.0, SIDE + 3.0)
+POSITIONS = outputs(st.builds(GuidedPosition, st.builds(NedPoint, ANYWHERE, ANYWHERE)))
+VELOCITIES = outputs(st.builds(GuidedVelocity, st.floats(-2.0, 2.0), st.floats(-0.8, 0.8)))
+
+
+def places_of(evidence: EvidenceMap, occupied: bool) -> np.ndarray:
+    """Middles of the cells where something stands, or which nobody has seen; columns north, east."""
+    at = evidence.log_odds >= evidence.settings.occupied_at if occupied else evidence.log_odds == 0.0
+    return (np.argwhere(at) + 0.5) * evidence.evidence_m
+
+
+def gap_m(places: np.ndarray, north_m: float, east_m: float) -> float:
+    return float(np.hypot(places[:, 0] - north_m, places[:, 1] - east_m).min()) if len(places) else math.inf
+
+
+@runs(max_examples=400, deadline=None)
+@given(grounds(), POSITIONS)
+def test_a_position_that_passes_is_near_and_the_way_there_clear_and_seen(evidence: EvidenceMap, output: Output) -> None:
+    assert isinstance(output.setpoint, GuidedPosition)
+    pose, there = output.pose, output.setpoint.point
+    standing, unseen = places_of(evidence, True), places_of(evidence, False)
+    if gap_m(standing, pose.north_m, pose.east_m) < RADIUS_M + 0.2 or fault_of(output, surroundings(evidence)):
+        return
+    distance_m = pose.point.distance_m(there)
+    assert distance_m <= farthest_m(output.speed_m_s, SETTINGS.guidance) + 0.1
+    braking_m = 0.5 * 0.25 + 0.5**2 / 1.6
+    for along_m in np.arange(0.0, distance_m - 0.1, 0.05):
+        share = along_m / distance_m
+        north_m = pose.north_m + share * (there.north_m - pose.north_m)
+        east_m = pose.east_m + share * (there.east_m - pose.east_m)
+        assert (0.0 <= north_m <= SIDE and 0.0 <= east_m <= SIDE) or along_m >= distance_m - braking_m - 0.15
+        assert gap_m(standing, north_m, east_m) > RADIUS_M - 1e-6
+        if along_m < distance_m - braking_m - 0.15:
+            assert gap_m(unseen, north_m, east_m) > 0.5 * evidence.evidence_m - 0.06
+
+
+@runs(max_examples=400, deadline=None)
+@given(grounds(), VELOCITIES)
+def test_a_velocity_that_passes_can_be_stopped_on_its_arc(evidence: EvidenceMap, output: Output) -> None:
+    assert isinstance(output.setpoint, GuidedVelocity)
+    pose, speed_m_s = output.pose, output.setpoint.forward_m_s
+    standing = places_of(evidence, True)
+    if gap_m(standing, pose.north_m, pose.east_m) < RADIUS_M + 0.3 or fault_of(output, surroundings(evidence)):
+        return
+    north_m, east_m = pose.north_m, pose.east_m
+    course_rad = pose.heading_rad + (math.pi if speed_m_s < 0.0 else 0.0)
+    curvature_m = output.setpoint.yaw_rate_rad_s / max(output.speed_m_s, 1.0)
+    alone_m = abs(speed_m_s) * 3.25 + speed_m_s**2 / 1.6
+    for _ in np.arange(0.0, alone_m - 0.1 - evidence.evidence_m, 0.02):
+        north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
+        course_rad += 0.02 * curvature_m
+        assert gap_m(standing, north_m, east_m) > RADIUS_M - 0.05 - evidence.evidence_m
+
+
+CELLS = st.sets(st.tuples(st.integers(0, SIDE - 1), st.integers(0, SIDE - 1)), max_size=60)
+
+
+@runs(max_examples=400, deadline=None)
+@given(grounds(), CELLS, POSITIONS)
+def test_backing_out_asks_for_nothing_that_is_refused(
+    evidence: EvidenceMap, closed: set[tuple[int, int]], output: Output
+) -> None:
+    """Neither fences nor what stands there: also where the rover stands close beside closed fields, or in one."""
+    for x, y in closed:
+        evidence.base.weights[y, x] = 1.0
+    speed_m_s = backing_speed_m_s(output.pose, evidence, RADIUS_M, SETTINGS.guidance)
+    back = replace(output, setpoint=GuidedVelocity(-speed_m_s, 0.0))
+    assert speed_m_s < BACK_LEAST_M_S or fault_of(back, surroundings(evidence)) == ""
+
+
+def test_on_open_ground_it_backs_out_as_fast_as_it_may() -> None:
+    back_m_s = backing_speed_m_s(Pose(MIDDLE, MIDDLE, 0.7, 0.0), open_ground(), RADIUS_M, SETTINGS.guidance)
+    assert back_m_s == SETTINGS.guidance.back_out_speed_m_s
+
+
+@runs(max_examples=200, deadline=None)
+@given(POSITIONS)
+def test_on_open_ground_that_was_seen_only_distance_and_the_edge_of_the_map_count(output: Output) -> None:
+    assert isinstance(output.setpoint, GuidedPosition)
+    there = output.setpoint.point
+    distance_m = output.pose.point.distance_m(there)
+    inside = 0.0 < there.north_m < SIDE and 0.0 < there.east_m < SIDE
+    fault = fault_of(output, surroundings(open_ground()))
+    if inside:
+        assert bool(fault) == (distance_m > farthest_m(output.speed_m_s, SETTINGS.guidance) + 0.1)
+
+
+@pytest.mark.parametrize("setpoint", [STOP, GuidedVelocity(0.0, 0.5), GuidedHeading(1.0)])
+def test_standing_and_turning_on_the_spot_always_pass(setpoint: Setpoint) -> None:
+    evidence = open_ground()
+    patched(evidence, MIDDLE - 1.0, MIDDLE - 1.0, 2.0, 2.0)
+    assert fault_of(Output(setpoint, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), surroundings(evidence)) == ""
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_what_is_not_a_number_does_not_pass(value: float) -> None:
+    known, pose = surroundings(open_ground()), Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    for setpoint in (
+        GuidedPosition(NedPoint(value, 1.0)),
+        GuidedVelocity(value, 0.0),
+        GuidedVelocity(1.0, value),
+    ):
+        assert fault_of(Output(setpoint, pose, 0.0), known)
+
+
+def test_the_faults_have_names() -> None:
+    pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    ahead = Output(GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), pose, 0.0)
+    evidence = open_ground()
+    patched(evidence, MIDDLE + 2.0, MIDDLE - 1.0, 2.0, 0.0)
+    assert fault_of(ahead, surroundings(evidence)) == "target on ground not seen"
+    patched(evidence, MIDDLE + 2.0, MIDDLE - 1.0, 2.0, 2.0)
+    assert fault_of(ahead, surroundings(evidence)) == "target behind something"
+    fast = Output(GuidedVelocity(2.0, 0.0), pose, 2.0)
+    assert fault_of(fast, surroundings(evidence)) == "velocity leads into something"
+
+
+def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
+    said: list[str] = []
+    check, known = OutputCheck(lambda text, severity: said.append(text)), surroundings(open_ground())
+    pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    good = Guide(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), 1.0)
+    assert check.passed(good, pose, 0.0, known) is good and not said and not check.refused
+    far = Guide(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
+    assert check.passed(far, pose, 0.0, known).setpoint == STOP
+    assert said == ["Stopping: target farther away than the horizon"] and check.refused.total() == 1
+
+
+def test_a_rule_more_is_asked_like_the_others() -> None:
+    check = OutputCheck(lambda text, severity: None, (lambda output, known: "not on Sundays",))
+    drive = Guide(Motion.LOOK, GuidedHeading(0.0), 0.5)
+    assert check.passed(drive, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0, surroundings(open_ground())).setpoint == STOP
+    assert check.refused == {"not on Sundays": 1}
+
+
+def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None:
+    """From some moment on the driver wants straight through the wall: the rover stops, and says why."""
+    rig = Rig(yard(tmp_path))
+    rig.until_driven(2.0)
+    driver = rig.companion.driver
+    assert driver is not None
+    through = Guide(Motion.DRIVE, GuidedPosition(NedPoint(0.0, 7.0)), 2.0)
+    driver.update = lambda *_: (through, None)  # type: ignore[method-assign]
+    since_s = rig.now_s()
+    rig.run_for(10.0)
+    setpoints = [one for one in rig.sent_since(since_s) if one.is_setpoint]
+    assert setpoints and all(one.is_standstill for one in setpoints[1:])
+    assert rig.speed_m_s < 0.05 and rig.simulator.collisions == ()
+    assert rig.companion.output_check.refused.total() > 100
+    assert "Stopping: target behind something" in rig.texts()
+
+
+# --- borders ---------------------------------------------------------------------------------------------------------
+
+
+def bordered(*bounds: Bound) -> Surroundings:
+    return Surroundings(open_ground(), RoverLimits(RADIUS_M, 2.0, 8.0), SETTINGS, Bounds(bounds))
+
+
+def inner(side_m: float) -> Bound:
+    """A square in the middle of the ground that the rover must not leave."""
+    corner = MIDDLE - side_m / 2.0
+    square = shapely.box(corner, corner, corner + side_m, corner + side_m)
+    return Bound("the yard", square, True, RADIUS_M, RADIUS_M)
+
+
+@runs(max_examples=400, deadline=None)
+@given(st.one_of(POSITIONS, VELOCITIES), st.floats(5.0, 12.0))
+def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, side_m: float) -> None:
+    bound = inner(side_m)
+    if fault_of(output, bordered(bound)):
+        return
+    here, setpoint = output.pose, output.setpoint
+    if isinstance(setpoint, GuidedPosition):
+        way = shapely.LineString([(here.east_m, here.north_m), (setpoint.point.east_m, setpoint.point.north_m)])
+    else:
+        assert isinstance(setpoint, GuidedVelocity)
+        fastest_m_s = max(abs(setpoint.forward_m_s), output.speed_m_s)
+        if setpoint.forward_m_s == 0.0:
+            return
+        course_rad = here.heading_rad + (math.pi if setpoint.forward_m_s < 0.0 else 0.0)
+        curvature_m = setpoint.yaw_rate_rad_s / max(output.speed_m_s, SETTINGS.steering.scale_base_m_s)
+        north_m, east_m, points = here.north_m, here.east_m, []
+        for _ in np.arange(0.0, fastest_m_s * 0.25 + fastest_m_s**2 / 1.6, 0.02):
+            points.append((east_m, north_m))
+            north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
+            course_rad += 0.02 * curvature_m
+        way = shapely.LineString([(here.east_m, here.north_m), *points, (east_m, north_m)])
+    assert bound.shape.buffer(0.02).covers(way)
+
+
+@pytest.mark.parametrize(
+    ("setpoint", "heading_rad", "fault"),
+    [
+        (GuidedPosition(NedPoint(MIDDLE + 2.0, MIDDLE)), 0.0, False),
+        (GuidedPosition(NedPoint(MIDDLE + 3.5, MIDDLE)), 0.0, True),
+        (GuidedVelocity(1.5, 0.0), 0.0, False),
+        (GuidedVelocity(2.0, 0.0), 0.0, True),
+        (GuidedVelocity(-2.0, 0.0), math.pi, True),
+        (GuidedVelocity(-1.5, 0.0), math.pi, False),
+        (GuidedVelocity(0.0, 0.0), 0.0, False),
+        (GuidedHeading(0.0), 0.0, False),
+    ],
+)
+def test_positions_and_velocities_before_a_border(setpoint: Setpoint, heading_rad: float, fault: bool) -> None:
+    """3 m from the middle: from 2 m/s the rover needs 3 m, from 1.5 m/s 1.8 m, and its body is 0.35 m."""
+    found = inside_borders(Output(setpoint, Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 0.0), bordered(inner(6.0)))
+    assert found == ("setpoint leads over the border of the yard" if fault else "")
+
+
+def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path) -> None:
+    """The map and its rules out of the way: the shapes alone keep the rover inside the autopilot's fence, and it is said."""
+    rig = Rig(yard(tmp_path), prepare=stored(box(KEEP_IN, -6.0, -2.4, 6.5, 20.0), **POLYGONS, FENCE_MARGIN=0.0))
+    rig.until_driven(1.0)
+    driver, bounds = rig.companion.driver, rig.companion._pursuit.laid.bounds  # type: ignore[union-attr]
+    assert driver is not None and len(bounds) == 1
+    rig.companion.output_check = OutputCheck(rig.companion._tell, (inside_borders,))
+    out = Guide(Motion.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
+    driver.update = lambda *_: (out, None)  # type: ignore[method-assign]
+    rig.run_for(15.0)
+    assert any("setpoint leads over the border of the autopilot's fence" in text for text in rig.texts())
+    assert rig.simulator._vehicle.plan.fence.count == 0 and rig.speed_m_s < 0.05

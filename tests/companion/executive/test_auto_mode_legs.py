@@ -1,0 +1,100 @@
+"""When a leg that AUTO hands over is ours: handed over, fallen silent, over."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.core.frames import GeoPoint
+from companion.vehicle.events.event import Event
+from companion.vehicle.events.targets import (
+    LEG_KEPT_S,
+    GuidedLeg,
+    ItemCurrentSeen,
+    ItemReachedSeen,
+    LegSeen,
+    LegState,
+    leg_after,
+    leg_at_heartbeat,
+)
+from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
+from companion.vehicle.state import VehicleState, fold
+
+HERE, THERE = GeoPoint(53.0, 23.0), GeoPoint(53.1, 23.0)
+LIVE = GuidedLeg(HERE, 10.0, 3)
+
+
+def test_what_is_handed_over_is_live_and_stays_the_same_leg() -> None:
+    assert leg_after(None, LegSeen(1.0, HERE)) == GuidedLeg(HERE, 1.0)
+    assert leg_after(LIVE, LegSeen(11.0, HERE)) == replace(LIVE, told_s=11.0)
+    assert leg_after(replace(LIVE, state=LegState.SILENT), LegSeen(19.0, HERE)) == replace(LIVE, told_s=19.0)
+
+
+def test_another_place_or_one_after_the_end_is_a_new_leg() -> None:
+    assert leg_after(LIVE, LegSeen(11.0, THERE)) == GuidedLeg(THERE, 11.0)
+    assert leg_after(replace(LIVE, state=LegState.OVER), LegSeen(11.0, HERE)) == GuidedLeg(HERE, 11.0)
+
+
+@pytest.mark.parametrize("index", [None, 3])
+def test_the_item_that_is_reached_ends_its_leg(index: int | None) -> None:
+    leg = leg_after(replace(LIVE, index=index), ItemReachedSeen(11.0, 3))
+    assert leg is not None and leg.state is LegState.OVER
+
+
+@pytest.mark.parametrize(("index", "reached"), [(3, 4), (3, 0), (None, 0)])
+def test_another_item_or_a_guided_target_that_is_reached_does_not(index: int | None, reached: int) -> None:
+    leg = replace(LIVE, index=index)
+    assert leg_after(leg, ItemReachedSeen(11.0, reached)) == leg
+
+
+def test_the_item_under_way_is_learned_and_another_one_ends_the_leg() -> None:
+    leg = leg_after(replace(LIVE, index=None), ItemCurrentSeen(11.0, 5))
+    assert leg is not None and leg.index == 5
+    assert leg_after(leg, ItemCurrentSeen(12.0, 5)) == leg
+    assert leg_after(leg, ItemCurrentSeen(13.0, 6)) == replace(leg, state=LegState.OVER)
+    assert leg_after(replace(LIVE, state=LegState.SILENT, index=None), ItemCurrentSeen(13.0, 6)) == replace(
+        LIVE, state=LegState.SILENT, index=None
+    )
+
+
+def test_out_of_auto_or_not_repeated_it_is_silent() -> None:
+    silent = replace(LIVE, state=LegState.SILENT)
+    assert leg_at_heartbeat(LIVE, 10.0 + LEG_KEPT_S, in_auto=True) == LIVE
+    assert leg_at_heartbeat(LIVE, 10.1 + LEG_KEPT_S, in_auto=True) == silent
+    assert leg_at_heartbeat(LIVE, 10.0, in_auto=False) == silent
+    assert leg_at_heartbeat(None, 10.0, in_auto=True) is None
+
+
+news = st.one_of(
+    st.builds(lambda p: lambda t: LegSeen(t, p), st.sampled_from([HERE, THERE])),
+    st.builds(lambda i: lambda t: ItemReachedSeen(t, i), st.integers(0, 3)),
+    st.builds(lambda i: lambda t: ItemCurrentSeen(t, i), st.integers(0, 3)),
+    st.builds(
+        lambda m, a: lambda t: HeartbeatSeen(t, m, a, 1),
+        st.sampled_from([RoverMode.AUTO, RoverMode.GUIDED, RoverMode.HOLD, RoverMode.MANUAL]),
+        st.booleans(),
+    ),
+)
+
+
+@given(st.lists(st.tuples(news, st.floats(0.05, 3.0)), max_size=40), st.booleans())
+def test_whatever_is_heard_the_rover_is_ours_only_in_our_mode_and_in_auto_only_while_handed_over(
+    heard: list[tuple[object, float]], in_auto: bool
+) -> None:
+    state, time_s, told_s, mode = VehicleState(in_auto=in_auto), 0.0, -1e9, None
+    for make, after_s in heard:
+        time_s += after_s
+        event: Event = make(time_s)  # type: ignore[operator]
+        state = fold(state, event)
+        told_s = time_s if isinstance(event, LegSeen) else told_s
+        mode = event.mode if isinstance(event, HeartbeatSeen) else mode
+        if not state.is_ours:
+            continue
+        assert mode == (RoverMode.AUTO if in_auto else RoverMode.GUIDED)
+        if in_auto and isinstance(event, HeartbeatSeen):
+            assert time_s - told_s <= LEG_KEPT_S and event.armed
+        # The item of a leg that is live has not been told of as done.
+        assert not (in_auto and isinstance(event, ItemReachedSeen) and state.leg and event.index == state.leg.index)

@@ -1,0 +1,145 @@
+"""The driver beside a navigator that takes its time, and a rover that does not move."""
+
+from threading import Event
+
+import numpy as np
+
+from companion.control.point_controller import Motion
+from companion.core.frames import NedPoint, Pose
+from companion.core.grid import empty_grid
+from companion.core.rover_limits import RoverLimits
+from companion.core.scan import RangeScan
+from companion.executive.goal_driver import Driver
+from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
+from companion.mission.mission import OnBlocked
+from companion.mission.resolve import ResolvedTarget
+from companion.navigation.field_step import Decision, NavState
+from companion.navigation.search_budget import Searcher
+from companion.navigation.step_runner import InlineRunner, StepCall, StepRunner, ThreadRunner
+from companion.planning.registry import make_planner
+from companion.settings import Settings
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+
+SETTINGS = Settings()
+
+
+class LateRunner:
+    """Hands a result over only when told to."""
+
+    def __init__(self) -> None:
+        self.call: StepCall | None = None
+        self.ready = False
+
+    @property
+    def busy(self) -> bool:
+        return self.call is not None
+
+    @property
+    def working(self) -> bool:
+        return self.call is not None and not self.ready
+
+    def start(self, call: StepCall) -> None:
+        self.call = call
+
+    def take(self) -> tuple[NavState, Decision] | None:
+        if not self.ready or self.call is None:
+            return None
+        call, self.call, self.ready = self.call, None, False
+        return call()
+
+    def close(self) -> None:
+        """Nothing to end."""
+
+
+def target(north_m: float, east_m: float) -> ResolvedTarget:
+    point = NedPoint(north_m, east_m)
+    return ResolvedTarget("t", point, empty_grid(40, 40).cell_at(point), 0.0, OnBlocked.SKIP, None)
+
+
+def seen_map(pose: Pose) -> EvidenceMap:
+    evidence = new_map(empty_grid(40, 40), 0.35, SETTINGS.mapping)
+    bearings = np.radians(np.arange(0.0, 360.0, 5.0))
+    scan = RangeScan(0.0, bearings, np.full(72, np.inf), 0.2, 8.0, np.radians(5.0), "test")
+    integrate(evidence, pose, scan, 1)
+    return evidence
+
+
+def driver(runner: StepRunner, pose: Pose) -> Driver:
+    planner = make_planner("hybrid", SETTINGS.planner)
+    searcher = Searcher(planner, SETTINGS.navigator, np.random.default_rng(1))
+    return Driver(seen_map(pose), RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, runner)
+
+
+def at(time_s: float, heading_rad: float = 0.0) -> Pose:
+    return Pose(20.5, 20.5, heading_rad, time_s)
+
+
+def test_the_rover_stands_until_the_first_decision() -> None:
+    runner = LateRunner()
+    drive = driver(runner, at(0.0))
+    drive.head_for(target(30.5, 20.5), at(0.0))
+    assert drive.update(at(0.05), 0.0)[0].setpoint == GuidedVelocity(0.0, 0.0)
+    runner.ready = True
+    guide, decision = drive.update(at(0.1), 0.0)
+    assert decision is not None
+    assert isinstance(guide.setpoint, GuidedPosition)
+    assert guide.setpoint.point.north_m > 22.0
+
+
+def test_a_step_begun_for_the_last_leg_does_not_steer_the_next_one() -> None:
+    runner = LateRunner()
+    drive = driver(runner, at(0.0))
+    drive.head_for(target(30.5, 20.5), at(0.0))
+    drive.update(at(0.05), 0.0)
+    assert runner.busy
+    drive.leave()
+    drive.head_for(target(10.5, 20.5), at(0.1))
+    runner.ready = True
+    assert drive.update(at(0.15), 0.0)[1] is None
+    drive.update(at(0.2), 0.0)
+    runner.ready = True
+    _, decision = drive.update(at(0.25), 0.0)
+    assert decision is not None
+    assert decision.path[-1].y == 10
+
+
+def test_a_rover_that_does_not_get_on_backs_out_and_plans_anew() -> None:
+    drive = driver(InlineRunner(), at(0.0))
+    drive.head_for(target(30.5, 20.5), at(0.0))
+    setpoints = [drive.update(at(0.05 * tick), 0.0)[0].setpoint for tick in range(300)]
+    backwards = [s for s in setpoints if isinstance(s, GuidedVelocity) and s.forward_m_s < 0.0]
+    assert backwards
+    assert drive.tally.stuck >= 1
+    assert isinstance(setpoints[20], GuidedPosition)
+    assert drive.evidence.penalty.max() > 0.0
+
+
+def test_the_thread_gives_the_same_decision() -> None:
+    inline = driver(InlineRunner(), at(0.0))
+    inline.head_for(target(30.5, 20.5), at(0.0))
+    _, wanted = inline.update(at(0.05), 0.0)
+    runner = ThreadRunner()
+    try:
+        threaded = driver(runner, at(0.0))
+        threaded.head_for(target(30.5, 20.5), at(0.0))
+        decision = None
+        for _ in range(3000):
+            decision = threaded.update(at(0.05), 0.0)[1]
+            if decision is not None:
+                break
+            Event().wait(0.01)
+        assert decision is not None
+        assert wanted is not None
+        assert decision.path == wanted.path
+    finally:
+        runner.close()
+
+
+def test_a_rover_faster_than_it_may_be_is_braked() -> None:
+    one = driver(InlineRunner(), at(0.0))
+    one.head_for(target(32.5, 20.5), at(0.0))
+    assert one.update(at(0.0), 0.0)[0].motion is Motion.DRIVE
+    assert one.update(at(0.1), 2.2)[0].motion is Motion.DRIVE
+    surging, _ = one.update(at(0.2), 2.4)
+    assert (surging.motion, surging.setpoint) == (Motion.BRAKE, GuidedVelocity(0.0, 0.0))
+    assert one.update(at(0.3), 2.2)[0].motion is Motion.DRIVE

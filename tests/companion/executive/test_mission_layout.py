@@ -1,0 +1,58 @@
+"""The mission where the autopilot's frame lies, and where it lies after the frame has moved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
+from companion.executive.mission_layout import apart_m, from_home, lay, lay_again
+from companion.executive.mission_progress import Leg, on_reached, on_time
+from companion.mission.mission import Mission
+from companion.settings import MappingSettings
+from tests.support.rig import yard
+
+ORIGIN = GeoPoint(-35.3632621, 149.1652374)
+HOME = LocalFrame(ORIGIN).to_geo(NedPoint(3.0, -4.0))
+POSE = Pose(3.2, -3.8, 0.0, 0.0)
+TWO = '[[target]]\nname = "a"\nfield = [15, 7]\n[[target]]\nname = "b"\nnorth_m = 2.0\neast_m = 5.0\n'
+
+
+@pytest.fixture
+def mission(tmp_path: Path) -> Mission:
+    return yard(tmp_path, TWO)
+
+
+def test_fields_and_metres_count_from_home(mission: Mission) -> None:
+    laid = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
+    first, second = laid.itinerary.targets
+    assert first.point.distance_m(NedPoint(3.0, 9.0)) < 1e-3
+    assert second.point.distance_m(NedPoint(5.0, 1.0)) < 1e-3
+    assert laid.itinerary.home.point == POSE.point
+    assert laid.evidence.base.cell_at(POSE.point) == laid.itinerary.home.cell
+    saved = from_home(laid)
+    assert saved.south_west.north_m == pytest.approx(-7.5, abs=1e-3)
+    assert saved.south_west.east_m == pytest.approx(-2.5, abs=1e-3)
+
+
+def test_laid_again_everything_is_where_it_was_on_earth_and_progress_is_kept(mission: Mission) -> None:
+    laid = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
+    itinerary = on_time(on_reached(laid.itinerary, 5.0), 5.0)
+    moved = LocalFrame(ORIGIN).to_geo(NedPoint(-120.0, 75.0))
+    again = lay_again(laid, itinerary, mission, MappingSettings(), moved)
+    before, after = LocalFrame(ORIGIN), LocalFrame(moved)
+    for old, new in zip(
+        (*itinerary.targets, itinerary.home), (*again.itinerary.targets, again.itinerary.home), strict=True
+    ):
+        assert apart_m(before.to_geo(old.point), after.to_geo(new.point)) < 0.01
+        assert (old.name, old.cell) == (new.name, new.cell)
+    assert (again.itinerary.statuses, again.itinerary.index) == (itinerary.statuses, 1)
+    assert again.itinerary.leg is Leg.TRAVEL
+    assert again.home == HOME and again.origin == moved
+    assert not again.evidence.log_odds.any()
+
+
+def test_distance_between_places() -> None:
+    assert apart_m(ORIGIN, ORIGIN) == 0.0
+    assert apart_m(ORIGIN, HOME) == pytest.approx(5.0, abs=1e-3)

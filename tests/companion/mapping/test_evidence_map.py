@@ -1,0 +1,355 @@
+"""From ranges to weights: posts with exact ray casting around a rover that looks at them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from companion.core.frames import NedPoint, Pose
+from companion.core.grid import BASE_WEIGHT, Cell, Grid, empty_grid
+from companion.core.scan import RangeScan
+from companion.mapping.evidence_map import (
+    EvidenceMap,
+    clearance_m,
+    doubt,
+    forget,
+    integrate,
+    known_fields,
+    look_along,
+    new_map,
+    penalise,
+)
+from companion.mapping.sensor_agreement import BELIEVED_S
+from companion.settings import MappingSettings
+
+SETTINGS = MappingSettings()
+RADIUS_M = 0.35
+MAX_M = 8.0
+FULL_CIRCLE = np.radians(np.arange(0.0, 360.0, 5.0))
+WIDTH_RAD = math.radians(5.0)
+
+Post = tuple[float, float, float]
+"""A round post: north, east, radius; metres."""
+
+
+def ranges(pose: Pose, posts: list[Post], bearing_rad: np.ndarray) -> np.ndarray:
+    """Exact ranges to the nearest post along each bearing; inf beyond the sensor's reach."""
+    result = np.full(len(bearing_rad), np.inf)
+    angle = pose.heading_rad + bearing_rad
+    for north_m, east_m, radius_m in posts:
+        dn, de = north_m - pose.north_m, east_m - pose.east_m
+        along = dn * np.cos(angle) + de * np.sin(angle)
+        off = radius_m**2 - (dn**2 + de**2 - along**2)
+        hit = np.where((off >= 0.0) & (along > 0.0), along - np.sqrt(np.maximum(off, 0.0)), np.inf)
+        result = np.minimum(result, hit)
+    return np.where(result < MAX_M, result, np.inf)
+
+
+def scan(range_m: np.ndarray, bearing_rad: np.ndarray = FULL_CIRCLE, width_rad: float = WIDTH_RAD) -> RangeScan:
+    return RangeScan(0.0, bearing_rad, np.asarray(range_m, np.float64), 0.1, MAX_M, width_rad, "test")
+
+
+def sectors(pose: Pose, posts: list[Post]) -> RangeScan:
+    """72 sectors of 5 degrees, each the nearest of nine rays, as a scanning lidar gives them."""
+    spread = (np.arange(9) / 8.0 - 0.5) * WIDTH_RAD
+    rays = ranges(pose, posts, (FULL_CIRCLE[:, None] + spread[None, :]).ravel())
+    return scan(rays.reshape(len(FULL_CIRCLE), 9).min(axis=1))
+
+
+class Ground:
+    """A map, and a rover that looks round on it."""
+
+    def __init__(self, base: Grid | None = None, radius_m: float = RADIUS_M) -> None:
+        self.map: EvidenceMap = new_map(empty_grid(30, 20) if base is None else base, radius_m, SETTINGS)
+        self.stamp = 0
+
+    def take(self, pose: Pose, reading: RangeScan, times: int = 1) -> None:
+        for _ in range(times):
+            self.stamp += 1
+            integrate(self.map, pose, reading, self.stamp)
+
+    def look_round(self, pose: Pose, posts: list[Post], times: int = 1) -> None:
+        self.take(pose, sectors(pose, posts), times)
+
+    def obstacles(self) -> set[tuple[int, int]]:
+        return {(int(x), int(y)) for y, x in np.argwhere(self.map.grid.weights >= 1.0)}
+
+
+HERE = Pose(10.5, 10.5, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("often", [1, 40])
+def test_a_sensor_that_sees_nothing_does_not_outvote_one_that_sees_something(often):
+    """At ten scans a second of the one and any number of another; when the one falls silent, the other is believed."""
+    ground, ahead = Ground(), np.zeros(1)
+    nothing = replace(scan(np.array([np.inf]), ahead), sender=158)
+    ground.take(HERE, nothing, times=often)
+    for i in range(30):
+        ground.take(HERE, replace(scan(np.array([4.0]), ahead), time_s=0.1 * i))
+        ground.take(HERE, replace(nothing, time_s=0.1 * i + 0.05), times=often)
+        assert i < 5 or (10, 14) in ground.obstacles()
+    ground.take(HERE, replace(nothing, time_s=2.9 + BELIEVED_S + 0.01), times=40)
+    assert (10, 14) not in ground.obstacles()
+
+
+def test_a_sensor_frees_at_once_where_it_saw_something_itself():
+    ground, ahead = Ground(), np.zeros(1)
+    ground.take(HERE, scan(np.array([4.0]), ahead), times=3)
+    ground.take(HERE, scan(np.array([np.inf]), ahead), times=12)
+    assert (10, 14) not in ground.obstacles()
+
+
+def test_what_a_moved_map_forgets_it_does_not_keep_from_being_freed():
+    ground, ahead = Ground(), np.zeros(1)
+    ground.take(HERE, scan(np.array([4.0]), ahead), times=3)
+    forget(ground.map)
+    ground.take(HERE, replace(scan(np.array([np.inf]), ahead), sender=158))
+    assert known_fields(ground.map)[11:18, 10].all() and not (ground.map.log_odds > 0.0).any()
+
+
+def test_what_is_seen_beyond_the_map_is_nobodys_cell():
+    ground, round_about = Ground(empty_grid(3, 3)), np.radians([0.0, 90.0, 180.0, 270.0])
+    for sender in (1, 158):
+        ground.take(Pose(1.5, 1.5, 0.3, 0.0), replace(scan(np.full(4, 5.0), round_about), sender=sender))
+    assert known_fields(ground.map).any() and not (ground.map.log_odds > 0.0).any()
+
+
+@pytest.mark.parametrize("heading_deg", [0.0, 45.0, 90.0, 180.0, -135.0])
+@pytest.mark.parametrize("bearing_deg", [0.0, 90.0, -40.0])
+@pytest.mark.parametrize("corner", [NedPoint(0.0, 0.0), NedPoint(-200.0, 300.0), NedPoint(-10.25, -10.75)])
+def test_a_reading_hardens_the_field_it_ends_in(heading_deg, bearing_deg, corner):
+    ground = Ground(empty_grid(21, 21, 1.0, corner))
+    pose = Pose(corner.north_m + 10.5, corner.east_m + 10.5, math.radians(heading_deg), 0.0)
+    bearing = np.radians([bearing_deg])
+    ground.take(pose, scan(np.array([5.0]), bearing), times=3)
+    end = pose.point.moved(pose.heading_rad + bearing[0], 5.0 + SETTINGS.hit_depth_m)
+    field = ground.map.base.cell_at(end)
+    assert ground.map.grid.is_obstacle(field)
+    for x, y in ground.obstacles():
+        assert abs(x - field.x) <= 1 and abs(y - field.y) <= 1, "only it and what the rover's radius adds"
+
+
+def test_readings_free_the_ground_they_passed_and_unknown_ground_keeps_its_weight():
+    ground = Ground()
+    ground.take(HERE, scan(np.array([4.0]), np.zeros(1)), times=2)
+    known = known_fields(ground.map)
+    assert known[11:14, 10].all() and not known[17:, :].any() and not known[:, 15:].any()
+    assert (ground.map.grid.weights[~known & (ground.map.grid.weights < 1.0)] >= BASE_WEIGHT).all()
+    assert not {(10, 11), (10, 12)} & ground.obstacles()
+
+
+def test_nothing_seen_frees_up_to_the_sensors_reach_and_nan_says_nothing():
+    ground = Ground()
+    ground.take(HERE, scan(np.array([np.inf, np.nan]), np.array([0.0, math.pi / 2])))
+    known = known_fields(ground.map)
+    assert known[11:18, 10].all() and not known[19, 10]
+    assert not known[10, 13:].any()
+    assert not ground.obstacles()
+
+
+def test_the_map_without_evidence_is_the_mission_s():
+    base = empty_grid(6, 6)
+    base.weights[2, 3], base.weights[4, 0] = 1.0, 0.1
+    ground = Ground(base)
+    assert ground.obstacles() == {(3, 2)} and not known_fields(ground.map).any()
+    assert base.weights[2, 3] == 1.0 and base.weights.sum() == pytest.approx(34 * 0.5 + 1.1), "the base is only read"
+
+
+def test_obstacles_that_disappear_are_forgotten():
+    ground = Ground()
+    post = (15.5, 10.5, 0.3)
+    ground.look_round(HERE, [post], times=200)
+    assert (10, 15) in ground.obstacles()
+    looks = 0
+    while ground.obstacles() and looks < 50:
+        ground.look_round(HERE, [])
+        looks += 1
+    assert 3 <= looks <= 20, "after a second or two, not after the first miss"
+
+
+def test_obstacles_that_appear_on_ground_long_seen_free_are_seen_at_once():
+    ground = Ground()
+    ground.look_round(HERE, [], times=200)
+    ground.look_round(HERE, [(13.5, 10.5, 0.3)], times=4)
+    assert (10, 13) in ground.obstacles()
+
+
+def test_what_the_mission_closed_is_never_forgotten():
+    base = empty_grid(30, 20)
+    base.weights[13, 8:13] = 1.0
+    ground = Ground(base)
+    ground.look_round(HERE, [], times=100)
+    forget(ground.map)
+    doubt(ground.map, HERE.point, 10.0)
+    assert {(x, 13) for x in range(8, 13)} <= ground.obstacles()
+
+
+@pytest.mark.parametrize("radius_m", [0.02, 0.05])
+@pytest.mark.parametrize("distance_m", [3.0, 5.0])
+def test_a_thin_post_is_not_outvoted_by_the_free_ground_round_it(radius_m, distance_m):
+    """It stands in one of many beams that pass; seen from many places it must stay, in every one of them."""
+    ground = Ground()
+    post = (10.5 + distance_m, 10.5, radius_m)
+    lost = 0
+    for i in range(120):
+        pose = Pose(10.5, 10.5 + 0.5 * math.sin(i / 7.0), 0.02 * i, 0.0)
+        ground.look_round(pose, [post])
+        if i > 5:
+            lost += (10, int(post[0])) not in ground.obstacles()
+    assert lost == 0
+
+
+def test_random_readings_leave_no_ghosts():
+    """One reading in fifty is wrong and too short, and all are noisy by 3 cm, for a minute while the rover drives."""
+    rng = np.random.default_rng(7)
+    posts = [(5.5, 4.5, 0.4), (14.5, 9.5, 0.4), (6.5, 15.5, 0.4), (13.5, 20.5, 0.4), (8.5, 25.5, 0.4)]
+    ground = Ground()
+    ghosts = []
+    for i in range(600):
+        pose = Pose(10.0 + math.sin(i / 90.0), 4.0 + i / 30.0, math.pi / 2, 0.0)
+        reading = sectors(pose, posts).range_m + rng.normal(0.0, 0.03, len(FULL_CIRCLE))
+        wrong = rng.random(len(reading)) < 0.02
+        reading[wrong] = rng.uniform(0.2, MAX_M, wrong.sum())
+        ground.take(pose, scan(reading))
+        ghosts.append(len([c for c in ground.obstacles() if not near_a_post(c, posts)]))
+    # 600 scans have some 860 wrong readings, and the map some 500 fields in sight.
+    assert np.mean(ghosts) < 3.0, "few at any moment"
+    for _ in range(25):
+        ground.look_round(pose, posts)
+    in_sight = [c for c in ground.obstacles() if not near_a_post(c, posts) and abs(c[0] - pose.east_m) < 5]
+    assert not in_sight, "and none that lasts"
+
+
+def near_a_post(field: tuple[int, int], posts: list[Post]) -> bool:
+    """Whether rover and post could touch, or the field is beside one that they could touch in."""
+    return any(math.hypot(field[1] + 0.5 - n, field[0] + 0.5 - e) < r + RADIUS_M + 0.8 for n, e, r in posts)
+
+
+@pytest.mark.parametrize("wide_sectors", [False, True])
+def test_noise_does_not_fill_the_free_side_of_a_wall(wide_sectors):
+    """A wall 10 cm behind a field's edge, 300 scans with 3 cm of noise: the fields before it stay free.
+
+    A sector of 5 degrees gives the nearest of what it sees, so aslant a wall seems nearer, but not by a whole field.
+    """
+    rng = np.random.default_rng(3)
+    wall = [(14.1 + 0.5, 6.5 + 0.1 * i, 0.5) for i in range(81)]
+    ground = Ground(radius_m=0.3)
+    truth = sectors(HERE, wall).range_m if wide_sectors else ranges(HERE, wall, FULL_CIRCLE)
+    for _ in range(300):
+        ground.take(HERE, scan(truth + rng.normal(0.0, 0.03, len(truth))))
+    assert {(8, 14), (10, 14), (12, 14)} <= ground.obstacles()
+    assert {y for _, y in ground.obstacles()} <= ({13, 14} if wide_sectors else {14})
+    free_side = look_along(ground.map, HERE.point, NedPoint(14.5, 10.5), 0.0).clear_m
+    assert free_side > 14.1 - HERE.north_m - 0.3
+
+
+def test_the_field_under_the_rover_is_free():
+    ground = Ground()
+    ground.take(HERE, scan(np.full(len(FULL_CIRCLE), 0.15)), times=20)
+    assert (10, 10) not in ground.obstacles(), "readings of its own body"
+    ground.look_round(Pose(10.5, 14.5, 0.0, 0.0), [(10.5, 10.4, 0.1)], times=20)
+    assert (10, 10) in ground.obstacles()
+    ground.take(HERE, scan(np.full(len(FULL_CIRCLE), np.inf)))
+    assert (10, 10) not in ground.obstacles(), "where it stands nothing else can stand"
+
+
+@pytest.mark.parametrize(("radius_m", "closed"), [(0.3, False), (0.9, True)])
+def test_fields_too_narrow_for_the_rover_are_closed(radius_m, closed):
+    """A post 0.15 m behind the edge of the next field: a small rover fits into the middle of the field before it."""
+    ground = Ground(radius_m=radius_m)
+    ground.look_round(HERE, [(14.2, 10.5, 0.05)], times=10)
+    assert (10, 14) in ground.obstacles()
+    assert ((10, 13) in ground.obstacles()) is closed
+
+
+def test_ground_beside_obstacles_costs_more_and_less_so_with_distance():
+    ground = Ground()
+    ground.look_round(HERE, [(15.5, 10.5, 0.4)], times=10)
+    beside, next_to_it, far = (ground.map.grid.weights[y, 10] for y in (14, 13, 11))
+    assert 1.0 > beside > next_to_it > far == BASE_WEIGHT
+
+
+def test_penalties_add_up_to_an_obstacle_and_can_be_forgotten():
+    ground = Ground()
+    field = Cell(12, 12)
+    penalise(ground.map, field, 0.2)
+    assert ground.map.grid.weights[12, 12] == pytest.approx(0.7)
+    penalise(ground.map, field, 0.4)
+    assert ground.map.grid.is_obstacle(field)
+    penalise(ground.map, Cell(-1, 99), 1.0)
+    forget(ground.map)
+    assert (ground.map.grid.weights == BASE_WEIGHT).all() and not known_fields(ground.map).any()
+
+
+def test_doubt_forgets_weak_evidence_anywhere_and_strong_evidence_nearby():
+    far, near, weak = (17.5, 10.5, 0.3), (10.5, 12.5, 0.3), (10.5, 4.5, 0.3)
+    ground = Ground()
+    ground.look_round(HERE, [far, near], times=30)
+    ground.look_round(HERE, [far, near, weak], times=3)
+    assert {(10, 17), (12, 10), (4, 10)} <= ground.obstacles()
+    assert doubt(ground.map, HERE.point, 3.0)
+    assert (10, 17) in ground.obstacles() and not {(12, 10), (4, 10)} & ground.obstacles()
+    forget(ground.map)
+    assert not doubt(ground.map, HERE.point, 3.0), "nothing left to doubt"
+
+
+# --- along a line ----------------------------------------------------------------------------------------------------
+
+
+def test_look_along_ends_before_the_obstacle_and_where_nothing_has_been_seen():
+    ground = Ground()
+    ground.look_round(HERE, [(15.5, 10.5, 0.4)], times=10)
+    line = look_along(ground.map, HERE.point, NedPoint(19.5, 10.5), RADIUS_M)
+    assert 15.1 - 10.5 - RADIUS_M - 0.4 < line.clear_m <= 15.1 - 10.5 - RADIUS_M + 0.05
+    free = look_along(ground.map, HERE.point, NedPoint(10.5, 17.5), RADIUS_M)
+    assert free.clear_m == pytest.approx(7.0) and free.seen_m == pytest.approx(7.0)
+    beyond = look_along(ground.map, HERE.point, NedPoint(10.5, 29.0), RADIUS_M)
+    assert MAX_M - 0.6 < beyond.seen_m < MAX_M + 0.3
+
+
+def test_look_along_counts_what_stands_beside_the_line():
+    ground = Ground()
+    ground.look_round(HERE, [(14.5, 11.4, 0.2)], times=10)
+    ahead = NedPoint(18.0, 10.5)
+    assert look_along(ground.map, HERE.point, ahead, 0.3).clear_m == pytest.approx(7.5)
+    assert look_along(ground.map, HERE.point, ahead, 1.0).clear_m < 4.0
+
+
+def test_look_along_respects_fences_and_penalties():
+    base = empty_grid(30, 20)
+    base.weights[14, 10] = 1.0
+    ground = Ground(base)
+    penalise(ground.map, Cell(14, 10), 1.0)
+    assert look_along(ground.map, HERE.point, NedPoint(18.5, 10.5), 0.3).clear_m == pytest.approx(3.5, abs=0.3)
+    assert look_along(ground.map, HERE.point, NedPoint(10.5, 18.5), 0.3).clear_m == pytest.approx(3.5, abs=0.3)
+
+
+def test_look_along_never_leaves_the_grid():
+    ground = Ground()
+    ground.look_round(HERE, [], times=3)
+    assert look_along(ground.map, HERE.point, NedPoint(10.5, -5.0), 0.3).clear_m <= 10.5
+    assert look_along(ground.map, HERE.point, HERE.point, 0.3).clear_m == 0.0
+
+
+def test_a_rover_close_to_a_wall_can_leave_it():
+    ground = Ground()
+    wall = [(10.9, 5.5 + 0.1 * i, 0.05) for i in range(101)]
+    ground.look_round(Pose(9.0, 10.5, 0.0, 0.0), wall, times=20)
+    beside = NedPoint(10.9 - 0.05 - RADIUS_M, 10.5)
+    assert look_along(ground.map, beside, NedPoint(6.5, 10.5), 0.6).clear_m == pytest.approx(beside.north_m - 6.5)
+    assert look_along(ground.map, beside, NedPoint(12.5, 10.5), 0.3).clear_m < 0.3
+
+
+def test_clearance_is_the_distance_to_the_nearest_obstacle():
+    ground = Ground()
+    ground.look_round(HERE, [(13.5, 10.5, 0.25)], times=10)
+    assert clearance_m(ground.map, HERE.point, 6.0) == pytest.approx(2.75, abs=0.3)
+    assert clearance_m(ground.map, HERE.point, 1.5) == pytest.approx(1.5)
+
+
+def test_very_large_maps_get_a_coarser_raster():
+    assert new_map(empty_grid(3000, 1500), RADIUS_M, SETTINGS).evidence_m > SETTINGS.evidence_m
+    assert new_map(empty_grid(100, 50), RADIUS_M, SETTINGS).evidence_m == SETTINGS.evidence_m

@@ -1,0 +1,99 @@
+"""What the sensors see moving, what they do not, and how long its trail stays in the map."""
+
+import numpy as np
+import pytest
+
+from companion.core.frames import NedPoint, Pose
+from companion.core.grid import empty_grid
+from companion.core.scan import RangeScan
+from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
+from companion.perception.moving_obstacles import Moving
+from companion.perception.object_tracker import Tracker
+from companion.settings import Settings
+from sitl.sensors.range_sensors import SUITES
+from sitl.world.movers import Mover, timed_track
+from sitl.world.world import World
+
+SETTINGS = Settings()
+PERIOD_S = 0.1
+
+
+class Watcher:
+    """A rover that stands (or drives north) and looks about, with the simulator's own rays and 2 cm of noise."""
+
+    def __init__(self, world: World, suite: str, seed: int, speed_m_s: float = 0.0) -> None:
+        lidar = SUITES[suite].lidar
+        assert lidar is not None
+        self.world, self.lidar, self.speed_m_s = world, lidar, speed_m_s
+        self.evidence: EvidenceMap = new_map(empty_grid(40, 40), 0.35, SETTINGS.mapping)
+        self.tracker = Tracker(self.evidence, SETTINGS.traffic)
+        self.chance = np.random.default_rng(seed)
+        self.scans = 0
+
+    def look(self) -> tuple[Moving, ...]:
+        time_s = self.scans * PERIOD_S
+        self.scans += 1
+        pose = Pose(10.0 + self.speed_m_s * time_s, 20.0, 0.0, time_s)
+        lidar = self.lidar
+        true_m = self.world.rays_m(pose.north_m, pose.east_m, lidar.bearings_rad(), lidar.max_m, time_s)
+        range_m = np.where(true_m >= lidar.max_m, np.inf, true_m + self.chance.normal(0.0, 0.02, true_m.shape))
+        bearings = np.radians(np.arange(72) * lidar.increment_deg + lidar.offset_deg)
+        scan = RangeScan(time_s, bearings, range_m, 0.1, lidar.max_m, np.radians(lidar.increment_deg), "test")
+        self.tracker.take(pose, 0.0, scan)
+        integrate(self.evidence, pose, scan, self.scans)
+        self.tracker.remember(pose, lidar.max_m)
+        return self.tracker.moving(time_s)
+
+
+def ground(*movers: Mover) -> World:
+    obstacles = np.zeros((40, 40), np.bool_)
+    obstacles[17:19, 10:18] = True
+    obstacles[5:14, 24] = True
+    return World(obstacles, movers=movers)
+
+
+@pytest.mark.parametrize("suite", ["lidar-90", "lidar-360"])
+@pytest.mark.parametrize("speed_m_s", [0.6, 1.2])
+def test_what_crosses_is_seen_moving(suite: str, speed_m_s: float) -> None:
+    errors = []
+    for seed in range(6):
+        track = timed_track(
+            [(13.0, 28.0 if suite == "lidar-360" else 23.9), (13.0, 10.0)], speed_m_s, 1.0, repeats=False
+        )
+        watcher = Watcher(ground(Mover("m", 0.5, track)), suite, seed)
+        watcher.world.obstacles[5:14, 24] = False
+        for _ in range(10 + round(6.5 / speed_m_s / PERIOD_S)):
+            found = watcher.look()
+            time_s = (watcher.scans - 1) * PERIOD_S
+            errors += [
+                (abs(one.east_m_s + speed_m_s), abs(one.north_m_s), one.at(time_s).distance_m(NedPoint(*there)))
+                for one in found
+                for there in [watcher.world.mover_at(0, time_s)[:2]]
+            ]
+    assert len(errors) > 60
+    along, across, place = np.percentile(np.array(errors), 80, axis=0)
+    assert along < 0.4 and across < 0.4 and place < 0.7
+
+
+@pytest.mark.parametrize("suite", ["lidar-90", "lidar-360"])
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.8])
+def test_what_stands_is_never_taken_for_something_that_moves(suite: str, speed_m_s: float) -> None:
+    for seed in range(5):
+        watcher = Watcher(ground(), suite, seed, speed_m_s)
+        assert sum(len(watcher.look()) for _ in range(80)) == 0
+
+
+def test_the_trail_of_something_that_moves_is_soon_free_again() -> None:
+    track = timed_track([(13.0, 12.0), (13.0, 40.0)], 1.0, 1.0, repeats=False)
+    watcher = Watcher(World(np.zeros((40, 40), np.bool_), movers=(Mover("m", 0.5, track),)), "lidar-360", 3)
+    blocked_s: dict[tuple[int, int], float] = {}
+    for _ in range(170):
+        watcher.look()
+        time_s = (watcher.scans - 1) * PERIOD_S
+        there = watcher.world.mover_at(0, time_s)[:2]
+        for y, x in np.argwhere(watcher.evidence.grid.weights[8:18, 14:27] >= 1.0):
+            # Fields that the disc, the rover's radius added, left more than a field ago.
+            if there[1] - (x + 14.5) > 0.5 + 0.35 + 1.0:
+                blocked_s[y, x] = blocked_s.get((y, x), 0.0) + PERIOD_S
+    assert max(blocked_s.values(), default=0.0) < 2.0
+    assert not (watcher.evidence.grid.weights[8:18, 14:24] >= 1.0).any()

@@ -1,0 +1,109 @@
+"""Thresholds of the battery: which reading counts, for how long it must last, and that a level never goes back."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.safety.battery_monitor import STALE_S, Level, Power, PowerState, judged, with_battery
+from companion.settings import PowerSettings
+from companion.vehicle.events.plan import BatterySeen
+
+SETTINGS = PowerSettings(return_percent=20.0, hold_percent=10.0, return_volts=11.0, hold_volts=10.0, after_s=5.0)
+
+
+def fed(readings: list[tuple[float, int | None, float | None]], settings: PowerSettings = SETTINGS) -> PowerState:
+    """Time, per cent, volts of one battery; judged at each."""
+    state = PowerState()
+    for time_s, percent, volts in readings:
+        state = judged(with_battery(state, BatterySeen(time_s, 0, volts, percent)), time_s, settings)
+    return state
+
+
+def steady(
+    percent: int | None, volts: float | None, seconds: float = 6.0
+) -> list[tuple[float, int | None, float | None]]:
+    return [(0.5 * i, percent, volts) for i in range(int(2.0 * seconds) + 1)]
+
+
+@pytest.mark.parametrize(
+    ("percent", "volts", "level", "reason"),
+    [
+        (20, 11.0, Level.FINE, ""),
+        (19, 12.0, Level.RETURN, "battery at 19 %"),
+        (50, 10.9, Level.RETURN, "battery at 10.9 V"),
+        (10, 12.0, Level.RETURN, "battery at 10 %"),
+        (9, 12.0, Level.HOLD, "battery at 9 %"),
+        (None, 9.9, Level.HOLD, "battery at 9.9 V"),
+        (0, 12.0, Level.HOLD, "battery at 0 %"),
+        (None, None, Level.FINE, ""),
+    ],
+)
+def test_levels(percent: int | None, volts: float | None, level: Level, reason: str) -> None:
+    state = fed(steady(percent, volts))
+    assert (state.level, state.reason) == (level, reason)
+
+
+def test_it_takes_a_while_without_a_break() -> None:
+    assert fed(steady(15, 12.0, 4.5)).level is Level.FINE
+    assert fed(steady(15, 12.0, 5.0)).level is Level.RETURN
+    broken = [(t, 15 if t != 3.0 else 25, v) for t, _, v in steady(15, 12.0, 7.0)]
+    assert fed(broken).level is Level.FINE
+
+
+def test_a_level_never_goes_back_but_a_rover_that_has_not_begun_may() -> None:
+    power = Power(SETTINGS)
+    for i in range(12):
+        power.take_in(BatterySeen(0.5 * i, 0, 12.0, 15))
+        power.level(0.5 * i)
+    power.take_in(BatterySeen(7.0, 0, 12.6, 100))
+    assert power.level(7.0) is Level.RETURN and power.reason == "battery at 15 %"
+    assert power.hindrance(7.0) == ""
+
+
+def test_a_reading_that_has_grown_old_says_nothing() -> None:
+    state = fed(steady(15, 12.0, 4.0))
+    assert judged(state, 4.0 + STALE_S + 0.1, SETTINGS).level is Level.FINE
+
+
+def test_the_short_form_counts_only_where_there_is_no_other() -> None:
+    state = with_battery(PowerState(), BatterySeen(0.0, -1, 12.0, 5))
+    for time_s in (0.0, 5.0):
+        alone = judged(state if time_s == 0.0 else judged(state, 0.0, SETTINGS), time_s, SETTINGS)
+    assert alone.level is Level.HOLD
+    both = with_battery(state, BatterySeen(0.0, 0, 12.0, 80))
+    assert judged(judged(both, 0.0, SETTINGS), 6.0, SETTINGS).level is Level.FINE
+
+
+def test_any_of_several_batteries_counts_and_is_named() -> None:
+    state = with_battery(with_battery(PowerState(), BatterySeen(0.0, 0, 12.0, 80)), BatterySeen(0.0, 1, 12.0, 12))
+    state = judged(judged(state, 0.0, SETTINGS), 5.0, SETTINGS)
+    assert (state.level, state.reason) == (Level.RETURN, "battery 2 at 12 %")
+
+
+@pytest.mark.parametrize(
+    ("charge_state", "level"),
+    [(0, Level.FINE), (1, Level.FINE), (2, Level.RETURN), (3, Level.HOLD), (5, Level.HOLD), (6, Level.FINE)],
+)
+def test_the_autopilots_own_failsafe_counts_unless_switched_off(charge_state: int, level: Level) -> None:
+    for heed in (True, False):
+        settings = SETTINGS.model_copy(update={"heed_autopilot": heed})
+        state = with_battery(PowerState(), BatterySeen(0.0, 0, 12.0, 80, charge_state))
+        state = judged(judged(state, 0.0, settings), 5.0, settings)
+        assert state.level is (level if heed else Level.FINE)
+
+
+def test_zero_switches_a_threshold_off() -> None:
+    off = PowerSettings(return_percent=0.0, hold_percent=0.0)
+    assert fed(steady(0, 0.5), off).level is Level.FINE
+
+
+@given(st.lists(st.tuples(st.none() | st.integers(0, 100), st.none() | st.floats(0.1, 60.0)), max_size=60))
+def test_whatever_comes_the_level_only_rises_and_has_a_reason(readings: list[tuple[int | None, float | None]]) -> None:
+    state = PowerState()
+    for i, (percent, volts) in enumerate(readings):
+        before = state.level
+        state = judged(with_battery(state, BatterySeen(float(i), 0, volts, percent)), float(i), SETTINGS)
+        assert state.level >= before
+        assert bool(state.reason) == (state.level > Level.FINE)

@@ -1,0 +1,128 @@
+"""A range sensor that repeats itself is noticed, and what merely looks so is not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from companion.core.scan import RangeScan
+from companion.perception.scan_watch import STUCK_M, STUCK_S, ScanWatch
+from companion.vehicle.events.vehicle import AttitudeSeen, LocalPositionSeen
+from companion.vehicle.state import VehicleState
+from tests.support.shared_data import SHARED, needs_shared
+
+VIEW_RAD = np.radians(np.arange(-45.0, 45.0, 1.25))
+MOTION = {"standing": (0.0, 0.0), "driving": (1.0, 0.0), "turning": (0.0, 0.5)}
+
+
+def scan(time_s: float, range_m: list[float], bearing_rad: list[float] | None = None, name: str = "lidar") -> RangeScan:
+    bearings = VIEW_RAD[: len(range_m)] if bearing_rad is None else np.array(bearing_rad)
+    return RangeScan(time_s, bearings, np.array(range_m), 0.1, 8.0, math.radians(1.25), name)
+
+
+def vehicle(time_s: float, speed_m_s: float, rate_rad_s: float) -> VehicleState:
+    return VehicleState(
+        position=LocalPositionSeen(time_s, time_s, 0.0, 0.0, speed_m_s, 0.0),
+        attitude=AttitudeSeen(time_s, time_s, 0.0, rate_rad_s),
+    )
+
+
+def noticed_s(readings: list[float], motion: str, bearing_rad: list[float] | None = None, name: str = "lidar") -> float:
+    """When the same readings are noticed, sent ten times a second for 5 s; inf: never."""
+    watch = ScanWatch()
+    for i in range(50):
+        watch.take(scan(0.1 * i, readings, bearing_rad, name), vehicle(0.1 * i, *MOTION[motion]))
+        if watch.reason:
+            return 0.1 * i
+    return math.inf
+
+
+MANY = [1.0 + 0.01 * i for i in range(72)]
+NOTHING = [math.inf] * 72
+WALL = [math.inf] * 70 + [7.1, 6.9]
+
+
+@pytest.mark.parametrize(
+    ("readings", "bearing_rad", "motion", "limit_s"),
+    [
+        (MANY, None, "driving", STUCK_S + 0.1),
+        (MANY, None, "turning", STUCK_S + 0.1),
+        (MANY, None, "standing", math.inf),
+        (NOTHING, None, "driving", math.inf),
+        (NOTHING, None, "turning", math.inf),
+        (WALL, None, "driving", 1.2),
+        ([0.3 + 0.001 * i for i in range(72)], None, "driving", math.inf),  # a mast in the way
+        ([math.nan] * 30 + MANY[:42], None, "driving", STUCK_S + 0.1),
+        ([3.0], [0.0], "driving", STUCK_S + 0.1),  # one thin beam, straight ahead
+        ([3.0], [math.pi], "driving", STUCK_S + 0.1),
+        ([3.0], [math.radians(45.0)], "driving", math.inf),  # beside a wall
+        ([3.0], [math.radians(45.0)], "turning", STUCK_S + 0.1),
+        ([math.inf], [0.0], "driving", math.inf),
+        ([3.0] * 40, None, "driving", math.inf),  # a wide sonar, or a proximity sector
+    ],
+)
+def test_the_same_readings_are_noticed_when_they_would_have_to_change(readings, bearing_rad, motion, limit_s):
+    found_s = noticed_s(readings, motion, bearing_rad)
+    assert found_s <= limit_s and math.isfinite(found_s) == math.isfinite(limit_s)
+    assert found_s >= STUCK_S
+
+
+def test_the_nearest_of_all_sensors_may_look_at_a_wall_all_day():
+    assert noticed_s([3.0], "driving", [0.0], "rangefinder") == math.inf
+
+
+def test_a_sensor_that_measures_three_times_a_second_and_is_sent_thirty_times_is_no_fault():
+    watch, fits = ScanWatch(), 0
+    for i in range(300):
+        measured = [one + 0.02 * (i // 10) for one in MANY]
+        fits += watch.take(scan(i / 30.0, measured), vehicle(i / 30.0, *MOTION["driving"]))
+        assert not watch.reason
+    assert 30 <= fits <= 90, "what is repeated while the rover drives is not put on the map again"
+
+
+def test_it_is_believed_again_when_it_says_something_else_and_another_sensor_does_not_hide_it():
+    watch = ScanWatch()
+    for i in range(20):
+        watch.take(scan(0.1 * i, MANY), vehicle(0.1 * i, *MOTION["driving"]))
+        watch.take(scan(0.1 * i, [2.0 + 0.01 * i] * 8, name="other"), vehicle(0.1 * i, *MOTION["driving"]))
+    assert watch.reason == "lidar repeats itself"
+    for i in range(20, 40):
+        assert not watch.take(scan(0.1 * i, MANY), vehicle(0.1 * i, *MOTION["standing"])), "standing heals nothing"
+    assert watch.reason
+    assert watch.take(scan(4.0, [one + 0.01 for one in MANY]), vehicle(4.0, *MOTION["standing"]))
+    assert not watch.reason
+
+
+def test_a_stuck_sensor_does_not_hide_behind_another_component_with_the_same_message():
+    watch = ScanWatch()
+    for i in range(20):
+        watch.take(scan(0.1 * i, MANY), vehicle(0.1 * i, *MOTION["driving"]))
+        another = replace(scan(0.1 * i, [2.0 + 0.01 * i] * 72), sender=158)
+        watch.take(another, vehicle(0.1 * i, *MOTION["driving"]))
+    assert watch.reason == "lidar repeats itself"
+
+
+@needs_shared
+@pytest.mark.parametrize("max_m", [2.0, 4.5, 8.0])
+def test_a_real_lidar_on_a_real_rover_raises_no_alarm(max_m: float) -> None:
+    """A Hokuyo on the MinesRover through rooms, in 72 cells of whole centimetres as OBSTACLE_DISTANCE has them."""
+    lines = (SHARED / "data/lidar/breezyslam/exp2.dat").read_text(encoding="utf-8").splitlines()
+    rows = [np.array(line.split(), float) for line in lines if line.strip()]
+    watch, before, driving = ScanWatch(), rows[0], 0
+    for row in rows[1:]:
+        elapsed_s = (row[0] - before[0]) / 1e6
+        left_m, right_m = 2.0 * math.pi * 0.077 * (row[2:4] - before[2:4]) / 2000.0
+        motion = abs(left_m + right_m) / 2.0 / elapsed_s, (right_m - left_m) / 0.33 / elapsed_s
+        cells = np.array([part[part > 50].min(initial=1e9) for part in np.array_split(row[24:706], 72)])
+        range_m = np.where(cells / 1000.0 < max_m, np.round(cells / 1000.0, 2), np.inf)
+        watch.take(
+            scan(row[0] / 1e6, range_m.tolist(), np.radians(np.linspace(-120, 120, 72)).tolist()),
+            vehicle(row[0] / 1e6, *motion),
+        )
+        assert not watch.reason
+        driving += motion[0] > 2 * STUCK_M
+        before = row
+    assert driving > 100

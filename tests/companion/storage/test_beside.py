@@ -1,0 +1,157 @@
+"""Work beside the loop: who waits for it in the end, and how long in all."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from companion.checkpoint.writer import StateFile, ThreadWriter, Update
+from companion.core.rounds import Mark
+from companion.recording.reader import load_record
+from companion.recording.recorder import MOST_WAITING_BYTES, Recorder
+from companion.settings import Settings
+from companion.storage.beside import Beside, Patience
+from companion.storage.saving import Saver
+from tests.companion.settings.test_tunable_parameters import HangingDisk
+from tests.support.rig import yard
+
+
+class Slow(threading.Thread):
+    """Ends after so long of a clock that only its ``join`` moves."""
+
+    def __init__(self, clock: HandClock, takes_s: float) -> None:
+        super().__init__()
+        self.clock, self.left_s = clock, takes_s
+
+    def join(self, timeout: float | None = None) -> None:
+        assert timeout is not None
+        waited_s = min(timeout, self.left_s)
+        self.left_s -= waited_s
+        self.clock.time_s += waited_s
+
+    def is_alive(self) -> bool:
+        return self.left_s > 0.0
+
+
+class HandClock:
+    time_s = 0.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def sleep_until_s(self, time_s: float) -> None:
+        self.time_s = time_s
+
+
+@pytest.mark.parametrize(
+    ("takes_s", "ended", "waited_s"),
+    [
+        ([0.1, 0.1], [True, True], 0.2),
+        ([0.25, 9.0, 0.1], [True, False, False], 0.5),
+        ([9.0, 9.0, 9.0, 9.0], [False, False, False, False], 0.5),
+    ],
+)
+def test_all_who_wait_for_a_disk_have_half_a_second_together(
+    takes_s: list[float], ended: list[bool], waited_s: float
+) -> None:
+    clock = HandClock()
+    patience = Patience(clock=clock)
+    assert [patience.wait(Slow(clock, each)) for each in takes_s] == ended
+    assert clock.time_s == pytest.approx(waited_s)
+
+
+def test_a_run_that_ends_by_itself_has_more_time() -> None:
+    clock = HandClock()
+    patience = Patience(clock=clock)
+    patience.extend(10.0)
+    assert patience.wait(Slow(clock, 10.2))
+    assert not patience.wait(Slow(clock, 0.4))
+
+
+class NoPatience(Patience):
+    """Counts those who would wait."""
+
+    asked = 0
+
+    def wait(self, thread: threading.Thread) -> bool:
+        self.asked += 1
+        return not thread.is_alive()
+
+
+@pytest.fixture
+def hanging() -> Iterator[HangingDisk]:
+    disk = HangingDisk()
+    yield disk
+    disk.free.set()
+
+
+def test_state_settings_and_record_wait_with_one_patience(tmp_path: Path, hanging: HangingDisk) -> None:
+    patience = NoPatience()
+    saver = Saver(hanging, patience)
+    saver.save(tmp_path / "tuned.toml", b"new")
+    writer = ThreadWriter(StateFile(tmp_path / "state", hanging), patience)
+    writer.put(Update())
+    recorder = Recorder(tmp_path / "run", None, Settings(), 0, beside=Beside("record", patience))
+    for part in (saver, writer, recorder):
+        part.close()
+    assert patience.asked == 3
+
+
+def test_a_state_that_is_not_saved_in_time_is_told(tmp_path: Path, hanging: HangingDisk) -> None:
+    file = StateFile(tmp_path / "state", hanging)
+    writer = ThreadWriter(file, Patience(0.01))
+    file.take = lambda update: hanging.sync(0)  # type: ignore[method-assign]
+    writer.put(Update())
+    assert writer.problem == ""
+    writer.close()
+    assert writer.problem == f"{tmp_path / 'state'}: the state is not saved yet: the disk does not answer"
+
+
+def test_a_disk_that_hangs_does_not_keep_the_record_from_being_closed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    free = threading.Event()
+    mission = yard(tmp_path)
+    beside = Beside("record", Patience(0.01))
+    recorder = Recorder(tmp_path / "run", mission, Settings(), 0, beside=beside)
+    monkeypatch.setattr("os.fsync", lambda handle: free.wait(30.0))
+    recorder.begin(0.0, Mark.BEGIN)
+    recorder.heard(1.0, [])
+    recorder.heard(2.0, [])
+    recorder.close()
+    assert recorder.problem == f"{tmp_path / 'run'}: the record has ended: the disk does not answer"
+    record = load_record(tmp_path / "run")
+    assert not record.whole and any("was not closed" in note for note in record.notes)
+    free.set()
+    beside.close()
+
+
+def test_a_disk_that_hangs_for_minutes_ends_the_record_before_the_memory(tmp_path: Path) -> None:
+    free = threading.Event()
+    beside = Beside("record", Patience(0.01))
+    beside.put(lambda: bool(free.wait(30.0)) and None)
+    recorder = Recorder(tmp_path / "run", None, Settings(), 0, beside=beside)
+    recorder.begin(0.0, Mark.BEGIN)
+    for second in range(1, 30):
+        recorder.said(float(second), bytes(MOST_WAITING_BYTES // 20))
+        assert (recorder.problem == "") == (second <= 20), second
+        recorder.heard(float(second), [])
+    free.set()
+    recorder.close()
+    assert (tmp_path / "run" / "link.tlog").stat().st_size <= MOST_WAITING_BYTES
+
+
+def test_with_a_thread_the_record_is_the_same(tmp_path: Path) -> None:
+    written = []
+    for name, beside in (("at-once", None), ("beside", Beside("record", Patience(30.0)))):
+        recorder = Recorder(tmp_path / name, None, Settings(), 0, start_us=0, beside=beside)
+        for tick in range(100):
+            recorder.heard(0.1 * tick, [bytes([tick])])
+            recorder.said(0.1 * tick, b"said")
+        recorder.close()
+        written.append({path.name: path.read_bytes() for path in recorder.directory.iterdir()})
+        assert recorder.problem == ""
+    assert written[0] == written[1]

@@ -1,0 +1,146 @@
+"""A pipe under the name of any file that is read or written: each command says so in one line and waits for nobody."""
+
+from __future__ import annotations
+
+import ast
+import os
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from companion.cli.commands import app as companion
+from companion.storage.disk import OsDisk, replace_file
+from sitl.cli.commands import app as sitl
+from tests.support.rig import yard
+
+NOBODY = ("--connect", "tcp:127.0.0.1:9")
+PLAN = ("--start", "0,0", "--target", "1,1")
+ROOT = Path(__file__).resolve().parents[3]
+FREE = str(ROOT / "missions" / "maps" / "one-obstacle.png")
+REASONS = ("not a file", "no grids", "no problems: a MovingAI scenario file is needed")
+"""Where any file is looked for, a pipe is none."""
+RUN = ("run", "yard.toml", *NOBODY)
+ROS = "image: {pipe}\nresolution: 1.0\norigin: [0, 0, 0]\n"
+
+COMPANION: dict[str, tuple[str, ...]] = {
+    "m.toml": ("run", "{}", *NOBODY),
+    "m.plan": ("mission", "check", "{}"),
+    "m.waypoints": ("mission", "check", "{}"),
+    "fence.plan": ("mission", "check", "fenced.toml"),
+    "prior.png": ("mission", "check", "known.toml"),
+    "s.toml": (*RUN, "--settings", "{}"),
+    "d.toml": ("doctor", *NOBODY, "--settings", "{}"),
+    "b.toml": ("bench", "--sizes", "1", "--settings", "{}"),
+    "state/tuned.toml": (*RUN, "--state", "state"),
+    "seen/tuned.toml": ("doctor", *NOBODY, "--state", "seen"),
+    "old/mission.state": (*RUN, "--state", "old", "--resume"),
+    "signed/signing-time": (*RUN, "--state", "signed", "--signing-key", "key"),
+    "key-pipe": (*RUN, "--signing-key", "{}"),
+    "record/link.tlog": (*RUN, "--record", "record"),
+    "copies/inputs/mission/yard.toml": (*RUN, "--record", "copies"),
+    "replayed/meta.json": ("replay", "replayed"),
+    "map.png": ("plan", "{}", *PLAN),
+    "map.pgm": ("plan", "{}", *PLAN),
+    "map.bmp": ("plan", "{}", *PLAN),
+    "map.map": ("plan", "{}", *PLAN),
+    "map.yaml": ("plan", "{}", *PLAN),
+    "ros.pgm": ("plan", "ros.yaml", *PLAN),
+    "plan.png": ("plan", FREE, *PLAN, "--image", "{}"),
+    "plan.toml": ("plan", FREE, *PLAN, "--settings", "{}"),
+    "bench.map": ("bench", "{}", "--sizes", ""),
+    "good.map.scen": ("bench", "good.map", "--sizes", ""),
+    "bench.json": ("bench", "--sizes", "1", "--json", "{}"),
+    "pages/benchmarks.md": ("bench", "--sizes", "1", "--docs", "pages"),
+    "maps/one-obstacle.png": ("bench", "--sizes", "1", "--maps", "maps"),
+}
+SITL: dict[str, tuple[str, ...]] = {
+    "mission.toml": ("drive", "{}"),
+    "w.png": ("drive", "yard.toml", "--world", "{}"),
+    "alone.png": ("drive", "--world", "{}", "--start", "1,1", "--target", "3,3"),
+    "w.toml": ("drive", "yard.toml", "--world", "{}"),
+    "w.yaml": ("drive", "yard.toml", "--world", "{}"),
+    "w.map": ("drive", "yard.toml", "--world", "{}"),
+    "base.png": ("drive", "yard.toml", "--world", "based.toml"),
+    "settings.toml": ("drive", "yard.toml", "--settings", "{}"),
+    "image.png": ("drive", "yard.toml", "--image", "{}"),
+    "stem.yaml": ("drive", "yard.toml", "--map", "stem"),
+    "drive.json": ("drive", "yard.toml", "--json", "{}"),
+    "driven/rounds.bin": ("drive", "yard.toml", "--record", "driven"),
+    "rover.param": ("drive", "yard.toml", "--params", "{}"),
+    "faults.toml": ("drive", "yard.toml", "--faults", "{}"),
+    "served.toml": ("serve", "{}"),
+    "served.param": ("serve", "yard.toml", "--params", "{}"),
+    "served-faults.toml": ("serve", "yard.toml", "--faults", "{}"),
+    "firmware.param": ("physics", "yard.toml", "--params", "{}"),
+    "out.param": ("physics", "yard.toml", "--write-params", "{}"),
+    "kmaps/known-1.png": ("experiment", "kwasniewski-table1", "--runs", "3", "--maps", "kmaps"),
+    "field.map": ("experiment", "navigation", "--runs", "1", "--world", "{}"),
+    "runs.json": ("experiment", "navigation", "--runs", "1", "--json", "{}"),
+    "results/results.md": ("experiment", "navigation", "--runs", "1", "--docs", "results"),
+    "grids/one.txt": ("experiment", "sedighi-table1", "--runs", "1", "--maps", "grids"),
+}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """With files that name others, and nobody to connect to."""
+    monkeypatch.chdir(tmp_path)
+    yard(tmp_path)
+    head = (tmp_path / "yard.toml").read_text()
+    Path("fenced.toml").write_text('fence = "fence.plan"\n' + head)
+    Path("known.toml").write_text('prior_map = "prior.png"\n' + head)
+    Path("ros.yaml").write_text(ROS.format(pipe="ros.pgm"))
+    Path("based.toml").write_text('base = "base.png"\n')
+    Path("good.map").write_text("type octile\nheight 2\nwidth 2\nmap\n..\n..\n")
+    Path("key").write_text("words\n")
+    Path("key").chmod(0o600)
+    return tmp_path
+
+
+@pytest.mark.timeout(100)
+@pytest.mark.parametrize("name", [*COMPANION, *SITL])
+def test_every_command_refuses_a_pipe_in_one_line(folder: Path, name: str) -> None:
+    (folder / name).parent.mkdir(parents=True, exist_ok=True)
+    os.mkfifo(folder / name)
+    app, command = (companion, COMPANION[name]) if name in COMPANION else (sitl, SITL[name])
+    result = CliRunner().invoke(app, [word.format(name) for word in command])
+    assert result.exit_code == 2
+    assert len(result.stderr.splitlines()) == 1
+    assert Path(name).stem in result.stderr or Path(name).parent.name in result.stderr
+    assert any(words in result.stderr for words in REASONS)
+
+
+def test_a_pipe_under_the_name_of_the_new_file_fails_the_write(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "file.new")
+    with pytest.raises(OSError, match="No such device"):
+        replace_file(OsDisk(), tmp_path / "file", b"words")
+
+
+OPENERS = {"open", "read_text", "read_bytes"}
+OPENED_OTHERWISE = {
+    "companion/storage/reading.py": "the way itself",
+    "companion/storage/disk.py": "writes",
+    "companion/checkpoint/place.py": "the lock: opened for reading and writing, a pipe is not waited for",
+    "companion/recording/recorder.py": "writes, after refuse_pipe",
+    "companion/cli/inputs.py": "writes, after refuse_pipe",
+    "companion/mission/waypoints_reader.py": "mission/text_file.py's read_text",
+    "companion/mission/plan_reader.py": "mission/text_file.py's read_text",
+    "companion/mapping/map_files.py": "a picture that reading.py has opened",
+    "companion/cli/kernels.py": "the program's own files",
+    "companion/cli/live.py": "/dev/null",
+    "companion/cli/entry.py": "/dev/null",
+    "companion/bench/measure.py": "/proc",
+    "sitl/experiments/soak.py": "/proc",
+    "sitl/scenario.py": "World.open",
+}
+
+
+def test_every_file_is_opened_where_pipes_are_refused() -> None:
+    opening = set()
+    for path in (path for top in ("companion", "sitl") for path in (ROOT / top).rglob("*.py")):
+        calls = [node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
+        names = {call.id if isinstance(call, ast.Name) else getattr(call, "attr", "") for call in calls}
+        if names & OPENERS:
+            opening.add(path.relative_to(ROOT).as_posix())
+    assert opening == OPENED_OTHERWISE.keys()

@@ -1,0 +1,266 @@
+"""What a stranger reads is true: examples parse, commands and options exist, links lead somewhere, settings agree."""
+
+from __future__ import annotations
+
+import configparser
+import re
+import runpy
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+
+import click
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import companion.cli.commands
+import sitl.cli.commands
+from companion.cli.run import EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED
+from companion.cli.service import ALIVE_S
+from companion.mission.sensor_tables import BeamTable, LidarTable, ProximityTable, SensorsTable, SunTable
+from companion.settings import parse_settings
+from sitl.faults.fault_file import load_faults
+from sitl.sensors.suites import suite_of
+from sitl.world.world_file import DoorTable, ObstacleTable, RoughTable, SlipperyTable, WorldTable, load_world
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
+    ROOT / "missions" / "README.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
+APPS = {"rover-companion": companion.cli.commands.app, "rover-sitl": sitl.cli.commands.app}
+FORBIDDEN = re.compile(r"/work\b|/root\b|/tmp\b|/home/", re.IGNORECASE)
+
+pages = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+
+
+def blocks(language: str) -> list[tuple[str, str]]:
+    """Every code block of a language on all pages: where it stands, and its text."""
+    pattern = re.compile(rf"^ *```{language}\n(.*?)^ *```", re.MULTILINE | re.DOTALL)
+    return [
+        (f"{page.name} line {text.count(chr(10), 0, found.start()) + 1}", found[1])
+        for page in PAGES
+        for text in [page.read_text(encoding="utf-8")]
+        for found in pattern.finditer(text)
+    ]
+
+
+@pytest.mark.parametrize(("where", "text"), blocks("toml"))
+def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path) -> None:
+    if text.startswith("# settings"):
+        assert parse_settings(tomllib.loads(text), where).profile
+        return
+    if text.startswith("# faults"):
+        (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
+        assert load_faults(tmp_path / "plan.toml").faults
+        return
+    if text.startswith("# world"):
+        (tmp_path / "world.toml").write_text(text, encoding="utf-8")
+        assert load_world(tmp_path / "world.toml").obstacles.any()
+        return
+    if text.startswith("# sensors"):
+        assert suite_of(SensorsTable.model_validate(tomllib.loads(text))).lidar
+        return
+    shutil.copytree(ROOT / "missions" / "maps", tmp_path / "maps")
+    shutil.copy(ROOT / "missions" / "field.plan", tmp_path)
+    (tmp_path / "rover.param").write_text("WP_SPEED,2\n", encoding="utf-8")
+    mission = tmp_path / "example.toml"
+    mission.write_text(text, encoding="utf-8")
+    result = CliRunner().invoke(APPS["rover-companion"], ["mission", "check", str(mission)])
+    assert result.exit_code == 0, f"{where}: {result.stderr}"
+
+
+def test_every_key_of_a_mission_is_explained() -> None:
+    from companion.mission.toml_reader import (
+        AreaTable,
+        CorridorTable,
+        GridTable,
+        MissionTable,
+        RoverTable,
+        SitlTable,
+        TargetTable,
+    )
+
+    text = (ROOT / "docs" / "missions.md").read_text(encoding="utf-8")
+    tables = (MissionTable, GridTable, RoverTable, TargetTable, AreaTable, CorridorTable, SitlTable)
+    for key in {key for table in tables for key in table.model_fields}:
+        stem = "line_..." if key.startswith("line_") else key
+        assert key in text or stem in text, f"docs/missions.md does not mention {key}"
+
+
+def test_every_key_of_a_world_and_of_sensors_is_explained() -> None:
+    text = (ROOT / "docs" / "worlds.md").read_text(encoding="utf-8")
+    tables = [WorldTable, ObstacleTable, DoorTable, SlipperyTable, RoughTable]
+    tables += [SensorsTable, LidarTable, BeamTable, ProximityTable, SunTable]
+    for key in {key for table in tables for key in table.model_fields}:
+        assert re.search(rf"\b{key}\b", text), f"docs/worlds.md does not mention {key}"
+
+
+def usages() -> list[tuple[str, list[str]]]:
+    """Every mention of one of our commands with a sub-command, in code blocks or in code within a line."""
+    found = []
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        code = [*re.findall(r"`([^`\n]+)`", text), *(line for _, block in blocks("sh") for line in block.splitlines())]
+        for piece in code:
+            words = piece.split("#")[0].split()
+            words[:1] = [word.rpartition("/")[2] for word in words[:1]]
+            if len(words) > 1 and words[0] in APPS and re.fullmatch("[a-z]+", words[1]):
+                found.append((page.name, words))
+    return found
+
+
+def command_of(words: list[str]) -> tuple[click.Command, list[str]]:
+    """The command that the words name, and what is left of them. KeyError names one that does not exist."""
+    command = typer.main.get_command(APPS[words[0]])
+    rest = words[1:]
+    while rest and isinstance(getattr(command, "commands", None), dict):
+        command = command.commands[rest.pop(0)]  # type: ignore[attr-defined]
+    return command, rest
+
+
+def test_there_are_usages_to_check() -> None:
+    assert len(usages()) > 20
+    assert {words[1] for _, words in usages()} >= {"run", "plan", "mission", "drive", "serve", "experiment"}
+
+
+@pytest.mark.parametrize(
+    ("page", "words"), usages(), ids=lambda value: " ".join(value) if isinstance(value, list) else value
+)
+def test_commands_and_options_exist(page: str, words: list[str]) -> None:
+    names = [part for word in words for part in word.strip("[]").split("|")]
+    alternatives = ["|" in word for word in words]
+    if any(alternatives):  # run | plan | mission check
+        return
+    command, rest = command_of(words)
+    options = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)} | {
+        "--help"
+    }
+    asked = {word.strip("[]").rstrip(".,;") for word in rest if word.strip("[]").startswith("--")}
+    assert asked <= options, f"{page}: {' '.join(names)}"
+
+
+def test_every_command_is_in_the_readme() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for name, app in APPS.items():
+        for sub in typer.main.get_command(app).commands:  # type: ignore[attr-defined]
+            assert f"{name} {sub}" in text
+
+
+@pages
+def test_options_named_alone_exist_somewhere(page: Path) -> None:
+    known = {"--help"}
+    queue = [typer.main.get_command(app) for app in APPS.values()]
+    while queue:
+        command = queue.pop()
+        known |= {option for parameter in command.params for option in parameter.opts}
+        queue += list(getattr(command, "commands", {}).values())
+    named = set(re.findall(r"`(--[a-z-]+)", page.read_text(encoding="utf-8")))
+    assert named <= known
+
+
+def test_the_settings_page_is_that_of_the_models() -> None:
+    made = runpy.run_path(str(ROOT / "docs" / "make_settings.py"))["page"]()
+    page = (ROOT / "docs" / "settings.md").read_text(encoding="utf-8")
+    assert page == made, "write it anew: .venv/bin/python docs/make_settings.py"
+    assert re.search(r"\| \| *$|\|  \|$", page, re.MULTILINE) is None, "a setting has no description"
+
+
+@pages
+def test_settings_that_pages_name_exist(page: Path) -> None:
+    from companion.settings import Settings
+
+    known = set()
+    for name, field in Settings.model_fields.items():
+        inner = getattr(field.annotation, "model_fields", {})
+        known |= {f"{name}.{key}" for key in inner}
+    sections = "|".join(Settings.model_fields)
+    named = set(re.findall(rf"`((?:{sections})\.[a-z_0-9]+)`", page.read_text(encoding="utf-8")))
+    assert {name for name in named if not name.endswith((".py", ".tlog"))} <= known
+
+
+@pages
+def test_relative_links_lead_somewhere(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    links = re.findall(r"\]\(([^)]+)\)", text)
+    for link in links:
+        assert "://" in link or (page.parent / link.partition("#")[0]).exists(), link
+
+
+@pages
+def test_nothing_tells_of_the_machine_it_was_written_on(page: Path) -> None:
+    found = FORBIDDEN.search(page.read_text(encoding="utf-8"))
+    assert found is None, found
+
+
+def test_every_page_can_be_reached_from_the_readme() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    for page in (ROOT / "docs").glob("*.md"):
+        assert f"(docs/{page.name})" in text
+
+
+def test_modules_and_tests_that_pages_name_exist() -> None:
+    tests = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for name in re.findall(r"`((?:companion|sitl|tests|docs|missions)/[a-z_/0-9.-]*)`", text):
+            assert (ROOT / name).exists() or (ROOT / f"{name}.png").exists(), f"{page.name}: {name}"
+        for name in re.findall(r"`(test_[a-z_0-9]+)`", text):
+            assert f"def {name}(" in tests, f"{page.name}: {name}"
+
+
+def test_every_table_of_hazards_has_its_five_columns_and_names_a_test() -> None:
+    text = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8")
+    text = re.sub(r"<!-- begin .*?<!-- end [^\n]*\n", "", text, flags=re.DOTALL)  # tables that experiments write
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
+    heads = [row for row in rows if row[0] == "hazard"]
+    assert heads and all(row == ["hazard", "detection", "reaction", "time to reaction", "test"] for row in heads)
+    hazards = [row for row in rows if row not in heads and set(row[0]) != {"-"}]
+    for row in hazards:
+        assert len(row) == 5 and all(row[i] for i in (0, 2, 3)), row[0]
+        assert re.search(r"`(test_|tests/)", row[4]), f"{row[0]}: no test"
+
+
+def test_the_picture_is_small() -> None:
+    assert 10_000 < (ROOT / "docs" / "images" / "rooms.png").stat().st_size < 200_000
+
+
+def test_the_design_page_names_every_module_and_has_the_layers_that_are_checked() -> None:
+    text = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
+    for package in ("companion", "sitl"):
+        for module in (ROOT / package).iterdir():
+            name = module.name if module.suffix == ".py" else f"{module.name}/"
+            covered = name.startswith(("_", "autopilot")) or module.suffix not in (".py", "")
+            assert covered or name in text, f"docs/design.md does not name {package}/{name}"
+    config = configparser.ConfigParser()
+    config.read(ROOT / ".importlinter")
+    layers = config["importlinter:contract:companion"]["layers"].strip().splitlines()
+    block = text.partition("## Who may know whom")[2].partition("```text\n")[2].partition("```")[0]
+    assert [line.split() for line in block.splitlines()] == [line.replace("|", " ").split() for line in layers]
+
+
+def test_the_service_is_one_that_systemd_takes_and_the_program_understands(tmp_path: Path) -> None:
+    (_, text), *more = blocks("ini")
+    assert not more
+    unit = configparser.ConfigParser(strict=True)
+    unit.optionxform = str  # type: ignore[assignment,method-assign]
+    unit.read_string(text)
+    service = unit["Service"]
+    program, command, _, *options = service["ExecStart"].split()
+    assert program.endswith("/bin/rover-companion")
+    commands = typer.main.get_command(APPS["rover-companion"]).commands  # type: ignore[attr-defined]
+    known = {name for parameter in commands[command].params for name in parameter.opts}
+    assert {option for option in options if option.startswith("--")} <= known
+    assert service["RestartPreventExitStatus"].split() == [str(EXIT_BAD_INPUT), str(EXIT_MISSED)]
+    assert service["SuccessExitStatus"] == str(EXIT_STOPPED)
+    assert float(service["WatchdogSec"]) > 5 * ALIVE_S and float(service["TimeoutStopSec"]) > 2.0
+    analyze = shutil.which("systemd-analyze")
+    if analyze is not None:
+        path = tmp_path / "rover-companion.service"
+        path.write_text(text.replace(program, "/bin/true"))
+        done = subprocess.run([analyze, "verify", path], capture_output=True, text=True, timeout=60, check=False)
+        assert str(path) not in done.stderr and "rover-companion.service:" not in done.stderr, done.stderr

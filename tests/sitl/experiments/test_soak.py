@@ -1,0 +1,106 @@
+"""The soak: its ground can be driven, its faults end, its person helps only when asked, and what it counts is what happened."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.core.grid import OBSTACLE, inflated
+from companion.mission.check import check_mission
+from sitl.autopilot.vehicle import Mode
+from sitl.experiments import soak, soak_faults
+from sitl.experiments.experiment import Options
+from sitl.experiments.soak import Person, Soaked, SoakReport, soaked
+from sitl.experiments.soak_worlds import FINE_M, ROOM_M, drawn, mission_on
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_every_place_but_the_sealed_one_can_be_reached_with_room_to_spare(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    ground = drawn(rng)
+    mission = mission_on(ground, "lidar-90", "soak", rng)
+    check_mission(mission)
+    solid = ground.world.obstacles
+    roomy = inflated(np.where(solid, OBSTACLE, 0.0), ROOM_M / FINE_M) < OBSTACLE
+    from_start = reached_from(roomy, ground.start_m)
+    assert all(from_start[index(place)] for place in ground.reachable_m)
+    assert len(mission.targets) == len(ground.reachable_m) + (ground.sealed_m is not None)
+    if ground.sealed_m is not None:
+        assert not reached_from(~solid, ground.start_m)[index(ground.sealed_m)]
+
+
+def index(place_m: tuple[float, float]) -> tuple[int, int]:
+    return int(place_m[0] / FINE_M), int(place_m[1] / FINE_M)
+
+
+def reached_from(free: np.ndarray, place_m: tuple[float, float]) -> np.ndarray:
+    """A plain search, field by field."""
+    reached = np.zeros_like(free)
+    waiting = [index(place_m)]
+    while waiting:
+        row, column = waiting.pop()
+        if free[row, column] and not reached[row, column]:
+            reached[row, column] = True
+            waiting += [(row + 1, column), (row - 1, column), (row, column + 1), (row, column - 1)]
+    return reached
+
+
+def test_faults_are_of_every_kind_and_come_while_it_drives() -> None:
+    plans = [soak_faults.plan_of(np.random.default_rng(seed)) for seed in range(200)]
+    faults = [fault for plan in plans for fault in plan.faults]
+    assert {len(plan.faults) for plan in plans} == set(range(soak_faults.MOST + 1))
+    assert len({(type(fault), getattr(fault, "what", "")) for fault in faults}) == len(soak_faults.FAULTS)
+    assert all(fault.since == "driving" and fault.end_s > fault.start_s for fault in faults)
+    assert plans[7] == soak_faults.plan_of(np.random.default_rng(7))
+
+
+class Vehicle:
+    """What the person sees of a run."""
+
+    def __init__(self) -> None:
+        self.simulator = self
+        self.time_s = 0.0
+        self.vehicle = "the vehicle"
+
+
+def test_the_person_helps_when_asked_for_long_enough(monkeypatch: pytest.MonkeyPatch) -> None:
+    modes, armed = [], []
+    monkeypatch.setattr(soak, "set_mode", lambda vehicle, mode: modes.append(mode) or True)
+    monkeypatch.setattr(soak, "arm", lambda vehicle: armed.append(vehicle) or True)
+    person, run = Person(), Vehicle()
+    for run.time_s in np.arange(0.0, 7.5, 0.5):
+        person.look(run, "stopped: disarmed, waiting for a person to arm")  # type: ignore[arg-type]
+    person.look(run, "driving")  # type: ignore[arg-type]
+    for run.time_s in np.arange(8.0, 15.5, 0.5):
+        person.look(run, "stopped: disarmed, waiting for a person to arm")  # type: ignore[arg-type]
+    assert (person.helped, modes, armed) == (0, [], [])
+    run.time_s = 16.0
+    person.look(run, "stopped: disarmed, waiting for a person to arm")  # type: ignore[arg-type]
+    assert (person.helped, modes, armed) == (1, [Mode.GUIDED], ["the vehicle"])
+
+
+def test_a_run_is_driven_and_repeats() -> None:
+    first, again = soaked(0), soaked(0)
+    assert (first.ended, first.collisions, first.error) == ("reached", 0, "")
+    assert first.driven_m > 20.0
+    assert (first.driven_m, first.time_s, first.person) == (again.driven_m, again.time_s, again.person)
+
+
+def test_an_error_is_a_finding_and_not_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(soak, "_driven", lambda drive, result: 1 / 0)
+    assert soaked(1).error.startswith("ZeroDivisionError")
+
+
+def test_the_page_shows_what_was_counted(tmp_path: Path) -> None:
+    runs = [Soaked(seed, "posts", "lidar-90", ("Reboot",), "reached", memory_mb=300.0 + seed) for seed in range(39)]
+    runs.append(Soaked(39, "rooms", "lidar-90", collisions=2, error="ValueError: x", memory_mb=340.0))
+    report = SoakReport(Options(40), tuple(runs))
+    assert report.growth_mb == pytest.approx(20.0, abs=1.0)
+    (page,) = report.write_docs(tmp_path)
+    text = page.read_text(encoding="utf-8")
+    assert page.name == "safety.md" and "Reboot 39" in text
+    assert "| all | 40 | 39 | 39 | 0 | 1 | 2 | 1 | 0 | 0 |" in text
+    assert len(report.tables()) == 2
+    assert report.failure == "1 runs with a contact, 1 runs with an error, 1 runs left unfinished"
+    assert SoakReport(Options(39), tuple(runs[:39])).failure == ""
+    assert SoakReport(Options(2), tuple(runs[:2])).growth_mb is None

@@ -1,0 +1,398 @@
+"""The terminal view: a pure function of the state, looked at as text; what it is made of; the terminal that it needs."""
+
+import io
+import math
+import os
+import pty
+import select
+import signal
+import subprocess
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import Console
+from typer.testing import CliRunner
+
+from companion.core.frames import GeoPoint
+from sitl.cli.commands import app
+from sitl.cli.pace import Pace
+from sitl.cli.viewer import Viewer, ViewError, terminal
+from sitl.sim_link import PacketCounter
+from sitl.simulator import Simulator
+from sitl.view.sketch import COARSEST_M, Disc, Kind, Layer, Place, Scene, frame_for, paint
+from sitl.view.view import LOOKS, STATE_SIGNS, Fact, Section, View, arrow, render
+from sitl.view.watching import Rates, Watching
+from sitl.world.doors import Door
+from sitl.world.movers import Mover, timed_track
+from sitl.world.truth import SimStart
+from sitl.world.world import World
+from tests.sitl.network.test_server import free_port
+from tests.support.sitl_client import READY_S, Client, open_ground
+
+MISSION = "[grid]\nsize = [20, 20]\nhome = [1, 1]\n[[target]]\nfield = [9, 9]\n"
+
+
+def scene(fields: list[str], rover: tuple[float, float] = (0.5, 0.5), heading_deg: float = 0.0, **more: Any) -> Scene:
+    """Fields of 1 m, the first line in the north; # is a wall."""
+    where = np.array([[sign == "#" for sign in line] for line in reversed(fields)])
+    height, width = where.shape
+    options = {"track": np.empty((0, 2)), "bounds_m": (0.0, 0.0, float(height), float(width)), **more}
+    return Scene((Layer(Kind.WALL, where, 1.0, 0.0, 0.0),), Disc(*rover, 0.3), math.radians(heading_deg), **options)
+
+
+def screen(view: View, columns: int = 80, rows: int = 24, colour: bool = False) -> list[str]:
+    console = Console(file=io.StringIO(), width=columns, height=rows, color_system="truecolor" if colour else None)
+    console.print(render(view, columns, rows, colour=colour), height=rows)
+    assert isinstance(console.file, io.StringIO)
+    return console.file.getvalue().rstrip("\n").split("\n")
+
+
+def a_view(one: Scene, **more: Any) -> View:
+    return View("Test", one, (Section("Rover", (Fact("mode", "GUIDED, armed"),)),), **more)
+
+
+ROOM = ["########", "#      #", "#   #  #", "########"]
+
+
+def test_the_picture_is_north_up_and_the_rover_points_where_it_goes() -> None:
+    one = scene(ROOM, (1.5, 1.5), 90.0, places=(Place("t", 2.5, 6.5),), movers=(Disc(1.5, 5.5, 0.4),))
+    frame = frame_for(one, 4, 8)
+    assert (frame.dot_m, frame.north_m, frame.west_m) == (1.0, 4.0, 0.0)
+    dots = paint(one, frame)
+    assert dots[2, 4] == Kind.WALL and dots[1, 4] == Kind.NOTHING and dots[2, 5] == Kind.MOVER
+    text = "\n".join(screen(a_view(one)))
+    assert "→" in text and "◎" in text and "█▀▄ obstacle" in text and "o moving" in text
+
+
+@pytest.mark.parametrize(
+    ("degrees", "sign"), [(0, "↑"), (44, "↗"), (90, "→"), (135, "↘"), (180, "↓"), (-91, "←"), (-20, "↑"), (300, "↖")]
+)
+def test_arrows(degrees: float, sign: str) -> None:
+    assert arrow(math.radians(degrees)) == sign
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (100, 30), (200, 60), (60, 16), (59, 30), (20, 5), (1, 1)])
+@pytest.mark.parametrize("colour", [True, False])
+def test_it_fits_into_any_terminal(columns: int, rows: int, colour: bool) -> None:
+    news = tuple(f"{n} s: something that takes more than one line to tell" for n in range(40))
+    lines = screen(a_view(scene(ROOM), news=news), columns, rows, colour=colour)
+    assert len(lines) <= rows or columns < 60
+    if not colour:
+        assert max(map(len, lines)) <= columns
+    if columns >= 60:
+        assert "GUIDED, armed" in "\n".join(lines) and "39 s" in "\n".join(lines)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (120, 40)])
+@pytest.mark.parametrize("colour", [True, False])
+def test_everything_in_sight_is_in_the_legend(columns: int, rows: int, colour: bool) -> None:
+    whole = np.ones((1, 2), dtype=np.bool_)
+    layers = tuple(Layer(kind, whole, 1.0, 2.0 * number, 0.0) for number, kind in enumerate(Kind))
+    places = tuple(
+        Place(state, 5.0, east_m, state) for east_m, state in zip((5.0, 9.0, 13.0, 17.0), STATE_SIGNS, strict=True)
+    )
+    one = Scene(layers, Disc(1.0, 5.0, 0.3), 0.0, np.empty((0, 2)), places=places, bounds_m=(0.0, 0.0, 26.0, 26.0))
+    lines = screen(a_view(one), columns, rows, colour=colour)
+    told = " ".join(line.split("│")[1] for line in lines if line.count("│") > 3) if not colour else "\n".join(lines)
+    for look in LOOKS.values():
+        assert look.name in told
+    for sign, name in zip(STATE_SIGNS.values(), ("target", "reached", "given up", "start"), strict=True):
+        assert f"{sign} {name}" in told
+    assert colour or "█▀▄ obstacle" in told
+    assert len(lines) <= rows
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(80, 24), (140, 30), (70, 50)])
+def test_the_title_gives_the_worlds_size_whatever_the_window(columns: int, rows: int) -> None:
+    assert "Test: 8 x 4 m" in screen(a_view(scene(ROOM)), columns, rows)[0]
+    assert "Test ─" in screen(a_view(scene(ROOM, bounds_m=None)), columns, rows)[0]
+
+
+def test_kinds_can_be_told_apart_without_colours() -> None:
+    whole = np.ones((2, 2), dtype=np.bool_)
+    kinds = [kind for kind in Kind if kind is not Kind.MOVER]
+    layers = tuple(Layer(kind, whole, 1.0, 0.0, 2.0 * number) for number, kind in enumerate(kinds))
+    one = Scene(layers, Disc(-5.0, 0.0, 0.3), 0.0, np.empty((0, 2)), bounds_m=(0.0, 0.0, 2.0, 2.0 * len(kinds)))
+    rows = [line for line in screen(a_view(one), 100, 24) if "█" in line and "obstacle" not in line]
+    signs = set(rows[0][1:].split("│")[0])
+    assert len(signs) == len(kinds)
+
+
+def test_with_colours_two_dots_share_a_character() -> None:
+    lines = screen(a_view(scene(["#", " "] * 8)), colour=True)
+    assert "▀" in "".join(lines) and "\x1b[38;2;" in "".join(lines)
+
+
+PLACES_M = st.integers(-5000, 5000).map(lambda tenths: tenths / 10.0 + 0.05)
+
+
+@given(PLACES_M, PLACES_M, st.integers(2, 120), st.integers(1, 300), st.sampled_from([0.05, 0.3, 1.0, 7.0]))
+def test_every_wall_in_sight_is_painted(north_m: float, east_m: float, rows: int, columns: int, field_m: float) -> None:
+    where = np.zeros((60, 80), dtype=np.bool_)
+    where[37, 11] = True
+    one = Scene((Layer(Kind.WALL, where, field_m, -3.0, 5.0),), Disc(north_m, east_m, 0.3), 0.0, np.empty((0, 2)))
+    frame = frame_for(one, rows, columns)
+    dots = paint(one, frame)
+    assert dots.shape == (rows, columns)
+    assert frame.dot(north_m, east_m) is not None
+    here = frame.dot(-3.0 + 37.5 * field_m, 5.0 + 11.5 * field_m)
+    if here is not None and 0 < here[0] < rows - 1 and 0 < here[1] < columns - 1:
+        # A field's middle may lie on the edge between two dots.
+        row, column = here
+        assert (dots[row - 1 : row + 2, column - 1 : column + 2] == Kind.WALL).any()
+    side = math.ceil(field_m / frame.dot_m) + 1
+    assert (dots == Kind.WALL).sum() <= side * side
+
+
+def test_a_large_world_is_shown_round_the_rover_and_not_beyond_its_edges() -> None:
+    fields = [" " * 900] * 700
+    frame = frame_for(scene(fields, (350.5, 450.5)), 40, 60)
+    assert frame.dot_m < COARSEST_M
+    where = frame.dot(350.5, 450.5)
+    assert where is not None and abs(where[0] - 20) <= 1 and abs(where[1] - 30) <= 1
+    corner = frame_for(scene(fields, (1.5, 1.5)), 40, 60)
+    assert (corner.west_m, corner.north_m) == (0.0, 40.0)
+
+
+def test_the_track_has_no_gaps() -> None:
+    one = scene([" " * 40] * 20, track=np.array([[1.5, 1.5], [18.5, 38.5]]))
+    dots = paint(one, frame_for(one, 20, 40))
+    assert (dots == Kind.TRACK).any(axis=0).sum() == 38
+
+
+def test_the_simulator_as_it_is_seen() -> None:
+    fields = np.zeros((20, 30), dtype=np.bool_)
+    fields[0] = True
+    door = np.zeros_like(fields)
+    door[5, 5:8] = True
+    mover = Mover("m", 0.4, timed_track([(10.0, 20.0), (10.0, 25.0)], 1.0, 0.0, repeats=True), True, "")
+    world = World(fields, movers=(mover,), doors=(Door("d", door, ((2000, 4000),)),))
+    simulator = Simulator(world, SimStart(10.5, 3.5, math.radians(90.0), GeoPoint(0.0, 0.0)), "none", noise=False)
+    link = simulator.connect(name="tcp:1.2.3.4:5")
+    watching = Watching("Yard", simulator)
+    simulator.advance_to_s(1.0)
+    closed = "\n".join(screen(watching.view(0.0)))
+    for text in ("Yard: 30 x", "MANUAL, disarmed", "no fix", "90° E", "tcp:1.2.3.4:5", "door closed", "→", "o moving"):
+        assert text in closed
+    simulator.advance_to_s(3.0)
+    link.take()
+    opened = "\n".join(screen(watching.view(1.0)))
+    assert "door open" in opened and "door closed" not in opened and "2.0 times" in opened and "out " in opened
+
+
+def test_way_target_and_collisions_are_shown() -> None:
+    simulator = open_ground()
+    client = Client(simulator)
+    client.run_for(READY_S)
+    client.set_mode(15)
+    client.arm()
+    client.drive_to(8.0, 0.0)
+    watching = Watching("Open", simulator)
+    for _ in range(6):
+        client.run_for(0.5)
+        view = watching.view(0.0)
+    text = "\n".join(screen(view))
+    assert "GUIDED, armed" in text and "◎" in text and "↑" in text and "• way" in text and "position known" in text
+    assert any(place.name == "target" and place.north_m == pytest.approx(8.0, abs=0.1) for place in view.scene.places)
+
+
+def test_after_a_reboot_the_destination_is_where_the_rover_goes_and_the_news_tell() -> None:
+    simulator = open_ground()
+    watching = Watching("Open", simulator)
+    origin_m = 0.0
+    for leg in range(2):
+        client = Client(simulator)
+        client.run_for(READY_S)
+        watching.note()
+        client.set_mode(15)
+        client.arm()
+        client.drive_to(8.0, 0.0)
+        client.run_for(1.0)
+        (target,) = (place for place in watching.scene().places if place.name == "target")
+        assert target.north_m - simulator.start.north_m == pytest.approx(origin_m + 8.0, abs=0.1)
+        if leg == 0:
+            client.run_for(6.0)
+            origin_m = simulator.truth.north_m - simulator.start.north_m
+            assert origin_m > 4.0
+            client.command(400, 0.0)
+            client.command(246, 1.0)
+            simulator.advance_to_s(simulator.time_s + 0.5)
+            watching.note()
+    told = [text.partition(" s: ")[2] for text in watching.news]
+    begun = ["mode GUIDED, was MANUAL", "armed"]
+    assert told == [*begun, "the autopilot has booted: MANUAL, disarmed", *begun]
+
+
+def test_rates_count_since_a_while_ago() -> None:
+    rates = Rates()
+    for tenth in range(100):
+        told = rates.update(tenth / 10.0, {"a": (tenth, 5 * tenth)})
+    assert told["a"] == (pytest.approx(10.0), pytest.approx(50.0))
+    assert rates.update(10.0, {"b": (3, 4)})["b"][0] < 3.0
+
+
+@given(st.lists(st.tuples(st.sampled_from([0xFD, 0xFE]), st.integers(0, 255), st.booleans())), st.integers(1, 50))
+def test_packets_are_counted_wherever_the_stream_is_cut(packets: list[tuple[int, int, bool]], piece: int) -> None:
+    stream = b""
+    for magic, length, signed in packets:
+        rest = length + (8 if magic == 0xFE else 12 + 13 * signed) - 3
+        stream += bytes([magic, length, int(signed)]) + bytes([0xFD]) * rest
+    counter = PacketCounter()
+    for start in range(0, len(stream), piece):
+        counter.feed(stream[start : start + piece])
+    assert counter.packets == len(packets)
+
+
+@pytest.mark.parametrize("command", ["drive", "serve"])
+def test_without_a_terminal_there_is_one_line(tmp_path: Path, command: str) -> None:
+    mission = tmp_path / "open.toml"
+    mission.write_text(MISSION)
+    result = CliRunner().invoke(app, [command, str(mission), "--view"])
+    assert result.exit_code == 2 and result.output.count("\n") == 1 and "no terminal" in result.output
+
+
+def on_a_terminal(arguments: list[str], until: bytes, number: signal.Signals, **variables: str) -> tuple[int, bytes]:
+    """Run on a pseudo-terminal, send a signal when some text has appeared; exit code and everything written."""
+    ours, theirs = pty.openpty()
+    code = "from sitl.cli.main import main; main()"
+    environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24", **variables}
+    written = b""
+    with subprocess.Popen(
+        [sys.executable, "-c", code, *arguments], stdin=theirs, stdout=theirs, stderr=theirs, env=environment
+    ) as child:
+        os.close(theirs)
+        try:
+            told = False
+            while select.select([ours], [], [], 60.0)[0]:
+                try:
+                    data = os.read(ours, 65536)
+                except OSError:  # the other end is closed
+                    break
+                written += data
+                if not data:
+                    break
+                if until in written and not told:
+                    told = True
+                    child.send_signal(number)
+            return child.wait(timeout=10.0), written
+        finally:
+            child.kill()
+            os.close(ours)
+
+
+ENTER, LEAVE, SHOW_CURSOR = b"\x1b[?1049h", b"\x1b[?1049l", b"\x1b[?25h"
+
+
+def test_serving_gives_the_terminal_back_and_needs_no_colours(tmp_path: Path) -> None:
+    mission = tmp_path / "open.toml"
+    mission.write_text(MISSION)
+    arguments = ["serve", str(mission), "--view", "--listen", f"tcp:127.0.0.1:{free_port()}"]
+    code, written = on_a_terminal(arguments, b"disarmed", signal.SIGINT, NO_COLOR="1")
+    assert code == 0 and ENTER in written
+    assert written.rindex(LEAVE) > written.rindex(ENTER) and written.rindex(SHOW_CURSOR) > written.rindex(ENTER)
+    assert b"stopped after" in written[written.rindex(LEAVE) :]
+    assert b"\x1b[38;" not in written and b"\x1b[48;" not in written
+
+
+def test_driving_gives_the_terminal_back_when_it_is_ended(tmp_path: Path) -> None:
+    mission = tmp_path / "open.toml"
+    mission.write_text(MISSION.replace("20, 20", "2000, 20").replace("9, 9", "1990, 9"))
+    code, written = on_a_terminal(["drive", str(mission), "--view"], b"GUIDED", signal.SIGTERM)
+    assert code == 130 and written.rindex(LEAVE) > written.rindex(ENTER)
+    assert b"stopped by SIGTERM" in written[written.rindex(LEAVE) :] and b"Traceback" not in written
+
+
+def test_the_last_picture_of_a_drive_stays_on_the_terminal(tmp_path: Path) -> None:
+    mission = tmp_path / "open.toml"
+    mission.write_text(MISSION)
+    arguments = ["drive", str(mission), "--view", "--speedup", "1000"]
+    code, written = on_a_terminal(arguments, b"no such text", signal.SIGINT)
+    after = written[written.rindex(LEAVE) :].decode()
+    assert code == 0 and after.rindex("✓") > after.index("outcome: reached")
+
+
+class StillClock:
+    """Time passes only by sleeping."""
+
+    def __init__(self) -> None:
+        self.time_s = 100.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def sleep_until_s(self, time_s: float) -> None:
+        self.time_s = max(self.time_s, time_s)
+
+
+def test_a_pace_counts_from_its_first_moment_and_catches_up() -> None:
+    clock = StillClock()
+    pace, free = Pace(10.0, clock), Pace(None, clock)
+    pace.wait(5.0)
+    free.wait(50.0)
+    assert clock.time_s == 100.0
+    pace.wait(25.0)
+    assert clock.time_s == pytest.approx(102.0)
+    clock.time_s = 110.0
+    pace.wait(30.0)
+    assert clock.time_s == 110.0
+
+
+def test_a_terminal_that_cannot_move_its_cursor_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    ours, theirs = pty.openpty()
+    with os.fdopen(theirs, "w") as stream:
+        monkeypatch.setattr(sys, "stdout", stream)
+        monkeypatch.setenv("TERM", "dumb")
+        with pytest.raises(ViewError, match="TERM=dumb"):
+            terminal()
+        monkeypatch.setenv("TERM", "xterm")
+        assert terminal().is_terminal
+    os.close(ours)
+
+
+class Stopped(io.StringIO):
+    """A terminal that takes nothing more once ``held``, as after Ctrl-S, until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.going, self.reached = threading.Event(), threading.Event()
+        self.going.set()
+
+    def write(self, text: str) -> int:
+        if not self.going.is_set():
+            self.reached.set()
+            self.going.wait(30.0)
+        return super().write(text)
+
+
+def test_a_stopped_terminal_does_not_hold_up_who_shows() -> None:
+    stream = Stopped()
+    one = a_view(scene(ROOM))
+    with Viewer(Console(file=stream, force_terminal=True, width=80, height=24)) as viewer:
+        stream.going.clear()
+        viewer.show(one)
+        assert stream.reached.wait(10.0)
+        for _ in range(100):  # the terminal is stuck in the middle of the first picture all the while
+            viewer.show(a_view(scene(ROOM)))
+        assert not stream.going.is_set()
+        stream.going.set()
+    assert "GUIDED, armed" in stream.getvalue() and LEAVE.decode() in stream.getvalue()
+
+
+def test_pictures_are_due_five_times_a_second() -> None:
+    viewer = Viewer(Console(file=io.StringIO()))
+    assert sum(viewer.is_due(hundredth / 100.0) for hundredth in range(1000)) == pytest.approx(50, abs=2)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_an_error_gives_the_terminal_back(error: type[BaseException]) -> None:
+    stream = io.StringIO()
+    with pytest.raises(error), Viewer(Console(file=stream, force_terminal=True, width=80, height=24)) as viewer:
+        viewer.show(a_view(scene(ROOM)))
+        raise error
+    assert stream.getvalue().rindex(LEAVE.decode()) > stream.getvalue().rindex(ENTER.decode())

@@ -1,0 +1,124 @@
+"""A simulated rover on a TCP port of this process, and the companion as a process of its own."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from companion.core.clock import WallClock
+from companion.mission.mission import Mission
+from sitl.network import open_endpoint
+from sitl.network.server import serve
+from sitl.scenario import scenario_from_mission
+from sitl.simulator import Simulator
+from tests.sitl.network.test_server import free_port
+
+READY_S = 45.0
+
+
+class Served:
+    """The simulator runs in a thread in real time; it has been switched on long enough to be armed."""
+
+    def __init__(self, mission: Mission, *more: str) -> None:
+        """``more``: addresses to listen on besides TCP."""
+        self.simulator: Simulator = scenario_from_mission(mission).simulator(0)
+        self.simulator.advance_to_s(READY_S)
+        self.url = f"tcp:127.0.0.1:{free_port()}"
+        self._endpoints = [
+            open_endpoint(url, self.simulator, serial_port=port) for port, url in enumerate((self.url, *more))
+        ]
+        self._running = True
+        self._pilot = self.simulator.connect()
+        self._pilot_mav = mavlink.MAVLink(None, 255, 190)
+        self._parser = mavlink.MAVLink(None)
+        self._thread = threading.Thread(target=self._serve, daemon=True)
+        self._thread.start()
+
+    def _serve(self) -> None:
+        serve(self.simulator, self._endpoints, WallClock().now_s, 1.0, lambda: self._running)
+
+    def pilot(self, command: int, *parameters: float) -> None:
+        filled = [*parameters, *([0.0] * (7 - len(parameters)))]
+        message = mavlink.MAVLink_command_long_message(1, 1, command, 0, *filled)
+        self._pilot.receive(message.pack(self._pilot_mav))
+
+    def heard(self) -> list[Any]:
+        """What the ground station has been sent since the last call."""
+        return self._parser.parse_buffer(self._pilot.take()) or []
+
+    def mode(self) -> int:
+        """As the next heartbeats say."""
+        self.heard()
+        beats: list[Any] = []
+        wait_until(lambda: bool(beats.extend(self._beats()) or beats), 3.0)
+        return int(beats[-1].custom_mode)
+
+    def _beats(self) -> list[Any]:
+        return [m for m in self.heard() if m.get_type() == "HEARTBEAT" and m.get_srcComponent() == 1]
+
+    def close(self) -> None:
+        self._running = False
+        self._thread.join(timeout=5.0)
+        for endpoint in self._endpoints:
+            endpoint.close()
+
+
+def wait_until(done: Callable[[], bool], limit_s: float) -> None:
+    stop_s = time.monotonic() + limit_s
+    while not done():
+        assert time.monotonic() < stop_s, f"not within {limit_s} s"
+        time.sleep(0.02)
+
+
+@contextmanager
+def process(module: str, *arguments: object, first: str = "") -> Iterator[subprocess.Popen[str]]:
+    """``rover-companion`` (module companion) or ``rover-sitl`` (module sitl); killed in the end. Its default place for states is its own.
+
+    ``first``: code that the process runs before anything else.
+    """
+    code = f"{first}\nfrom {module}.cli.main import main; main()"
+    command = [sys.executable, "-c", code, *map(str, arguments)]
+    with (
+        tempfile.TemporaryDirectory() as states,
+        subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, "XDG_STATE_HOME": states},
+        ) as child,
+    ):
+        try:
+            yield child
+        finally:
+            child.kill()
+
+
+def finished(child: subprocess.Popen[str], limit_s: float) -> tuple[int, str, str]:
+    """Exit code, stdout and stderr of a process that has ended or will."""
+    out, err = child.communicate(timeout=limit_s)
+    return child.returncode, out, err
+
+
+@contextmanager
+def served(mission: Mission) -> Iterator[Served]:
+    world = Served(mission)
+    try:
+        yield world
+    finally:
+        world.close()
+
+
+def mission_path(mission: Mission) -> Path:
+    assert mission.source is not None
+    return mission.source
