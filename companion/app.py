@@ -9,16 +9,16 @@ import numpy as np
 
 from companion.checkpoint.checkpointer import Memory
 from companion.control.point_controller import STANDSTILL
-from companion.control.setpoint_check import OutputCheck
+from companion.control.setpoint_check import SetpointCheck
 from companion.core.clock import Clock, stopwatch_s
 from companion.core.frames import GeoPoint
 from companion.core.rounds import Mark
-from companion.executive.auto_mode_legs import AutoLegs
-from companion.executive.goal_driver import Driver
-from companion.executive.goal_requests import Errands
-from companion.executive.mission_executor import Pursuit
+from companion.executive.auto_mode_legs import AutoModeLegs
+from companion.executive.goal_driver import GoalDriver
+from companion.executive.goal_requests import GoalRequests
+from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import from_home
-from companion.executive.mission_progress import Itinerary, TargetStatus
+from companion.executive.mission_progress import MissionProgress, TargetStatus
 from companion.executive.outbox import Outbox
 from companion.executive.plan_watch import PlanWatch
 from companion.executive.speaking import Speaker
@@ -34,13 +34,13 @@ from companion.operator.telling import Teller
 from companion.perception.moving_obstacles import announced
 from companion.perception.newest_scans import newest_ranges
 from companion.recording.recorder import DecisionLog
-from companion.safety.mode_latch import Control, Reaction, Verdict, Watch, awaited, check, latched
+from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
 from companion.safety.watchdogs import Watchdogs
 from companion.settings import Settings
-from companion.supervision.localization_monitor import Whereabouts
-from companion.supervision.mission_limits import Oversight
+from companion.supervision.localization_monitor import LocalizationMonitor
+from companion.supervision.mission_limits import MissionLimits
 from companion.supervision.setting_out import SettingOut
-from companion.supervision.shutdown import HandOver
+from companion.supervision.shutdown import Shutdown
 from companion.supervision.startup import StartUp
 from companion.vehicle.commands import SetMode
 from companion.vehicle.events.event import Event
@@ -79,8 +79,8 @@ class Companion:
         self._reporter = Reporter(self.outcome.said)
         self._teller = Teller(autopilot, clock, self._reporter)
         self._tell = self._teller.tell
-        self.watch = Watch()
-        self._pursuit: Pursuit | None = None
+        self.watch = LatchState()
+        self._executor: MissionExecutor | None = None
         self._autopilot = autopilot
         self._clock = clock
         self._mission = mission
@@ -92,20 +92,20 @@ class Companion:
         self._start_up = StartUp(mission, settings, arm=arm, kept=memory.kept if memory else None)
         self._outbox = Outbox(settings.guidance)
         self._speaker = Speaker(autopilot, self._outbox, self._tell)
-        self.output_check = OutputCheck(self._tell)
-        self.oversight = Oversight(autopilot, settings, self._tell)
+        self.output_check = SetpointCheck(self._tell)
+        self.oversight = MissionLimits(autopilot, settings, self._tell)
         self._next_tick_s = now_s = clock.now_s()
         log.begin(now_s, Mark.BEGIN)
         self._watchdogs = Watchdogs(settings.safety)
-        self._whereabouts = Whereabouts(settings.safety.jump_m, self._tell, self._start_afresh)
-        self._errands = Errands(mission, settings.safety, self._speaker.send, self._tell)
-        self._legs = AutoLegs(self._tell)
+        self._whereabouts = LocalizationMonitor(settings.safety.jump_m, self._tell, self._start_afresh)
+        self._errands = GoalRequests(mission, settings.safety, self._speaker.send, self._tell)
+        self._legs = AutoModeLegs(self._tell)
         self._plan_watch = PlanWatch(mission.stored, autopilot.downloads, self._tell)
         self._stopped = False
         self._stop_asked = False
         tuned = (self._outbox, self._whereabouts, self._start_up)
         self._attendant = Attendant(settings, autopilot, self._tell, keep_settings, tuned)
-        self._handover = HandOver(autopilot, self._speaker.send)
+        self._handover = Shutdown(autopilot, self._speaker.send)
         waits = (self._start_up, autopilot, self.oversight, self._reporter, self._teller)
         self._setting_out = SettingOut(*waits, self._speaker.send, self._hand_over)
         self._done = False
@@ -118,31 +118,31 @@ class Companion:
     @property
     def evidence(self) -> EvidenceMap | None:
         """The map; None before the mission has begun."""
-        return None if self._pursuit is None else self._pursuit.evidence
+        return None if self._executor is None else self._executor.evidence
 
     @property
-    def driver(self) -> Driver | None:
+    def driver(self) -> GoalDriver | None:
         """Who drives; None before the mission has begun."""
-        return None if self._pursuit is None else self._pursuit.driver
+        return None if self._executor is None else self._executor.driver
 
     @property
-    def itinerary(self) -> Itinerary | None:
+    def progress(self) -> MissionProgress | None:
         """Progress through the targets; None before the mission has begun."""
-        return None if self._pursuit is None else self._pursuit.itinerary
+        return None if self._executor is None else self._executor.progress
 
     @property
     def origin(self) -> GeoPoint | None:
         """What map and targets count from, in metres; None before the mission has begun."""
-        return None if self._pursuit is None else self._pursuit.laid.origin
+        return None if self._executor is None else self._executor.layout.origin
 
     def save_map(self, path_without_suffix: Path) -> bool:
         """Write what has been mapped as a ROS map (.yaml and .pgm), its place in metres from home.
 
         False when the mission has not begun. Raises MapError when it cannot be written.
         """
-        if self._pursuit is None:
+        if self._executor is None:
             return False
-        save_ros_map(from_home(self._pursuit.laid), path_without_suffix, known=known_fields(self._pursuit.evidence))
+        save_ros_map(from_home(self._executor.layout), path_without_suffix, known=known_fields(self._executor.evidence))
         return True
 
     def run(self, observe: Callable[[Status], None] = lambda status: None) -> Outcome:
@@ -158,7 +158,7 @@ class Companion:
         began_s = stopwatch_s()
         self._listen(now_s)
         self._watchdogs.tick(now_s, late_s, planner_works=self._runner.working)
-        self._settings = self._attendant.attend(self._pursuit, now_s)
+        self._settings = self._attendant.attend(self._executor, now_s)
         self.oversight.service(self.vehicle, now_s)
         if self._stop_asked and not self._handover.begun:
             self._log.mark(Mark.STOP)
@@ -194,11 +194,11 @@ class Companion:
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
-        return statuses_of(self._mission, self._pursuit)
+        return statuses_of(self._mission, self._executor)
 
     def status(self) -> Status:
         """A picture of this moment."""
-        return status_of(self._clock.now_s(), self.vehicle, self._mission, self._pursuit, self._reporter)
+        return status_of(self._clock.now_s(), self.vehicle, self._mission, self._executor, self._reporter)
 
     # Listening ---------------------------------------------------------------------------------------------------
 
@@ -230,33 +230,33 @@ class Companion:
         self.oversight.take_in(event)
         self._plan_watch.take_in(event)
         if isinstance(event, TargetAsked):
-            idle = self._pursuit is None or self._stopped or self._handover.begun
-            self._errands.take_in(event, self.vehicle, self._pursuit, self._reporter.doing if idle else "")
-        if self._pursuit is None:
+            idle = self._executor is None or self._stopped or self._handover.begun
+            self._errands.take_in(event, self.vehicle, self._executor, self._reporter.doing if idle else "")
+        if self._executor is None:
             # At every heartbeat: a person may take the rover out of GUIDED within a tick of our having set it.
-            self.watch = Watch(latched(self.watch.control, self.vehicle))
+            self.watch = LatchState(latched(self.watch.control, self.vehicle))
             return
         if isinstance(event, RangeSeen) and self._watchdogs.scan_fits and not self._whereabouts.position_doubted:
             pose, attitude = self.vehicle.pose_at(event.time_s), self.vehicle.attitude
             if pose is not None and attitude is not None:
-                self._pursuit.map_scan(pose, attitude.yaw_rate_rad_s, event.scan)
-        self._whereabouts.take_in(event, self.vehicle, self._pursuit)
+                self._executor.map_scan(pose, attitude.yaw_rate_rad_s, event.scan)
+        self._whereabouts.take_in(event, self.vehicle, self._executor)
 
     # Judging -----------------------------------------------------------------------------------------------------
 
     def _act(self, now_s: float) -> None:
         """Judge who may drive and whether it is safe; then drive, stop, or be silent."""
-        if self._pursuit is None:
-            self._pursuit = self._begin(now_s)
-            if self._pursuit is None:
+        if self._executor is None:
+            self._executor = self._begin(now_s)
+            if self._executor is None:
                 return
-        if self._legs.follow(self.vehicle, self._pursuit):
-            self._end(self._pursuit, now_s)
+        if self._legs.follow(self.vehicle, self._executor):
+            self._end(self._executor, now_s)
             return
         if self._whereabouts.must_ask(now_s):
             self._autopilot.ask_places()
         before = self.watch.control
-        doubt = self._doubt(self._pursuit, now_s)
+        doubt = self._doubt(self._executor, now_s)
         self.watch, verdict = check(self.watch, self.vehicle, now_s, self._settings.safety, doubt)
         if verdict.reaction is not Reaction.DRIVE:
             self._refrain(verdict, before, now_s)
@@ -264,12 +264,12 @@ class Companion:
         if self._stopped or before is not Control.COMPANION:
             self._start_afresh()
         self._stopped = False
-        self._drive(self._pursuit, now_s)
+        self._drive(self._executor, now_s)
 
-    def _doubt(self, pursuit: Pursuit, now_s: float) -> str:
+    def _doubt(self, executor: MissionExecutor, now_s: float) -> str:
         """Why the rover must not be driven now, besides old data and modes; empty when it may."""
         doubt = self._whereabouts.reason(now_s) or self._watchdogs.reason
-        return doubt or self.oversight.doubt(pursuit, self.vehicle.pose_at(now_s), now_s)
+        return doubt or self.oversight.doubt(executor, self.vehicle.pose_at(now_s), now_s)
 
     def _refrain(self, verdict: Verdict, before: Control, now_s: float) -> None:
         """Stop, HOLD or silence. ``before``: who drove until now."""
@@ -292,68 +292,70 @@ class Companion:
 
     # Driving -----------------------------------------------------------------------------------------------------
 
-    def _begin(self, now_s: float) -> Pursuit | None:
+    def _begin(self, now_s: float) -> MissionExecutor | None:
         """Once the rover may be driven, the mission on the map; until then whatever brings it there."""
-        laid = self._setting_out.step(self.vehicle, self.watch.control, now_s)
-        if laid is None:
+        layout = self._setting_out.step(self.vehicle, self.watch.control, now_s)
+        if layout is None:
             return None
-        self._tell(f"Companion: {self._mission.name}, {len(laid.itinerary.targets)} targets", INFO)
+        self._tell(f"Companion: {self._mission.name}, {len(layout.progress.targets)} targets", INFO)
         assert self.vehicle.scan is not None
         scan = (self.vehicle.scan_ahead or self.vehicle.scan).scan
-        pursuit = Pursuit(self._mission, self._settings, laid, scan, self._runner, self._log, self._tell, self._rng)
-        if self._memory is not None and self._memory.take_up(pursuit, self.vehicle, now_s):
-            self._tell(f"Resumed {self._start_up.found}, {pursuit.reached} targets reached before", INFO)
-        return pursuit
+        executor = MissionExecutor(
+            self._mission, self._settings, layout, scan, self._runner, self._log, self._tell, self._rng
+        )
+        if self._memory is not None and self._memory.take_up(executor, self.vehicle, now_s):
+            self._tell(f"Resumed {self._start_up.found}, {executor.reached} targets reached before", INFO)
+        return executor
 
-    def _drive(self, pursuit: Pursuit, now_s: float) -> None:
+    def _drive(self, executor: MissionExecutor, now_s: float) -> None:
         """One tick on the way."""
         pose = self.vehicle.pose_at(now_s)
         assert pose is not None
         # Within AUTO the battery is for the autopilot's own failsafe: there is no way back inside a leg.
-        if not self.vehicle.in_auto and (reason := self.oversight.broken_off(pursuit, pose, now_s)):
+        if not self.vehicle.in_auto and (reason := self.oversight.broken_off(executor, pose, now_s)):
             self._hand_over(now_s, reason)
             return
         others = announced(self.vehicle, pose, self._mission.rover.radius_m, self._settings.traffic)
-        pursuit.heed_latency(self.vehicle.latency_s)
-        guide = pursuit.drive(pose, self.vehicle.speed_m_s, now_s, others)
-        self._reporter.doing = pursuit.doing
-        guide = self._legs.guide(guide, pursuit, self._settings.guidance.min_speed_m_s)
+        executor.heed_latency(self.vehicle.latency_s)
+        guide = executor.drive(pose, self.vehicle.speed_m_s, now_s, others)
+        self._reporter.doing = executor.doing
+        guide = self._legs.guide(guide, executor, self._settings.guidance.min_speed_m_s)
         if guide is not None:
             self._speaker.guide(
-                self.output_check.passed(guide, pose, self.vehicle.speed_m_s, pursuit.surroundings), now_s
+                self.output_check.passed(guide, pose, self.vehicle.speed_m_s, executor.surroundings), now_s
             )
         else:
-            self._end(pursuit, now_s)
+            self._end(executor, now_s)
 
-    def _end(self, pursuit: Pursuit, now_s: float) -> None:
+    def _end(self, executor: MissionExecutor, now_s: float) -> None:
         """The mission is over, one way or another."""
-        self.outcome.targets = pursuit.statuses()
-        self._tell(f"Mission ended: {pursuit.reached} of {len(self.outcome.targets)} targets reached", INFO)
+        self.outcome.targets = executor.statuses()
+        self._tell(f"Mission ended: {executor.reached} of {len(self.outcome.targets)} targets reached", INFO)
         self._hand_over(now_s, "done")
 
     def _start_afresh(self) -> None:
         """What was sent before counts for nothing, and the rover may be moved: the leg begins again where it then is."""
         self._outbox.reset()
-        if self._pursuit is not None:
-            self._pursuit.driver.leave()
+        if self._executor is not None:
+            self._executor.driver.leave()
 
     # Ending, and what outlasts the round -------------------------------------------------------------------------
 
     def _hand_over(self, now_s: float, why: str) -> None:
         """The run ends."""
         self._reporter.doing = why
-        stopped = self._handover.begin(self.vehicle, self.watch.control, now_s, driven=self._pursuit is not None)
+        stopped = self._handover.begin(self.vehicle, self.watch.control, now_s, driven=self._executor is not None)
         if stopped and why != "done":
             self._tell(f"Companion: {why}, HOLD", WARNING)
 
     def _remember(self, now_s: float) -> None:
         """What this run would need to go on after a crash."""
-        if self._memory is not None and self._pursuit is not None:
+        if self._memory is not None and self._executor is not None:
             left, doubted = self._handover.ours, self._whereabouts.position_doubted
-            self._memory.note(now_s, self.vehicle, self.watch.control, self._pursuit, doubted, left, self._done)
+            self._memory.note(now_s, self.vehicle, self.watch.control, self._executor, doubted, left, self._done)
 
     def _tell_of_faults(self, now_s: float) -> None:
         """What a person should know though it stops nothing."""
         problem = self._log.problem or (self._memory.heed_problem(self._log) if self._memory else "")
-        ours, underway = self.watch.control is Control.COMPANION, self._pursuit is not None
+        ours, underway = self.watch.control is Control.COMPANION, self._executor is not None
         self._teller.of_faults(now_s, problem, heard=self.vehicle.heartbeat is not None, underway=underway, ours=ours)

@@ -8,7 +8,6 @@ from sitl.autopilot.link import Channel
 from sitl.faults.link_faults import Way
 from sitl.faults.player import FaultPlayer
 
-
 MAGIC_1, MAGIC_2, SIGNED = 0xFE, 0xFD, 1
 HEAD_BYTES = 3
 """Magic, payload's length, and MAVLink 2's flags: enough to know how long a packet is."""

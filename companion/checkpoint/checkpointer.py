@@ -15,8 +15,8 @@ from companion.core.frames import NedPoint
 from companion.core.grid import Cell
 from companion.core.rounds import Mark
 from companion.executive.goal_driver import Tally
-from companion.executive.mission_executor import Pursuit
-from companion.executive.mission_progress import Itinerary, Leg
+from companion.executive.mission_executor import MissionExecutor
+from companion.executive.mission_progress import Leg, MissionProgress
 from companion.mapping.evidence_map import EvidenceMap
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
@@ -35,7 +35,7 @@ UNSAVED = "The state cannot be saved: no --resume from here"
 BAND_CELLS = 250_000
 """So much of the map is copied in one tick, a megabyte; larger maps take several."""
 
-Occasion = tuple[Itinerary, Control, bool, bool, bool]
+Occasion = tuple[MissionProgress, Control, bool, bool, bool]
 
 
 class Memory:
@@ -72,25 +72,25 @@ class Memory:
         log.mark(Mark.UNSAVED)
         return UNSAVED
 
-    def take_up(self, pursuit: Pursuit, vehicle: VehicleState, now_s: float) -> bool:
-        """Go on in the middle of the leg: once, with a pursuit on the ground of ``lay_resumed``. False: there is nothing to take up."""
+    def take_up(self, executor: MissionExecutor, vehicle: VehicleState, now_s: float) -> bool:
+        """Go on in the middle of the leg: once, with an executor on the ground of ``lay_resumed``. False: there is nothing to take up."""
         if self.kept is None:
             return False
         state = self.kept.state
         tally = Tally(state.tally.steps, state.tally.return_steps, state.tally.stuck)
-        pursuit.driver.go_on(tally, state.tally.epoch)
+        executor.driver.go_on(tally, state.tally.epoch)
         if state.draws is not None:
-            pursuit.driver.searcher.rng.bit_generator.state = _generator(state.draws)
-        shift = shift_of(state, pursuit.laid)
+            executor.driver.searcher.rng.bit_generator.state = _generator(state.draws)
+        shift = shift_of(state, executor.layout)
         for x, y in state.trail:
-            pursuit.trail.enter(Cell(x + shift.x, y + shift.y))
-        _look(pursuit, vehicle)
-        itinerary, leg, pose = pursuit.itinerary, state.leg, vehicle.pose_at(now_s)
-        drives = itinerary.leg in (Leg.TRAVEL, Leg.HOME) and not pursuit.target_refused
+            executor.trail.enter(Cell(x + shift.x, y + shift.y))
+        _look(executor, vehicle)
+        progress, leg, pose = executor.progress, state.leg, vehicle.pose_at(now_s)
+        drives = progress.leg in (Leg.TRAVEL, Leg.HOME) and not executor.target_refused
         if leg is not None and pose is not None and drives:
             past = nav_state(leg, shift)
-            if pursuit.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
-                pursuit.driver.take_up(itinerary.goal, past, leg.doubts_left, pose)
+            if executor.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
+                executor.driver.take_up(progress.goal, past, leg.doubts_left, pose)
         return True
 
     def note(
@@ -98,7 +98,7 @@ class Memory:
         now_s: float,
         vehicle: VehicleState,
         control: Control,
-        pursuit: Pursuit,
+        executor: MissionExecutor,
         doubted: bool,
         released: bool,
         done: bool,
@@ -107,19 +107,19 @@ class Memory:
         position, heartbeat = vehicle.position, vehicle.heartbeat
         if position is None or heartbeat is None:
             return
-        if not pursuit.driver.planning:
-            self._draws = pursuit.driver.searcher.rng.bit_generator.state
-        ended = done and pursuit.itinerary.ended
-        occasion = (pursuit.itinerary, control, heartbeat.armed, released, ended)
+        if not executor.driver.planning:
+            self._draws = executor.driver.searcher.rng.bit_generator.state
+        ended = done and executor.progress.ended
+        occasion = (executor.progress, control, heartbeat.armed, released, ended)
         happened, self._occasion = occasion != self._occasion, occasion
-        afresh, self._map = self._map not in (None, (pursuit.maps_begun, doubted)), (pursuit.maps_begun, doubted)
+        afresh, self._map = self._map not in (None, (executor.maps_begun, doubted)), (executor.maps_begun, doubted)
         if afresh:
             self._rows = None
         elif self._rows is None and not doubted and self._is_due(now_s, position) and not self._writer.busy:
-            self._rows = _rows(pursuit.evidence)
+            self._rows = _rows(executor.evidence)
         band = None if self._rows is None else next(self._rows, None)
         if done and not doubted:  # nobody waits any more
-            self._writer.put(Update(dict(_rows(pursuit.evidence))))
+            self._writer.put(Update(dict(_rows(executor.evidence))))
         elif band is not None:
             self._writer.put(Update(dict([band])))
         through = self._rows is not None and band is None
@@ -127,7 +127,7 @@ class Memory:
             self._rows, self._complete = None, True
             self._saved_s, self._saved_at = now_s, NedPoint(position.north_m, position.east_m)
         if afresh or through or done or (happened and self._complete):
-            now = self._snapshot(now_s, position, vehicle.sticks, pursuit, occasion)
+            now = self._snapshot(now_s, position, vehicle.sticks, executor, occasion)
             self._writer.put(Update(snapshot=now, afresh=afresh))
 
     def close(self) -> None:
@@ -140,10 +140,10 @@ class Memory:
         return now_s - self._saved_s >= SAVE_S and moved_m >= MOVED_M
 
     def _snapshot(
-        self, now_s: float, position: LocalPositionSeen, sticks: Sticks, pursuit: Pursuit, occasion: Occasion
+        self, now_s: float, position: LocalPositionSeen, sticks: Sticks, executor: MissionExecutor, occasion: Occasion
     ) -> Snapshot:
         _, control, armed, released, ended = occasion
-        driver, laid = pursuit.driver, pursuit.laid
+        driver, layout = executor.driver, executor.layout
         leg, doubts_left, epoch = driver.leg
         tally = driver.tally
         return Snapshot(
@@ -156,26 +156,26 @@ class Memory:
             armed=armed,
             boot_s=position.boot_s,
             ahead_s=clock_ahead_s(position),
-            origin=laid.origin,
-            home=laid.home,
-            itinerary=pursuit.itinerary,
-            leg=leg if driver.goal is pursuit.itinerary.goal else None,
+            origin=layout.origin,
+            home=layout.home,
+            progress=executor.progress,
+            leg=leg if driver.goal is executor.progress.goal else None,
             doubts_left=doubts_left,
-            trail=pursuit.trail.back()[::-1],
-            base=pursuit.evidence.base,
-            subdivisions=pursuit.evidence.subdivisions,
+            trail=executor.trail.back()[::-1],
+            base=executor.evidence.base,
+            subdivisions=executor.evidence.subdivisions,
             tally=SavedTally(steps=tally.steps, return_steps=tally.return_steps, stuck=tally.stuck, epoch=epoch),
             draws=self._draws,
             sticks_us=sticks.rest_us,
         )
 
 
-def _look(pursuit: Pursuit, vehicle: VehicleState) -> None:
+def _look(executor: MissionExecutor, vehicle: VehicleState) -> None:
     """A rover that is found driving is beyond what had been seen when the state was written: what it sees now comes before the first target."""
     seen, attitude = vehicle.scan_ahead, vehicle.attitude
     pose = None if seen is None else vehicle.pose_at(seen.time_s)
     if seen is not None and attitude is not None and pose is not None:
-        pursuit.map_scan(pose, attitude.yaw_rate_rad_s, seen.scan)
+        executor.map_scan(pose, attitude.yaw_rate_rad_s, seen.scan)
 
 
 def _rows(evidence: EvidenceMap) -> Iterator[tuple[BandPlace, Raster]]:

@@ -48,7 +48,7 @@ class SavedErrand(SavedPlace):
 
 
 class SavedProgress(Part):
-    """The itinerary: where to return to, what has become of each target. Times are what was left of them."""
+    """The progress: where to return to, what has become of each target. Times are what was left of them."""
 
     start: SavedPlace
     statuses: tuple[TargetStatus, ...] = Field(min_length=1, max_length=MAX_TARGETS)

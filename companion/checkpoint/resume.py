@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from companion.checkpoint.model import SavedLeg, SavedPlace, SavedState
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell
-from companion.executive.mission_layout import Laid, apart_m, from_home, lay
-from companion.executive.mission_progress import Itinerary
+from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
+from companion.executive.mission_progress import MissionProgress
 from companion.mapping.evidence_map import restore
 from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, OnBlocked
@@ -86,7 +86,7 @@ def lay_resumed(
     *,
     same: bool,
     fence: AutopilotFence = NO_FENCE,
-) -> tuple[Laid, str]:
+) -> tuple[MissionLayout, str]:
     """The mission where it lies now, with the progress and the map of then; and what is to be said of the map.
 
     ``same``: the autopilot has been on since, so that its frame is the one of then unless its origin has moved. Otherwise a new estimate may put
@@ -95,11 +95,11 @@ def lay_resumed(
     state, then = kept.state, GeoPoint(*kept.state.origin)
     start = _now_at(state.progress.start, then, origin)
     began_at = Pose(start.north_m, start.east_m, 0.0, now_s)
-    laid = lay(mission, settings, origin, GeoPoint(*state.home), began_at, fence)
-    laid = replace(laid, itinerary=_progress(laid, state, then, now_s))
-    evidence, shift = laid.evidence, shift_of(state, laid)
+    layout = lay(mission, settings, origin, GeoPoint(*state.home), began_at, fence)
+    layout = replace(layout, progress=_progress(layout, state, then, now_s))
+    evidence, shift = layout.evidence, shift_of(state, layout)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:
-        return laid, "without its map (the settings of the map have changed)"
+        return layout, "without its map (the settings of the map have changed)"
     same = same and apart_m(origin, then) <= SAME_ORIGIN_M
     fine = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
     log_odds = _moved(kept.rasters["log_odds"], evidence.log_odds.shape, fine)
@@ -108,15 +108,15 @@ def lay_resumed(
         log_odds = np.where(log_odds >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
         penalty = np.zeros_like(penalty)
     restore(evidence, log_odds, penalty)
-    return laid, "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
+    return layout, "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
 
 
-def shift_of(state: SavedState, laid: Laid) -> Cell:
+def shift_of(state: SavedState, layout: MissionLayout) -> Cell:
     """By how many fields the grid's corner lies elsewhere from home than it did: what was field f is now f + shift.
 
     Home is in the middle of a field of either grid; but a grid that is laid round places in degrees may be a field larger in another frame.
     """
-    corner, resolution_m = from_home(laid).south_west, laid.evidence.base.resolution_m
+    corner, resolution_m = from_home(layout).south_west, layout.evidence.base.resolution_m
     east, north = state.ground.east_m - corner.east_m, state.ground.north_m - corner.north_m
     return Cell(round(east / resolution_m), round(north / resolution_m))
 
@@ -133,16 +133,16 @@ def nav_state(leg: SavedLeg, shift: Cell) -> NavState:
     )
 
 
-def _progress(laid: Laid, state: SavedState, then: GeoPoint, now_s: float) -> Itinerary:
+def _progress(layout: MissionLayout, state: SavedState, then: GeoPoint, now_s: float) -> MissionProgress:
     """How far the mission had come, on the targets where they lie now."""
     progress, errand = state.progress, None
     if progress.errand is not None:
-        point = _now_at(progress.errand, then, laid.origin)
-        cell = laid.evidence.base.cell_at(point)
+        point = _now_at(progress.errand, then, layout.origin)
+        cell = layout.evidence.base.cell_at(point)
         errand = ResolvedTarget(progress.errand.name, point, cell, 0.0, OnBlocked.SKIP, progress.errand.speed_m_s)
     return replace(
-        laid.itinerary,
-        home=replace(laid.itinerary.home, name=progress.start.name),
+        layout.progress,
+        home=replace(layout.progress.home, name=progress.start.name),
         statuses=progress.statuses,
         index=progress.index,
         leg=progress.leg,

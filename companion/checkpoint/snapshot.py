@@ -19,7 +19,7 @@ from companion.checkpoint.model import (
 )
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.core.grid import Cell, Grid
-from companion.executive.mission_progress import Itinerary
+from companion.executive.mission_progress import MissionProgress
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import NavState
 from companion.safety.mode_latch import Control
@@ -40,7 +40,7 @@ class Snapshot:
     ahead_s: float
     origin: GeoPoint
     home: GeoPoint
-    itinerary: Itinerary
+    progress: MissionProgress
     leg: NavState | None
     doubts_left: int
     trail: tuple[Cell, ...]
@@ -73,7 +73,7 @@ def saved_state(now: Snapshot) -> SavedState:
         ahead_s=now.ahead_s,
         origin=(now.origin.lat_deg, now.origin.lon_deg),
         home=(now.home.lat_deg, now.home.lon_deg),
-        progress=_progress(now.itinerary, now.now_s),
+        progress=_progress(now.progress, now.now_s),
         leg=None if now.leg is None else _leg(now.leg, now.doubts_left),
         trail=now.trail,
         ground=ground,
@@ -83,18 +83,18 @@ def saved_state(now: Snapshot) -> SavedState:
     )
 
 
-def _progress(itinerary: Itinerary, now_s: float) -> SavedProgress:
-    give_up_s = itinerary.give_up_s
+def _progress(progress: MissionProgress, now_s: float) -> SavedProgress:
+    give_up_s = progress.give_up_s
     return SavedProgress(
         start=SavedPlace(
-            name=itinerary.home.name, north_m=itinerary.home.point.north_m, east_m=itinerary.home.point.east_m
+            name=progress.home.name, north_m=progress.home.point.north_m, east_m=progress.home.point.east_m
         ),
-        statuses=itinerary.statuses,
-        index=itinerary.index,
-        leg=itinerary.leg,
-        left_s=_left_s(itinerary.until_s, now_s),
+        statuses=progress.statuses,
+        index=progress.index,
+        leg=progress.leg,
+        left_s=_left_s(progress.until_s, now_s),
         give_up_left_s=None if give_up_s is None else _left_s(give_up_s, now_s),
-        errand=None if itinerary.errand is None else _errand(itinerary.errand),
+        errand=None if progress.errand is None else _errand(progress.errand),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from companion.control.arc_view import TOUCH_M, ArcView, Rolling
 from companion.control.manoeuvre import Manoeuvre, Try, find_manoeuvre, tries
-from companion.control.point_controller import Guide
+from companion.control.point_controller import ControlCommand
 from companion.control.reference_path import Route
 from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
@@ -31,7 +31,7 @@ OFF_ROUTE_RADII = 1.0
 """A manoeuvre that ends farther from the route than so many turning radii leads nowhere any more."""
 
 
-class Helm:
+class ArcController:
     """Steers one rover. It remembers the manoeuvre under way and the last few poses. ``backwards``: the rover rolls tail first."""
 
     def __init__(self, evidence: EvidenceMap, settings: Settings) -> None:
@@ -53,7 +53,7 @@ class Helm:
         self.manoeuvre = None
         self._looked_s = -math.inf
 
-    def guide(self, route: Route, pose: Pose, speed_m_s: float, rover: RoverLimits) -> Guide:
+    def guide(self, route: Route, pose: Pose, speed_m_s: float, rover: RoverLimits) -> ControlCommand:
         """What to tell the autopilot now. ``speed_m_s``: over ground, without a sign."""
         rolling = self._rolling(pose, speed_m_s)
         self.backwards = rolling.speed_m_s < 0.0
@@ -62,7 +62,7 @@ class Helm:
         self._told_m = view.told_m
         return answer
 
-    def _answer(self, view: ArcView, route: Route, rover: RoverLimits) -> Guide:
+    def _answer(self, view: ArcView, route: Route, rover: RoverLimits) -> ControlCommand:
         """On with the manoeuvre, on along the route, or stop."""
         if view.would_touch():
             self.manoeuvre = None
@@ -110,7 +110,7 @@ class Helm:
         if off_m > OFF_ROUTE_RADII * rover.turning_radius_m:
             self.manoeuvre = None
 
-    def _go_on(self, view: ArcView, route: Route) -> Guide | None:
+    def _go_on(self, view: ArcView, route: Route) -> ControlCommand | None:
         """The next moment of the manoeuvre; None when it is over, or cannot be driven any more."""
         manoeuvre = self.manoeuvre
         assert manoeuvre is not None

@@ -13,7 +13,7 @@ import numpy as np
 
 from companion.control.braking import blind_distance_m, braking_distance_m, fastest_blind_m_s, fastest_within_m
 from companion.control.manoeuvre import Leg
-from companion.control.point_controller import STOP, Guide, Motion, speed_limit_m_s
+from companion.control.point_controller import STOP, ControlCommand, Motion, speed_limit_m_s
 from companion.control.reference_path import STEP_M
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
@@ -135,16 +135,16 @@ class ArcView:
         rest = line[at:] - np.vstack((self._here, line[at:-1]))
         return at, float(np.hypot(*rest.T).sum()) / self._scale
 
-    def brake(self) -> Guide:
+    def brake(self) -> ControlCommand:
         """Stop with the wheels as they are: the arc that the rover is on has been looked along.
 
         To tell it the arc it really drives would open that arc more and more if it drives wider ones than it is told.
         """
         if abs(self.rolling.speed_m_s) <= self._settings.guidance.roll_out_m_s:
-            return Guide(Motion.BRAKE, STOP, 0.0)
-        return Guide(Motion.BRAKE, GuidedVelocity(0.0, self._turn_rate(self.told_m)), 0.0)
+            return ControlCommand(Motion.BRAKE, STOP, 0.0)
+        return ControlCommand(Motion.BRAKE, GuidedVelocity(0.0, self._turn_rate(self.told_m)), 0.0)
 
-    def drive(self, ahead: Ahead, *, backwards: bool, left_m: float) -> Guide:
+    def drive(self, ahead: Ahead, *, backwards: bool, left_m: float) -> ControlCommand:
         """Go on along a way, as fast as may be; BRAKE or BLOCKED where that is not at all."""
         guidance, steering = self._settings.guidance, self._settings.steering
         slowest_m_s = guidance.min_speed_m_s if not backwards else guidance.back_out_speed_m_s
@@ -152,7 +152,7 @@ class ArcView:
         reach_m = min(ahead.clear_m, ahead.seen_m + creep_m)
         if reach_m < max(self.needed_m, creep_m) + 0.1:
             stopped = abs(self.rolling.speed_m_s) <= steering.stopped_m_s
-            return Guide(Motion.BLOCKED, STOP, 0.0) if stopped else self.brake()
+            return ControlCommand(Motion.BLOCKED, STOP, 0.0) if stopped else self.brake()
         limit_m_s = fastest_within_m(min(reach_m, left_m), guidance)
         bend_m_s = math.sqrt(steering.lateral_m_s2 / max(abs(ahead.curvature_m), 1e-3))
         beside_m = clearance_m(self._evidence, self.pose.point, guidance.slow_within_m + self.rover.radius_m)
@@ -166,7 +166,7 @@ class ArcView:
         self.told_m = ahead.curvature_m
         told_m_s = math.floor(10.0 * speed_m_s + 1e-6) / 10.0  # never rounded up: that would lead farther
         setpoint = GuidedVelocity(-told_m_s if backwards else told_m_s, self._turn_rate(ahead.curvature_m))
-        return Guide(Motion.DRIVE, setpoint, speed_m_s)
+        return ControlCommand(Motion.DRIVE, setpoint, speed_m_s)
 
     def _left_alone_m_s(self, wanted_m_s: float, curvature_m: float, *, backwards: bool) -> float:
         """As fast as wanted, or so fast as the rover may be left alone with; 0 where that is too slow to drive at all.

@@ -15,7 +15,7 @@ from numba import njit
 
 from companion.control.evasion import Choice, Situation, on_arcs, on_the_way, out_of_the_way
 from companion.control.motion_prediction import PERIOD_S, Points
-from companion.control.point_controller import Guide
+from companion.control.point_controller import ControlCommand
 from companion.control.reference_path import Route
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
@@ -30,7 +30,7 @@ NEAR_M = 0.15
 
 
 def yielded(
-    now: Guide,
+    now: ControlCommand,
     route: Route | None,
     pose: Pose,
     speed_m_s: float,
@@ -41,7 +41,7 @@ def yielded(
     aside_rad: float | None = None,
     *,
     backwards: bool = False,
-) -> tuple[Guide, float | None]:
+) -> tuple[ControlCommand, float | None]:
     """What to do instead of ``now`` because of what moves; ``now`` itself if nothing comes across.
 
     Also which way the rover moves aside, if it does; handed in again as ``aside_rad`` it keeps to that.
@@ -76,7 +76,7 @@ def yielded(
     return best.guide, best.aside_rad
 
 
-class WayGiver:
+class CollisionAvoidance:
     """Makes way on behalf of one rover, and keeps in mind where it moves aside to and since when it has not got on."""
 
     def __init__(self, evidence: EvidenceMap, rover: RoverLimits) -> None:
@@ -87,7 +87,7 @@ class WayGiver:
 
     def give(
         self,
-        now: Guide,
+        now: ControlCommand,
         route: Route | None,
         pose: Pose,
         speed_m_s: float,
@@ -95,7 +95,7 @@ class WayGiver:
         settings: Settings,
         *,
         backwards: bool,
-    ) -> Guide:
+    ) -> ControlCommand:
         """What to do instead of ``now``, as ``yielded`` says."""
         evidence, rover, aside_rad = self._evidence, self._rover, self._aside_rad
         guide, self._aside_rad = yielded(

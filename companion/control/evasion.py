@@ -23,7 +23,7 @@ from companion.control.motion_prediction import (
     moved_on_arc,
     steered_along,
 )
-from companion.control.point_controller import STOP, Guide, Motion, turn_to
+from companion.control.point_controller import STOP, ControlCommand, Motion, turn_to
 from companion.control.reference_path import Route
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
@@ -78,16 +78,16 @@ class Choice:
     ``aside_rad``: which way it then moves aside.
     """
 
-    guide: Guide
+    guide: ControlCommand
     places: Points
     until_s: float = math.inf
     aside_rad: float | None = None
 
 
-def on_the_way(at: Situation, now: Guide, route: Route | None) -> Iterator[Choice]:
+def on_the_way(at: Situation, now: ControlCommand, route: Route | None) -> Iterator[Choice]:
     """Going on, going on a little, stopping."""
     pose, rolls_m = at.pose, at.rolls_m
-    halt = Choice(Guide(Motion.BRAKE, STOP, 0.0), ahead(pose, -rolls_m if at.backwards else rolls_m))
+    halt = Choice(ControlCommand(Motion.BRAKE, STOP, 0.0), ahead(pose, -rolls_m if at.backwards else rolls_m))
     if now.motion is Motion.DRIVE and route is not None:
         way = _told_way(now, route, pose)
         course_rad = pose.heading_rad + (math.pi if at.backwards else 0.0)
@@ -100,7 +100,7 @@ def on_the_way(at: Situation, now: Guide, route: Route | None) -> Iterator[Choic
     yield halt
 
 
-def _nearer(now: Guide, pose: Pose, along_m: Points) -> Guide:
+def _nearer(now: ControlCommand, pose: Pose, along_m: Points) -> ControlCommand:
     """The same, but told no farther than where the rover is to come to stand: it must stop there also if it is told nothing more."""
     if not isinstance(now.setpoint, GuidedPosition):
         return now
@@ -108,10 +108,10 @@ def _nearer(now: Guide, pose: Pose, along_m: Points) -> Guide:
     if stands_m >= pose.point.distance_m(there):
         return now
     nearer = pose.point.moved(pose.point.bearing_rad(there), stands_m)
-    return Guide(now.motion, GuidedPosition(nearer), now.speed_m_s)
+    return ControlCommand(now.motion, GuidedPosition(nearer), now.speed_m_s)
 
 
-def _told_way(now: Guide, route: Route, pose: Pose) -> Points:
+def _told_way(now: ControlCommand, route: Route, pose: Pose) -> Points:
     """Where it drives: straight to the place that it is told, and on from there along the route.
 
     That place lies some metres ahead. On a route that turns off before it, a new one that begins sideways above all, the rover goes
@@ -145,7 +145,7 @@ def _straight_on(at: Situation) -> list[Choice]:
     there = at.pose.point.moved(at.pose.heading_rad, float(along_m[-1]))
     if at.speed_m_s <= at.settings.guidance.roll_out_m_s or not _may_stand(at, there):
         return []
-    return [Choice(Guide(Motion.LOOK, GuidedPosition(there), at.speed_m_s), ahead(at.pose, along_m))]
+    return [Choice(ControlCommand(Motion.LOOK, GuidedPosition(there), at.speed_m_s), ahead(at.pose, along_m))]
 
 
 def _may_stand(at: Situation, there: NedPoint) -> bool:
@@ -173,7 +173,7 @@ def _aside(at: Situation, bearing_rad: float) -> list[Choice]:
         places = moved(ahead(pose, at.rolls_m), bearing_rad, along_m)
         if error_rad > math.radians(guidance.turn_until_close_deg):
             return [Choice(turn_to(bearing_rad, at.speed_m_s, guidance), places, aside_rad=bearing_rad)]
-        going = Guide(Motion.LOOK, GuidedPosition(there), going_m_s)
+        going = ControlCommand(Motion.LOOK, GuidedPosition(there), going_m_s)
         return [Choice(going, places, aside_rad=bearing_rad)]
     return []
 
@@ -186,7 +186,7 @@ def _off(at: Situation) -> list[Choice]:
         return []
     stands_s = guidance.brake_delay_s + at.speed_m_s / guidance.deceleration_m_s2
     back_m = np.minimum(np.maximum(at.times_s - stands_s, 0.0) * back_m_s, OFF_M)
-    guide = Guide(Motion.LOOK, GuidedVelocity(-back_m_s, 0.0), back_m_s)
+    guide = ControlCommand(Motion.LOOK, GuidedVelocity(-back_m_s, 0.0), back_m_s)
     return [Choice(guide, ahead(at.pose, at.rolls_m - back_m))]
 
 
@@ -209,4 +209,4 @@ def on_arcs(at: Situation) -> Iterator[Choice]:
             turn_rate = curvature_m * max(at.speed_m_s, steering.scale_base_m_s)
             setpoint = GuidedVelocity(-going_m_s if tail_first else going_m_s, round(turn_rate, 2))
             places = moved_on_arc(pose, course_rad, curvature_m, along_m)
-            yield Choice(Guide(Motion.LOOK, setpoint, going_m_s), places)
+            yield Choice(ControlCommand(Motion.LOOK, setpoint, going_m_s), places)

@@ -37,7 +37,7 @@ class Motion(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Guide:
+class ControlCommand:
     """What to tell the autopilot now."""
 
     motion: Motion
@@ -45,7 +45,7 @@ class Guide:
     speed_m_s: float
 
 
-STANDSTILL = Guide(Motion.BLOCKED, STOP, 0.0)
+STANDSTILL = ControlCommand(Motion.BLOCKED, STOP, 0.0)
 
 
 def guide(
@@ -58,7 +58,7 @@ def guide(
     *,
     looking_rad: float | None = None,
     braking: bool = False,
-) -> Guide:
+) -> ControlCommand:
     """The setpoint and speed for this moment. ``BLOCKED`` means that not even the next piece of the route is clear.
 
     ``looking_rad``: the heading of the last answer if that was LOOK. It is kept until reached, and a longer clear reach is wanted
@@ -66,13 +66,13 @@ def guide(
     """
     needed_m = braking_distance_m(speed_m_s, settings)
     if _would_touch(pose, speed_m_s, needed_m, evidence, rover, settings):
-        return Guide(Motion.BRAKE, STOP, 0.0)
+        return ControlCommand(Motion.BRAKE, STOP, 0.0)
     target, reach_m, room_m = farthest_clear(route, pose, speed_m_s, evidence, rover, settings)
     distance_m = pose.point.distance_m(route.end)
     at_end = len(route.points) - 1 - route.progress <= int(1.0 / STEP_M)
     rolling = speed_m_s > settings.roll_out_m_s
     if rolling and reach_m < min(needed_m + (settings.brake_on_m if braking else 0.0), distance_m - 0.1):
-        return Guide(Motion.BRAKE, STOP, 0.0)
+        return ControlCommand(Motion.BRAKE, STOP, 0.0)
     wanted_m = settings.least_reach_m if looking_rad is None else settings.reach_after_look_m
     if reach_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach_m > 0.0):
         if looking_rad is not None and not _is_turned_to(looking_rad, pose, settings):
@@ -93,7 +93,7 @@ def guide(
     if not at_end:
         limit_m_s = min(limit_m_s, max(fastest_within_m(reach_m, settings), settings.min_speed_m_s))
     limit_m_s = min(limit_m_s, _limit_by_heading(pose, evidence, rover, settings))
-    return Guide(Motion.DRIVE, GuidedPosition(target), limit_m_s)
+    return ControlCommand(Motion.DRIVE, GuidedPosition(target), limit_m_s)
 
 
 def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> float:
@@ -139,11 +139,11 @@ def _is_turned_to(bearing_rad: float, pose: Pose, settings: GuidanceSettings) ->
     return abs(wrap_pi_rad(bearing_rad - pose.heading_rad)) <= math.radians(settings.turned_deg)
 
 
-def turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -> Guide:
+def turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -> ControlCommand:
     """Turn on the spot; a rover that still rolls brakes first, lest it drives an arc."""
     if speed_m_s > settings.roll_out_m_s:
-        return Guide(Motion.BRAKE, STOP, 0.0)
-    return Guide(Motion.LOOK, GuidedHeading(bearing_rad), settings.min_speed_m_s)
+        return ControlCommand(Motion.BRAKE, STOP, 0.0)
+    return ControlCommand(Motion.LOOK, GuidedHeading(bearing_rad), settings.min_speed_m_s)
 
 
 def _look_or_blocked(
@@ -153,7 +153,7 @@ def _look_or_blocked(
     evidence: EvidenceMap,
     rover: RoverLimits,
     settings: GuidanceSettings,
-) -> Guide:
+) -> ControlCommand:
     """The next piece is not clear, or has not been seen: turn to it; when turned and still so, it is blocked."""
     ahead = route.point_ahead(settings.look_ahead_m)
     line = look_along(evidence, pose.point, ahead, rover.radius_m)
@@ -169,8 +169,8 @@ def _look_or_blocked(
         creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
         clear_m = look_along(evidence, pose.point, pose.point.moved(bearing, creep_m), rover.radius_m).clear_m
         target = pose.point.moved(bearing, min(creep_m, clear_m))
-        return Guide(Motion.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
-    return Guide(Motion.BLOCKED, STOP, 0.0)
+        return ControlCommand(Motion.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
+    return ControlCommand(Motion.BLOCKED, STOP, 0.0)
 
 
 def speed_limit_m_s(beside_m: float, bearing_error_rad: float, rover: RoverLimits, settings: GuidanceSettings) -> float:

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m
-from companion.control.point_controller import STOP, Guide, Motion
+from companion.control.point_controller import STOP, ControlCommand, Motion
 from companion.core.frames import NedPoint, Pose
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.arc_kernels import BLOCKED, arc_clear, kept_room
@@ -137,7 +137,7 @@ def fault_of(output: Output, known: Surroundings, rules: tuple[Rule, ...] = RULE
     return ""
 
 
-class OutputCheck:
+class SetpointCheck:
     """Stands between guidance and the outbox. ``refused``: how often each rule was broken."""
 
     def __init__(self, tell: Tell, rules: tuple[Rule, ...] = RULES) -> None:
@@ -145,11 +145,11 @@ class OutputCheck:
         self._tell = tell
         self._rules = rules
 
-    def passed(self, guide: Guide, pose: Pose, speed_m_s: float, known: Surroundings) -> Guide:
+    def passed(self, guide: ControlCommand, pose: Pose, speed_m_s: float, known: Surroundings) -> ControlCommand:
         """The same guide, or velocity zero in its place if its setpoint breaks a rule."""
         fault = fault_of(Output(guide.setpoint, pose, speed_m_s), known, self._rules)
         if not fault:
             return guide
         self.refused[fault] += 1
         self._tell(f"Stopping: {fault}", WARNING)
-        return Guide(Motion.BRAKE, STOP, 0.0)
+        return ControlCommand(Motion.BRAKE, STOP, 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.control.point_controller import STANDSTILL, Guide, Motion
+from companion.control.point_controller import STANDSTILL, ControlCommand, Motion
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.core.grid import Cell
@@ -29,7 +29,7 @@ class Progress:
     changed_s: float
 
 
-class Recovery:
+class StuckRecovery:
     """Watches one rover on one map. ``radius_m`` is the rover's."""
 
     def __init__(self, evidence: EvidenceMap, radius_m: float, settings: GuidanceSettings) -> None:
@@ -52,7 +52,7 @@ class Recovery:
         """The rover stands still for a good reason."""
         self._progress = None
 
-    def is_stuck(self, pose: Pose, now: Guide) -> bool:
+    def is_stuck(self, pose: Pose, now: ControlCommand) -> bool:
         """No movement (turning counts for a while) for ``stuck_after_s``; to be asked at every tick."""
         last = self._progress
         if last is None or pose.point.distance_m(last.pose.point) >= MOVED_M:
@@ -74,7 +74,7 @@ class Recovery:
         self._back_until_s = pose.time_s + self._settings.back_out_m / self._settings.back_out_speed_m_s
         self._progress = None
 
-    def backing(self, pose: Pose) -> Guide | None:
+    def backing(self, pose: Pose) -> ControlCommand | None:
         """Straight back over ground that is known to be free, and not a step farther; None when done, or not at it."""
         if pose.time_s >= self._back_until_s:
             return None
@@ -83,4 +83,4 @@ class Recovery:
         if speed_m_s < BACK_LEAST_M_S:
             self._back_until_s = pose.time_s
             return STANDSTILL
-        return Guide(Motion.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)
+        return ControlCommand(Motion.LOOK, GuidedVelocity(-speed_m_s, 0.0), speed_m_s)

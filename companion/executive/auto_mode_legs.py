@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from companion.control.point_controller import STANDSTILL, Guide, Motion
+from companion.control.point_controller import STANDSTILL, ControlCommand, Motion
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
-from companion.executive.mission_executor import Pursuit, Tell
+from companion.executive.mission_executor import MissionExecutor, Tell
 from companion.executive.mission_progress import Leg, TargetStatus, ended_at, parked, sent_to
 from companion.vehicle.commands import GuidedPosition
 from companion.vehicle.events.targets import GuidedLeg, LegState
@@ -19,7 +19,7 @@ SLACK_M = 1.0
 """The rover drives on between the end of a leg and the news of it."""
 
 
-class AutoLegs:
+class AutoModeLegs:
     """Follows what the autopilot hands over. ``tell`` says a text with its severity to the people."""
 
     def __init__(self, tell: Tell) -> None:
@@ -27,65 +27,65 @@ class AutoLegs:
         self._leg: GuidedLeg | None = None
         self._parked = False
 
-    def follow(self, vehicle: VehicleState, pursuit: Pursuit) -> bool:
+    def follow(self, vehicle: VehicleState, executor: MissionExecutor) -> bool:
         """To be called at every tick; True when every leg has been driven or ended, and none is under way."""
         if not vehicle.in_auto:
             return False
         if not self._parked:
             self._parked = True
-            pursuit.itinerary = parked(pursuit.itinerary)
+            executor.progress = parked(executor.progress)
         leg, before = vehicle.leg, self._leg
         if leg is None:
             return False
         live = leg.state is LegState.LIVE
         if before is not None and (leg.state is LegState.OVER or (live and leg.point != before.point)):
-            self._end(before, vehicle, pursuit)
+            self._end(before, vehicle, executor)
         if live and self._leg is None:
             self._leg = leg
-            self._begin(leg, pursuit)
-        return self._leg is None and pursuit.itinerary.ended
+            self._begin(leg, executor)
+        return self._leg is None and executor.progress.ended
 
-    def guide(self, guide: Guide | None, pursuit: Pursuit, slow_m_s: float) -> Guide | None:
+    def guide(self, guide: ControlCommand | None, executor: MissionExecutor, slow_m_s: float) -> ControlCommand | None:
         """What to do: where the companion is content, the autopilot may want the rover nearer to the place (a small WP_RADIUS)."""
-        itinerary = pursuit.itinerary
-        if self._leg is None or guide is not STANDSTILL or itinerary.leg is not Leg.STAY:
+        progress = executor.progress
+        if self._leg is None or guide is not STANDSTILL or progress.leg is not Leg.STAY:
             return guide
-        if itinerary.statuses[itinerary.index] is not TargetStatus.REACHED:
+        if progress.statuses[progress.index] is not TargetStatus.REACHED:
             return guide
-        return Guide(Motion.DRIVE, GuidedPosition(itinerary.goal.point), slow_m_s)
+        return ControlCommand(Motion.DRIVE, GuidedPosition(progress.goal.point), slow_m_s)
 
-    def _begin(self, leg: GuidedLeg, pursuit: Pursuit) -> None:
-        index = _index_of(leg.point, pursuit)
+    def _begin(self, leg: GuidedLeg, executor: MissionExecutor) -> None:
+        index = _index_of(leg.point, executor)
         if index is None:
             self._tell("AUTO hands over a place that is not in the mission as it was read: not driven", WARNING)
             return
-        pursuit.itinerary = sent_to(pursuit.itinerary, index)
-        pursuit.driver.leave()
+        executor.progress = sent_to(executor.progress, index)
+        executor.driver.leave()
 
-    def _end(self, leg: GuidedLeg, vehicle: VehicleState, pursuit: Pursuit) -> None:
+    def _end(self, leg: GuidedLeg, vehicle: VehicleState, executor: MissionExecutor) -> None:
         self._leg = None
-        pursuit.driver.leave()
-        itinerary = pursuit.itinerary
-        if _index_of(leg.point, pursuit) is None:
+        executor.driver.leave()
+        progress = executor.progress
+        if _index_of(leg.point, executor) is None:
             return
-        if itinerary.statuses[itinerary.index] is TargetStatus.REACHED and itinerary.leg is Leg.STAY:
-            pursuit.itinerary = parked(itinerary)
+        if progress.statuses[progress.index] is TargetStatus.REACHED and progress.leg is Leg.STAY:
+            executor.progress = parked(progress)
             return
-        name, place = itinerary.goal.name, itinerary.goal.point
+        name, place = progress.goal.name, progress.goal.point
         here = vehicle.position
         left_m = 0.0 if here is None else place.distance_m(NedPoint(here.north_m, here.east_m))
         if left_m <= vehicle.parameters.get("WP_RADIUS", WP_RADIUS_M) + SLACK_M:
             self._tell(f"Reached {name}", INFO)
-            pursuit.itinerary = ended_at(itinerary, TargetStatus.REACHED)
+            executor.progress = ended_at(progress, TargetStatus.REACHED)
         else:
             self._tell(f"AUTO has gone on {left_m:.1f} m before {name}", WARNING)
-            pursuit.itinerary = ended_at(itinerary, TargetStatus.SKIPPED)
+            executor.progress = ended_at(progress, TargetStatus.SKIPPED)
 
 
-def _index_of(point: GeoPoint, pursuit: Pursuit) -> int | None:
+def _index_of(point: GeoPoint, executor: MissionExecutor) -> int | None:
     """The target at a place: the first one that has not had its turn, else the last one that had."""
-    itinerary = pursuit.itinerary
-    place = LocalFrame(pursuit.laid.origin).to_ned(point)
-    there = [i for i, target in enumerate(itinerary.targets) if target.point.distance_m(place) <= SAME_M]
-    pending = [i for i in there if itinerary.statuses[i] is TargetStatus.PENDING]
+    progress = executor.progress
+    place = LocalFrame(executor.layout.origin).to_ned(point)
+    there = [i for i, target in enumerate(progress.targets) if target.point.distance_m(place) <= SAME_M]
+    pending = [i for i in there if progress.statuses[i] is TargetStatus.PENDING]
     return pending[0] if pending else there[-1] if there else None

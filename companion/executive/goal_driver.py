@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
-from companion.control.arc_controller import Helm
-from companion.control.collision_avoidance import WayGiver
-from companion.control.point_controller import STANDSTILL, STOP, Guide, Motion, guide
+from companion.control.arc_controller import ArcController
+from companion.control.collision_avoidance import CollisionAvoidance
+from companion.control.point_controller import STANDSTILL, STOP, ControlCommand, Motion, guide
 from companion.control.reference_path import Route, advanced, route_along
-from companion.control.stuck_recovery import Recovery
+from companion.control.stuck_recovery import StuckRecovery
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
@@ -50,7 +50,7 @@ class Tally:
     stuck: int = 0
 
 
-class Driver:
+class GoalDriver:
     """One leg after the other, on one map."""
 
     def __init__(
@@ -73,7 +73,7 @@ class Driver:
         self._runner = runner
         self._goal: ResolvedTarget | None = None
         self._state: NavState | None = None
-        self._recovery = Recovery(evidence, rover.radius_m, settings.guidance)
+        self._recovery = StuckRecovery(evidence, rover.radius_m, settings.guidance)
         self._doubts_left = 0
         self.seed = int(searcher.rng.integers(2**63)) if seed is None else seed
         self._epoch = 0
@@ -82,13 +82,13 @@ class Driver:
         self.step_s = 0.0
         """From the round in which the last step began to the one that took its answer: a replay has the same rounds."""
         self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
-        self._helm = Helm(evidence, settings) if rover.turning_radius_m > 0.0 else None
+        self._helm = ArcController(evidence, settings) if rover.turning_radius_m > 0.0 else None
         self._looking_rad: float | None = None
         self._braking = False
         self._moving: tuple[Moving, ...] = ()
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf
-        self._way_giver = WayGiver(evidence, rover)
+        self._way_giver = CollisionAvoidance(evidence, rover)
 
     def head_for(self, goal: ResolvedTarget, pose: Pose, way: tuple[Cell, ...] = ()) -> None:
         """Begin a leg from here, if there is one along a way that was driven before."""
@@ -148,7 +148,7 @@ class Driver:
         self._state = None
         self.route = None
 
-    def standing(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> Guide:
+    def standing(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> ControlCommand:
         """What to do where there is nothing to do: stand, and make way."""
         return self._make_way(STANDSTILL, pose, speed_m_s, moving)
 
@@ -156,7 +156,9 @@ class Driver:
         """The rover stands still for a good reason: do not count it as stuck."""
         self._recovery.pause()
 
-    def update(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...] = ()) -> tuple[Guide, Decision | None]:
+    def update(
+        self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...] = ()
+    ) -> tuple[ControlCommand, Decision | None]:
         """One tick: the setpoint for now, and the navigator's decision if it has just made one. ``moving``: what moves about."""
         guide, decision = self._drive(pose, speed_m_s, moving)
         if self._goal is None or not moving or (decision is not None and decision.action is Action.REACHED):
@@ -167,13 +169,17 @@ class Driver:
             self.pause()
         return way, decision
 
-    def _make_way(self, guide: Guide, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> Guide:
+    def _make_way(
+        self, guide: ControlCommand, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]
+    ) -> ControlCommand:
         manoeuvre = self._helm.manoeuvre if self._helm else None
         route = self.route if manoeuvre is None else manoeuvre.as_route()
         backwards = self._helm is not None and self._helm.backwards
         return self._way_giver.give(guide, route, pose, speed_m_s, moving, self._settings, backwards=backwards)
 
-    def _drive(self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]) -> tuple[Guide, Decision | None]:
+    def _drive(
+        self, pose: Pose, speed_m_s: float, moving: tuple[Moving, ...]
+    ) -> tuple[ControlCommand, Decision | None]:
         """The same as if nothing came across."""
         self._moving = moving
         if self._goal is None or self._state is None:
@@ -198,13 +204,13 @@ class Driver:
             self._get_unstuck(pose)
         return now, decision
 
-    def _guided(self, route: Route, pose: Pose, speed_m_s: float, rover: RoverLimits) -> Guide:
+    def _guided(self, route: Route, pose: Pose, speed_m_s: float, rover: RoverLimits) -> ControlCommand:
         """The setpoint that leads along the route, for a rover that turns on the spot or for one that cannot."""
         if self._helm is not None:
             return self._helm.guide(route, pose, speed_m_s, rover)
         told_m_s = self._goal.speed_m_s if self._goal is not None else None
         if speed_m_s > OVERSPEED * max(self._rover.cruise_speed_m_s, told_m_s or 0.0):
-            return Guide(Motion.BRAKE, STOP, 0.0)
+            return ControlCommand(Motion.BRAKE, STOP, 0.0)
         settings, looking, braking = self._settings.guidance, self._looking_rad, self._braking
         now = guide(route, pose, speed_m_s, self.evidence, rover, settings, looking_rad=looking, braking=braking)
         self._braking = now.motion is Motion.BRAKE

@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 from companion.core.frames import LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE
-from companion.executive.mission_executor import Pursuit, Tell
-from companion.executive.mission_layout import Laid
+from companion.executive.mission_executor import MissionExecutor, Tell
+from companion.executive.mission_layout import MissionLayout
 from companion.executive.mission_progress import Leg
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -28,12 +28,12 @@ SAME_M = 0.02
 """Places nearer to each other than this are one: a radio's rounding."""
 
 
-def refusal(place: NedPoint, here: NedPoint, laid: Laid, reach_m: float) -> str:
+def refusal(place: NedPoint, here: NedPoint, layout: MissionLayout, reach_m: float) -> str:
     """Why the rover must not be sent to a place, in words; empty when it may, as far as is known. The rest is found on the way."""
     distance_m = here.distance_m(place)
     if distance_m > reach_m:
         return f"{distance_m:.0f} m away, farther than {reach_m:g} m"
-    evidence, bounds = laid.evidence, laid.bounds
+    evidence, bounds = layout.evidence, layout.bounds
     cell = evidence.base.cell_at(place)
     if not evidence.base.contains(cell):
         return "outside the mission's grid"
@@ -48,7 +48,7 @@ def refusal(place: NedPoint, here: NedPoint, laid: Laid, reach_m: float) -> str:
     return ""
 
 
-class Errands:
+class GoalRequests:
     """Answers every request, and has the accepted ones driven. ``send`` is for commands, ``tell`` for texts."""
 
     def __init__(
@@ -65,7 +65,7 @@ class Errands:
         self._refusals = 0
         self._times_s: deque[float] = deque([-math.inf] * MOST_A_SECOND, maxlen=MOST_A_SECOND)
 
-    def take_in(self, asked: TargetAsked, vehicle: VehicleState, pursuit: Pursuit | None, idle: str) -> None:
+    def take_in(self, asked: TargetAsked, vehicle: VehicleState, executor: MissionExecutor | None, idle: str) -> None:
         """One request. ``idle`` says why the rover is not being driven; it is empty when it is."""
         flood = asked.time_s - self._times_s[0] < 1.0
         self._times_s.append(asked.time_s)
@@ -74,10 +74,10 @@ class Errands:
             return
         if asked.point is None:
             answer, reason = asked.fault, asked.reason
-        elif pursuit is None or idle or not _may_drive(vehicle):
+        elif executor is None or idle or not _may_drive(vehicle):
             answer, reason = TargetAnswer.NOT_NOW, f"not driving ({idle or 'mode is not GUIDED'})"
         else:
-            answer, reason = self._judge(asked, vehicle, pursuit)
+            answer, reason = self._judge(asked, vehicle, executor)
         if reason:
             self._refuse(reason, asked.time_s)
         self._send(AnswerTarget(asked.asker, asked.form, answer), asked.time_s)
@@ -92,38 +92,38 @@ class Errands:
         again = f" ({self._refusals} times)" if same else ""
         self._tell(f"Errand refused{again}: {reason}", WARNING)
 
-    def _judge(self, asked: TargetAsked, vehicle: VehicleState, pursuit: Pursuit) -> tuple[TargetAnswer, str]:
+    def _judge(self, asked: TargetAsked, vehicle: VehicleState, executor: MissionExecutor) -> tuple[TargetAnswer, str]:
         """A place, and a rover that is driven: the answer, and the reason of a refusal."""
         pose = vehicle.pose_at(asked.time_s)
         assert asked.point is not None
         if pose is None:
             return TargetAnswer.NOT_NOW, "no position"
-        itinerary = pursuit.itinerary
-        if itinerary.ended or itinerary.leg is Leg.HOME:
+        progress = executor.progress
+        if progress.ended or progress.leg is Leg.HOME:
             return (
                 TargetAnswer.NOT_NOW,
-                "the rover is on its way back" if itinerary.leg is Leg.HOME else "the mission is over",
+                "the rover is on its way back" if progress.leg is Leg.HOME else "the mission is over",
             )
-        place = LocalFrame(pursuit.laid.origin).to_ned(asked.point)
-        if self._is_repeated(asked, place, pursuit):
+        place = LocalFrame(executor.layout.origin).to_ned(asked.point)
+        if self._is_repeated(asked, place, executor):
             self._heard_s = asked.time_s
             return TargetAnswer.ACCEPTED, ""
-        if reason := refusal(place, pose.point, pursuit.laid, self._reach_m):
+        if reason := refusal(place, pose.point, executor.layout, self._reach_m):
             return TargetAnswer.DENIED, reason
         self._last, self._heard_s = asked, asked.time_s
         self._count += 1
-        name, cell = f"errand {self._count}", pursuit.evidence.base.cell_at(place)
+        name, cell = f"errand {self._count}", executor.evidence.base.cell_at(place)
         speed_m_s = None if asked.speed_m_s is None else min(asked.speed_m_s, self._cruise_m_s)
         self._tell(f"Errand {self._count}: {pose.point.distance_m(place):.1f} m away, then the mission goes on", INFO)
-        pursuit.run_errand(ResolvedTarget(name, place, cell, 0.0, OnBlocked.SKIP, speed_m_s))
+        executor.run_errand(ResolvedTarget(name, place, cell, 0.0, OnBlocked.SKIP, speed_m_s))
         return TargetAnswer.ACCEPTED, ""
 
-    def _is_repeated(self, asked: TargetAsked, place: NedPoint, pursuit: Pursuit) -> bool:
+    def _is_repeated(self, asked: TargetAsked, place: NedPoint, executor: MissionExecutor) -> bool:
         """Whether this very errand is under way, or was a moment ago."""
-        last, errand = self._last, pursuit.itinerary.errand
+        last, errand = self._last, executor.progress.errand
         if last is None or last.point is None or asked.speed_m_s != last.speed_m_s:
             return False
-        same = LocalFrame(pursuit.laid.origin).to_ned(last.point).distance_m(place) <= SAME_M
+        same = LocalFrame(executor.layout.origin).to_ned(last.point).distance_m(place) <= SAME_M
         return same and (errand is not None or asked.time_s - self._heard_s <= REPEAT_S)
 
 

@@ -8,17 +8,17 @@ from collections.abc import Callable
 import numpy as np
 
 from companion.control.braking import counted_s, for_link
-from companion.control.point_controller import Guide
+from companion.control.point_controller import ControlCommand
 from companion.control.setpoint_check import Surroundings
 from companion.core.frames import GeoPoint, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
-from companion.executive.goal_driver import Driver
-from companion.executive.mission_layout import Laid, apart_m, fenced_again, lay_again
+from companion.executive.goal_driver import GoalDriver
+from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, lay_again
 from companion.executive.mission_progress import (
-    Itinerary,
     Leg,
+    MissionProgress,
     TargetStatus,
     on_reached,
     on_time,
@@ -36,7 +36,7 @@ from companion.navigation.field_step import Action, Decision
 from companion.navigation.search_budget import Searcher
 from companion.navigation.step_runner import StepRunner
 from companion.perception.moving_obstacles import Moving, merged
-from companion.perception.object_tracker import Tracker
+from companion.perception.object_tracker import ObjectTracker
 from companion.planning.registry import make_planner
 from companion.recording.recorder import DecisionLog
 from companion.settings import Settings
@@ -54,22 +54,22 @@ Tell = Callable[[str, int], None]
 """Says a text with its severity to the people."""
 
 
-class Pursuit:
+class MissionExecutor:
     """Made when the rover may be driven for the first time. ``scan``: any of its sensor, which tells how far and wide it sees."""
 
     def __init__(
         self,
         mission: Mission,
         settings: Settings,
-        laid: Laid,
+        layout: MissionLayout,
         scan: RangeScan,
         runner: StepRunner,
         log: DecisionLog,
         tell: Tell,
         rng: np.random.Generator,
     ) -> None:
-        self.laid = laid
-        self.itinerary: Itinerary = laid.itinerary
+        self.layout = layout
+        self.progress: MissionProgress = layout.progress
         self.doing = "driving"
         self.maps_begun = 0
         """Grows whenever what had been mapped is worth nothing any more."""
@@ -96,38 +96,38 @@ class Pursuit:
             tell("Single beams see too little for a rover that turns in arcs: give it a lidar", WARNING)
         planner = make_planner(settings.navigator.planner, settings.planner)
         searcher = Searcher(planner, settings.navigator, rng)
-        self.driver = Driver(laid.evidence, self._limits, settings, searcher, runner)
-        self._tracker = Tracker(laid.evidence, settings.traffic)
+        self.driver = GoalDriver(layout.evidence, self._limits, settings, searcher, runner)
+        self._tracker = ObjectTracker(layout.evidence, settings.traffic)
 
     @property
     def evidence(self) -> EvidenceMap:
         """The map."""
-        return self.laid.evidence
+        return self.layout.evidence
 
     @property
     def surroundings(self) -> Surroundings:
         """What is known of the ground, and the rover on it."""
-        return Surroundings(self.evidence, self._limits, self._settings, self.laid.bounds)
+        return Surroundings(self.evidence, self._limits, self._settings, self.layout.bounds)
 
     @property
     def reached(self) -> int:
         """How many targets have been reached."""
-        return sum(status is TargetStatus.REACHED for status in self.itinerary.statuses)
+        return sum(status is TargetStatus.REACHED for status in self.progress.statuses)
 
     @property
     def returning(self) -> bool:
         """Whether the rover is on its way back for good."""
-        return bool(self._refuges) or self.itinerary.ended
+        return bool(self._refuges) or self.progress.ended
 
     @property
     def target_refused(self) -> str:
         """Why the target that is next must not be driven to; empty when it may, and while the rover is on an errand or on its way back."""
-        on_errand = self.itinerary.errand is not None or self.itinerary.leg is not Leg.TRAVEL
-        return "" if on_errand else self.laid.refused.get(self.itinerary.index, "")
+        on_errand = self.progress.errand is not None or self.progress.leg is not Leg.TRAVEL
+        return "" if on_errand else self.layout.refused.get(self.progress.index, "")
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
-        return [(t.name, status) for t, status in zip(self.itinerary.targets, self.itinerary.statuses, strict=True)]
+        return [(t.name, status) for t, status in zip(self.progress.targets, self.progress.statuses, strict=True)]
 
     def retune(self, settings: Settings) -> None:
         """Other settings from the next tick on; those of the map itself and the planner stay."""
@@ -152,45 +152,45 @@ class Pursuit:
 
     def follow_origin(self, origin: GeoPoint, now_s: float) -> bool:
         """Whether the autopilot has moved the origin of its frame; the mission is then laid out anew, with an empty map."""
-        moved_m = apart_m(origin, self.laid.origin)
+        moved_m = apart_m(origin, self.layout.origin)
         if moved_m <= ORIGIN_MOVED_M:
             return False
         self._tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", WARNING)
         self.maps_begun += 1
-        self.laid = lay_again(self.laid, self.itinerary, self._mission, self._settings.mapping, origin)
-        self.itinerary = self.laid.itinerary
+        self.layout = lay_again(self.layout, self.progress, self._mission, self._settings.mapping, origin)
+        self.progress = self.layout.progress
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
-        self.driver = Driver(self.evidence, self._limits, self._settings, searcher, self._runner, seed)
+        self.driver = GoalDriver(self.evidence, self._limits, self._settings, searcher, self._runner, seed)
         self.driver.tally = before.tally
         self.driver.doubt_until(now_s + VERDICT_S)
-        self._tracker = Tracker(self.evidence, self._settings.traffic)
+        self._tracker = ObjectTracker(self.evidence, self._settings.traffic)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         return True
 
     def run_errand(self, errand: ResolvedTarget) -> None:
         """Drive there first; then the mission goes on."""
-        self.itinerary = with_errand(self.itinerary, errand)
+        self.progress = with_errand(self.progress, errand)
         self.driver.leave()
 
     def heed_fence(self, fence: AutopilotFence) -> None:
         """The autopilot's fence as it is now; a new one closes and opens ground at once."""
-        if fence is self.laid.fence or fence == self.laid.fence:
+        if fence is self.layout.fence or fence == self.layout.fence:
             return
-        self.laid = fenced_again(self.laid, self.itinerary, self._mission, fence)
+        self.layout = fenced_again(self.layout, self.progress, self._mission, fence)
         self.driver.leave()
-        self._tell(f"The autopilot's fence has changed: {len(self.laid.bounds)} borders now", WARNING)
+        self._tell(f"The autopilot's fence has changed: {len(self.layout.bounds)} borders now", WARNING)
 
     def outside(self, point: NedPoint) -> str:
         """In words, that the rover is beyond a border; empty when it is not."""
-        name = self.laid.bounds.outside(point)
+        name = self.layout.bounds.outside(point)
         return f"the rover is beyond the border of {name}" if name else ""
 
     def go_back(self, reason: str, rally: list[NedPoint], pose: Pose) -> None:
         """Give the mission up: to the nearest of the rally points, or back the way the rover came. ``reason`` is told."""
         planner = make_planner("dijkstra", self._settings.planner)
-        self._refuges = refuges(self.itinerary.home, self.trail, rally, pose.point, self.evidence, planner)
+        self._refuges = refuges(self.progress.home, self.trail, rally, pose.point, self.evidence, planner)
         missed = [name for name, status in self.statuses() if status is not TargetStatus.REACHED]
         self._tell(f"Returning: {reason}. Missed: {', '.join(missed) or 'nothing'}", WARNING)
         self._seek_refuge()
@@ -198,7 +198,7 @@ class Pursuit:
     def _seek_refuge(self) -> None:
         """The next place to try."""
         refuge = self._refuges[0]
-        self.itinerary = returning(self.itinerary, refuge.place)
+        self.progress = returning(self.progress, refuge.place)
         along = " along the way it came" if refuge.way else ""
         self._tell(f"Back to {refuge.place.name}, {refuge.length_m:.0f} m{along}", WARNING)
 
@@ -206,29 +206,31 @@ class Pursuit:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
         self.maps_begun += 1
-        self._tracker = Tracker(self.evidence, self._settings.traffic)
+        self._tracker = ObjectTracker(self.evidence, self._settings.traffic)
         self.driver.leave()
         self.driver.doubt_until(now_s + VERDICT_S)
 
-    def drive(self, pose: Pose, speed_m_s: float, now_s: float, announced: tuple[Moving, ...] = ()) -> Guide | None:
+    def drive(
+        self, pose: Pose, speed_m_s: float, now_s: float, announced: tuple[Moving, ...] = ()
+    ) -> ControlCommand | None:
         """What to do for the mission now; None when it has ended. ``announced``: who has told of itself and may come near."""
         moving = merged(announced, self._tracker.moving(now_s), now_s)
         self.trail.enter(self.evidence.base.cell_at(pose.point))
-        waited = self.itinerary.leg is Leg.WAIT
-        self.itinerary = on_time(self.itinerary, now_s)
-        if waited and self.itinerary.leg is Leg.TRAVEL:
+        waited = self.progress.leg is Leg.WAIT
+        self.progress = on_time(self.progress, now_s)
+        if waited and self.progress.leg is Leg.TRAVEL:
             look_again(self.evidence, self._scans - WATCHED_SCANS)
-        if self.itinerary.ended:
+        if self.progress.ended:
             return None
-        if self.itinerary.leg in (Leg.STAY, Leg.WAIT):
-            self.doing = "holding" if self.itinerary.leg is Leg.STAY else "waiting for the way to clear"
+        if self.progress.leg in (Leg.STAY, Leg.WAIT):
+            self.doing = "holding" if self.progress.leg is Leg.STAY else "waiting for the way to clear"
             self.driver.pause()
             return self.driver.standing(pose, speed_m_s, moving)
-        if self.driver.goal is not self.itinerary.goal:
+        if self.driver.goal is not self.progress.goal:
             if self._is_refused(now_s):
                 return self.driver.standing(pose, speed_m_s, moving)
-            self._tell(f"Heading for {self.itinerary.goal.name}", INFO)
-            self.driver.head_for(self.itinerary.goal, pose, self._way_back(pose))
+            self._tell(f"Heading for {self.progress.goal.name}", INFO)
+            self.driver.head_for(self.progress.goal, pose, self._way_back(pose))
         self.doing = "driving"
         guide, decision = self.driver.update(pose, speed_m_s, moving)
         if decision is not None:
@@ -242,7 +244,7 @@ class Pursuit:
             return False
         self._tell(f"Refused: {reason}", WARNING)
         navigator = self._settings.navigator
-        self.itinerary = on_unreachable(self.itinerary, now_s, navigator.wait_retry_s, navigator.wait_limit_s)
+        self.progress = on_unreachable(self.progress, now_s, navigator.wait_retry_s, navigator.wait_limit_s)
         return True
 
     def _way_back(self, pose: Pose) -> tuple[Cell, ...]:
@@ -253,11 +255,11 @@ class Pursuit:
         return way if way[0] == here and way[-1] == self._refuges[0].place.cell else ()
 
     def _take_decision(self, decision: Decision, now_s: float) -> None:
-        goal = self.itinerary.goal
+        goal = self.progress.goal
         self._log.write_decision(now_s, goal.name, decision)
         if decision.action is Action.REACHED:
             self._tell(f"Reached {goal.name}", INFO)
-            self.itinerary = on_reached(self.itinerary, now_s)
+            self.progress = on_reached(self.progress, now_s)
         elif decision.action is Action.UNREACHABLE:
             self._tell(f"Unreachable: {goal.name} ({decision.reason})", WARNING)
             navigator = self._settings.navigator
@@ -267,6 +269,6 @@ class Pursuit:
             else:
                 # How long a leg of AUTO may take is the autopilot's to say (DO_GUIDED_LIMITS).
                 limit_s = math.inf if self._mission.in_auto else navigator.wait_limit_s
-                self.itinerary = on_unreachable(self.itinerary, now_s, navigator.wait_retry_s, limit_s)
+                self.progress = on_unreachable(self.progress, now_s, navigator.wait_retry_s, limit_s)
         if decision.action in (Action.REACHED, Action.UNREACHABLE):
             self.driver.leave()

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import OBSTACLE, Grid, inflated
-from companion.executive.mission_progress import Itinerary, plan_itinerary, relaid
+from companion.executive.mission_progress import MissionProgress, plan_progress, relaid
 from companion.mapping.evidence_map import EvidenceMap, new_map, rebase
 from companion.mission.bounds import Bounds
 from companion.mission.fence import NO_FENCE, AutopilotFence
@@ -17,13 +17,13 @@ from companion.settings import MappingSettings
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Laid:
+class MissionLayout:
     """Where the mission lies. ``home`` is the place its metres and fields count from: home as it was when the mission began."""
 
     origin: GeoPoint
     home: GeoPoint
     evidence: EvidenceMap
-    itinerary: Itinerary
+    progress: MissionProgress
     fence: AutopilotFence
     bounds: Bounds
     refused: Mapping[int, str]
@@ -37,43 +37,47 @@ def lay(
     home: GeoPoint,
     pose: Pose,
     fence: AutopilotFence = NO_FENCE,
-) -> Laid:
+) -> MissionLayout:
     """Lay the mission out; the rover returns to ``pose`` when it has to. Raises MissionError."""
     frame = LocalFrame(origin)
     resolved = resolve(mission, frame, frame.to_ned(home), fence)
     start = _start(pose.point, resolved.ground)
     evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
-    itinerary = plan_itinerary(resolved.targets, start)
-    return Laid(origin, home, evidence, itinerary, fence, resolved.bounds, resolved.refused)
+    progress = plan_progress(resolved.targets, start)
+    return MissionLayout(origin, home, evidence, progress, fence, resolved.bounds, resolved.refused)
 
 
-def lay_again(laid: Laid, itinerary: Itinerary, mission: Mission, settings: MappingSettings, origin: GeoPoint) -> Laid:
+def lay_again(
+    layout: MissionLayout, progress: MissionProgress, mission: Mission, settings: MappingSettings, origin: GeoPoint
+) -> MissionLayout:
     """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
     frame = LocalFrame(origin)
-    resolved = resolve(mission, frame, frame.to_ned(laid.home), laid.fence)
-    before = LocalFrame(laid.origin)
-    start = frame.to_ned(before.to_geo(itinerary.home.point))
-    errand = itinerary.errand
+    resolved = resolve(mission, frame, frame.to_ned(layout.home), layout.fence)
+    before = LocalFrame(layout.origin)
+    start = frame.to_ned(before.to_geo(progress.home.point))
+    errand = progress.errand
     if errand is not None:
         point = frame.to_ned(before.to_geo(errand.point))
         errand = replace(errand, point=point, cell=resolved.ground.cell_at(point))
     evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
-    itinerary = relaid(itinerary, resolved.targets, _start(start, resolved.ground), errand)
-    return Laid(origin, laid.home, evidence, itinerary, laid.fence, resolved.bounds, resolved.refused)
+    progress = relaid(progress, resolved.targets, _start(start, resolved.ground), errand)
+    return MissionLayout(origin, layout.home, evidence, progress, layout.fence, resolved.bounds, resolved.refused)
 
 
-def fenced_again(laid: Laid, itinerary: Itinerary, mission: Mission, fence: AutopilotFence) -> Laid:
+def fenced_again(
+    layout: MissionLayout, progress: MissionProgress, mission: Mission, fence: AutopilotFence
+) -> MissionLayout:
     """The same ground and all that has been seen of it, with another fence of the autopilot. Raises MissionError."""
-    frame = LocalFrame(laid.origin)
-    resolved = resolve(mission, frame, frame.to_ned(laid.home), fence)
-    rebase(laid.evidence, _base(mission, resolved))
-    return replace(laid, itinerary=itinerary, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
+    frame = LocalFrame(layout.origin)
+    resolved = resolve(mission, frame, frame.to_ned(layout.home), fence)
+    rebase(layout.evidence, _base(mission, resolved))
+    return replace(layout, progress=progress, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
 
 
-def from_home(laid: Laid) -> Grid:
+def from_home(layout: MissionLayout) -> Grid:
     """The map as it is, with its place in metres from home: what ``prior_map`` expects of a saved map."""
-    grid = laid.evidence.grid
-    home, corner = LocalFrame(laid.origin).to_ned(laid.home), grid.south_west
+    grid = layout.evidence.grid
+    home, corner = LocalFrame(layout.origin).to_ned(layout.home), grid.south_west
     return Grid(grid.weights, grid.resolution_m, NedPoint(corner.north_m - home.north_m, corner.east_m - home.east_m))
 
 

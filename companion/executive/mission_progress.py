@@ -31,7 +31,7 @@ class Leg(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Itinerary:
+class MissionProgress:
     """Progress through the targets. ``until_s`` ends a stay or a wait; ``home`` is where the mission began.
 
     ``errand``: a place that somebody asked for on the way; it comes first, then the mission goes on where it was.
@@ -59,103 +59,103 @@ class Itinerary:
         return self.home if self.leg is Leg.HOME or self.index >= len(self.targets) else self.targets[self.index]
 
 
-def plan_itinerary(targets: tuple[ResolvedTarget, ...], home: ResolvedTarget) -> Itinerary:
-    """The itinerary at the start of a mission."""
-    return Itinerary(targets, home, (TargetStatus.PENDING,) * len(targets))
+def plan_progress(targets: tuple[ResolvedTarget, ...], home: ResolvedTarget) -> MissionProgress:
+    """The progress at the start of a mission."""
+    return MissionProgress(targets, home, (TargetStatus.PENDING,) * len(targets))
 
 
-def with_errand(itinerary: Itinerary, errand: ResolvedTarget) -> Itinerary:
+def with_errand(progress: MissionProgress, errand: ResolvedTarget) -> MissionProgress:
     """The errand first, instead of one under way. A stay that it interrupts is over, a wait becomes another try after it."""
-    if itinerary.errand is None and itinerary.leg is Leg.STAY:
-        itinerary = _next(itinerary)
-    elif itinerary.leg is Leg.WAIT:
-        itinerary = replace(itinerary, leg=Leg.TRAVEL)
-    return replace(itinerary, errand=errand)
+    if progress.errand is None and progress.leg is Leg.STAY:
+        progress = _next(progress)
+    elif progress.leg is Leg.WAIT:
+        progress = replace(progress, leg=Leg.TRAVEL)
+    return replace(progress, errand=errand)
 
 
-def parked(itinerary: Itinerary) -> Itinerary:
+def parked(progress: MissionProgress) -> MissionProgress:
     """Nowhere to go until somebody says so; all over when every target has had its turn."""
-    over = TargetStatus.PENDING not in itinerary.statuses
-    return replace(itinerary, leg=Leg.DONE if over else Leg.STAY, until_s=math.inf)
+    over = TargetStatus.PENDING not in progress.statuses
+    return replace(progress, leg=Leg.DONE if over else Leg.STAY, until_s=math.inf)
 
 
-def sent_to(itinerary: Itinerary, index: int) -> Itinerary:
+def sent_to(progress: MissionProgress, index: int) -> MissionProgress:
     """To this target, whatever the order."""
-    return replace(itinerary, index=index, leg=Leg.TRAVEL, give_up_s=None)
+    return replace(progress, index=index, leg=Leg.TRAVEL, give_up_s=None)
 
 
-def ended_at(itinerary: Itinerary, status: TargetStatus) -> Itinerary:
+def ended_at(progress: MissionProgress, status: TargetStatus) -> MissionProgress:
     """Somebody else has ended this target: that is what has become of it."""
-    return parked(_marked(itinerary, status))
+    return parked(_marked(progress, status))
 
 
 def relaid(
-    itinerary: Itinerary,
+    progress: MissionProgress,
     targets: tuple[ResolvedTarget, ...],
     home: ResolvedTarget,
     errand: ResolvedTarget | None = None,
-) -> Itinerary:
+) -> MissionProgress:
     """The same progress with every place where it lies now: the local frame has moved."""
-    return replace(itinerary, targets=targets, home=home, errand=errand)
+    return replace(progress, targets=targets, home=home, errand=errand)
 
 
-def on_reached(itinerary: Itinerary, now_s: float) -> Itinerary:
+def on_reached(progress: MissionProgress, now_s: float) -> MissionProgress:
     """The goal has been reached: stay as long as the target asks, or be done."""
-    if itinerary.errand is not None:
-        return replace(itinerary, errand=None)
-    if itinerary.leg is Leg.HOME:
-        return replace(itinerary, leg=Leg.DONE)
-    itinerary = _marked(itinerary, TargetStatus.REACHED)
-    return replace(itinerary, leg=Leg.STAY, until_s=now_s + itinerary.targets[itinerary.index].hold_s, give_up_s=None)
+    if progress.errand is not None:
+        return replace(progress, errand=None)
+    if progress.leg is Leg.HOME:
+        return replace(progress, leg=Leg.DONE)
+    progress = _marked(progress, TargetStatus.REACHED)
+    return replace(progress, leg=Leg.STAY, until_s=now_s + progress.targets[progress.index].hold_s, give_up_s=None)
 
 
-def on_unreachable(itinerary: Itinerary, now_s: float, retry_s: float, wait_limit_s: float) -> Itinerary:
+def on_unreachable(progress: MissionProgress, now_s: float, retry_s: float, wait_limit_s: float) -> MissionProgress:
     """The goal cannot be reached, and the rover is back where the leg began: ``on_blocked`` decides. An errand is dropped."""
-    if itinerary.errand is not None:
-        return replace(itinerary, errand=None)
-    if itinerary.leg is Leg.HOME:
-        return replace(itinerary, leg=Leg.HOLD)
-    itinerary = _marked(itinerary, TargetStatus.UNREACHABLE)
-    match itinerary.targets[itinerary.index].on_blocked:
+    if progress.errand is not None:
+        return replace(progress, errand=None)
+    if progress.leg is Leg.HOME:
+        return replace(progress, leg=Leg.HOLD)
+    progress = _marked(progress, TargetStatus.UNREACHABLE)
+    match progress.targets[progress.index].on_blocked:
         case OnBlocked.SKIP:
-            return _next(itinerary)
+            return _next(progress)
         case OnBlocked.WAIT:
-            give_up_s = now_s + wait_limit_s if itinerary.give_up_s is None else itinerary.give_up_s
+            give_up_s = now_s + wait_limit_s if progress.give_up_s is None else progress.give_up_s
             if now_s >= give_up_s:
-                return _next(replace(itinerary, give_up_s=None))
-            return replace(itinerary, leg=Leg.WAIT, until_s=now_s + retry_s, give_up_s=give_up_s)
+                return _next(replace(progress, give_up_s=None))
+            return replace(progress, leg=Leg.WAIT, until_s=now_s + retry_s, give_up_s=give_up_s)
         case OnBlocked.RETURN:
-            return replace(_skipped_rest(itinerary), leg=Leg.HOME)
+            return replace(_skipped_rest(progress), leg=Leg.HOME)
         case _:
-            return replace(_skipped_rest(itinerary), leg=Leg.HOLD)
+            return replace(_skipped_rest(progress), leg=Leg.HOLD)
 
 
-def returning(itinerary: Itinerary, place: ResolvedTarget) -> Itinerary:
+def returning(progress: MissionProgress, place: ResolvedTarget) -> MissionProgress:
     """Nothing but back to a place: the targets not reached yet are skipped, an errand is dropped."""
-    return replace(_skipped_rest(itinerary), leg=Leg.HOME, home=place, errand=None)
+    return replace(_skipped_rest(progress), leg=Leg.HOME, home=place, errand=None)
 
 
-def on_time(itinerary: Itinerary, now_s: float) -> Itinerary:
+def on_time(progress: MissionProgress, now_s: float) -> MissionProgress:
     """A stay that is over leads to the next target, a wait that is over to another try."""
-    if itinerary.leg is Leg.STAY and now_s >= itinerary.until_s:
-        return _next(itinerary)
-    if itinerary.leg is Leg.WAIT and now_s >= itinerary.until_s:
-        return replace(itinerary, leg=Leg.TRAVEL)
-    return itinerary
+    if progress.leg is Leg.STAY and now_s >= progress.until_s:
+        return _next(progress)
+    if progress.leg is Leg.WAIT and now_s >= progress.until_s:
+        return replace(progress, leg=Leg.TRAVEL)
+    return progress
 
 
-def _next(itinerary: Itinerary) -> Itinerary:
-    if itinerary.index + 1 >= len(itinerary.targets):
-        return replace(itinerary, index=len(itinerary.targets), leg=Leg.DONE)
-    return replace(itinerary, index=itinerary.index + 1, leg=Leg.TRAVEL)
+def _next(progress: MissionProgress) -> MissionProgress:
+    if progress.index + 1 >= len(progress.targets):
+        return replace(progress, index=len(progress.targets), leg=Leg.DONE)
+    return replace(progress, index=progress.index + 1, leg=Leg.TRAVEL)
 
 
-def _marked(itinerary: Itinerary, status: TargetStatus) -> Itinerary:
-    statuses = list(itinerary.statuses)
-    statuses[itinerary.index] = status
-    return replace(itinerary, statuses=tuple(statuses))
+def _marked(progress: MissionProgress, status: TargetStatus) -> MissionProgress:
+    statuses = list(progress.statuses)
+    statuses[progress.index] = status
+    return replace(progress, statuses=tuple(statuses))
 
 
-def _skipped_rest(itinerary: Itinerary) -> Itinerary:
-    rest = tuple(TargetStatus.SKIPPED if status is TargetStatus.PENDING else status for status in itinerary.statuses)
-    return replace(itinerary, statuses=rest)
+def _skipped_rest(progress: MissionProgress) -> MissionProgress:
+    rest = tuple(TargetStatus.SKIPPED if status is TargetStatus.PENDING else status for status in progress.statuses)
+    return replace(progress, statuses=rest)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from companion.control.point_controller import Guide
+from companion.control.point_controller import ControlCommand
 from companion.core.frames import wrap_pi_rad
 from companion.settings import GuidanceSettings, Settings
 from companion.vehicle.commands import ChangeSpeed, Command, GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
@@ -34,7 +34,7 @@ class Outbox:
         self._speed_m_s = math.nan
         self._speed_s = -math.inf
 
-    def due(self, guide: Guide, now_s: float, confirmed: bool | None) -> list[Command]:
+    def due(self, guide: ControlCommand, now_s: float, confirmed: bool | None) -> list[Command]:
         """The commands to send now. ``confirmed`` False: the autopilot follows something else, so say it again."""
         commands: list[Command] = []
         if self._is_due(guide.setpoint, now_s, confirmed):

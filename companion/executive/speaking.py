@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from companion.control.point_controller import STANDSTILL, Guide
+from companion.control.point_controller import STANDSTILL, ControlCommand
 from companion.executive.outbox import Outbox
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import EncodeError
@@ -21,7 +21,7 @@ class Speaker:
         self._outbox = outbox
         self._tell = tell
 
-    def guide(self, guide: Guide, now_s: float) -> None:
+    def guide(self, guide: ControlCommand, now_s: float) -> None:
         """A setpoint and its speed, as far as they are new or due again."""
         for command in self._outbox.due(guide, now_s, self._autopilot.target_confirmed):
             self.send(command, now_s)

@@ -7,7 +7,7 @@ import gc
 import numpy as np
 from numba.core import event
 
-from companion.control.arc_controller import Helm
+from companion.control.arc_controller import ArcController
 from companion.control.collision_avoidance import first_near, least_room_m
 from companion.control.motion_prediction import steered
 from companion.control.reference_path import Route
@@ -17,7 +17,7 @@ from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import clearance_m, integrate, look_along, new_map, penalise, unseen_beside
-from companion.perception.object_tracker import Tracker
+from companion.perception.object_tracker import ObjectTracker
 from companion.planning import registry
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedVelocity
@@ -38,7 +38,7 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     unseen_beside(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.3, 0.5)
     clearance_m(evidence, NedPoint(4.0, 4.0), 1.0)
     view = RangeScan(0.0, np.linspace(-0.5, 0.5, 8), np.full(8, 2.0), 0.2, 4.0, 0.1, "warm-up")
-    Tracker(evidence, settings.traffic).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
+    ObjectTracker(evidence, settings.traffic).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
     places = np.zeros((2, 2))
     least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]), 5.0)
     steered(0.0, 0.0, 0.0, places, np.zeros(2), np.zeros(1))
@@ -87,7 +87,7 @@ def _steer(settings: Settings) -> None:
     """To a place behind, standing and rolling, as rovers do that cannot turn on the spot."""
     evidence = new_map(empty_grid(16, 16), 0.35, settings.mapping)
     route = Route(np.column_stack((np.linspace(8.0, 2.0, 25), np.full(25, 8.0))))
-    helm = Helm(evidence, settings)
+    helm = ArcController(evidence, settings)
     for tick in range(8):
         rover = RoverLimits(0.35, 2.0, 8.0, turning_radius_m=1.0)
         helm.guide(route, Pose(8.0 + 0.05 * tick, 8.0, 0.0, 0.05 * tick), 1.0 if tick > 4 else 0.0, rover)

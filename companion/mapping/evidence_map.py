@@ -18,7 +18,7 @@ from companion.core.grid import Cell, Grid
 from companion.core.scan import RangeScan
 from companion.mapping.arc_kernels import Ground
 from companion.mapping.kernels import cast_scan, first_unseen, look, nearest, soften, weigh
-from companion.mapping.sensor_agreement import Witnesses
+from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 
 MAX_EVIDENCE_CELLS = 16_000_000
@@ -44,7 +44,7 @@ class EvidenceMap:
     subdivisions: int
     rover_radius_m: float
     settings: MappingSettings
-    witnesses: Witnesses = field(default_factory=Witnesses)
+    witnesses: SensorAgreement = field(default_factory=SensorAgreement)
 
     @property
     def evidence_m(self) -> float:

@@ -17,7 +17,7 @@ Cells = NDArray[np.int64]
 """Evidence cells, shape (n, 2): x and y."""
 
 
-class Witnesses:
+class SensorAgreement:
     """The hits of the newest second, by who has seen them."""
 
     def __init__(self) -> None:

@@ -266,9 +266,7 @@ def _sitl(table: SitlTable, path: Path) -> SitlSpec:
         heading_deg=table.heading_deg,
         sensors=sensors_from(table.sensors, path.parent, MissionError),
         home=None if table.home is None else GeoPoint(table.home.lat_deg, table.home.lon_deg),
-        movers=tuple(
-            _named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)
-        ),
+        movers=tuple(_named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)),
         steering=table.steering,
         parameters=path.parent / table.parameters if table.parameters else None,
     )

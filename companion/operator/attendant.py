@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Protocol
 
-from companion.executive.mission_executor import Pursuit
+from companion.executive.mission_executor import MissionExecutor
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.figures import Telemetry
 from companion.operator.parameters import ParameterServer
@@ -21,7 +21,7 @@ class Tunable(Protocol):
 
 
 class Attendant:
-    """``tuned``: who is told of other settings besides the pursuit; ``keep`` takes them for the next run."""
+    """``tuned``: who is told of other settings besides the executor; ``keep`` takes them for the next run."""
 
     def __init__(
         self,
@@ -41,12 +41,12 @@ class Attendant:
         """Note what is asked."""
         self._parameters.take(event)
 
-    def attend(self, pursuit: Pursuit | None, now_s: float) -> Settings:
+    def attend(self, executor: MissionExecutor | None, now_s: float) -> Settings:
         """Answer, and take over what has been set; the settings from now on."""
-        for command in (*self._parameters.due(now_s), *self._telemetry.due(pursuit, now_s)):
+        for command in (*self._parameters.due(now_s), *self._telemetry.due(executor, now_s)):
             self._autopilot.send(command, now_s)
         if self._settings is not self._parameters.settings:
             self._settings = self._parameters.settings
-            for one in self._tuned if pursuit is None else (*self._tuned, pursuit):
+            for one in self._tuned if executor is None else (*self._tuned, executor):
                 one.retune(self._settings)
         return self._settings

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from companion.executive.mission_executor import Pursuit
+from companion.executive.mission_executor import MissionExecutor
 from companion.navigation.field_step import Decision, Part
 from companion.planning.problem import path_cost
 from companion.vehicle.commands import Command, TellFigure
@@ -20,25 +20,25 @@ class Telemetry:
         self._period_s = 1.0 / rate_hz if rate_hz > 0.0 else math.inf
         self._told_s = -math.inf
 
-    def due(self, pursuit: Pursuit | None, now_s: float) -> list[Command]:
+    def due(self, executor: MissionExecutor | None, now_s: float) -> list[Command]:
         """The figures to send now; none before the mission has begun."""
-        if pursuit is None or self._period_s == math.inf or now_s - self._told_s < self._period_s - 1e-6:
+        if executor is None or self._period_s == math.inf or now_s - self._told_s < self._period_s - 1e-6:
             return []
         self._told_s = now_s
-        return [TellFigure(name, value) for name, value in figures(pursuit).items()]
+        return [TellFigure(name, value) for name, value in figures(executor).items()]
 
 
-def figures(pursuit: Pursuit) -> dict[str, float]:
+def figures(executor: MissionExecutor) -> dict[str, float]:
     """NAV_PART: 1 A (return), 2 B, 3 C, 0 none yet. PATH_COST: of the path decided on, -1 for none. SEARCH_MS: the last step with its
     searches, in whole rounds.
 
     PROGRESS: targets reached, of all, in percent.
     """
-    decision: Decision | None = pursuit.driver.decision
-    weights = pursuit.evidence.grid.weights
+    decision: Decision | None = executor.driver.decision
+    weights = executor.evidence.grid.weights
     return {
         "NAV_PART": 0.0 if decision is None else PARTS[decision.part],
         "PATH_COST": path_cost(weights, decision.path) if decision is not None and decision.path else -1.0,
-        "SEARCH_MS": 1e3 * pursuit.driver.step_s,
-        "PROGRESS": 100.0 * pursuit.reached / len(pursuit.itinerary.targets),
+        "SEARCH_MS": 1e3 * executor.driver.step_s,
+        "PROGRESS": 100.0 * executor.reached / len(executor.progress.targets),
     }

@@ -2,32 +2,32 @@
 
 from __future__ import annotations
 
-from companion.executive.mission_executor import Pursuit
+from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_progress import TargetStatus
 from companion.mission.mission import Mission
 from companion.operator.reporting import Reporter, Status
 from companion.vehicle.state import VehicleState
 
 
-def statuses_of(mission: Mission, pursuit: Pursuit | None) -> list[tuple[str, TargetStatus]]:
-    """Every target's name and what has become of it so far. ``pursuit``: None before the mission has begun."""
-    if pursuit is None:
+def statuses_of(mission: Mission, executor: MissionExecutor | None) -> list[tuple[str, TargetStatus]]:
+    """Every target's name and what has become of it so far. ``executor``: None before the mission has begun."""
+    if executor is None:
         return [(target.name, TargetStatus.PENDING) for target in mission.targets]
-    return pursuit.statuses()
+    return executor.statuses()
 
 
 def status_of(
-    now_s: float, vehicle: VehicleState, mission: Mission, pursuit: Pursuit | None, reporter: Reporter
+    now_s: float, vehicle: VehicleState, mission: Mission, executor: MissionExecutor | None, reporter: Reporter
 ) -> Status:
     """A picture of this moment."""
     return Status(
         time_s=now_s,
         doing=reporter.doing,
         pose=vehicle.pose_at(now_s),
-        decision=pursuit.driver.decision if pursuit else None,
-        target=pursuit.itinerary.goal.name if pursuit and not pursuit.itinerary.ended else "",
-        targets_reached=pursuit.reached if pursuit else 0,
+        decision=executor.driver.decision if executor else None,
+        target=executor.progress.goal.name if executor and not executor.progress.ended else "",
+        targets_reached=executor.reached if executor else 0,
         targets=len(mission.targets),
-        steps=pursuit.driver.tally.steps if pursuit else 0,
+        steps=executor.driver.tally.steps if executor else 0,
         news=tuple(reporter.news),
     )

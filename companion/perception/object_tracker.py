@@ -101,7 +101,7 @@ class Track:
         return moving, stray_m <= STRAY_M + blur_m and moving.speed_m_s >= SURE * error_m_s
 
 
-class Tracker:
+class ObjectTracker:
     """Remembers which ground has been seen free, and follows what enters it."""
 
     def __init__(self, evidence: EvidenceMap, settings: TrafficSettings) -> None:

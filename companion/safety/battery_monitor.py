@@ -25,7 +25,7 @@ class Level(IntEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class PowerState:
+class BatteryState:
     """The newest of each battery, since when it has been below which threshold, and what followed (with the reason in words)."""
 
     batteries: Mapping[int, BatterySeen] = field(default_factory=dict)
@@ -34,12 +34,12 @@ class PowerState:
     reason: str = ""
 
 
-def with_battery(state: PowerState, seen: BatterySeen) -> PowerState:
+def with_battery(state: BatteryState, seen: BatterySeen) -> BatteryState:
     """One more reading."""
     return replace(state, batteries={**state.batteries, seen.number: seen})
 
 
-def judged(state: PowerState, now_s: float, settings: PowerSettings) -> PowerState:
+def judged(state: BatteryState, now_s: float, settings: PowerSettings) -> BatteryState:
     """The state at this moment: a level is reached when a reading has asked for it for ``after_s`` without a break."""
     if not state.batteries:
         return state
@@ -76,11 +76,11 @@ def _reason(level: Level, batteries: list[BatterySeen], settings: PowerSettings)
     return ""
 
 
-class Power:
+class BatteryMonitor:
     """Keeps the state for the companion."""
 
     def __init__(self, settings: PowerSettings) -> None:
-        self.state = PowerState()
+        self.state = BatteryState()
         self._settings = settings
 
     def take_in(self, event: Event) -> None:

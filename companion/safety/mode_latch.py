@@ -24,7 +24,7 @@ class Control(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class LatchState:
     """The state of latch and watchdogs."""
 
     control: Control = Control.NOBODY
@@ -59,8 +59,8 @@ def latched(control: Control, vehicle: VehicleState) -> Control:
 
 
 def check(
-    watch: Watch, vehicle: VehicleState, now_s: float, settings: SafetySettings, doubt: str = ""
-) -> tuple[Watch, Verdict]:
+    watch: LatchState, vehicle: VehicleState, now_s: float, settings: SafetySettings, doubt: str = ""
+) -> tuple[LatchState, Verdict]:
     """One tick of latch and watchdogs. ``doubt``: a reason of the caller's own why the rover must not move.
 
     Setpoints may be sent only on DRIVE and STOP. Unsafe for longer than ``hold_after_s``: HOLD once, then silence until a
@@ -69,7 +69,7 @@ def check(
     control = latched(watch.control, vehicle)
     heartbeat = vehicle.heartbeat
     if heartbeat is None or control is not Control.COMPANION:
-        return Watch(control), Verdict(Reaction.SILENT, "" if control is Control.NOBODY else _not_ours(vehicle))
+        return LatchState(control), Verdict(Reaction.SILENT, "" if control is Control.NOBODY else _not_ours(vehicle))
     if watch.hold_sent:
         # The heartbeat may still show GUIDED just after our own HOLD: wait until it has been seen to leave GUIDED.
         if heartbeat.armed and heartbeat.time_s >= watch.hold_s + HOLD_AGAIN_S:
@@ -79,7 +79,7 @@ def check(
     if not heartbeat.armed:
         return replace(watch, unsafe_since_s=None), Verdict(Reaction.SILENT, "disarmed")
     if vehicle.sticks.moved:
-        return Watch(Control.PERSON, None, hold_sent=True, hold_s=now_s), Verdict(
+        return LatchState(Control.PERSON, None, hold_sent=True, hold_s=now_s), Verdict(
             Reaction.HOLD, "the sticks were moved"
         )
     reason = unsafe_reason(vehicle, now_s, settings) or doubt
@@ -87,7 +87,7 @@ def check(
         return replace(watch, unsafe_since_s=None), Verdict(Reaction.DRIVE)
     since_s = now_s if watch.unsafe_since_s is None else watch.unsafe_since_s
     if now_s - since_s >= settings.hold_after_s:
-        return Watch(Control.PERSON, since_s, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, reason)
+        return LatchState(Control.PERSON, since_s, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, reason)
     return replace(watch, unsafe_since_s=since_s), Verdict(Reaction.STOP, reason)
 
 

@@ -30,7 +30,7 @@ TOTALS = {"FENCE_TOTAL": PlanKind.FENCE, "RALLY_TOTAL": PlanKind.RALLY}
 """ArduPilot tells everybody these parameters when a list has got another length."""
 
 
-class Fencing:
+class FenceMonitor:
     """``fence`` is None until it is known; ``missing`` says what is awaited. ``tell`` says a text with its severity to the people."""
 
     def __init__(self, autopilot: AutopilotLink, settings: FenceSettings, tell: Callable[[str, int], None]) -> None:

@@ -6,7 +6,7 @@ import math
 from collections import deque
 from collections.abc import Callable
 
-from companion.executive.mission_executor import Pursuit, Tell
+from companion.executive.mission_executor import MissionExecutor, Tell
 from companion.executive.mission_layout import apart_m
 from companion.settings import Settings
 from companion.vehicle.events.event import Event
@@ -28,7 +28,7 @@ CALM_S = 10.0
 """until it has been calm for so long."""
 
 
-class Whereabouts:
+class LocalizationMonitor:
     """Keeps the doubt that there is, and says when it is settled. The map is worthless from a jump on, and begun anew.
 
     ``tell`` says a text with its severity to the people; ``start_afresh`` has the leg begin again where the rover then is.
@@ -71,7 +71,7 @@ class Whereabouts:
         self._asked_s = now_s
         return True
 
-    def take_in(self, event: Event, vehicle: VehicleState, pursuit: Pursuit) -> None:
+    def take_in(self, event: Event, vehicle: VehicleState, executor: MissionExecutor) -> None:
         """One more event, already folded into ``vehicle``."""
         match event:
             case LocalPositionSeen() if vehicle.jump_m > self._jump_m:
@@ -81,8 +81,8 @@ class Whereabouts:
             case LocalPositionSeen() if vehicle.wander.noticed:
                 self._note_wandering(vehicle.wander.off_m, event.time_s)
             case OriginSeen():
-                self._find_ground(event, pursuit)
-            case HomeSeen() if not self._home_told and apart_m(event.point, pursuit.laid.home) > HOME_MOVED_M:
+                self._find_ground(event, executor)
+            case HomeSeen() if not self._home_told and apart_m(event.point, executor.layout.home) > HOME_MOVED_M:
                 self._home_told = True
                 self._tell("Home has moved; the mission stays where it began", WARNING)
             case _:
@@ -98,11 +98,11 @@ class Whereabouts:
         if len(self._wandered_s) == WANDERINGS and now_s - self._wandered_s[0] <= WANDERINGS_S:
             self._unsure_until_s = now_s + CALM_S
 
-    def _find_ground(self, event: OriginSeen, pursuit: Pursuit) -> None:
+    def _find_ground(self, event: OriginSeen, executor: MissionExecutor) -> None:
         """The origin as it is now: after a jump this tells whether the frame has moved or only the rover's place in it."""
-        if pursuit.follow_origin(event.point, event.time_s):
+        if executor.follow_origin(event.point, event.time_s):
             self._doubt, self._doubt_s = "EKF origin moved", event.time_s
         elif self._doubt and event.time_s - self._doubt_s >= SETTLED_S:
-            pursuit.forget_map(event.time_s)
+            executor.forget_map(event.time_s)
             self._doubt = ""
             self._start_afresh()

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from companion.core.frames import LocalFrame, Pose
-from companion.executive.mission_executor import Pursuit, Tell
+from companion.executive.mission_executor import MissionExecutor, Tell
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.fence import NO_FENCE, AutopilotFence
-from companion.safety.battery_monitor import Level, Power
+from companion.safety.battery_monitor import BatteryMonitor, Level
 from companion.settings import Settings
-from companion.supervision.fence_monitor import Fencing
+from companion.supervision.fence_monitor import FenceMonitor
 from companion.vehicle.events.event import Event
 from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState
@@ -19,14 +19,14 @@ LISTEN_S = 1.5
 """Who finds a rover armed in GUIDED listens so long before driving it: another companion's figures come every second."""
 
 
-class Oversight:
+class MissionLimits:
     """Listens before and during the mission. ``ended_by``: why it was broken off, in words; empty while it was not."""
 
     def __init__(self, autopilot: AutopilotLink, settings: Settings, tell: Tell) -> None:
         self.ended_by = ""
         self._autopilot = autopilot
-        self._fencing = Fencing(autopilot, settings.fence, tell)
-        self._power = Power(settings.power)
+        self._fencing = FenceMonitor(autopilot, settings.fence, tell)
+        self._power = BatteryMonitor(settings.power)
         self._to_rally = settings.power.to_rally
         self._breached = False
         self._listens_until_s = math.nan
@@ -66,14 +66,14 @@ class Oversight:
         self.ended_by = self._power.reason
         return self.ended_by
 
-    def doubt(self, pursuit: Pursuit, pose: Pose | None, now_s: float) -> str:
+    def doubt(self, executor: MissionExecutor, pose: Pose | None, now_s: float) -> str:
         """Why the rover must not be driven now; empty when it may. A fence that has changed is in force from here on."""
-        pursuit.heed_fence(self._fence)
+        executor.heed_fence(self._fence)
         if self._autopilot.rival_heard(now_s):
             return "another companion drives this rover"
-        return self._fencing.breached(now_s) or ("" if pose is None else pursuit.outside(pose.point))
+        return self._fencing.breached(now_s) or ("" if pose is None else executor.outside(pose.point))
 
-    def broken_off(self, pursuit: Pursuit, pose: Pose, now_s: float) -> str:
+    def broken_off(self, executor: MissionExecutor, pose: Pose, now_s: float) -> str:
         """Why the rover must stop for good here, in words; empty to go on, though perhaps only back."""
         level = self._power.level(now_s)
         if level is Level.FINE:
@@ -81,10 +81,10 @@ class Oversight:
         self.ended_by = self._power.reason
         if level is Level.HOLD:
             return self.ended_by
-        if not pursuit.returning:
-            frame = LocalFrame(pursuit.laid.origin)
+        if not executor.returning:
+            frame = LocalFrame(executor.layout.origin)
             rally = [frame.to_ned(point) for point in self._fencing.rally] if self._to_rally else []
-            pursuit.go_back(self.ended_by, rally, pose)
+            executor.go_back(self.ended_by, rally, pose)
         return ""
 
     @property

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from companion.executive.mission_layout import Laid
+from companion.executive.mission_layout import MissionLayout
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.reporting import Reporter
 from companion.operator.telling import Teller
 from companion.safety.mode_latch import Control
-from companion.supervision.mission_limits import Oversight
+from companion.supervision.mission_limits import MissionLimits
 from companion.supervision.startup import StartUp, overruled
 from companion.vehicle.commands import Arm, Command, SetMode
 from companion.vehicle.events.vehicle import RoverMode
@@ -26,7 +26,7 @@ class SettingOut:
         self,
         start_up: StartUp,
         autopilot: AutopilotLink,
-        oversight: Oversight,
+        oversight: MissionLimits,
         reporter: Reporter,
         teller: Teller,
         send: Callable[[Command, float], None],
@@ -40,7 +40,7 @@ class SettingOut:
         self._send = send
         self._end = end
 
-    def step(self, vehicle: VehicleState, control: Control, now_s: float) -> Laid | None:
+    def step(self, vehicle: VehicleState, control: Control, now_s: float) -> MissionLayout | None:
         """The mission on the ground once the rover may be driven; until then all is done that brings it there."""
         if self._autopilot.twin_heard(now_s):
             self._reporter.doing = TWIN
@@ -52,14 +52,14 @@ class SettingOut:
             return None
         fence, hindrance = self._oversight.before_driving(now_s, out=out)
         control = Control.PERSON if taken else control
-        laid, command = self._start_up.step(vehicle, control, now_s, fence, hindrance)
+        layout, command = self._start_up.step(vehicle, control, now_s, fence, hindrance)
         if command is not None:
             self._send(command, now_s)
         if command == SetMode(RoverMode.HOLD):
             self._teller.tell(f"HOLD: {self._start_up.held}", WARNING)
-        if laid is None:
+        if layout is None:
             self._tell_what_is_missing(heard=vehicle.heartbeat is not None)
-        return laid
+        return layout
 
     def _tell_what_is_missing(self, *, heard: bool) -> None:
         refused = self._autopilot.last_ack(Arm())

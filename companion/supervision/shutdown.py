@@ -18,7 +18,7 @@ AGAIN_S = 0.2
 """HOLD is asked for this often until then."""
 
 
-class HandOver:
+class Shutdown:
     """Begun once, by whatever ends the run. ``send`` gives the autopilot a command at a time."""
 
     def __init__(self, autopilot: AutopilotLink, send: Callable[[Command, float], None]) -> None:

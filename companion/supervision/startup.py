@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from companion.checkpoint.resume import Kept, Ownership, lay_resumed, ownership, same_boot
 from companion.control.point_controller import STANDSTILL
-from companion.executive.mission_layout import Laid, lay
+from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import TargetStatus
 from companion.mission.bounds import Bounds
 from companion.mission.fence import NO_FENCE, AutopilotFence
@@ -117,7 +117,7 @@ class StartUp:
         now_s: float,
         fence: AutopilotFence = NO_FENCE,
         hindrance: str = "",
-    ) -> tuple[Laid | None, Command | None]:
+    ) -> tuple[MissionLayout | None, Command | None]:
         """The mission on the ground once the rover may be driven; until then the command to give now, if any.
 
         ``fence``: the autopilot's own. ``hindrance``: see ``start_step``. Raises MissionError as soon as it is known that the mission
@@ -134,13 +134,13 @@ class StartUp:
         self.missing = step.missing
         if step.missing:
             return None, self._due(step.command or self._standstill(vehicle, now_s), now_s)
-        laid, pose = self._lay(vehicle, now_s, fence), vehicle.pose_at(now_s)
+        layout, pose = self._lay(vehicle, now_s, fence), vehicle.pose_at(now_s)
         if (
-            laid is not None
+            layout is not None
             and pose is not None
-            and laid.evidence.base.contains(laid.evidence.base.cell_at(pose.point))
+            and layout.evidence.base.contains(layout.evidence.base.cell_at(pose.point))
         ):
-            return laid, None
+            return layout, None
         self.missing = "the rover to stand on the mission's grid"
         self._look_again_s = now_s + LOOK_AGAIN_S
         return None, self._standstill(vehicle, now_s)
@@ -200,21 +200,21 @@ class StartUp:
         ground = (vehicle.origin and vehicle.origin.point, vehicle.home and vehicle.home.point, fence)
         if ground == self._checked:
             return
-        laid = self._lay(vehicle, now_s, fence)
-        if laid is None:
+        layout = self._lay(vehicle, now_s, fence)
+        if layout is None:
             return
         # One that a fence has closed while nobody listened is no error of whoever starts: it is refused when its turn comes, as on the way.
-        for number, reason in laid.refused.items() if self._kept is None else ():
-            if laid.itinerary.statuses[number] is TargetStatus.PENDING:
+        for number, reason in layout.refused.items() if self._kept is None else ():
+            if layout.progress.statuses[number] is TargetStatus.PENDING:
                 raise MissionError(f"{self._mission.source or self._mission.name}: {reason}")
-        self._checked, self._bounds = ground, laid.bounds
+        self._checked, self._bounds = ground, layout.bounds
 
     def _stands_too_near(self, vehicle: VehicleState, now_s: float) -> str:
         pose = vehicle.pose_at(now_s)
         near = self._bounds.too_near(pose.point) if self._bounds is not None and pose is not None else ""
         return f"the rover to stand {near}" if near else ""
 
-    def _lay(self, vehicle: VehicleState, now_s: float, fence: AutopilotFence) -> Laid | None:
+    def _lay(self, vehicle: VehicleState, now_s: float, fence: AutopilotFence) -> MissionLayout | None:
         pose = vehicle.pose_at(now_s)
         if vehicle.origin is None or vehicle.home is None or pose is None:
             return None
@@ -222,5 +222,5 @@ class StartUp:
         if self._kept is None or vehicle.position is None:
             return lay(self._mission, mapping, origin, vehicle.home.point, pose, fence)
         same = same_boot(self._kept.state, vehicle.position)
-        laid, self.found = lay_resumed(self._kept, self._mission, mapping, origin, now_s, same=same, fence=fence)
-        return laid
+        layout, self.found = lay_resumed(self._kept, self._mission, mapping, origin, now_s, same=same, fence=fence)
+        return layout

@@ -100,7 +100,7 @@ def _run_with_lines(run: Drive, console: Console, pace: Pace) -> Report:
 def _state(run: Drive, status: Status) -> str:
     part = status.decision.part.value if status.decision else "-"
     state = f"{status.time_s:6.1f} s  {status.doing}  {status.target}  part {part}  step {status.steps}"
-    goal = run.companion.itinerary.goal if run.companion.itinerary else None
+    goal = run.companion.progress.goal if run.companion.progress else None
     if goal is not None and status.pose is not None:
         state += f"  {status.pose.point.distance_m(goal.point):.0f} m to go"
     return state

@@ -86,14 +86,14 @@ class DriveView:
     def _scene(self) -> Scene:
         """The truth faintly, and over it what the companion knows."""
         scene, simulator, companion = self._watching.scene(), self._run.simulator, self._run.companion
-        evidence, itinerary = companion.evidence, companion.itinerary
+        evidence, progress = companion.evidence, companion.progress
         layers = world_layers(simulator.world, simulator.time_s, Kind.HIDDEN)
         places = [place for place in scene.places if place.state == "start"]
-        if evidence is not None and itinerary is not None and companion.origin is not None:
+        if evidence is not None and progress is not None and companion.origin is not None:
             # An autopilot that has rebooted counts from where it did so, and with it the companion.
             north_m, east_m = self._run.scenario.start.place_of(companion.origin)
             layers += seen_layers(evidence, north_m, east_m)
-            for target, state in zip(itinerary.targets, itinerary.statuses, strict=True):
+            for target, state in zip(progress.targets, progress.statuses, strict=True):
                 there = (target.point.north_m + north_m, target.point.east_m + east_m)
                 places.append(Place(target.name, *there, STATES[state]))
         return replace(scene, layers=layers, places=tuple(places))
@@ -114,7 +114,7 @@ def mission_section(status: Status, run: Drive) -> Section:
     """What the companion is doing, where it is going, and why."""
     companion = run.companion
     decision = status.decision
-    goal = companion.itinerary.goal if companion.itinerary else None
+    goal = companion.progress.goal if companion.progress else None
     left = ""
     if goal is not None and status.pose is not None and status.target:
         left = f", {status.pose.point.distance_m(goal.point):.0f} m"

@@ -163,14 +163,14 @@ def _draw_track(axes: Axes, north: NDArray[np.float64], east: NDArray[np.float64
 def _draw_places(axes: Axes, run: Drive) -> None:
     start = run.scenario.start
     axes.plot(start.east_m, start.north_m, "o", color="#2e7d32", markersize=9, label="start")
-    itinerary, origin = run.companion.itinerary, run.companion.origin
-    if itinerary is None or origin is None:
+    progress, origin = run.companion.progress, run.companion.origin
+    if progress is None or origin is None:
         return
     north_m, east_m = start.place_of(origin)
-    for i, target in enumerate(itinerary.targets):
+    for i, target in enumerate(progress.targets):
         place = (target.point.east_m + east_m, target.point.north_m + north_m)
         axes.plot(*place, "*", color="#d32f2f", markersize=14, label="target" if i == 0 else None)
-        if len(itinerary.targets) > 1:
+        if len(progress.targets) > 1:
             # Towards the middle, where there is room for it.
             left = place[0] > sum(axes.get_xlim()) / 2.0
             aside, towards = ((-8, 8), "right") if left else ((8, 8), "left")

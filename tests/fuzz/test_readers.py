@@ -12,9 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.executive.goal_requests import Errands
+from companion.executive.goal_requests import GoalRequests
 from companion.operator.parameters import ParameterServer
-from companion.supervision.fence_monitor import Fencing
+from companion.supervision.fence_monitor import FenceMonitor
 from tests.fuzz.finds import FINDS
 from tests.fuzz.targets import REFUSALS, BadRefusalError, refusing, targets
 
@@ -50,7 +50,8 @@ def test_changed_packets_are_survived_by_a_companion_that_drives(data: st.DataOb
 
 
 @pytest.mark.parametrize(
-    ("example", "part", "method"), [(1, ParameterServer, "_change"), (2, Errands, "_judge"), (3, Fencing, "breached")]
+    ("example", "part", "method"),
+    [(1, ParameterServer, "_change"), (2, GoalRequests, "_judge"), (3, FenceMonitor, "breached")],
 )
 def test_packets_reach_whom_they_are_for(
     example: int, part: type, method: str, monkeypatch: pytest.MonkeyPatch

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.executive.mission_executor import Pursuit
+from companion.executive.mission_executor import MissionExecutor
 from companion.vehicle.state import PARAMETERS_KEPT
 from tests.support.rig import Rig, yard
 from tests.support.served import mission_path, served
@@ -239,13 +239,13 @@ def test_range_data_at_a_thousand_a_second_is_not_mapped_so_often_and_parameters
     mapped = []
     rig = Rig(yard(tmp_path))
     rig.until_driven(1.0)
-    take = Pursuit.map_scan
+    take = MissionExecutor.map_scan
 
     def counted(*given: Any) -> None:
         mapped.append(given)
         take(*given)
 
-    monkeypatch.setattr(Pursuit, "map_scan", counted)
+    monkeypatch.setattr(MissionExecutor, "map_scan", counted)
     rig.garble = lambda data: data + b"".join(map(lidar, range(50))) + b"".join(map(told_parameters, range(50)))
     rig.run_for(1.0)
     assert 0 < len(mapped) <= 3 * TICK_HZ + 3 + 12

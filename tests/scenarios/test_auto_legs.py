@@ -181,7 +181,7 @@ def test_the_end_of_the_companion_while_auto_drives_changes_nothing(tmp_path: Pa
     assert rig.simulator.vehicle.mode == AUTO
 
 
-class HandOver:
+class Shutdown:
     """The line from the autopilot: what is handed over is changed, or lost from a moment on."""
 
     def __init__(self, rig: Asker, lost_s: float = 0.0, **fields: int) -> None:
@@ -201,7 +201,7 @@ class HandOver:
 @pytest.mark.parametrize("frame", [0, 3])
 def test_a_leg_may_be_said_in_any_frame_with_a_latitude(tmp_path: Path, frame: int) -> None:
     rig = in_auto(tmp_path, ROUND_THE_WALL)
-    rig.change = HandOver(rig, coordinate_frame=frame)
+    rig.change = Shutdown(rig, coordinate_frame=frame)
     rig.until(lambda: "Heading for guided item 2" in rig.texts(), 60.0)
     assert rig.companion.status().target == "guided item 2"
 
@@ -213,7 +213,7 @@ OTHERS = {"component": {"target_component": 195}, "everybody": {"target_componen
 @pytest.mark.parametrize("fields", OTHERS.values(), ids=OTHERS)
 def test_what_is_no_leg_of_ours_is_not_driven(tmp_path: Path, fields: dict[str, int]) -> None:
     rig = in_auto(tmp_path, ROUND_THE_WALL)
-    rig.change = HandOver(rig, **fields)
+    rig.change = Shutdown(rig, **fields)
     rig.until(lambda: item(rig) == 2, 60.0)
     driven_m = rig.simulator.driven_m
     rig.run_for(8.0)
@@ -224,10 +224,10 @@ def test_what_is_no_leg_of_ours_is_not_driven(tmp_path: Path, fields: dict[str, 
 
 def test_a_leg_that_falls_silent_is_driven_for_two_seconds_and_no_longer(tmp_path: Path) -> None:
     rig = in_leg(tmp_path)
-    rig.change = HandOver(rig, lost_s=1.4)
+    rig.change = Shutdown(rig, lost_s=1.4)
     rig.run_for(1.4)
     assert rig.companion.vehicle.is_ours, "one repetition or two were lost on the way"
-    rig.change = HandOver(rig, lost_s=6.0)
+    rig.change = Shutdown(rig, lost_s=6.0)
     since_s = rig.now_s()
     rig.run_for(5.9)
     assert_silent_since(rig, since_s + 4.6)
@@ -239,7 +239,7 @@ def test_a_leg_that_falls_silent_is_driven_for_two_seconds_and_no_longer(tmp_pat
 @pytest.mark.parametrize("lost", [("MISSION_ITEM_REACHED",), ("MISSION_CURRENT",)])
 def test_either_news_of_its_end_ends_a_leg(tmp_path: Path, lost: tuple[str, ...]) -> None:
     rig = in_auto(tmp_path, ROUND_THE_WALL)
-    change = HandOver(rig)
+    change = Shutdown(rig)
     change.lost = lost
     rig.change = change
     rig.until(lambda: item(rig) == 3, 90.0)

@@ -80,7 +80,7 @@ def test_targets_and_walls_stay_where_they_are_when_the_autopilot_counts_from_el
         gate = view.scene.places[-1]
         assert (gate.north_m, gate.east_m) == pytest.approx(GATE_M, abs=0.1)
         seen = next(layer for layer in view.scene.layers if layer.kind is Kind.SEEN)
-        # Its fields are the mission's own, laid from the new origin: they lie elsewhere by less than a field.
+        # Its fields are the mission's own, layout from the new origin: they lie elsewhere by less than a field.
         assert (seen.south_m, seen.west_m) == pytest.approx((0.0, 0.0), abs=1.0)
 
 

@@ -60,11 +60,11 @@ def test_every_form_of_a_guided_target_leads_to_the_same_place(driving: Asker, f
     wanted = messages(driving)
     driving.ask(wanted[form])
     assert driving.answered() == ACCEPTED
-    itinerary = driving.companion.itinerary
-    assert itinerary is not None and itinerary.errand is not None
+    progress = driving.companion.progress
+    assert progress is not None and progress.errand is not None
     # Floats in degrees are good to a metre here, whole numbers to a centimetre.
     room_m = 1.0 if form in ("long", "old item") else 0.02
-    assert itinerary.errand.point.distance_m(_local(driving, driving.field(5, 12))) < room_m
+    assert progress.errand.point.distance_m(_local(driving, driving.field(5, 12))) < room_m
 
 
 def _local(rig: Asker, place: tuple[int, int]) -> NedPoint:
@@ -219,9 +219,9 @@ def test_a_speed_is_a_limit_and_never_more_than_the_mission_allows(driving: Aske
     for speed_m_s, taken_m_s in ((0.6, 0.6), (9.0, 2.0), (0.0, None)):
         driving.reposition(driving.field(5, 12), speed=speed_m_s)
         assert driving.answered() == ACCEPTED
-        itinerary = driving.companion.itinerary
-        assert itinerary is not None and itinerary.errand is not None
-        assert itinerary.errand.speed_m_s == (None if taken_m_s is None else pytest.approx(taken_m_s))
+        progress = driving.companion.progress
+        assert progress is not None and progress.errand is not None
+        assert progress.errand.speed_m_s == (None if taken_m_s is None else pytest.approx(taken_m_s))
 
 
 def test_an_errand_keeps_its_place_when_the_origin_moves(tmp_path: Path) -> None:

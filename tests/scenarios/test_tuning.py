@@ -69,13 +69,13 @@ def test_everything_that_keeps_settings_hears_of_a_change(tmp_path: Path) -> Non
     companion: Any = rig.companion
     assert companion._settings.safety.stale_s == 0.7
     assert companion._whereabouts._jump_m == 3.0
-    assert companion._pursuit._given is companion._settings  # as it is; what follows from a late link lies on top
-    assert companion._pursuit._settings is companion.driver._settings
+    assert companion._executor._given is companion._settings  # as it is; what follows from a late link lies on top
+    assert companion._executor._settings is companion.driver._settings
     assert companion.driver._settings.guidance.stuck_after_s == 9.0
     assert companion.driver._recovery._settings.stuck_after_s == 9.0
     assert companion._outbox._settings is companion._settings.guidance
     assert companion.driver.searcher.settings.wait_retry_s == 7.0
-    assert companion._pursuit._tracker._settings is companion._settings.traffic
+    assert companion._executor._tracker._settings is companion._settings.traffic
 
 
 def test_a_watchdog_that_was_shortened_acts_sooner(tmp_path: Path) -> None:

@@ -75,8 +75,8 @@ def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[Kept, Mission]:
     frame = LocalFrame(origin)
     home = frame.to_ned(HOME)
     mission = yard(folder)
-    laid = lay(mission, MappingSettings(), origin, HOME, Pose(home.north_m, home.east_m, 0.0, 0.0))
-    base = laid.evidence.base
+    layout = lay(mission, MappingSettings(), origin, HOME, Pose(home.north_m, home.east_m, 0.0, 0.0))
+    base = layout.evidence.base
     corner = base.south_west
     state = a_state(
         origin=(origin.lat_deg, origin.lon_deg),
@@ -95,10 +95,10 @@ def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[Kept, Mission]:
             resolution_m=1.0,
             width=base.width,
             height=base.height,
-            subdivisions=laid.evidence.subdivisions,
+            subdivisions=layout.evidence.subdivisions,
         ),
     )
-    log_odds, penalty = np.zeros_like(laid.evidence.log_odds), np.zeros_like(laid.evidence.penalty)
+    log_odds, penalty = np.zeros_like(layout.evidence.log_odds), np.zeros_like(layout.evidence.penalty)
     log_odds[10:20, 30:34], log_odds[20:60, 30:34], log_odds[60, 60] = 3.0, -1.2, 0.9
     penalty[3, 3] = 0.15
     return Kept(state, {"log_odds": log_odds, "penalty": penalty}), mission
@@ -106,16 +106,16 @@ def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[Kept, Mission]:
 
 def test_in_the_same_frame_the_map_is_what_it_was(tmp_path: Path) -> None:
     kept, mission = kept_of(tmp_path)
-    laid, said = lay_resumed(kept, mission, MappingSettings(), ORIGIN, 500.0, same=True)
-    assert np.array_equal(laid.evidence.log_odds, kept.rasters["log_odds"])
-    assert np.array_equal(laid.evidence.penalty, kept.rasters["penalty"])
-    assert laid.evidence.grid.weights[1, 3] >= 1.0, "and the fields know it"
+    layout, said = lay_resumed(kept, mission, MappingSettings(), ORIGIN, 500.0, same=True)
+    assert np.array_equal(layout.evidence.log_odds, kept.rasters["log_odds"])
+    assert np.array_equal(layout.evidence.penalty, kept.rasters["penalty"])
+    assert layout.evidence.grid.weights[1, 3] >= 1.0, "and the fields know it"
     assert said == "with its map"
-    itinerary = laid.itinerary
-    assert (itinerary.leg, itinerary.until_s, itinerary.give_up_s) == (Leg.WAIT, 502.0, 600.0)
-    assert itinerary.statuses == (TargetStatus.UNREACHABLE,)
+    progress = layout.progress
+    assert (progress.leg, progress.until_s, progress.give_up_s) == (Leg.WAIT, 502.0, 600.0)
+    assert progress.statuses == (TargetStatus.UNREACHABLE,)
     home = LocalFrame(ORIGIN).to_ned(HOME)
-    assert itinerary.home.point.distance_m(home) < 1e-6 and itinerary.goal.cell == Cell(15, 7)
+    assert progress.home.point.distance_m(home) < 1e-6 and progress.goal.cell == Cell(15, 7)
 
 
 @pytest.mark.parametrize(("north_m", "east_m", "same"), [(0.0, 0.0, False), (7.3, -4.1, True), (-3.0, 2.0, False)])
@@ -124,14 +124,14 @@ def test_in_a_frame_that_may_be_another_only_obstacles_count_and_lie_on_the_same
 ) -> None:
     kept, mission = kept_of(tmp_path)
     origin = LocalFrame(ORIGIN).to_geo(NedPoint(north_m, east_m))
-    laid, said = lay_resumed(kept, mission, MappingSettings(), origin, 0.0, same=same)
-    settings, log_odds = MappingSettings(), laid.evidence.log_odds
+    layout, said = lay_resumed(kept, mission, MappingSettings(), origin, 0.0, same=same)
+    settings, log_odds = MappingSettings(), layout.evidence.log_odds
     assert (log_odds >= 0.0).all(), "no ground counts as seen"
     assert np.array_equal(log_odds > 0.0, kept.rasters["log_odds"] > 0.0)
     assert log_odds.max() < settings.sure_at, "and an obstacle may be doubted"
-    assert not laid.evidence.penalty.any()
+    assert not layout.evidence.penalty.any()
     assert "obstacles" in said
-    corner = laid.evidence.base.south_west
+    corner = layout.evidence.base.south_west
     before = lay_resumed(kept, mission, MappingSettings(), ORIGIN, 0.0, same=True)[0].evidence.base.south_west
     assert corner.distance_m(NedPoint(before.north_m - north_m, before.east_m - east_m)) < 0.01
 
@@ -142,20 +142,20 @@ def test_a_grid_that_has_become_a_field_larger_takes_the_map_along(tmp_path: Pat
         update={"east_m": kept.state.ground.east_m + 2.0, "north_m": kept.state.ground.north_m - 1.0}
     )
     moved = Kept(kept.state.model_copy(update={"ground": ground}), kept.rasters)
-    laid, _ = lay_resumed(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
-    assert shift_of(moved.state, laid) == Cell(2, -1)
-    s = laid.evidence.subdivisions
-    assert np.array_equal(laid.evidence.log_odds[:-s, 2 * s :], kept.rasters["log_odds"][s:, : -2 * s])
-    assert not laid.evidence.log_odds[:, : 2 * s].any()
+    layout, _ = lay_resumed(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
+    assert shift_of(moved.state, layout) == Cell(2, -1)
+    s = layout.evidence.subdivisions
+    assert np.array_equal(layout.evidence.log_odds[:-s, 2 * s :], kept.rasters["log_odds"][s:, : -2 * s])
+    assert not layout.evidence.log_odds[:, : 2 * s].any()
     leg = SavedLeg(past=((4, 4), (5, 4)), returning=True, until_search=2, since_better=1, draws=9, doubts_left=1)
-    assert nav_state(leg, shift_of(moved.state, laid)).past == (Cell(6, 3), Cell(7, 3))
+    assert nav_state(leg, shift_of(moved.state, layout)).past == (Cell(6, 3), Cell(7, 3))
 
 
 def test_other_settings_of_the_map_cost_the_map_and_not_the_progress(tmp_path: Path) -> None:
     kept, mission = kept_of(tmp_path)
-    laid, said = lay_resumed(kept, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
-    assert not laid.evidence.log_odds.any() and "without its map" in said
-    assert laid.itinerary.statuses == (TargetStatus.UNREACHABLE,)
+    layout, said = lay_resumed(kept, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
+    assert not layout.evidence.log_odds.any() and "without its map" in said
+    assert layout.progress.statuses == (TargetStatus.UNREACHABLE,)
 
 
 def test_a_large_map_is_copied_in_parts_of_a_megabyte() -> None:

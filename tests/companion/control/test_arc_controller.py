@@ -7,17 +7,17 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from companion.control.arc_controller import Helm
+from companion.control.arc_controller import ArcController
 from companion.control.braking import braking_distance_m
 from companion.control.collision_avoidance import yielded
 from companion.control.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, tries
-from companion.control.point_controller import Guide, Motion
+from companion.control.point_controller import ControlCommand, Motion
 from companion.control.reference_path import Route
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
-from companion.executive.goal_driver import Driver
+from companion.executive.goal_driver import GoalDriver
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -64,13 +64,13 @@ class Car:
 
     def __init__(self, evidence: EvidenceMap, way: Route, start: Pose) -> None:
         self.evidence, self.way, self.pose = evidence, way, start
-        self.helm = Helm(evidence, SETTINGS)
+        self.helm = ArcController(evidence, SETTINGS)
         self.speed_m_s = 0.0
         self.curvature = 0.0
         self.poses = [start]
-        self.guides: list[Guide] = []
+        self.guides: list[ControlCommand] = []
 
-    def tick(self) -> Guide:
+    def tick(self) -> ControlCommand:
         north, east = self.way.points.T
         ahead = slice(self.way.progress, self.way.progress + 17)
         nearest = int(np.argmin(np.hypot(north[ahead] - self.pose.north_m, east[ahead] - self.pose.east_m)))
@@ -309,7 +309,7 @@ def test_the_planner_is_told_heading_and_radius() -> None:
             return planner.plan(problem, budget, rng)
 
     searcher = Searcher(Spy(), SETTINGS.navigator, np.random.default_rng(1))
-    driver = Driver(ground(), ROVER, SETTINGS, searcher, InlineRunner())
+    driver = GoalDriver(ground(), ROVER, SETTINGS, searcher, InlineRunner())
     start = pose(30.0)
     there = NedPoint(MIDDLE, MIDDLE + 10.0)
     driver.head_for(ResolvedTarget("t", there, driver.evidence.base.cell_at(there), 0.0, OnBlocked.SKIP, None), start)
@@ -321,7 +321,7 @@ def test_the_planner_is_told_heading_and_radius() -> None:
 
 def test_it_makes_way_on_arcs_and_never_turns_on_the_spot() -> None:
     route_on = route((0, 0), (16, 0))
-    now = Guide(Motion.DRIVE, GuidedVelocity(2.0, 0.0), 2.0)
+    now = ControlCommand(Motion.DRIVE, GuidedVelocity(2.0, 0.0), 2.0)
     crossing = Moving("m", 0.0, NedPoint(MIDDLE + 4.0, MIDDLE - 3.0), 0.0, 1.2, 0.5)
     way, aside_rad = yielded(now, route_on, pose(), 1.5, (crossing,), ground(), ROVER, SETTINGS)
     assert isinstance(way.setpoint, GuidedVelocity) and way is not now and aside_rad is None

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.control.collision_avoidance import WayGiver, first_near, least_room_m, yielded
-from companion.control.point_controller import Guide, Motion
+from companion.control.collision_avoidance import CollisionAvoidance, first_near, least_room_m, yielded
+from companion.control.point_controller import ControlCommand, Motion
 from companion.control.reference_path import Route
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
@@ -23,7 +23,7 @@ SETTINGS = Settings()
 ROVER = RoverLimits(0.35, 2.0, 8.0)
 HERE = Pose(20.0, 20.0, 0.0, 100.0)
 ROUTE = Route(np.column_stack((np.linspace(20.0, 36.0, 65), np.full(65, 20.0))))
-DRIVE = Guide(Motion.DRIVE, GuidedPosition(NedPoint(28.0, 20.0)), 2.0)
+DRIVE = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(28.0, 20.0)), 2.0)
 
 
 def open_ground(walls_m: float = math.inf) -> EvidenceMap:
@@ -41,7 +41,9 @@ def crossing(east_m: float, east_m_s: float, north_m: float = 24.0) -> Moving:
     return Moving("m", 100.0, NedPoint(north_m, 20.0 + east_m), 0.0, east_m_s, 0.5)
 
 
-def made(moving: Moving, speed_m_s: float = 1.5, ground: EvidenceMap | None = None, now: Guide = DRIVE) -> Guide:
+def made(
+    moving: Moving, speed_m_s: float = 1.5, ground: EvidenceMap | None = None, now: ControlCommand = DRIVE
+) -> ControlCommand:
     evidence = ground if ground is not None else open_ground()
     return yielded(now, ROUTE, HERE, speed_m_s, (moving,), evidence, ROVER, SETTINGS)[0]
 
@@ -67,7 +69,7 @@ def test_what_stands_is_far_or_goes_away_is_no_reason(moving: Moving) -> None:
 
 def test_it_moves_aside_for_what_comes_straight_at_it() -> None:
     towards = Moving("m", 100.0, NedPoint(26.0, 20.0), -1.0, 0.0, 0.5)
-    standing = Guide(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
+    standing = ControlCommand(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
     guide, aside_rad = yielded(standing, ROUTE, HERE, 0.0, (towards,), open_ground(), ROVER, SETTINGS)
     assert guide.motion is Motion.LOOK and aside_rad is not None
     assert abs(math.sin(aside_rad)) > 0.6
@@ -78,7 +80,7 @@ def test_it_moves_aside_for_what_comes_straight_at_it() -> None:
 
 def test_it_backs_off_between_walls() -> None:
     towards = Moving("m", 100.0, NedPoint(22.0, 20.0), -0.35, 0.0, 0.5)
-    standing = Guide(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
+    standing = ControlCommand(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
     guide = made(towards, 0.0, open_ground(1.0), standing)
     assert isinstance(guide.setpoint, GuidedVelocity) and guide.setpoint.forward_m_s < 0.0
 
@@ -130,8 +132,8 @@ def test_it_looks_where_it_really_drives_and_not_where_the_route_is() -> None:
     )
     other = Moving("m", 100.0, NedPoint(23.5, 22.2), -0.4, 0.0, 0.5)
 
-    def then(told: NedPoint) -> Guide:
-        now = Guide(Motion.DRIVE, GuidedPosition(told), 1.5)
+    def then(told: NedPoint) -> ControlCommand:
+        now = ControlCommand(Motion.DRIVE, GuidedPosition(told), 1.5)
         made = yielded(now, Route(round_it), HERE, 1.0, (other,), open_ground(), ROVER, SETTINGS)[0]
         return DRIVE if made is now else made
 
@@ -140,7 +142,7 @@ def test_it_looks_where_it_really_drives_and_not_where_the_route_is() -> None:
 
 
 def test_who_makes_way_is_patient_for_a_while_and_anew_each_time() -> None:
-    giver = WayGiver(open_ground(), ROVER)
+    giver = CollisionAvoidance(open_ground(), ROVER)
     assert not giver.is_patient(0.0, 30.0, yields=False)
     assert all(giver.is_patient(now_s, 30.0, yields=True) for now_s in (1.0, 10.0, 30.9))
     assert not giver.is_patient(31.0, 30.0, yields=True)

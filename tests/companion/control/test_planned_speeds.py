@@ -11,7 +11,7 @@ from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
-from companion.executive.goal_driver import Driver
+from companion.executive.goal_driver import GoalDriver
 from companion.executive.outbox import Outbox
 from companion.mapping.evidence_map import integrate, new_map
 from companion.mission.mission import OnBlocked
@@ -46,14 +46,14 @@ class Straight:
         return PlanResult(PlanStatus.FOUND, path, self.name)
 
 
-def driver(planner: Straight) -> Driver:
+def driver(planner: Straight) -> GoalDriver:
     evidence = new_map(empty_grid(40, 40, FIELDS_M), 0.35, SETTINGS.mapping)
     bearings = np.radians(np.arange(0.0, 360.0, 5.0))
     scan = RangeScan(0.0, bearings, np.full(72, np.inf), 0.1, 8.0, np.radians(5.0), "test")
     for stamp in (1, 2, 3):
         integrate(evidence, at(0.0), scan, stamp)
     searcher = Searcher(planner, SETTINGS.navigator, np.random.default_rng(1))
-    result = Driver(evidence, RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, InlineRunner())
+    result = GoalDriver(evidence, RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, InlineRunner())
     result.head_for(GOAL, at(0.0))
     return result
 

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.control.braking import fastest_within_m, stopping_distance_m
-from companion.control.point_controller import Guide, Motion, guide
+from companion.control.point_controller import ControlCommand, Motion, guide
 from companion.control.reference_path import (
     STEP_M,
     Route,
@@ -44,7 +44,7 @@ def looked(posts: list[Post] | None = None, times: int = 10) -> Ground:
     return ground
 
 
-def told(ground: Ground, pose: Pose = HERE, speed_m_s: float = 0.0, route: Route | None = None) -> Guide:
+def told(ground: Ground, pose: Pose = HERE, speed_m_s: float = 0.0, route: Route | None = None) -> ControlCommand:
     route = northward(ground) if route is None else route
     return guide(route, pose, speed_m_s, ground.map, ROVER, SETTINGS)
 

@@ -14,9 +14,9 @@ from hypothesis import settings as runs
 from hypothesis import strategies as st
 
 from companion.control.braking import farthest_m
-from companion.control.point_controller import STOP, Guide, Motion
+from companion.control.point_controller import STOP, ControlCommand, Motion
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
-from companion.control.setpoint_check import Output, OutputCheck, Surroundings, fault_of, inside_borders
+from companion.control.setpoint_check import Output, SetpointCheck, Surroundings, fault_of, inside_borders
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -185,18 +185,18 @@ def test_the_faults_have_names() -> None:
 
 def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
     said: list[str] = []
-    check, known = OutputCheck(lambda text, severity: said.append(text)), surroundings(open_ground())
+    check, known = SetpointCheck(lambda text, severity: said.append(text)), surroundings(open_ground())
     pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
-    good = Guide(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), 1.0)
+    good = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), 1.0)
     assert check.passed(good, pose, 0.0, known) is good and not said and not check.refused
-    far = Guide(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
+    far = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
     assert check.passed(far, pose, 0.0, known).setpoint == STOP
     assert said == ["Stopping: target farther away than the horizon"] and check.refused.total() == 1
 
 
 def test_a_rule_more_is_asked_like_the_others() -> None:
-    check = OutputCheck(lambda text, severity: None, (lambda output, known: "not on Sundays",))
-    drive = Guide(Motion.LOOK, GuidedHeading(0.0), 0.5)
+    check = SetpointCheck(lambda text, severity: None, (lambda output, known: "not on Sundays",))
+    drive = ControlCommand(Motion.LOOK, GuidedHeading(0.0), 0.5)
     assert check.passed(drive, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0, surroundings(open_ground())).setpoint == STOP
     assert check.refused == {"not on Sundays": 1}
 
@@ -207,7 +207,7 @@ def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None
     rig.until_driven(2.0)
     driver = rig.companion.driver
     assert driver is not None
-    through = Guide(Motion.DRIVE, GuidedPosition(NedPoint(0.0, 7.0)), 2.0)
+    through = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(0.0, 7.0)), 2.0)
     driver.update = lambda *_: (through, None)  # type: ignore[method-assign]
     since_s = rig.now_s()
     rig.run_for(10.0)
@@ -280,10 +280,10 @@ def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path
     """The map and its rules out of the way: the shapes alone keep the rover inside the autopilot's fence, and it is said."""
     rig = Rig(yard(tmp_path), prepare=stored(box(KEEP_IN, -6.0, -2.4, 6.5, 20.0), **POLYGONS, FENCE_MARGIN=0.0))
     rig.until_driven(1.0)
-    driver, bounds = rig.companion.driver, rig.companion._pursuit.laid.bounds  # type: ignore[union-attr]
+    driver, bounds = rig.companion.driver, rig.companion._executor.layout.bounds  # type: ignore[union-attr]
     assert driver is not None and len(bounds) == 1
-    rig.companion.output_check = OutputCheck(rig.companion._tell, (inside_borders,))
-    out = Guide(Motion.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
+    rig.companion.output_check = SetpointCheck(rig.companion._tell, (inside_borders,))
+    out = ControlCommand(Motion.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
     driver.update = lambda *_: (out, None)  # type: ignore[method-assign]
     rig.run_for(15.0)
     assert any("setpoint leads over the border of the autopilot's fence" in text for text in rig.texts())

@@ -9,7 +9,7 @@ from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
-from companion.executive.goal_driver import Driver
+from companion.executive.goal_driver import GoalDriver
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -64,10 +64,10 @@ def seen_map(pose: Pose) -> EvidenceMap:
     return evidence
 
 
-def driver(runner: StepRunner, pose: Pose) -> Driver:
+def driver(runner: StepRunner, pose: Pose) -> GoalDriver:
     planner = make_planner("hybrid", SETTINGS.planner)
     searcher = Searcher(planner, SETTINGS.navigator, np.random.default_rng(1))
-    return Driver(seen_map(pose), RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, runner)
+    return GoalDriver(seen_map(pose), RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, runner)
 
 
 def at(time_s: float, heading_rad: float = 0.0) -> Pose:

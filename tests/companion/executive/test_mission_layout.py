@@ -25,30 +25,30 @@ def mission(tmp_path: Path) -> Mission:
 
 
 def test_fields_and_metres_count_from_home(mission: Mission) -> None:
-    laid = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
-    first, second = laid.itinerary.targets
+    layout = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
+    first, second = layout.progress.targets
     assert first.point.distance_m(NedPoint(3.0, 9.0)) < 1e-3
     assert second.point.distance_m(NedPoint(5.0, 1.0)) < 1e-3
-    assert laid.itinerary.home.point == POSE.point
-    assert laid.evidence.base.cell_at(POSE.point) == laid.itinerary.home.cell
-    saved = from_home(laid)
+    assert layout.progress.home.point == POSE.point
+    assert layout.evidence.base.cell_at(POSE.point) == layout.progress.home.cell
+    saved = from_home(layout)
     assert saved.south_west.north_m == pytest.approx(-7.5, abs=1e-3)
     assert saved.south_west.east_m == pytest.approx(-2.5, abs=1e-3)
 
 
 def test_laid_again_everything_is_where_it_was_on_earth_and_progress_is_kept(mission: Mission) -> None:
-    laid = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
-    itinerary = on_time(on_reached(laid.itinerary, 5.0), 5.0)
+    layout = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
+    progress = on_time(on_reached(layout.progress, 5.0), 5.0)
     moved = LocalFrame(ORIGIN).to_geo(NedPoint(-120.0, 75.0))
-    again = lay_again(laid, itinerary, mission, MappingSettings(), moved)
+    again = lay_again(layout, progress, mission, MappingSettings(), moved)
     before, after = LocalFrame(ORIGIN), LocalFrame(moved)
     for old, new in zip(
-        (*itinerary.targets, itinerary.home), (*again.itinerary.targets, again.itinerary.home), strict=True
+        (*progress.targets, progress.home), (*again.progress.targets, again.progress.home), strict=True
     ):
         assert apart_m(before.to_geo(old.point), after.to_geo(new.point)) < 0.01
         assert (old.name, old.cell) == (new.name, new.cell)
-    assert (again.itinerary.statuses, again.itinerary.index) == (itinerary.statuses, 1)
-    assert again.itinerary.leg is Leg.TRAVEL
+    assert (again.progress.statuses, again.progress.index) == (progress.statuses, 1)
+    assert again.progress.leg is Leg.TRAVEL
     assert again.home == HOME and again.origin == moved
     assert not again.evidence.log_odds.any()
 

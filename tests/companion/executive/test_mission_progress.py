@@ -9,13 +9,13 @@ import pytest
 from companion.core.frames import NedPoint
 from companion.core.grid import Cell
 from companion.executive.mission_progress import (
-    Itinerary,
     Leg,
+    MissionProgress,
     TargetStatus,
     on_reached,
     on_time,
     on_unreachable,
-    plan_itinerary,
+    plan_progress,
     with_errand,
 )
 from companion.mission.mission import OnBlocked
@@ -29,16 +29,16 @@ def target(name: str, on_blocked: OnBlocked = OnBlocked.SKIP, hold_s: float = 0.
     return ResolvedTarget(name, NedPoint(0.0, 0.0), Cell(0, 0), hold_s, on_blocked, None)
 
 
-def itinerary(on_blocked: OnBlocked = OnBlocked.SKIP) -> Itinerary:
-    return plan_itinerary((target("a", on_blocked, 3.0), target("b"), target("c")), target("start"))
+def progress(on_blocked: OnBlocked = OnBlocked.SKIP) -> MissionProgress:
+    return plan_progress((target("a", on_blocked, 3.0), target("b"), target("c")), target("start"))
 
 
-def blocked(state: Itinerary, now_s: float = 10.0) -> Itinerary:
+def blocked(state: MissionProgress, now_s: float = 10.0) -> MissionProgress:
     return on_unreachable(state, now_s, retry_s=5.0, wait_limit_s=12.0)
 
 
 def test_targets_come_in_order_each_with_its_stay():
-    state = itinerary()
+    state = progress()
     assert state.goal.name == "a" and state.leg is Leg.TRAVEL
     state = on_reached(state, 100.0)
     assert (state.leg, state.until_s, state.statuses) == (Leg.STAY, 103.0, (REACHED, PENDING, PENDING))
@@ -60,18 +60,18 @@ def test_targets_come_in_order_each_with_its_stay():
     ],
 )
 def test_on_blocked_decides(on_blocked, leg, goal, statuses):
-    state = blocked(itinerary(on_blocked))
+    state = blocked(progress(on_blocked))
     assert (state.leg, state.goal.name, state.statuses) == (leg, goal, statuses)
 
 
 def test_skipping_the_last_target_ends_the_mission():
-    state = replace(itinerary(), index=2, statuses=(REACHED, REACHED, PENDING))
+    state = replace(progress(), index=2, statuses=(REACHED, REACHED, PENDING))
     state = blocked(state)
     assert state.leg is Leg.DONE and state.statuses == (REACHED, REACHED, UNREACHABLE)
 
 
 def test_waiting_tries_again_and_gives_up_at_its_limit():
-    state = blocked(itinerary(OnBlocked.WAIT), now_s=10.0)
+    state = blocked(progress(OnBlocked.WAIT), now_s=10.0)
     tries = 1
     for now_s in (12.0, 15.0, 20.0):
         state = on_time(state, now_s)
@@ -84,12 +84,12 @@ def test_waiting_tries_again_and_gives_up_at_its_limit():
 
 
 def test_a_target_reached_after_waiting_counts_as_reached():
-    state = on_reached(on_time(blocked(itinerary(OnBlocked.WAIT)), 15.0), 20.0)
+    state = on_reached(on_time(blocked(progress(OnBlocked.WAIT)), 15.0), 20.0)
     assert state.statuses[0] is REACHED and state.give_up_s is None
 
 
 def test_home_reached_ends_the_mission_and_home_unreachable_holds():
-    state = blocked(itinerary(OnBlocked.RETURN))
+    state = blocked(progress(OnBlocked.RETURN))
     assert on_reached(state, 50.0).leg is Leg.DONE
     assert blocked(state).leg is Leg.HOLD
     assert on_reached(state, 50.0).statuses == state.statuses, "home is no target"
@@ -97,26 +97,26 @@ def test_home_reached_ends_the_mission_and_home_unreachable_holds():
 
 @pytest.mark.parametrize("leg", [Leg.TRAVEL, Leg.HOME, Leg.HOLD, Leg.DONE])
 def test_time_alone_changes_nothing_else(leg):
-    state = replace(itinerary(), leg=leg)
+    state = replace(progress(), leg=leg)
     assert on_time(state, 1e9) is state
 
 
 def test_an_errand_comes_first_and_then_the_same_target():
-    state = with_errand(itinerary(), target("errand"))
+    state = with_errand(progress(), target("errand"))
     assert state.goal.name == "errand" and not state.ended
     for after in (on_reached(state, 5.0), blocked(state)):
-        assert after == itinerary()
+        assert after == progress()
 
 
 def test_a_stay_that_an_errand_interrupts_is_over():
-    state = with_errand(on_reached(itinerary(), 100.0), target("errand"))
+    state = with_errand(on_reached(progress(), 100.0), target("errand"))
     assert on_time(state, 100.5) is state
     state = on_reached(state, 101.0)
     assert (state.leg, state.goal.name, state.statuses) == (Leg.TRAVEL, "b", (REACHED, PENDING, PENDING))
 
 
 def test_an_errand_while_waiting_at_the_last_target_comes_before_the_end():
-    state = itinerary()
+    state = progress()
     for now_s in (10.0, 20.0):
         state = on_time(on_reached(state, now_s), now_s + 3.0)
     state = with_errand(on_reached(state, 30.0), target("errand"))
@@ -125,12 +125,12 @@ def test_an_errand_while_waiting_at_the_last_target_comes_before_the_end():
 
 
 def test_a_wait_that_an_errand_interrupts_is_another_try_and_keeps_its_limit():
-    state = with_errand(blocked(itinerary(OnBlocked.WAIT), 10.0), target("errand"))
+    state = with_errand(blocked(progress(OnBlocked.WAIT), 10.0), target("errand"))
     state = on_reached(state, 20.0)
     assert (state.leg, state.goal.name, state.give_up_s) == (Leg.TRAVEL, "a", 22.0)
     assert blocked(state, 22.0).goal.name == "b"
 
 
 def test_a_newer_errand_takes_the_place_of_one_under_way():
-    state = with_errand(with_errand(itinerary(), target("first")), target("second"))
-    assert on_reached(state, 5.0) == itinerary()
+    state = with_errand(with_errand(progress(), target("first")), target("second"))
+    assert on_reached(state, 5.0) == progress()

@@ -8,7 +8,7 @@ from companion.core.grid import empty_grid
 from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.perception.moving_obstacles import Moving
-from companion.perception.object_tracker import Tracker
+from companion.perception.object_tracker import ObjectTracker
 from companion.settings import Settings
 from sitl.sensors.range_sensors import SUITES
 from sitl.world.movers import Mover, timed_track
@@ -26,7 +26,7 @@ class Watcher:
         assert lidar is not None
         self.world, self.lidar, self.speed_m_s = world, lidar, speed_m_s
         self.evidence: EvidenceMap = new_map(empty_grid(40, 40), 0.35, SETTINGS.mapping)
-        self.tracker = Tracker(self.evidence, SETTINGS.traffic)
+        self.tracker = ObjectTracker(self.evidence, SETTINGS.traffic)
         self.chance = np.random.default_rng(seed)
         self.scans = 0
 

@@ -6,16 +6,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.safety.battery_monitor import STALE_S, Level, Power, PowerState, judged, with_battery
+from companion.safety.battery_monitor import STALE_S, BatteryMonitor, BatteryState, Level, judged, with_battery
 from companion.settings import PowerSettings
 from companion.vehicle.events.plan import BatterySeen
 
 SETTINGS = PowerSettings(return_percent=20.0, hold_percent=10.0, return_volts=11.0, hold_volts=10.0, after_s=5.0)
 
 
-def fed(readings: list[tuple[float, int | None, float | None]], settings: PowerSettings = SETTINGS) -> PowerState:
+def fed(readings: list[tuple[float, int | None, float | None]], settings: PowerSettings = SETTINGS) -> BatteryState:
     """Time, per cent, volts of one battery; judged at each."""
-    state = PowerState()
+    state = BatteryState()
     for time_s, percent, volts in readings:
         state = judged(with_battery(state, BatterySeen(time_s, 0, volts, percent)), time_s, settings)
     return state
@@ -53,7 +53,7 @@ def test_it_takes_a_while_without_a_break() -> None:
 
 
 def test_a_level_never_goes_back_but_a_rover_that_has_not_begun_may() -> None:
-    power = Power(SETTINGS)
+    power = BatteryMonitor(SETTINGS)
     for i in range(12):
         power.take_in(BatterySeen(0.5 * i, 0, 12.0, 15))
         power.level(0.5 * i)
@@ -68,7 +68,7 @@ def test_a_reading_that_has_grown_old_says_nothing() -> None:
 
 
 def test_the_short_form_counts_only_where_there_is_no_other() -> None:
-    state = with_battery(PowerState(), BatterySeen(0.0, -1, 12.0, 5))
+    state = with_battery(BatteryState(), BatterySeen(0.0, -1, 12.0, 5))
     for time_s in (0.0, 5.0):
         alone = judged(state if time_s == 0.0 else judged(state, 0.0, SETTINGS), time_s, SETTINGS)
     assert alone.level is Level.HOLD
@@ -77,7 +77,7 @@ def test_the_short_form_counts_only_where_there_is_no_other() -> None:
 
 
 def test_any_of_several_batteries_counts_and_is_named() -> None:
-    state = with_battery(with_battery(PowerState(), BatterySeen(0.0, 0, 12.0, 80)), BatterySeen(0.0, 1, 12.0, 12))
+    state = with_battery(with_battery(BatteryState(), BatterySeen(0.0, 0, 12.0, 80)), BatterySeen(0.0, 1, 12.0, 12))
     state = judged(judged(state, 0.0, SETTINGS), 5.0, SETTINGS)
     assert (state.level, state.reason) == (Level.RETURN, "battery 2 at 12 %")
 
@@ -89,7 +89,7 @@ def test_any_of_several_batteries_counts_and_is_named() -> None:
 def test_the_autopilots_own_failsafe_counts_unless_switched_off(charge_state: int, level: Level) -> None:
     for heed in (True, False):
         settings = SETTINGS.model_copy(update={"heed_autopilot": heed})
-        state = with_battery(PowerState(), BatterySeen(0.0, 0, 12.0, 80, charge_state))
+        state = with_battery(BatteryState(), BatterySeen(0.0, 0, 12.0, 80, charge_state))
         state = judged(judged(state, 0.0, settings), 5.0, settings)
         assert state.level is (level if heed else Level.FINE)
 
@@ -101,7 +101,7 @@ def test_zero_switches_a_threshold_off() -> None:
 
 @given(st.lists(st.tuples(st.none() | st.integers(0, 100), st.none() | st.floats(0.1, 60.0)), max_size=60))
 def test_whatever_comes_the_level_only_rises_and_has_a_reason(readings: list[tuple[int | None, float | None]]) -> None:
-    state = PowerState()
+    state = BatteryState()
     for i, (percent, volts) in enumerate(readings):
         before = state.level
         state = judged(with_battery(state, BatterySeen(float(i), 0, volts, percent)), float(i), SETTINGS)

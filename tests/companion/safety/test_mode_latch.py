@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.core.frames import GeoPoint
 from companion.core.scan import RangeScan
-from companion.safety.mode_latch import Control, Reaction, Verdict, Watch, check, latched, unsafe_reason
+from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, check, latched, unsafe_reason
 from companion.settings import SafetySettings
 from companion.supervision.startup import start_step
 from companion.vehicle.commands import Arm, SetMode
@@ -49,10 +49,10 @@ def vehicle(now_s: float = 10.0, mode: int = GUIDED, *, armed: bool = True, ekf:
 
 
 UNSAFE = vehicle(ekf=0)
-NOBODY, OURS, THEIRS = Watch(), Watch(Control.COMPANION), Watch(Control.PERSON)
-STOPPED = Watch(Control.COMPANION, unsafe_since_s=9.0)
-LONG_STOPPED = Watch(Control.COMPANION, unsafe_since_s=8.0)
-HELD = Watch(Control.PERSON, 7.0, hold_sent=True)
+NOBODY, OURS, THEIRS = LatchState(), LatchState(Control.COMPANION), LatchState(Control.PERSON)
+STOPPED = LatchState(Control.COMPANION, unsafe_since_s=9.0)
+LONG_STOPPED = LatchState(Control.COMPANION, unsafe_since_s=8.0)
+HELD = LatchState(Control.PERSON, 7.0, hold_sent=True)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_a_short_gap_stops_and_does_not_hold():
 
 @given(st.lists(st.tuples(st.sampled_from([0, 4, 10, 11, 15]), st.booleans(), st.booleans()), max_size=40))
 def test_whatever_happens_setpoints_go_out_only_while_guided_and_armed(story):
-    watch = Watch()
+    watch = LatchState()
     for i, (mode, armed, good) in enumerate(story):
         now_s = 0.7 * i
         watch, verdict = check(watch, vehicle(now_s, mode, armed=armed, ekf=EKF_GOOD if good else 0), now_s, SETTINGS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from companion.mavlink.acks import AckKeeper
-from companion.safety.mode_latch import Control, Reaction, Watch, check
+from companion.safety.mode_latch import Control, LatchState, Reaction, check
 from companion.settings import SafetySettings
 from companion.supervision.startup import overruled
 from companion.vehicle.commands import ChangeSpeed, SetMode
@@ -50,7 +50,7 @@ def test_moved_sticks_are_a_hold_at_once_and_then_silence_until_guided_is_set_an
     state = vehicle(10.0)
     for steering_us in (1500, 1900, 1900):
         state = fold(state, SticksSeen(10.0, steering_us, 1500))
-    watch, verdict = check(Watch(Control.COMPANION), state, 10.0, SafetySettings())
+    watch, verdict = check(LatchState(Control.COMPANION), state, 10.0, SafetySettings())
     assert (verdict.reaction, verdict.reason) == (Reaction.HOLD, "the sticks were moved")
     assert check(watch, state, 10.1, SafetySettings())[1].reaction is Reaction.SILENT
     for seen, reaction in ((vehicle(11.0, HOLD), Reaction.SILENT), (vehicle(12.0), Reaction.DRIVE)):

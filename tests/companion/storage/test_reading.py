@@ -114,9 +114,7 @@ def test_what_a_mission_names_and_is_no_file(tmp_path: Path, key: str, what: str
     (tmp_path / "map.png").mkdir() if what == "folder" else os.mkfifo(tmp_path / "map.png")
     mission = tmp_path / "yard.toml"
     text = mission.read_text()
-    mission.write_text(
-        text.replace("yard.png", "map.png") if key == "sitl.world" else f'prior_map = "map.png"\n{text}'
-    )
+    mission.write_text(text.replace("yard.png", "map.png") if key == "sitl.world" else f'prior_map = "map.png"\n{text}')
     with pytest.raises(MissionError, match=rf"{key}: .*map.png: .*not a file; \w") as caught:
         load_mission(mission)
     assert "no such file" not in str(caught.value)
