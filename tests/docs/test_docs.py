@@ -229,20 +229,6 @@ def test_the_picture_is_small() -> None:
     assert 10_000 < (ROOT / "docs" / "images" / "rooms.png").stat().st_size < 200_000
 
 
-def test_the_design_page_names_every_module_and_has_the_layers_that_are_checked() -> None:
-    text = (ROOT / "docs" / "design.md").read_text(encoding="utf-8")
-    for package in ("companion", "sitl"):
-        for module in (ROOT / package).iterdir():
-            name = module.name if module.suffix == ".py" else f"{module.name}/"
-            covered = name.startswith(("_", "autopilot")) or module.suffix not in (".py", "")
-            assert covered or name in text, f"docs/design.md does not name {package}/{name}"
-    config = configparser.ConfigParser()
-    config.read(ROOT / ".importlinter")
-    layers = config["importlinter:contract:companion"]["layers"].strip().splitlines()
-    block = text.partition("## Who may know whom")[2].partition("```text\n")[2].partition("```")[0]
-    assert [line.split() for line in block.splitlines()] == [line.replace("|", " ").split() for line in layers]
-
-
 def test_the_service_is_one_that_systemd_takes_and_the_program_understands(tmp_path: Path) -> None:
     (_, text), *more = blocks("ini")
     assert not more

@@ -1,0 +1,103 @@
+"""The design page is true: its layout, its nouns and its import floors are those of the modules."""
+
+from __future__ import annotations
+
+import ast
+import configparser
+import re
+import runpy
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "design.md"
+MOST_FLOORS = 13
+
+
+@pytest.fixture(scope="module")
+def made() -> dict[str, Any]:
+    return runpy.run_path(str(ROOT / "docs" / "make_design.py"))
+
+
+def normal(text: str) -> str:
+    """Lower case, words apart: ``MissionProgress`` and ``mission_progress`` both become ``mission progress``."""
+    return re.sub(r"[\s_]+", " ", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", text)).lower()
+
+
+def defined(source: str) -> set[str]:
+    """The normal names of all classes of a module."""
+    return {normal(node.name) for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ClassDef)}
+
+
+def test_the_layout_and_the_nouns_are_those_of_the_modules(made: dict[str, Any]) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert text == made["page"](text), "write it anew: .venv/bin/python docs/make_design.py"
+
+
+def test_a_torn_line_of_the_layout_is_noticed(made: dict[str, Any]) -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    torn = text.replace("    clock.py", ".py", 1)
+    assert torn != text and made["page"](torn) == text
+
+
+def misplaced(module: Any, sources: dict[str, str]) -> list[str]:
+    """The nouns of a module that it does not speak of, or that another one defines."""
+    said = normal(re.sub(r"\n\nNouns: .+?\.\s*\"\"\"", "", sources[module.path], count=1, flags=re.DOTALL))
+    wrong = [noun for noun in module.nouns if normal(noun) not in said]
+    for noun in set(module.nouns) - set(wrong):
+        homes = {path for path, source in sources.items() if normal(noun) in defined(source)}
+        wrong += [noun] if homes and module.path not in homes else []
+    return wrong
+
+
+def test_every_noun_leads_to_the_file_that_speaks_of_it(made: dict[str, Any]) -> None:
+    found = made["modules"]()
+    sources = {
+        module.path: (
+            ROOT / module.path / "__init__.py" if module.path.endswith("/") else ROOT / module.path
+        ).read_text(encoding="utf-8")
+        for module in found
+    }
+    assert {module.path: wrong for module in found if (wrong := misplaced(module, sources))} == {}
+    grid = next(module for module in found if module.path == "companion/core/grid.py")
+    assert misplaced(made["Module"](grid.path, grid.says, ("genetic algorithm", "Pose")), sources) == [
+        "genetic algorithm",
+        "Pose",
+    ]
+
+
+def test_a_noun_has_one_home(made: dict[str, Any]) -> None:
+    twice = [made["Module"]("a.py", "A.", ("field",)), made["Module"]("b.py", "B.", ("field",))]
+    with pytest.raises(made["DesignError"], match=r"b\.py.*field.*a\.py"):
+        made["noun_table"](twice)
+
+
+def test_the_floors_on_the_page_are_those_that_are_checked() -> None:
+    config = configparser.ConfigParser()
+    config.read(ROOT / ".importlinter")
+    layers = [line.strip() for line in config["importlinter:contract:companion"]["layers"].strip().splitlines()]
+    block = PAGE.read_text(encoding="utf-8").partition("## Who may import whom")[2].partition("```text\n")[2]
+    assert block.partition("```")[0].splitlines() == layers
+    assert len(layers) <= MOST_FLOORS
+
+
+def test_only_the_field_step_stands_at_the_root_of_the_companion() -> None:
+    assert {path.name for path in (ROOT / "companion").glob("*.py")} == {"__init__.py", "app.py"}
+
+
+@pytest.mark.parametrize("program", ["companion", "sitl"])
+def test_the_tests_mirror_the_packages(program: str) -> None:
+    packages = {path.parent.name for path in (ROOT / program).glob("*/__init__.py")}
+    folders = {path.name for path in (ROOT / "tests" / program).iterdir() if path.is_dir() and path.name[0] != "_"}
+    assert folders <= packages
+
+
+@pytest.mark.parametrize("package", ["control", "executive", "safety", "supervision"])
+def test_every_module_that_moves_the_rover_has_a_unit_test_beside_it(package: str) -> None:
+    tests = "\n".join(
+        path.read_text(encoding="utf-8") for path in (ROOT / "tests" / "companion" / package).glob("*.py")
+    )
+    modules = [path.stem for path in (ROOT / "companion" / package).glob("*.py") if path.stem != "__init__"]
+    assert [name for name in modules if f"companion.{package}.{name} " not in tests] == []
