@@ -31,8 +31,8 @@ INTRODUCTION = """# Settings
 
 <!-- Written by docs/make_settings.py from companion/settings/. -->
 
-Every setting has a default, so no file is needed. To change some, write them into a TOML file and give it to `run`, `plan`,
-`bench` or `drive` with `--settings FILE`:
+All settings, with default, unit and range. No file is needed: every setting has a default. To change some, write
+them into a TOML file and give it to `run`, `doctor`, `plan`, `bench` or `drive` with `--settings FILE`:
 
 ```toml
 # settings
@@ -45,9 +45,10 @@ horizon_m = 6.0
 max_epochs = 80
 ```
 
-An unknown key is refused with one that is spelt nearly so, or else with all that are known there; so is a value of the wrong type or out of range.
-`profile = "paper"` searches with the genetic algorithm alone (it sets `navigator.planner` to `bspline-ga`, unless the file says
-otherwise); the default has graph search behind it, see [planners.md](planners.md).
+An unknown key is refused, with a similar key that exists or with all keys of that section. A value of the wrong type or
+out of range is refused too. `profile = "paper"` searches with the genetic algorithm alone (it sets `navigator.planner`
+to `bspline-ga`, unless the file says otherwise); the default profile has graph search behind it, see
+[planners.md](planners.md).
 """
 
 
