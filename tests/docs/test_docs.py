@@ -211,12 +211,23 @@ def test_settings_that_pages_name_exist(page: Path) -> None:
     assert {name for name in named if not name.endswith((".py", ".tlog"))} <= known
 
 
-@pages
-def test_relative_links_lead_somewhere(page: Path) -> None:
+def anchors(page: Path) -> set[str]:
+    """The anchors of a page's headings, as GitHub makes them."""
     text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
-    links = re.findall(r"\]\(([^)]+)\)", text)
-    for link in links:
-        assert "://" in link or (page.parent / link.partition("#")[0]).exists(), link
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading).lower().replace(" ", "-") for heading in headings}
+
+
+@pages
+def test_relative_links_lead_to_pages_and_headings(page: Path) -> None:
+    text = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    for link in re.findall(r"\]\(([^)]+)\)", text):
+        if "://" in link:
+            continue
+        path, _, anchor = link.partition("#")
+        target = page.parent / path if path else page
+        assert target.exists(), link
+        assert not anchor or anchor in anchors(target), link
 
 
 @pages
