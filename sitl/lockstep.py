@@ -157,7 +157,7 @@ class Drive:
         report.said = companion.outcome.said
         report.targets = [(name, str(status)) for name, status in companion.statuses()]
         report.collisions = len(self.simulator.collisions)
-        report.refused = companion.output_check.refused.total()
+        report.refused = companion.mission_run.setpoint_check.refused.total()
         report.distance_m = self.simulator.driven_m
         report.sim_time_s = self.simulator.time_s
         if companion.driver is not None:

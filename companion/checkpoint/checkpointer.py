@@ -16,7 +16,7 @@ from companion.core.grid import Cell
 from companion.core.rounds import Mark
 from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
-from companion.executive.mission_progress import Leg, MissionProgress
+from companion.executive.mission_progress import MissionPhase, MissionProgress
 from companion.mapping.evidence_map import EvidenceMap
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
@@ -86,7 +86,7 @@ class Memory:
             executor.trail.enter(Cell(x + shift.x, y + shift.y))
         _look(executor, vehicle)
         progress, leg, pose = executor.progress, state.leg, vehicle.pose_at(now_s)
-        drives = progress.leg in (Leg.TRAVEL, Leg.HOME) and not executor.target_refused
+        drives = progress.phase in (MissionPhase.TRAVEL, MissionPhase.HOME) and not executor.target_refused
         if leg is not None and pose is not None and drives:
             past = nav_state(leg, shift)
             if executor.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
@@ -159,7 +159,7 @@ class Memory:
             origin=layout.origin,
             home=layout.home,
             progress=executor.progress,
-            leg=leg if driver.goal is executor.progress.goal else None,
+            leg=leg if driver.goal == executor.progress.goal else None,
             doubts_left=doubts_left,
             trail=executor.trail.back()[::-1],
             base=executor.evidence.base,

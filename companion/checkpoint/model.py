@@ -6,7 +6,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from companion.executive.mission_progress import Leg, TargetStatus
+from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.safety.mode_latch import Control
 from companion.vehicle.rc_input import PULSES_US
@@ -22,7 +22,7 @@ FieldNumber = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 Geo = tuple[Latitude, Longitude]
 Pulse = Annotated[int, Field(ge=PULSES_US.start, lt=PULSES_US.stop)]
 
-UNDER_WAY = (Leg.TRAVEL, Leg.STAY, Leg.WAIT)
+UNDER_WAY = (MissionPhase.TRAVEL, MissionPhase.STAY, MissionPhase.WAIT)
 MAX_TARGETS = 1_000_000
 MAX_PAST = 4_000_000
 
@@ -53,7 +53,7 @@ class SavedProgress(Part):
     start: SavedPlace
     statuses: tuple[TargetStatus, ...] = Field(min_length=1, max_length=MAX_TARGETS)
     index: Count
-    leg: Leg
+    leg: MissionPhase
     left_s: Seconds
     give_up_left_s: Seconds | None
     errand: SavedErrand | None = None

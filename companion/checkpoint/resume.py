@@ -86,8 +86,8 @@ def lay_resumed(
     *,
     same: bool,
     fence: AutopilotFence = NO_FENCE,
-) -> tuple[MissionLayout, str]:
-    """The mission where it lies now, with the progress and the map of then; and what is to be said of the map.
+) -> tuple[MissionLayout, MissionProgress, str]:
+    """The mission where it lies now with the map of then, the progress, and what is to be said of the map.
 
     ``same``: the autopilot has been on since, so that its frame is the one of then unless its origin has moved. Otherwise a new estimate may put
     everything some metres elsewhere: no ground counts as seen free, and obstacles as such that have hardly been seen. Raises MissionError.
@@ -96,10 +96,10 @@ def lay_resumed(
     start = _now_at(state.progress.start, then, origin)
     began_at = Pose(start.north_m, start.east_m, 0.0, now_s)
     layout = lay(mission, settings, origin, GeoPoint(*state.home), began_at, fence)
-    layout = replace(layout, progress=_progress(layout, state, then, now_s))
+    progress = _progress(layout, state, then, now_s)
     evidence, shift = layout.evidence, shift_of(state, layout)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:
-        return layout, "without its map (the settings of the map have changed)"
+        return layout, progress, "without its map (the settings of the map have changed)"
     same = same and apart_m(origin, then) <= SAME_ORIGIN_M
     fine = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
     log_odds = _moved(kept.rasters["log_odds"], evidence.log_odds.shape, fine)
@@ -108,7 +108,8 @@ def lay_resumed(
         log_odds = np.where(log_odds >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
         penalty = np.zeros_like(penalty)
     restore(evidence, log_odds, penalty)
-    return layout, "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
+    said = "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
+    return layout, progress, said
 
 
 def shift_of(state: SavedState, layout: MissionLayout) -> Cell:
@@ -135,20 +136,20 @@ def nav_state(leg: SavedLeg, shift: Cell) -> NavState:
 
 def _progress(layout: MissionLayout, state: SavedState, then: GeoPoint, now_s: float) -> MissionProgress:
     """How far the mission had come, on the targets where they lie now."""
-    progress, errand = state.progress, None
-    if progress.errand is not None:
-        point = _now_at(progress.errand, then, layout.origin)
+    saved, requested = state.progress, None
+    if saved.errand is not None:
+        point = _now_at(saved.errand, then, layout.origin)
         cell = layout.evidence.base.cell_at(point)
-        errand = ResolvedTarget(progress.errand.name, point, cell, 0.0, OnBlocked.SKIP, progress.errand.speed_m_s)
-    return replace(
-        layout.progress,
-        home=replace(layout.progress.home, name=progress.start.name),
-        statuses=progress.statuses,
-        index=progress.index,
-        leg=progress.leg,
-        until_s=now_s + progress.left_s,
-        give_up_s=None if progress.give_up_left_s is None else now_s + progress.give_up_left_s,
-        errand=errand,
+        requested = ResolvedTarget(saved.errand.name, point, cell, 0.0, OnBlocked.SKIP, saved.errand.speed_m_s)
+    return MissionProgress(
+        layout.targets,
+        replace(layout.start, name=saved.start.name),
+        saved.statuses,
+        index=saved.index,
+        phase=saved.leg,
+        until_s=now_s + saved.left_s,
+        give_up_s=None if saved.give_up_left_s is None else now_s + saved.give_up_left_s,
+        requested=requested,
     )
 
 

@@ -91,10 +91,10 @@ def _progress(progress: MissionProgress, now_s: float) -> SavedProgress:
         ),
         statuses=progress.statuses,
         index=progress.index,
-        leg=progress.leg,
+        leg=progress.phase,
         left_s=_left_s(progress.until_s, now_s),
         give_up_left_s=None if give_up_s is None else _left_s(give_up_s, now_s),
-        errand=None if progress.errand is None else _errand(progress.errand),
+        errand=None if progress.requested is None else _errand(progress.requested),
     )
 
 
