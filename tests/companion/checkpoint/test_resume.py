@@ -13,7 +13,7 @@ from companion.checkpoint.resume import Kept, Ownership, lay_resumed, nav_state,
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell, empty_grid
 from companion.executive.mission_layout import lay
-from companion.executive.mission_progress import Leg, TargetStatus
+from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mapping.evidence_map import new_map
 from companion.mission.mission import Mission
 from companion.safety.mode_latch import Control
@@ -85,7 +85,7 @@ def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[Kept, Mission]:
             start=SavedPlace(north_m=home.north_m, east_m=home.east_m),
             statuses=(TargetStatus.UNREACHABLE,),
             index=0,
-            leg=Leg.WAIT,
+            leg=MissionPhase.WAIT,
             left_s=2.0,
             give_up_left_s=100.0,
         ),
@@ -106,13 +106,12 @@ def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[Kept, Mission]:
 
 def test_in_the_same_frame_the_map_is_what_it_was(tmp_path: Path) -> None:
     kept, mission = kept_of(tmp_path)
-    layout, said = lay_resumed(kept, mission, MappingSettings(), ORIGIN, 500.0, same=True)
+    layout, progress, said = lay_resumed(kept, mission, MappingSettings(), ORIGIN, 500.0, same=True)
     assert np.array_equal(layout.evidence.log_odds, kept.rasters["log_odds"])
     assert np.array_equal(layout.evidence.penalty, kept.rasters["penalty"])
     assert layout.evidence.grid.weights[1, 3] >= 1.0, "and the fields know it"
     assert said == "with its map"
-    progress = layout.progress
-    assert (progress.leg, progress.until_s, progress.give_up_s) == (Leg.WAIT, 502.0, 600.0)
+    assert (progress.phase, progress.until_s, progress.give_up_s) == (MissionPhase.WAIT, 502.0, 600.0)
     assert progress.statuses == (TargetStatus.UNREACHABLE,)
     home = LocalFrame(ORIGIN).to_ned(HOME)
     assert progress.home.point.distance_m(home) < 1e-6 and progress.goal.cell == Cell(15, 7)
@@ -124,7 +123,7 @@ def test_in_a_frame_that_may_be_another_only_obstacles_count_and_lie_on_the_same
 ) -> None:
     kept, mission = kept_of(tmp_path)
     origin = LocalFrame(ORIGIN).to_geo(NedPoint(north_m, east_m))
-    layout, said = lay_resumed(kept, mission, MappingSettings(), origin, 0.0, same=same)
+    layout, _, said = lay_resumed(kept, mission, MappingSettings(), origin, 0.0, same=same)
     settings, log_odds = MappingSettings(), layout.evidence.log_odds
     assert (log_odds >= 0.0).all(), "no ground counts as seen"
     assert np.array_equal(log_odds > 0.0, kept.rasters["log_odds"] > 0.0)
@@ -142,7 +141,7 @@ def test_a_grid_that_has_become_a_field_larger_takes_the_map_along(tmp_path: Pat
         update={"east_m": kept.state.ground.east_m + 2.0, "north_m": kept.state.ground.north_m - 1.0}
     )
     moved = Kept(kept.state.model_copy(update={"ground": ground}), kept.rasters)
-    layout, _ = lay_resumed(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
+    layout, _, _ = lay_resumed(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
     assert shift_of(moved.state, layout) == Cell(2, -1)
     s = layout.evidence.subdivisions
     assert np.array_equal(layout.evidence.log_odds[:-s, 2 * s :], kept.rasters["log_odds"][s:, : -2 * s])
@@ -153,9 +152,9 @@ def test_a_grid_that_has_become_a_field_larger_takes_the_map_along(tmp_path: Pat
 
 def test_other_settings_of_the_map_cost_the_map_and_not_the_progress(tmp_path: Path) -> None:
     kept, mission = kept_of(tmp_path)
-    layout, said = lay_resumed(kept, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
+    layout, progress, said = lay_resumed(kept, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
     assert not layout.evidence.log_odds.any() and "without its map" in said
-    assert layout.progress.statuses == (TargetStatus.UNREACHABLE,)
+    assert progress.statuses == (TargetStatus.UNREACHABLE,)
 
 
 def test_a_large_map_is_copied_in_parts_of_a_megabyte() -> None:
