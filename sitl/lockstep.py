@@ -8,9 +8,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
+from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -67,13 +69,22 @@ class TrackPoint:
     part: str
 
 
+class DriveOutcome(StrEnum):
+    """What came of a drive; the values are those of ``--json``."""
+
+    REACHED = "reached"
+    INCOMPLETE = "incomplete"
+    COLLISION = "collision"
+    TIME_LIMIT = "time limit"
+
+
 @dataclass
 class Report:
     """What a lock-step run came to; ``as_json`` gives the documented keys."""
 
     seed: int
-    outcome: str = "time limit"
-    targets: list[tuple[str, str]] = field(default_factory=list)
+    outcome: DriveOutcome = DriveOutcome.TIME_LIMIT
+    targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
     steps: int = 0
     return_steps: int = 0
     searches: int = 0
@@ -96,7 +107,7 @@ class Report:
         """0 all targets reached without a collision, 3 a target missed, 4 a collision."""
         if self.collisions:
             return 4
-        return 0 if self.outcome == "reached" else 3
+        return 0 if self.outcome is DriveOutcome.REACHED else 3
 
     def as_json(self) -> dict[str, object]:
         """For ``--json``: everything but track and texts."""
@@ -155,7 +166,7 @@ class Drive:
     def _sum_up(self) -> None:
         report, companion = self.report, self.companion
         report.said = companion.outcome.said
-        report.targets = [(name, str(status)) for name, status in companion.statuses()]
+        report.targets = companion.statuses()
         report.collisions = len(self.simulator.collisions)
         report.refused = companion.mission_run.setpoint_check.refused.total()
         report.distance_m = self.simulator.driven_m
@@ -175,6 +186,6 @@ class Drive:
         seconds = sorted(companion.outcome.step_seconds)
         report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0
         if report.collisions:
-            report.outcome = "collision"
+            report.outcome = DriveOutcome.COLLISION
         elif companion.done:
-            report.outcome = "reached" if companion.outcome.complete else "incomplete"
+            report.outcome = DriveOutcome.REACHED if companion.outcome.complete else DriveOutcome.INCOMPLETE

@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from companion.executive.plan_watch import AGAIN_S
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
 from companion.cli.source import refuse_arming
-from companion.executive.autopilot_mission import TRIES, MissionFetcher
+from companion.executive.autopilot_mission import AGAIN_S, TRIES, MissionFetcher
 from companion.mission.mission import Mission, MissionError, RoverSpec
 from companion.mission.stored import mission_of
 from tests.scenarios.test_auto_legs import GUIDED_ENABLE, NONE, ON, WAYPOINT, Row, place_deg

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from companion.supervision.startup import LEFT_S
 
 from companion.checkpoint.format import decoded
 from companion.checkpoint.model import SavedState
@@ -18,6 +17,7 @@ from companion.core.grid import Cell
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.safety.mode_latch import Control
+from companion.supervision.arming import LEFT_S
 from tests.scenarios.test_safety_pilot import hold_sticks
 from tests.support.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, without, yard
 
