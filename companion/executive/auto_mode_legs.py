@@ -1,4 +1,4 @@
-"""Legs of AUTO: a mission that the autopilot drives hands legs over (NAV_GUIDED_ENABLE); those are driven, the others are its own."""
+"""Legs of AUTO: the autopilot drives the mission and hands single legs over to the companion (NAV_GUIDED_ENABLE)."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from companion.vehicle.events.targets import GuidedLeg, LegState
 from companion.vehicle.state import VehicleState
 
 SAME_M = 0.1
-"""A place that is handed over and one of the mission nearer to each other than this are one: both are whole 1e-7 degrees."""
+"""A place that is handed over and a target nearer to it than this are the same: both are whole 1e-7 degrees."""
 WP_RADIUS_M = 2.0
 """ArduRover's default; the autopilot ends a leg when the rover is this near to its place."""
 SLACK_M = 1.0
@@ -46,7 +46,7 @@ class AutoModeLegs:
         return self._leg is None and executor.progress.ended
 
     def guide(self, wanted: ControlCommand, executor: MissionExecutor, slow_m_s: float) -> ControlCommand:
-        """What to do: where the companion is content, the autopilot may want the rover nearer to the place (a small WP_RADIUS)."""
+        """What to do. Once the target is reached, the autopilot may want the rover nearer (a small WP_RADIUS)."""
         progress = executor.progress
         if self._leg is None or wanted != STANDSTILL or progress.phase is not MissionPhase.STAY:
             return wanted

@@ -1,4 +1,4 @@
-"""Goal requests: places that people ask for during a run (DO_REPOSITION, a guided mission item), accepted or refused with a reason."""
+"""Goal requests: places that people ask for during a run (DO_REPOSITION, a guided item), accepted or refused."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from companion.vehicle.events.vehicle import RoverMode
 from companion.vehicle.state import VehicleState
 
 REPEAT_S = 5.0
-"""The same request within so long after it was heard last is a repetition: ground stations repeat what was not answered in time."""
+"""The same request within this time is a repetition: ground stations repeat what was not answered in time."""
 MOST_A_SECOND = 10
 """More requests are not even answered, until there are fewer."""
 REFUSED_AGAIN_S = 1.0
@@ -141,5 +141,5 @@ class GoalRequests:
 
 
 def _may_drive(vehicle: VehicleState) -> bool:
-    """As the newest heartbeat says, which may have come with the request itself. On legs of AUTO no request is accepted."""
+    """As the newest heartbeat says, which may have come with the request. On legs of AUTO no request is accepted."""
     return not vehicle.in_auto and vehicle.is_ours and vehicle.heartbeat is not None and vehicle.heartbeat.armed

@@ -52,9 +52,9 @@ from companion.vehicle.state import VehicleState
 ORIGIN_MOVED_M = 0.2
 """The autopilot tells its origin in whole 1e-7 degrees (1 cm): more than this is another origin."""
 VERDICT_S = 15.0
-"""After a jump of the position no target is given up for this long: a receiver that errs is mostly right again by then."""
+"""After a jump of the position no target is given up for this long: most receivers are right again by then."""
 WATCHED_SCANS = 20
-"""Before another try after waiting, obstacles that are not in the newest scans are forgotten: a door may have opened."""
+"""After a wait, obstacles that are not in this many newest scans are forgotten: a door may have opened."""
 
 
 class Task(Enum):
@@ -159,7 +159,7 @@ class MissionExecutor:
             self._tracker.remember(pose, scan.max_range_m)
 
     def follow_origin(self, origin: GeoPoint, now_s: float) -> bool:
-        """Whether the autopilot has moved the origin of its frame; the mission is then laid out anew, with an empty map."""
+        """Whether the autopilot has moved the origin of its frame; then the mission is laid out anew, the map empty."""
         moved_m = apart_m(origin, self.layout.origin)
         if moved_m <= ORIGIN_MOVED_M:
             return False
@@ -219,7 +219,7 @@ class MissionExecutor:
         self.progress = ended_at(self.progress, status)
 
     def go_back(self, reason: str, rally: list[NedPoint], pose: Pose) -> None:
-        """Give the mission up: to the nearest of the rally points, or back the way the rover came. ``reason`` is told."""
+        """Give the mission up: to the nearest rally point, or back the way the rover came. ``reason`` is told."""
         planner = make_planner("dijkstra", self._settings.current.planner)
         self._refuges = refuges(self.progress.home, self.trail, rally, pose.point, self.evidence, planner)
         missed = [name for name, status in self.statuses() if status is not TargetStatus.REACHED]
@@ -280,7 +280,7 @@ class MissionExecutor:
         return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, self._in_force)
 
     def _is_refused(self, now_s: float) -> bool:
-        """Whether the next target lies behind the autopilot's fence: it is not even tried, and the mission goes on after it."""
+        """Whether the next target lies behind the autopilot's fence: then it is not tried, and the next one comes."""
         reason = self.target_refused
         if not reason:
             return False
@@ -290,7 +290,7 @@ class MissionExecutor:
         return True
 
     def _way_back(self, pose: Pose) -> tuple[Cell, ...]:
-        """The fields to follow to a refuge, where they are known: as long as nothing has taken the rover off that way."""
+        """The fields to follow to a refuge, where they are known and the rover has not left that way."""
         if not self._refuges or not self._refuges[0].way:
             return ()
         way, here = self.trail.back(), self.evidence.base.cell_at(pose.point)

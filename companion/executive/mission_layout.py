@@ -1,4 +1,4 @@
-"""The mission laid out on the ground: once when it begins, and again whenever the autopilot moves the origin of its local frame."""
+"""The mission laid out on the ground, and laid out again whenever the autopilot moves the origin of its local frame."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from companion.settings import MappingSettings
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MissionLayout:
-    """Where the mission lies. ``home`` is the place its metres and fields count from: home as it was when the mission began."""
+    """Where the mission lies. Its metres and fields count from ``home``, home as it was when the mission began."""
 
     origin: GeoPoint
     home: GeoPoint

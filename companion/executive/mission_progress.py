@@ -1,4 +1,4 @@
-"""Progress through the mission: which target is next, and what becomes of the mission when one cannot be reached. Pure."""
+"""Progress through the mission: which target is next, and what happens when one cannot be reached. Pure."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def plan_progress(targets: tuple[ResolvedTarget, ...], home: ResolvedTarget) -> 
 
 
 def with_requested(progress: MissionProgress, requested: ResolvedTarget) -> MissionProgress:
-    """The requested goal first, instead of one under way. A stay that it interrupts is over, a wait becomes another try."""
+    """The requested goal first, replacing an earlier one. It ends a stay; a wait becomes another try."""
     if progress.requested is None and progress.phase is MissionPhase.STAY:
         progress = _next(progress)
     elif progress.phase is MissionPhase.WAIT:
@@ -116,7 +116,7 @@ def on_reached(progress: MissionProgress, now_s: float) -> MissionProgress:
 
 
 def on_unreachable(progress: MissionProgress, now_s: float, retry_s: float, wait_limit_s: float) -> MissionProgress:
-    """The goal cannot be reached, and the rover is back where the leg began: ``on_blocked`` decides. A requested goal is dropped."""
+    """The goal cannot be reached: ``on_blocked`` decides. A requested goal is dropped."""
     if progress.requested is not None:
         return replace(progress, requested=None)
     if progress.phase is MissionPhase.HOME:

@@ -1,4 +1,4 @@
-"""One run of a mission: the vehicle's state, who drives, what the run does now, and the executor once the mission has begun."""
+"""One run of a mission: the vehicle's state, the mode latch, what the run does now, and the mission executor."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ class MissionRun:
         return self.executor
 
     def start_afresh(self) -> None:
-        """What was sent before counts for nothing, and the rover may have been moved: the leg begins again where it then is."""
+        """Forget what was sent; the rover may have been moved, so the leg begins again where it then is."""
         self.sender.reset()
         if self.executor is not None:
             self.executor.driver.leave()

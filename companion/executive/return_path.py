@@ -81,7 +81,7 @@ def refuges(
     evidence: EvidenceMap,
     planner: Planner,
 ) -> list[Refuge]:
-    """The places to try, one after the other: rally points with a way there that is shorter than the way back, then the start.
+    """The places to try, in order: rally points with a way there that is shorter than the way back, then the start.
 
     The way back is the rover's own trail; where it does not lead to the start (the map was begun anew on the way), the
     length of the straight line stands for it. The way to a rally point is the shortest on the known map; one behind a

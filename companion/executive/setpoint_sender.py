@@ -1,4 +1,4 @@
-"""The setpoint sender: of what guidance wants, the commands that are new or due again; and every other command to the autopilot."""
+"""The setpoint sender: sends setpoints that are new or due again, and every other command, to the autopilot."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SPEED_AGAIN_S = 3.0
 
 
 class SentSetpoints:
-    """Remembers what was sent last, and when: the autopilot brakes for every new setpoint, so none is sent needlessly."""
+    """Remembers what was sent last, and when: the autopilot brakes for every new setpoint."""
 
     def __init__(self) -> None:
         self.reset()

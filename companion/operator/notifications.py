@@ -1,4 +1,4 @@
-"""The notifier: texts for the ground station and for those who watch the program; the run's status and outcome as they see it."""
+"""The notifier: texts for the ground station and the terminal; the run's status and outcome as people see them."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ class Outcome:
 
 
 class Notifier:
-    """Tells texts to the ground station, none twice in a row, and keeps them. ``said`` is the list that it keeps them in."""
+    """Tells texts to the ground station, none twice in a row, and keeps them in the list ``said``."""
 
     def __init__(self, autopilot: AutopilotLink, clock: Clock, said: list[str]) -> None:
         self.said = said
@@ -99,11 +99,11 @@ class Notifier:
             self.tell(text, Severity.WARNING)
 
     def note(self, text: str, severity: Severity) -> None:
-        """Keep a text for those who watch the program itself."""
+        """Keep a text for the terminal only."""
         self.news.append(News(severity, text))
 
     def tell_faults(self, run: MissionRun, now_s: float, problem: str) -> None:
-        """What a person should know although it stops nothing, each once. ``problem``: of the record or the state file."""
+        """Faults that stop nothing, each told once. ``problem``: of the record or the state file."""
         if run.vehicle.heartbeat is not None and self._autopilot.signing_trouble:
             self.once(self._autopilot.signing_trouble)
         if run.executor is None:

@@ -1,4 +1,4 @@
-"""The battery monitor: thresholds for charge and voltage, each believed only after a while. Pure but for ``BatteryMonitor``."""
+"""The battery monitor: thresholds for charge and voltage, each believed only after a while."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LOW, CRITICAL, FAILED = 2, 3, 5
 
 
 class Level(IntEnum):
-    """How far it has come. It never goes back: a battery that recovers at rest is still empty."""
+    """What the batteries allow. It never goes back: a battery that recovers at rest is still empty."""
 
     FINE = 0
     RETURN = 1
@@ -91,7 +91,7 @@ class BatteryMonitor:
             self.state = with_battery(self.state, event)
 
     def level(self, now_s: float) -> Level:
-        """How far it has come by now."""
+        """What they allow now."""
         self.state = judged(self.state, now_s, self._settings)
         return self.state.level
 

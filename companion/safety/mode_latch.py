@@ -1,4 +1,4 @@
-"""The mode latch: who drives, decided by flight mode, arming and doubts; a pilot always wins. Pure functions, no I/O."""
+"""The mode latch: whether companion or person drives, by flight mode, arming and doubts; the pilot wins. Pure."""
 
 from __future__ import annotations
 

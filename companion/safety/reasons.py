@@ -1,4 +1,4 @@
-"""Reasons and run phases: why the rover must not move, what is awaited, what the run does now, why it ended, and the text of each.
+"""Reasons and run phases as enums: why the rover must not move, what is awaited, what the run does, why it ended.
 
 The program compares the enums; people, records and the autopilot get the texts, which are made here and nowhere else.
 """

@@ -1,4 +1,4 @@
-"""Watchdogs: monitors of the sticks, the age of data, the companion's own loop and the scans; each may doubt that the rover may move."""
+"""Watchdogs: monitors of the sticks, the age of data, the companion's own loop and repeated scans."""
 
 from __future__ import annotations
 

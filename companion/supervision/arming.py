@@ -1,4 +1,4 @@
-"""Arming: from a link to a rover that may be driven. What is awaited, the one command that would help, and the mission laid out."""
+"""Arming: from a link to a rover that may be driven; what is awaited, and the one command that would help."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def arming_step(
     hindrance: Reason[WaitReason] | None = None,
     listens: str = "",
 ) -> ArmingStep:
-    """What stands between now and driving. ``hindrance``: anything else that must be out of the way before GUIDED is set.
+    """What stands between now and driving. ``hindrance``: anything else that keeps GUIDED from being set.
 
     GUIDED is set only on a rover that nobody drives (disarmed, or in HOLD), and never on one that a person has had
     (``control``); arming only if told to (``arm``). ``listens``: where the autopilot is listened for, in words.
@@ -93,7 +93,7 @@ def arming_step(
 
 
 def overruled(ack: AckSeen | None, heartbeat: HeartbeatSeen | None) -> bool:
-    """Whether somebody has chosen another mode since the autopilot took ours, though no heartbeat showed GUIDED between."""
+    """Whether a person has chosen another mode since the autopilot took ours, with no heartbeat in GUIDED between."""
     if ack is None or ack.result != 0 or heartbeat is None:
         return False
     return heartbeat.mode != RoverMode.GUIDED and heartbeat.time_s - ack.time_s > TAKEN_S
@@ -225,7 +225,7 @@ class Arming:
     # Whose rover it is -------------------------------------------------------------------------------------------
 
     def _had_by_person(self, vehicle: VehicleState) -> bool:
-        """Whether a person has driven it, or taken it out of our mode, since this run looks on, and has not set our mode since."""
+        """Whether a person has driven it, or taken it out of our mode, in this run and not set our mode since."""
         if (heartbeat := vehicle.heartbeat) is None:
             return False
         if heartbeat.mode == vehicle.own_mode:

@@ -1,4 +1,4 @@
-"""Assembly: makes the parts of one companion and connects them; here stand the monitors in their order of precedence."""
+"""Assembly: makes and connects the parts of one companion, with the monitors in their order of precedence."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Parts:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Options:
-    """``seed``: of every random choice; ``arm``: whether the motors may be armed; ``keep_settings``: takes changed settings."""
+    """``seed``: of random choices; ``arm``: whether to arm the motors; ``keep_settings``: takes changed settings."""
 
     seed: int
     arm: bool

@@ -1,4 +1,4 @@
-"""The fence monitor: the autopilot's own fence and rally points, read before the rover may be driven and regularly after that."""
+"""The fence monitor: the autopilot's own fence and rally points, read before driving, then regularly."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class FenceMonitor:
                 pass
 
     def service(self, vehicle: VehicleState, now_s: float) -> None:
-        """To be called every tick: asks for what is missing or old, puts together what has come, and tells of a breach."""
+        """To be called every tick: ask for what is missing or old, put together what has come, tell of a breach."""
         self._ask_and_take(vehicle, now_s)
         breach = self.doubt(now_s)
         if breach is not None and not self._breach_told:
@@ -95,7 +95,7 @@ class FenceMonitor:
         for kind in self._asked_s:
             self._fetch(kind, now_s)
         rally = self._autopilot.downloads.last(PlanKind.RALLY)
-        if rally is not None and rally is not self._rally:
+        if rally is not None and rally != self._rally:
             self._take_rally(rally)
         self._put_together(vehicle, now_s)
 
@@ -134,7 +134,7 @@ class FenceMonitor:
             self._notifier.tell(f"The autopilot's rally points are not used: {error}", Severity.WARNING)
 
     def _put_together(self, vehicle: VehicleState, now_s: float) -> None:
-        """The fence anew when anything of it is; what makes no sense, or could not be fetched, leaves the fence as it was."""
+        """Make the fence anew when a part of it has changed; what makes no sense leaves the fence as it was."""
         stored = self._autopilot.downloads.last(PlanKind.FENCE)
         told = all(name in vehicle.parameters for name in PARAMETERS) or self._tries >= PARAMETER_TRIES
         if stored is None or not told or vehicle.home is None:

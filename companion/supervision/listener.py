@@ -1,4 +1,4 @@
-"""The listener: folds what has come in into the vehicle's state, shows it to all that listen, and finds the scans for the map."""
+"""The listener: folds events into the vehicle's state, passes them to all that take them, and answers operators."""
 
 from __future__ import annotations
 

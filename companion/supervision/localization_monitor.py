@@ -1,4 +1,4 @@
-"""The localization monitor: doubts about where the rover is, when its position jumps or wanders or the frame's origin moves."""
+"""The localization monitor: doubts the position when it jumps or wanders, or when the frame's origin moves."""
 
 from __future__ import annotations
 
@@ -19,18 +19,18 @@ HOME_MOVED_M = 2.0
 ASK_PLACES_S = 0.5
 """While it is doubtful where the rover is, the origin is asked for this often,"""
 SETTLED_S = 0.4
-"""and an answer counts that comes so long after the doubt arose: position and origin then speak of the same frame."""
+"""and an answer counts that comes this long after the doubt arose: position and origin are then of one frame."""
 
 WANDERINGS, WANDERINGS_S = 3, 20.0
-"""A position that wanders so often within so long is no position to drive by,"""
+"""A position that wanders this often within this time is no position to drive by,"""
 ONCE_S = 3.0
 """(what lasts no longer than this is once)"""
 CALM_S = 10.0
-"""until it has been calm for so long."""
+"""until it has been calm for this long."""
 
 
 class LocalizationMonitor:
-    """Keeps the doubt that there is, and says when it is settled. The map is worthless from a jump on, and begun anew."""
+    """Keeps the doubt until it is settled. From a jump on the map is worthless, and begun anew."""
 
     def __init__(self, run: MissionRun, settings: LiveSettings, notifier: TextSink) -> None:
         self._run = run
@@ -98,7 +98,7 @@ class LocalizationMonitor:
             self._unsure_until_s = now_s + CALM_S
 
     def _find_ground(self, event: OriginSeen, executor: MissionExecutor) -> None:
-        """The origin as it is now: after a jump this tells whether the frame has moved or only the rover's place in it."""
+        """The origin as it is now: after a jump it tells whether the frame has moved, or only the rover in it."""
         if executor.follow_origin(event.point, event.time_s):
             self._doubt, self._doubt_s = Doubt.ORIGIN_MOVED, event.time_s
         elif self._doubt is not None and event.time_s - self._doubt_s >= SETTLED_S:

@@ -1,4 +1,4 @@
-"""Mission limits: what keeps a mission from beginning, and what breaks it off: fence, batteries, other companions, borders."""
+"""Mission limits: what keeps a mission from beginning and what breaks it off (fence, batteries, borders)."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState
 
 LISTEN_S = 1.5
-"""A rover that is found armed in GUIDED is listened to for this long first: another companion tells its figures every second."""
+"""How long to listen first to a rover found armed in GUIDED: another companion sends its figures every second."""
 
 
 class RivalMonitor:

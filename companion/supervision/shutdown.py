@@ -1,4 +1,4 @@
-"""Shutdown: at the end of a run a rover that is ours is stopped and put into HOLD, with time to see that it has been."""
+"""Shutdown: at the end of a run a rover that is ours is stopped and put into HOLD, and HOLD is confirmed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from companion.vehicle.events.vehicle import RoverMode
 from companion.vehicle.state import fold
 
 CONFIRM_S = 0.7
-"""The companion stays this long after its last command, to see that the rover is in HOLD; with all else, it is gone within a second."""
+"""How long the companion stays after its last command to see the rover in HOLD; it ends within a second in all."""
 AGAIN_S = 0.2
 """HOLD is asked for this often until then."""
 

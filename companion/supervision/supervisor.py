@@ -1,4 +1,4 @@
-"""The supervisor: whether the rover may be driven in this tick, walking the monitors; begins the mission and ends the run."""
+"""The supervisor: judges in each tick whether the rover may be driven; begins the mission and ends the run."""
 
 from __future__ import annotations
 

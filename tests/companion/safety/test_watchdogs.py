@@ -33,7 +33,7 @@ TICK_S = 0.05
 
 
 def noticed_s(took_s: Callable[[int], float], ticks: int = 2000) -> float:
-    """When a loop is noticed whose ``i``-th tick takes so long; inf: never. It catches up, and gives up what is a second late."""
+    """When a loop is noticed whose ``i``-th tick takes ``took_s(i)``; inf: never. What is a second late is given up."""
     watch, now_s, next_s = LoopMonitor(30.0), 0.0, 0.0
     for i in range(ticks):
         next_s += TICK_S
