@@ -31,12 +31,15 @@ from companion.settings import Settings
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.arming import Arming
 from companion.supervision.fence_monitor import FenceMonitor
+from companion.supervision.judge import Judge
+from companion.supervision.keeper import Keeper
 from companion.supervision.listener import Listener
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.supervision.mission_limits import BorderMonitor, MissionLimits
+from companion.supervision.pace import Pace
 from companion.supervision.rival_monitor import RivalMonitor
 from companion.supervision.shutdown import Shutdown
-from companion.supervision.supervisor import Pace, Supervisor
+from companion.supervision.supervisor import LoopWatch, Supervisor
 from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 
@@ -85,7 +88,7 @@ def assemble(
     run = MissionRun(mission, vehicle, sender, live, notifier, make_executor)
     log.begin(clock.now_s(), Mark.BEGIN)
 
-    localization, scans = LocalizationMonitor(run, live, notifier), ScanMonitor()
+    localization, scans = LocalizationMonitor(run, autopilot, live, notifier), ScanMonitor()
     loop, rivals = LoopMonitor(settings.safety.planner_s), RivalMonitor(autopilot)
     fences, batteries = FenceMonitor(autopilot, settings.fence, notifier), BatteryMonitor(settings.power)
     monitors = (
@@ -107,22 +110,18 @@ def assemble(
     limits = MissionLimits(run, fences, batteries, rivals, settings.power, outcome)
     kept = memory.kept if memory else None
     pace = Pace(clock, live, localization)
+    shutdown = Shutdown(run, autopilot, live, notifier)
     supervisor = Supervisor(
         run,
-        monitors,
-        pace=pace,
-        loop=loop,
+        Judge(run, monitors, live, notifier),
+        Arming(run, autopilot, limits, live, notifier, arm=options.arm, kept=kept),
+        limits,
+        shutdown,
+        loop=LoopWatch(loop, pace, noted),
         localization=localization,
-        fences=fences,
-        limits=limits,
-        arming=Arming(run, autopilot, limits, live, notifier, arm=options.arm, kept=kept),
-        shutdown=Shutdown(run, autopilot, notifier),
-        autopilot=autopilot,
-        runner=noted,
-        settings=live,
+        keeper=Keeper(run, memory, log, notifier, localization, shutdown),
         log=log,
         notifier=notifier,
         outcome=outcome,
-        memory=memory,
     )
     return Parts(run, pace, listener, supervisor, notifier, outcome)

@@ -9,6 +9,7 @@ from companion.core.severity import Severity, TextSink
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import apart_m
 from companion.executive.mission_run import MissionRun
+from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.reasons import Doubt, Reason
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events.event import Event
@@ -32,8 +33,9 @@ CALM_S = 10.0
 class LocalizationMonitor:
     """Keeps the doubt until it is settled. From a jump on the map is worthless, and begun anew."""
 
-    def __init__(self, run: MissionRun, settings: LiveSettings, notifier: TextSink) -> None:
+    def __init__(self, run: MissionRun, autopilot: AutopilotLink, settings: LiveSettings, notifier: TextSink) -> None:
         self._run = run
+        self._autopilot = autopilot
         self._settings = settings
         self._notifier = notifier
         self._doubt: Doubt | None = None
@@ -60,12 +62,11 @@ class LocalizationMonitor:
         """The companion's own loop stood still: what piled up meanwhile is not believed."""
         self._settled_s = now_s + SETTLED_S
 
-    def must_ask(self, now_s: float) -> bool:
-        """Whether it is time to ask for the origin (again)."""
-        if self._doubt is None or now_s - self._asked_s < ASK_PLACES_S:
-            return False
-        self._asked_s = now_s
-        return True
+    def service(self, now_s: float) -> None:
+        """To be called every tick: while there is a doubt, have the origin told again and again."""
+        if self._doubt is not None and now_s - self._asked_s >= ASK_PLACES_S:
+            self._asked_s = now_s
+            self._autopilot.ask_places()
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event; before the mission has begun there is no map that could be wrong."""

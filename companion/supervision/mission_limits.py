@@ -55,6 +55,15 @@ class MissionLimits:
         """The autopilot's, as known now."""
         return self._fences.fence
 
+    def service(self, now_s: float) -> None:
+        """To be called every tick: keep up with the autopilot's fence."""
+        self._fences.service(self._run.vehicle, now_s)
+
+    def heed_fence(self) -> None:
+        """A fence that has changed is in force from here on."""
+        if self._run.executor is not None:
+            self._run.executor.heed_fence(self._fences.fence)
+
     def awaited(self, now_s: float, *, left_driving: bool) -> Reason[WaitReason] | None:
         """What must come before the rover may be driven at all; None when nothing must.
 

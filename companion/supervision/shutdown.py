@@ -11,6 +11,7 @@ from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.mode_latch import Control
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import SetMode
 from companion.vehicle.events.vehicle import RoverMode
 from companion.vehicle.state import fold
@@ -24,9 +25,10 @@ AGAIN_S = 0.2
 class Shutdown:
     """Begun once, by whatever ends the run."""
 
-    def __init__(self, run: MissionRun, autopilot: AutopilotLink, notifier: TextSink) -> None:
+    def __init__(self, run: MissionRun, autopilot: AutopilotLink, settings: LiveSettings, notifier: TextSink) -> None:
         self._run = run
         self._autopilot = autopilot
+        self._settings = settings
         self._notifier = notifier
         self._leave_at_s = math.inf
         self._again_s = math.inf
@@ -61,10 +63,10 @@ class Shutdown:
             self._run.sender.send(SetMode(RoverMode.HOLD), now_s)
         return over
 
-    def wait(self, clock: Clock, now_s: float, tick_s: float) -> float:
+    def wait(self, clock: Clock, now_s: float) -> float:
         """Nothing else goes on any more: listen and ask for HOLD until it is over. Returns the time."""
         while not self.is_over(now_s):
-            now_s += tick_s
+            now_s += 1.0 / self._settings.current.link.tick_hz
             clock.sleep_until_s(now_s)
             for event in self._autopilot.poll(now_s):
                 self._run.vehicle = fold(self._run.vehicle, event)
