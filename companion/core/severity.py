@@ -1,4 +1,7 @@
-"""How severe a text for people is (the eight levels of MAV_SEVERITY and syslog), and what takes such texts."""
+"""How severe a text for people is (the eight levels of MAV_SEVERITY and syslog), and what takes such texts.
+
+Nouns: severity.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Legs of AUTO: the autopilot drives the mission and hands single legs over to the companion (NAV_GUIDED_ENABLE)."""
+"""Legs of AUTO: the autopilot drives the mission and hands single legs over to the companion (NAV_GUIDED_ENABLE).
+
+Nouns: legs of AUTO.
+"""
 
 from __future__ import annotations
 

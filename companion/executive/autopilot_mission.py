@@ -1,4 +1,7 @@
-"""The mission that the autopilot has stored: fetched before a run, and watched for changes during it."""
+"""The mission that the autopilot has stored: fetched before a run, and watched for changes during it.
+
+Nouns: mission fetcher.
+"""
 
 from __future__ import annotations
 

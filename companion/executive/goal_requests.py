@@ -1,4 +1,7 @@
-"""Goal requests: places that people ask for during a run (DO_REPOSITION, a guided item), accepted or refused."""
+"""Goal requests: places that people ask for during a run (DO_REPOSITION, a guided item), accepted or refused.
+
+Nouns: goal request, errand.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The mission executor: the mission under way, its map, the next target, and the driver that goes there."""
+"""The mission executor: the mission under way, its map, the next target, and the driver that goes there.
+
+Nouns: mission executor, task.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The mission laid out on the ground, and laid out again whenever the autopilot moves the origin of its local frame."""
+"""The mission laid out on the ground, and laid out again whenever the autopilot moves the origin of its local frame.
+
+Nouns: mission layout.
+"""
 
 from __future__ import annotations
 

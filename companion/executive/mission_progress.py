@@ -1,4 +1,7 @@
-"""Progress through the mission: which target is next, and what happens when one cannot be reached. Pure."""
+"""Progress through the mission: which target is next, and what happens when one cannot be reached. Pure.
+
+Nouns: mission progress, mission phase, target status.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""One run of a mission: the vehicle's state, the mode latch, what the run does now, and the mission executor."""
+"""One run of a mission: the vehicle's state, the mode latch, what the run does now, and the mission executor.
+
+Nouns: mission run, order.
+"""
 
 from __future__ import annotations
 

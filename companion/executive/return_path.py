@@ -1,6 +1,8 @@
 """The return path: the trail that the rover has left, and where to go when the battery runs low.
 
 It goes back the way it came, or to a rally point if the way there is shorter.
+
+Nouns: return path, trail, refuge.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The setpoint sender: sends setpoints that are new or due again, and every other command, to the autopilot."""
+"""The setpoint sender: sends setpoints that are new or due again, and every other command, to the autopilot.
+
+Nouns: setpoint sender.
+"""
 
 from __future__ import annotations
 

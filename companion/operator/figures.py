@@ -1,4 +1,7 @@
-"""A few figures for ground stations to plot (NAMED_VALUE_FLOAT)."""
+"""A few figures for ground stations to plot (NAMED_VALUE_FLOAT).
+
+Nouns: telemetry.
+"""
 
 from __future__ import annotations
 

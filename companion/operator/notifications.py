@@ -1,4 +1,7 @@
-"""The notifier: texts for the ground station and the terminal; the run's status and outcome as people see them."""
+"""The notifier: texts for the ground station and the terminal; the run's status and outcome as people see them.
+
+Nouns: notifier, status, outcome.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The parameter server: ground stations list, read and set the companion's own MAVLink parameters."""
+"""The parameter server: ground stations list, read and set the companion's own MAVLink parameters.
+
+Nouns: parameter server.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The battery monitor: thresholds for charge and voltage, each believed only after a while."""
+"""The battery monitor: thresholds for charge and voltage, each believed only after a while.
+
+Nouns: battery monitor.
+"""
 
 from __future__ import annotations
 

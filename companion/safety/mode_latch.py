@@ -1,4 +1,7 @@
-"""The mode latch: whether companion or person drives, by flight mode, arming and doubts; the pilot wins. Pure."""
+"""The mode latch: whether companion or person drives, by flight mode, arming and doubts; the pilot wins. Pure.
+
+Nouns: mode latch, verdict, reaction.
+"""
 
 from __future__ import annotations
 

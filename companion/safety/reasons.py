@@ -1,6 +1,8 @@
 """Reasons and run phases as enums: why the rover must not move, what is awaited, what the run does, why it ended.
 
 The program compares the enums; people, records and the autopilot get the texts, which are made here and nowhere else.
+
+Nouns: doubt, wait reason, end reason, refusal, run phase, activity.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Watchdogs: monitors of the sticks, the age of data, the companion's own loop and repeated scans."""
+"""Watchdogs: monitors of the sticks, the age of data, the companion's own loop and repeated scans.
+
+Nouns: watchdog, monitor.
+"""
 
 from __future__ import annotations
 

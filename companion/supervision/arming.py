@@ -1,4 +1,7 @@
-"""Arming: from a link to a rover that may be driven; what is awaited, and the one command that would help."""
+"""Arming: from a link to a rover that may be driven; what is awaited, and the one command that would help.
+
+Nouns: arming.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The fence monitor: the autopilot's own fence and rally points, read before driving, then regularly."""
+"""The fence monitor: the autopilot's own fence and rally points, read before driving, then regularly.
+
+Nouns: fence monitor.
+"""
 
 from __future__ import annotations
 

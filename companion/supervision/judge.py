@@ -1,4 +1,7 @@
-"""The judge: walks the monitors and asks the mode latch whether the rover may be driven, and tells why not."""
+"""The judge: walks the monitors and asks the mode latch whether the rover may be driven, and tells why not.
+
+Nouns: judge.
+"""
 
 from __future__ import annotations
 

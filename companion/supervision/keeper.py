@@ -1,4 +1,7 @@
-"""The keeper of a run: keeps in each tick what the run would need to go on after a crash, and tells of faults."""
+"""The keeper of a run: keeps in each tick what the run would need to go on after a crash, and tells of faults.
+
+Nouns: keeper.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The listener: folds events into the vehicle's state, passes them to all that take them, and answers operators."""
+"""The listener: folds events into the vehicle's state, passes them to all that take them, and answers operators.
+
+Nouns: listener.
+"""
 
 from __future__ import annotations
 

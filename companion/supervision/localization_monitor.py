@@ -1,4 +1,7 @@
-"""The localization monitor: doubts the position when it jumps or wanders, or when the frame's origin moves."""
+"""The localization monitor: doubts the position when it jumps or wanders, or when the frame's origin moves.
+
+Nouns: localization monitor.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Mission limits: what keeps a mission from beginning and what breaks it off (fence, batteries, borders)."""
+"""Mission limits: what keeps a mission from beginning and what breaks it off (fence, batteries, borders).
+
+Nouns: mission limits.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The pace of the field step: sleeps until the next round begins, and measures how late and how long it is."""
+"""The pace of the field step: sleeps until the next round begins, and measures how late and how long it is.
+
+Nouns: pace.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The rival monitor: another companion that drives the same rover, or may do so."""
+"""The rival monitor: another companion that drives the same rover, or may do so.
+
+Nouns: rival monitor.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Shutdown: at the end of a run a rover that is ours is stopped and put into HOLD, and HOLD is confirmed."""
+"""Shutdown: at the end of a run a rover that is ours is stopped and put into HOLD, and HOLD is confirmed.
+
+Nouns: shutdown.
+"""
 
 from __future__ import annotations
 

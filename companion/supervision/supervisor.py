@@ -1,4 +1,7 @@
-"""The supervisor: decides in each tick whether mission, arming or shutdown goes on; begins the mission and ends the run."""
+"""The supervisor: decides in each tick whether mission, arming or shutdown goes on; begins the mission and ends the run.
+
+Nouns: supervisor.
+"""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def test_who_cannot_turn_on_the_spot_keeps_inside_a_narrow_strip_by_itself(tmp_p
         if pose is not None:
             inside_m.append(min(3.0 - abs(pose.north_m), pose.east_m + 1.5, 16.0 - pose.east_m))
         assert rig.now_s() < 400.0
-    assert rig.companion.outcome.complete and rig.companion.output_check.refused == {}
+    assert rig.companion.outcome.complete and rig.companion.mission_run.setpoint_check.refused == {}
     assert min(inside_m) >= 0.35, "by the position that it is told: the whole body"
     assert min(min(3.0 - abs(north_m), 16.0 - east_m) for north_m, east_m in rig.track) > 0.0
     assert rig.companion.driver is not None and rig.companion.driver.tally.stuck > 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from companion.mavlink.download import Downloaded
+from companion.mavlink.rates import RateFault
 from companion.vehicle.commands import Command
 from companion.vehicle.events.event import Event
 from companion.vehicle.events.plan import PlanKind
@@ -42,6 +43,8 @@ class FakeAutopilot:
     served: int = 0
     trouble: str = " on a test"
     target_confirmed: bool | None = None
+    signing_trouble: str = ""
+    rate_faults: tuple[RateFault, ...] = ()
 
     def send(self, command: Command, now_s: float) -> None:
         self.sent.append(command)
@@ -64,6 +67,9 @@ class FakeAutopilot:
 
     def rival_heard(self, now_s: float) -> bool:
         return self.rival
+
+    def intruder(self, now_s: float) -> str:
+        return "another companion" if self.twin else ""
 
     def taken(self) -> list[Command]:
         """What has been sent since the last call."""
