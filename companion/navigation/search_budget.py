@@ -14,7 +14,7 @@ from companion.core.grid import Cell, Weights
 from companion.core.rover_limits import RoverLimits
 from companion.navigation.field_step import SearchKind
 from companion.planning.planner import Planner
-from companion.planning.problem import Budget, Motion, Mover, PlanningProblem, PlanResult
+from companion.planning.problem import Budget, ObstacleTrajectory, PlanningProblem, PlanResult, VehicleMotion
 from companion.settings import NavigatorSettings, SearchSettings, Settings
 
 
@@ -23,11 +23,13 @@ def budget_of(settings: SearchSettings) -> Budget:
     return Budget(settings.min_epochs, settings.max_epochs, settings.control_points, settings.population)
 
 
-def motion_of(pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, resolution_m: float) -> Motion:
+def motion_of(
+    pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, resolution_m: float
+) -> VehicleMotion:
     """As a planner is told it: where the rover points, how tightly it can turn and how fast it may be planned to go."""
     fastest_m_s = min(fastest_m_s, settings.guidance.max_speed_m_s)
     slowest_m_s = min(settings.guidance.min_speed_m_s, fastest_m_s)
-    return Motion(
+    return VehicleMotion(
         heading_rad=wrap_pi_rad(0.5 * math.pi - pose.heading_rad),
         turning_radius_fields=rover.turning_radius_m * settings.steering.planned_radius / resolution_m,
         speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m),
@@ -35,7 +37,7 @@ def motion_of(pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Sett
 
 
 @dataclass
-class Searcher:
+class PathSearcher:
     """Asks the planner, and keeps count. ``seconds`` has one entry per search."""
 
     planner: Planner
@@ -49,8 +51,8 @@ class Searcher:
         kind: SearchKind,
         start: Cell,
         target: Cell,
-        movers: tuple[Mover, ...] = (),
-        motion: Motion = Motion(),  # noqa: B008 - frozen
+        movers: tuple[ObstacleTrajectory, ...] = (),
+        motion: VehicleMotion = VehicleMotion(),  # noqa: B008 - frozen
         settings: NavigatorSettings | None = None,
     ) -> PlanResult:
         """One search over ``weights`` (not changed). The field the rover stands in is free, whatever the map says.
@@ -64,7 +66,7 @@ class Searcher:
         settings = settings or self.settings
         budget = budget_of(settings.thorough if kind is SearchKind.THOROUGH else settings.quick)
         result = self.planner.plan(
-            PlanningProblem(weights, start, target, movers=movers, motion=motion), budget, self.rng
+            PlanningProblem(weights, start, target, moving_obstacles=movers, motion=motion), budget, self.rng
         )
         self.seconds.append(stopwatch_s() - began_s)
         return result

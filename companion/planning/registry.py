@@ -13,7 +13,7 @@ from companion.planning.graph_search.dijkstra import Dijkstra
 from companion.planning.graph_search.dstar_lite import DstarLite
 from companion.planning.graph_search.theta_star import ThetaStar
 from companion.planning.hybrid import Hybrid
-from companion.planning.papers.achour_ga import SegmentGa
+from companion.planning.papers.achour_ga import AchourGa
 from companion.planning.papers.prm import Prm
 from companion.planning.papers.sedighi_ga import geisler, hermanu, sedighi
 from companion.planning.papers.wang_ga import vertex, vertex_plus
@@ -34,7 +34,7 @@ PLANNERS: dict[str, PlannerFactory] = {
     "hermanu": hermanu,
     "vertex": vertex,
     "vertex++": vertex_plus,
-    "achour": SegmentGa,
+    "achour": AchourGa,
     "prm": Prm,
 }
 

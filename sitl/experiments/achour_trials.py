@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.core.clock import stopwatch_s
-from companion.planning.line_of_sight import free_samples, shortened
 from companion.planning.papers.achour_ga import walked
+from companion.planning.papers.line_of_sight import free_samples, shortened
 from companion.planning.papers.prm import queried
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.random_numbers import draw_seed, seeded

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from companion.core.clock import stopwatch_s
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Grid, Weights
 from companion.navigation.field_step import Action, Decision, Part, SearchKind, begin, step
-from companion.navigation.search_budget import Searcher
+from companion.navigation.search_budget import PathSearcher
 from companion.planning.problem import PlanResult
 from companion.planning.registry import make_planner
 from companion.settings import Settings
@@ -105,7 +105,7 @@ class FieldRobot:
         self.run = FieldRun(seed, track=[start])
         rng = np.random.default_rng(seed)
         planner = make_planner(settings.navigator.planner, settings.planner)
-        self._searcher = Searcher(planner, settings.navigator, rng)
+        self._searcher = PathSearcher(planner, settings.navigator, rng)
         self._state = begin(start, target, int(rng.integers(2**63)), settings.navigator.better_every_fields)
         self._heading = (int(np.sign(target.x - start.x)), int(np.sign(target.y - start.y)))
 

@@ -11,15 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.random import Generator
 from numpy.typing import NDArray
 
-from companion.planning.ends import ends_free
+from companion.core.grid import Weights
 from companion.planning.graph_search.astar_kernel import Reached, shortest
-from companion.planning.planner import Capabilities
-from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import CellArray, cells_cost, plain
-from companion.settings import PlannerSettings
+from companion.planning.planner import Capabilities, CompletePlanner
+from companion.planning.problem import Path, PlanningProblem
+from companion.planning.raster import CellArray, cells_cost
 
 Floats = NDArray[np.float64]
 ROOM = 64
@@ -36,24 +34,14 @@ def _cheapest(
     return cells, cells_cost(weights, cells) if len(cells) else np.inf
 
 
-class Astar:
+class Astar(CompletePlanner):
     """The cheapest path, or the proof that there is none."""
 
     name = "astar"
     capabilities = Capabilities(proves_no_path=True, optimal=True)
 
-    def __init__(self, settings: PlannerSettings) -> None:
-        del settings  # nothing to set
-
-    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
-        """See ``Planner.plan``. FOUND or NO_PATH; budget and generator are left alone."""
-        del budget, rng
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        weights = plain(problem.weights)
-        # Zeros of numpy's come from the system as needed; a compiled function would write each of them.
+    def _path(self, problem: PlanningProblem, weights: Weights) -> Path | None:
+        # numpy's zeros come from the system when they are used; a compiled function would write each of them.
         reached = np.zeros(weights.size, np.int64)
         cells, cost = _cheapest(weights, reached, *problem.start, *problem.target, problem.corner_cutting)
-        if len(cells) == 0:
-            return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        return PlanResult(PlanStatus.FOUND, Path(cells, cost), self.name)
+        return Path(cells, cost) if len(cells) else None

@@ -9,15 +9,12 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Weights
-from companion.planning.ends import ends_free
-from companion.planning.planner import Capabilities
-from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import SQRT2, CellArray, cells_cost, plain
-from companion.settings import PlannerSettings
+from companion.planning.planner import Capabilities, CompletePlanner
+from companion.planning.problem import MIN_WEIGHT, Path, PlanningProblem
+from companion.planning.raster import SQRT2, CellArray, cells_cost
 
 Floats = NDArray[np.float64]
 
@@ -154,21 +151,12 @@ def shortest(
     return cells, cells_cost(weights, cells)
 
 
-class Dijkstra:
+class Dijkstra(CompletePlanner):
     """The cheapest path, or the proof that there is none."""
 
     name = "dijkstra"
     capabilities = Capabilities(proves_no_path=True, optimal=True)
 
-    def __init__(self, settings: PlannerSettings) -> None:
-        del settings  # nothing to set
-
-    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
-        """See ``Planner.plan``. FOUND or NO_PATH; budget and generator are left alone."""
-        del budget, rng
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        cells, cost = shortest(plain(problem.weights), *problem.start, *problem.target, problem.corner_cutting)
-        if len(cells) == 0:
-            return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        return PlanResult(PlanStatus.FOUND, Path(cells, cost), self.name)
+    def _path(self, problem: PlanningProblem, weights: Weights) -> Path | None:
+        cells, cost = shortest(weights, *problem.start, *problem.target, problem.corner_cutting)
+        return Path(cells, cost) if len(cells) else None

@@ -1,11 +1,8 @@
-"""A priority queue of fields whose priority may change: a binary heap that knows where each field is. Compiled.
-
-``heap[:size]`` has the waiting fields' numbers, ``place`` has for each field of the map where it is in the heap, plus 1 (0: not waiting), and
-``keys`` has two numbers for each field: the smaller first number comes first, and of equal ones the smaller second. Every function
-returns the new size. All arrays may begin as zeros, and each has room for every field, so none ever grows.
-"""
+"""A priority queue whose priorities may change: a binary heap that knows where each of its fields is. Compiled."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,6 +12,25 @@ Fields = NDArray[np.int32]
 Keys = NDArray[np.float64]
 
 
+class Queue(NamedTuple):
+    """Waiting fields in the order of their keys.
+
+    ``heap[: size[0]]``: the numbers of the waiting fields. ``place``: for each field its index in the heap plus 1, 0 when it does
+    not wait. ``keys``: two numbers for each field; the smaller first number comes out first, of equal ones the smaller second.
+    The arrays may begin as zeros and have room for every field, so they never grow.
+    """
+
+    heap: Fields
+    place: Fields
+    keys: Keys
+    size: NDArray[np.int64]
+
+
+def empty_queue(fields: int) -> Queue:
+    """A queue with room for so many fields. numpy's zeros come from the system only when they are used."""
+    return Queue(np.zeros(fields, np.int32), np.zeros(fields, np.int32), np.zeros((fields, 2)), np.zeros(1, np.int64))
+
+
 @njit(cache=True, nogil=True)
 def before(keys: Keys, a: int, b: int) -> bool:
     """Whether field a comes out before field b."""
@@ -22,8 +38,8 @@ def before(keys: Keys, a: int, b: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _settle(heap: Fields, place: Fields, keys: Keys, size: int, at: int) -> None:
-    """Move the field at this place of the heap up or down to where its keys belong."""
+def _sift(heap: Fields, place: Fields, keys: Keys, size: int, at: int) -> None:
+    """Move the field at this index of the heap up or down to where its keys belong."""
     field = heap[at]
     while at > 0 and before(keys, field, heap[(at - 1) >> 1]):
         above = (at - 1) >> 1
@@ -44,27 +60,27 @@ def _settle(heap: Fields, place: Fields, keys: Keys, size: int, at: int) -> None
 
 
 @njit(cache=True, nogil=True)
-def put(heap: Fields, place: Fields, keys: Keys, size: int, field: int, first: float, second: float) -> int:
-    """Let the field wait with these keys, whether it waits already or not."""
+def put(queue: Queue, field: int, first: float, second: float) -> None:
+    """Add the field with these keys or, if it waits already, change its keys."""
+    heap, place, keys, size = queue
     keys[field, 0], keys[field, 1] = first, second
     at = place[field] - 1
     if at < 0:
-        at = size
+        at = size[0]
         heap[at] = field
-        size += 1
-    _settle(heap, place, keys, size, at)
-    return size
+        size[0] += 1
+    _sift(heap, place, keys, size[0], at)
 
 
 @njit(cache=True, nogil=True)
-def take_out(heap: Fields, place: Fields, keys: Keys, size: int, field: int) -> int:
-    """Let the field wait no longer, if it does."""
+def take_out(queue: Queue, field: int) -> None:
+    """Remove the field, if it waits."""
+    heap, place, keys, size = queue
     at = place[field] - 1
     if at < 0:
-        return size
+        return
     place[field] = 0
-    size -= 1
-    if at < size:
-        heap[at] = heap[size]
-        _settle(heap, place, keys, size, at)
-    return size
+    size[0] -= 1
+    if at < size[0]:
+        heap[at] = heap[size[0]]
+        _sift(heap, place, keys, size[0], at)

@@ -11,9 +11,9 @@ from scipy.stats import binom
 
 from companion.core.grid import Cell
 from companion.planning.graph_search.dijkstra import Dijkstra
-from companion.planning.line_of_sight import sees
 from companion.planning.papers.achour_ga import walked
 from companion.planning.papers.achour_kernel import Task, cross, fitness, fittest, nearest_in_sight
+from companion.planning.papers.line_of_sight import sees
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
 from companion.planning.random_numbers import seeded
 from companion.planning.raster import is_path

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from companion.core.grid import Cell
-from companion.planning.line_of_sight import sees
+from companion.planning.papers.line_of_sight import sees
 from companion.planning.papers.prm import queried
 from companion.planning.papers.prm_kernel import Effort, distance, link, query, sample_difficult
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus

@@ -11,7 +11,7 @@ from companion.core.grid import Cell
 from companion.planning.bspline_ga import bspline
 from companion.planning.bspline_ga.planner import BsplineGa
 from companion.planning.bspline_ga.turning import sharpest
-from companion.planning.problem import Budget, Motion, PlanningProblem
+from companion.planning.problem import Budget, PlanningProblem, VehicleMotion
 from companion.settings import PlannerSettings
 from tests.support.planning_maps import one_obstacle
 
@@ -24,7 +24,7 @@ def plan(problem, seed, budget=BUDGET, **changes):
 
 
 def turning(problem, radius, heading=None):
-    return PlanningProblem(problem.weights, problem.start, problem.target, motion=Motion(heading, radius))
+    return PlanningProblem(problem.weights, problem.start, problem.target, motion=VehicleMotion(heading, radius))
 
 
 def greatest_curvature(line):

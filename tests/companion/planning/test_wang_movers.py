@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.planning.papers.wang_movers import Fleet, exclusion, first_meeting, fit_shares, fleet_of, place
-from companion.planning.problem import Mover
+from companion.planning.papers.wang_moving_obstacles import Fleet, exclusion, first_meeting, fit_shares, fleet_of, place
+from companion.planning.problem import ObstacleTrajectory
 
 NUMBERS = st.floats(-20.0, 20.0)
 
 
 def fleet(track, radius=2.0, safe=0.0, timing=0.0):
-    return Fleet(*fleet_of((Mover(radius, np.array(track, float)),), safe, timing))
+    return Fleet(*fleet_of((ObstacleTrajectory(radius, np.array(track, float)),), safe, timing))
 
 
 @pytest.mark.parametrize(
