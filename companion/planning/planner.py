@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 from numpy.random import Generator
 
@@ -18,7 +18,10 @@ from companion.settings import PlannerSettings
 
 @dataclass(frozen=True, slots=True)
 class Capabilities:
-    """What a planner guarantees or considers. ``turning_radius``: it considers the vehicle's, but cannot always keep it."""
+    """What a planner guarantees or considers.
+
+    ``turning_radius``: it considers the vehicle's, but cannot always keep it.
+    """
 
     proves_no_path: bool = False
     optimal: bool = False
@@ -33,9 +36,10 @@ class Capabilities:
 class Planner(Protocol):
     """Finds a path for a problem.
 
-    The result is a function of the problem, the budget and the generator's state. The path begins at the start and ends at the
-    target, is 8-connected, touches no obstacle and cuts no corner (unless the problem allows it). ``problem.weights`` is only
-    read. A start or target on an obstacle or outside the map is not an error: there is no path.
+    The result is a function of the problem, the budget and the generator's state. The path begins at the start and ends
+    at the target, is 8-connected, touches no obstacle and cuts no corner (unless the problem allows it).
+    ``problem.weights`` is only read. A start or target on an obstacle or outside the map is not an error: there is no
+    path.
     """
 
     @property
@@ -57,7 +61,10 @@ PlannerFactory = Callable[[PlannerSettings], Planner]
 
 
 class CompletePlanner(ABC):
-    """A planner that finds a path or proves that there is none. It needs no settings, no budget and no random numbers."""
+    """A planner that finds a path or proves that there is none.
+
+    It needs no settings, no budget and no random numbers.
+    """
 
     name: str
     capabilities: Capabilities
@@ -76,13 +83,8 @@ class CompletePlanner(ABC):
         """A path between free ends, None if there is none. ``weights``: those of the problem, see ``raster.plain``."""
 
 
-class Outcome(NamedTuple):
-    """What a random search has found, and the work it took; see ``PlanResult``."""
-
-    path: Path | None
-    evaluations: int
-    epochs: int
-    control_points: int = 0
+Outcome = tuple[Path | None, int, int, int]
+"""The result of a random search: path, evaluations, epochs, control points; see ``PlanResult``."""
 
 
 class RandomPlanner(ABC):

@@ -21,9 +21,10 @@ MIN_WEIGHT = 0.01
 class ObstacleTrajectory:
     """Where a moving obstacle is expected to be: a disc whose centre moves along straight segments.
 
-    ``track`` has shape (n, 3), one row for each end of a segment: time in seconds from the moment of planning (rising), then
-    x and y in fields (field centres at whole numbers). Between two rows the speed is constant; before the first row and after
-    the last the obstacle stands still. ``radius_fields`` includes the rover's own radius, as the map does.
+    ``track`` has shape (n, 3), one row for each end of a segment: time in seconds from the moment of planning (rising),
+    then x and y in fields (field centres at whole numbers). Between two rows the speed is constant; before the first
+    row and after the last the obstacle stands still. ``radius_fields`` includes the rover's own radius, as the map
+    does.
     """
 
     radius_fields: float
@@ -34,8 +35,9 @@ class ObstacleTrajectory:
 class VehicleMotion:
     """How the vehicle can move, for planners that consider it.
 
-    ``heading_rad``: at the start, 0 along +x, growing towards +y; None: any. ``turning_radius_fields``: the tightest arc it can
-    drive; 0: it turns on the spot. ``speeds_fields_s``: the lowest and the highest speed it may be commanded.
+    ``heading_rad``: at the start, 0 along +x, growing towards +y; None: any. ``turning_radius_fields``: the tightest
+    arc it can drive; 0: it turns on the spot. ``speeds_fields_s``: the lowest and the highest speed it may be
+    commanded.
     """
 
     heading_rad: float | None = None
@@ -48,8 +50,8 @@ class PlanningProblem:
     """Find a path over ``weights`` (shape (height, width), 1 = obstacle) from ``start`` to ``target``.
 
     ``corner_cutting`` allows a diagonal step past the corner of an obstacle, as the papers do. Without it both straight
-    neighbours of a diagonal step must be free. Planners never write to ``weights``. Only planners whose capabilities say so
-    consider ``moving_obstacles`` and ``motion``.
+    neighbours of a diagonal step must be free. Planners never write to ``weights``. Only planners whose capabilities
+    say so consider ``moving_obstacles`` and ``motion``.
     """
 
     weights: Weights
@@ -95,9 +97,9 @@ class Path:
     """The fields from start to target, each 8-adjacent to the one before.
 
     ``cell_array``: their coordinates, shape (n, 2), columns x and y; ``cells``: the same as tuples. ``cost``: see
-    ``path_cost``. ``curve``: the smooth line that the fields were made from, if the planner has one, shape (n, 2), columns x
-    and y in fields, field centres at whole numbers. ``speeds_fields_s``: the speed from each point of the curve to the next,
-    if the planner chooses speeds, shape (n - 1,). The arrays must not be written to.
+    ``path_cost``. ``curve``: the smooth line that the fields were made from, if the planner has one, shape (n, 2),
+    columns x and y in fields, field centres at whole numbers. ``speeds_fields_s``: the speed from each point of the
+    curve to the next, if the planner chooses speeds, shape (n - 1,). The arrays must not be written to.
     """
 
     cell_array: NDArray[np.int64]

@@ -1,7 +1,7 @@
-"""The file of rounds in a record: for each round of the loop its time, its packets and its marks, packed with a checksum.
+"""The rounds file of a record: for each round of the loop its time, its packets and its marks, with a checksum.
 
-A run follows from its inputs: files, settings, seed, the packets received, and these rounds. An entry takes 24 bytes, about
-2 MB an hour. Each has its own checksum, so that a torn or damaged entry is detected.
+A run follows from its inputs: files, settings, seed, the packets received, and these rounds. An entry takes 24 bytes,
+about 2 MB an hour. Each has its own checksum, so that a torn or damaged entry is detected.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""B-spline curves of degree 2 on clamped, equidistant knots (paper, section 3.1; Piegl & Tiller, A2.1 and A3.1). Compiled.
+"""B-spline curves of degree 2 on clamped, equidistant knots (paper, section 3.1; Piegl & Tiller, A2.1 and A3.1).
+
+Compiled.
 
 ``n`` control points make ``n - 2`` knot spans of equal length. The curve begins in the first control point and ends in
 the last. At any place only three basis functions differ from zero, so a basis is stored as three values and an index.
@@ -19,8 +21,8 @@ Points = NDArray[np.float64]
 class Basis(NamedTuple):
     """Basis functions at some places of a curve.
 
-    ``first``: the first control point that counts at each place, shape (samples,). ``values``: the weights of that one and the
-    next two, shape (samples, 3).
+    ``first``: the first control point that counts at each place, shape (samples,). ``values``: the weights of that one
+    and the next two, shape (samples, 3).
     """
 
     first: NDArray[np.int64]

@@ -1,6 +1,7 @@
 """Fitness of a B-spline chromosome (Kwasniewski & Gosiewski 2018, section 3.4). Compiled.
 
-A chromosome has shape (control points, 2), columns x and y in whole fields. Its first and last row are start and target.
+A chromosome has shape (control points, 2), columns x and y in whole fields. Its first and last row are start and
+target.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ PER_ONE = 1.0 / ONE
 
 GLANCES = 16
 GLANCE_FIELDS = 64
-"""Before all fields are summed a few are checked: GLANCES on a line as long as the map, and at least one in GLANCE_FIELDS."""
+"""A few fields are checked before all are summed: GLANCES on a line as long as the map, at least 1 in GLANCE_FIELDS."""
 
 
 @njit(cache=True, nogil=True)
@@ -80,12 +81,12 @@ def glance(weights: Weights, genes: CellArray, basis: Basis, enough: float) -> f
 def fitness(weights: Weights, genes: CellArray, basis: Basis, task: Task, vln: float, limit: float) -> float:
     """Equation 5: the sum of the fields under the lines from way point to way point; start and target count 0.
 
-    Obstacles and fields outside the map count ``vln`` each, and a cut corner adds ``vln``. A line that leaves the map is
-    not checked for corners. With ``task.by_length`` the fields of a line count in proportion to its length, so that of two
-    paths over equally many fields the straighter one is fitter (ours). See ``is_correct``.
+    Obstacles and fields outside the map count ``vln`` each, and a cut corner adds ``vln``. A line that leaves the map
+    is not checked for corners. With ``task.by_length`` the fields of a line count in proportion to its length, so that
+    of two paths over equally many fields the straighter one is fitter (ours). See ``is_correct``.
 
-    Stops as soon as it has reached ``limit``. The lines are those of ``raster.line_into``, drawn here again because a call
-    for each line would take longer than the line.
+    Stops as soon as it has reached ``limit``. The lines are those of ``raster.line_into``, drawn here again because a
+    call for each line would take longer than the line.
     """
     height, width = weights.shape
     total: float = -weights[genes[-1, 1], genes[-1, 0]]

@@ -1,7 +1,7 @@
 """Islands: several populations that evolve on several threads and send their best to the next one (our extension).
 
-Between two migrations no island depends on another, and each has its own random numbers. So the result depends on the seed and
-the number of islands, never on the number of threads.
+Between two migrations no island depends on another, and each has its own random numbers. So the result depends on the
+seed and the number of islands, never on the number of threads.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ def evolve_islands(
     archipelago: Archipelago,
     seeds: NDArray[np.int64],
 ) -> tuple[bool, CellArray, int, int]:
-    """As ``population.evolve``: (found, best chromosome, epochs of the island that lived longest, evaluations of all)."""
+    """As ``population.evolve``: (found, best chromosome, epochs of the longest-lived island, evaluations of all)."""
     islands, migrate_every, threads = archipelago
     _, min_epochs, max_epochs = lifetime
     vln = vln_of(weights, control_points, tuning)

@@ -6,18 +6,17 @@ from functools import lru_cache
 
 import numpy as np
 from numba import njit
-from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.core.grid import Weights
 from companion.planning.bspline_ga import bspline
 from companion.planning.bspline_ga.fitness import is_correct, way_point, way_points_for
 from companion.planning.bspline_ga.islands import Archipelago, evolve_islands
-from companion.planning.bspline_ga.parameters import Lifetime, Task, Tuning, task_of, tuning_of
+from companion.planning.bspline_ga.parameters import Lifetime, Plain, Task, Tuning, task_of, tuning_of
 from companion.planning.bspline_ga.population import evolve, vln_of
 from companion.planning.bspline_ga.turning import control_of, curve_points
 from companion.planning.planner import Capabilities, Outcome, RandomPlanner
-from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult
+from companion.planning.problem import Budget, Path, PlanningProblem
 from companion.planning.random_numbers import draw_seed, seeded
 from companion.planning.raster import CellArray, cells_cost, polyline, without_loops
 from companion.settings import PlannerSettings
@@ -30,8 +29,8 @@ Found = tuple[bool, CellArray, NDArray[np.float64], float, int, int, int]
 def path_of(genes: CellArray, task: Task, way_points: int) -> tuple[CellArray, NDArray[np.float64]]:
     """A chromosome's fields, and its curve with about two points for each field.
 
-    Where a field is visited twice the loop is cut out, and there is no curve (no rows), as it would still contain the loop.
-    A vehicle that cannot turn on the spot may need the loop, so it keeps its curve.
+    Where a field is visited twice the loop is cut out, and there is no curve (no rows), as it would still contain the
+    loop. A vehicle that cannot turn on the spot may need the loop, so it keeps its curve.
     """
     control = genes.astype(np.float64)
     if task.turning_radius_fields > 0.0:
@@ -50,9 +49,13 @@ def path_of(genes: CellArray, task: Task, way_points: int) -> tuple[CellArray, N
 
 @njit(cache=True, nogil=True)
 def search(
-    weights: Weights, task: Task, tuning: Tuning, lifetime: Lifetime, control_points: NDArray[np.int64], seed: int
+    weights: Weights, places: Plain, settings: Plain, lives: Plain, control_points: NDArray[np.int64], seed: int
 ) -> Found:
-    """One whole search: each number of control points in turn, until one gives a correct path."""
+    """One whole search: each number of control points in turn, until one gives a correct path.
+
+    ``places``, ``settings`` and ``lives``: the fields of ``Task``, ``Tuning`` and ``Lifetime``.
+    """
+    task, tuning, lifetime = Task(*places), Tuning(*settings), Lifetime(*lives)
     state = seeded(seed)
     epochs = 0
     evaluations = 0
@@ -68,14 +71,15 @@ def search(
 
 def search_islands(
     weights: Weights,
-    task: Task,
-    tuning: Tuning,
-    lifetime: Lifetime,
+    places: Plain,
+    settings: Plain,
+    lives: Plain,
     control_points: NDArray[np.int64],
     archipelago: Archipelago,
     seed: int,
 ) -> Found:
     """The same search on islands."""
+    task, tuning, lifetime = Task(*places), Tuning(*settings), Lifetime(*lives)
     rng = np.random.default_rng(seed)
     epochs = 0
     evaluations = 0
@@ -91,7 +95,10 @@ def search_islands(
 
 
 class BsplineGa(RandomPlanner):
-    """The genetic algorithm alone, as the paper's profile uses it."""
+    """The genetic algorithm alone, as the paper's profile uses it.
+
+    ``plan`` raises ValueError for a budget of fewer than 3 control points or 4 chromosomes.
+    """
 
     name = "bspline-ga"
     capabilities = Capabilities(random=True, smooth_curve=True, turning_radius=True)
@@ -101,23 +108,18 @@ class BsplineGa(RandomPlanner):
         self._archipelago = Archipelago(settings.islands, settings.migrate_every, settings.threads)
         self._by_length = settings.length_fitness
 
-    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
-        """See ``RandomPlanner.plan``. Raises ValueError for a budget of fewer than 3 control points or 4 chromosomes."""
-        counts_of(budget.control_points, budget.population)
-        return super().plan(problem, budget, rng)
-
     def _search(self, problem: PlanningProblem, weights: Weights, budget: Budget, seed: int) -> Outcome:
         counts = counts_of(budget.control_points, budget.population)
-        lifetime = Lifetime(budget.population, budget.min_epochs, budget.max_epochs)
-        common = (weights, task_of(problem, self._by_length), self._tuning, lifetime, counts)
+        lives = (budget.population, budget.min_epochs, budget.max_epochs)
+        common = (weights, task_of(problem, self._by_length), self._tuning, lives, counts)
         if self._archipelago.islands > 1:
             answer = search_islands(*common, self._archipelago, seed)
         else:
             answer = search(*common, seed)
         found, cells, curve, cost, count, epochs, evaluations = answer
         if not found:
-            return Outcome(None, evaluations, epochs)
-        return Outcome(Path(cells, cost, curve if len(curve) else None), evaluations, epochs, count)
+            return None, evaluations, epochs, 0
+        return Path(cells, cost, curve if len(curve) else None), evaluations, epochs, count
 
 
 @lru_cache

@@ -44,12 +44,12 @@ class Evolution(NamedTuple):
 
 
 class Population(NamedTuple):
-    """The selected chromosomes of this epoch, and in ``parents`` those of the last; arrays, so that they change in place.
+    """The selected chromosomes of this epoch, and in ``parents`` those of the last. Arrays, to be changed in place.
 
-    ``selected`` has shape (selected, most control points, 2); ``counts``, shape (selected,), says how many rows are used.
-    ``ranks`` are indices of ``selected``, best first; ``values`` is their fitness in that order. ``spent`` is epochs and
-    evaluations. ``first`` and ``basis`` are the two parts of ``bspline.basis``, with one row for every number of control
-    points that can occur.
+    ``selected`` has shape (selected, most control points, 2); ``counts``, shape (selected,), says how many rows are
+    used. ``ranks`` are indices of ``selected``, best first; ``values`` is their fitness in that order. ``spent`` is
+    epochs and evaluations. ``first`` and ``basis`` are the two parts of ``bspline.basis``, with one row for every
+    number of control points that can occur.
     """
 
     selected: Chromosomes
@@ -178,8 +178,8 @@ def select_from(
 def begin(evolution: Evolution, people: Population, control_points: int) -> None:
     """The first population (3.3): scattered, measured and selected.
 
-    Where one correct path is enough, correct ones are searched for first. That is fast, because every other chromosome is
-    dropped at its first obstacle.
+    Where one correct path is enough, correct ones are searched for first. That is fast, because every other chromosome
+    is dropped at its first obstacle.
     """
     task, tuning, size = evolution.task, evolution.tuning, evolution.lifetime.population
     height, width = evolution.weights.shape

@@ -1,8 +1,8 @@
 """Fitness of a B-spline chromosome for a vehicle that cannot turn on the spot. Compiled.
 
-Kwasniewski & Gosiewski 2018 name this extension at their end. Within one knot span a B-spline of degree 2 is a parabola, so
-its greatest curvature is known exactly: the cross product of its derivatives is constant, and the speed is least where the
-derivative, which moves along a straight line, is nearest to zero.
+Kwasniewski & Gosiewski 2018 name this extension at their end. Within one knot span a B-spline of degree 2 is a
+parabola, so its greatest curvature is known exactly: the cross product of its derivatives is constant, and the speed is
+least where the derivative, which moves along a straight line, is nearest to zero.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ MOST_EXCESS = 10.0
 
 @njit(cache=True, nogil=True)
 def control_of(genes: CellArray, task: Task) -> NDArray[np.float64]:
-    """The curve's control points, shape (n, 2): the chromosome with its second point moved onto the ray of the start heading.
+    """The control points, shape (n, 2): the chromosome with its second point moved onto the ray of the start heading.
 
-    A B-spline starts towards its second control point, so the curve has the heading exactly. A point behind the vehicle is
-    moved as far ahead of it.
+    A B-spline starts towards its second control point, so the curve has the heading exactly. A point behind the vehicle
+    is moved as far ahead of it.
     """
     control = genes.astype(np.float64)
     if not math.isnan(task.heading_rad):

@@ -1,8 +1,8 @@
 """Chromosomes of different lengths: the number of control points is one more gene (our extension). Compiled.
 
-Kwasniewski & Gosiewski 2018 call the choice of this number an important problem that they solve in a basic way. Here equation 6
-crosses the number as it crosses coordinates. It mutates by knot insertion and removal (Piegl & Tiller, A5.1), which hardly
-change the curve, so that a new control point begins where it does no harm.
+Kwasniewski & Gosiewski 2018 call the choice of this number an important problem that they solve in a basic way. Here
+equation 6 crosses the number as it crosses coordinates. It mutates by knot insertion and removal (Piegl & Tiller,
+A5.1), which hardly change the curve, so that a new control point begins where it does no harm.
 """
 
 from __future__ import annotations
@@ -86,8 +86,8 @@ def breed_any(
 ) -> int:
     """``operators.breed`` for parents of different lengths. Returns the child's number of control points.
 
-    On average as many inner coordinates mutate as in a chromosome of four control points. If each coordinate of a longer one
-    kept the same probability, hardly any child would resemble its parents.
+    On average as many inner coordinates mutate as in a chromosome of four control points. If each coordinate of a
+    longer one kept the same probability, hardly any child would resemble its parents.
     """
     better, other = choose_parents(len(parents), state)
     count: int = math.floor(tuning.mixing * counts[better] + (1.0 - tuning.mixing) * counts[other] + 0.5)

@@ -1,8 +1,8 @@
 """The compiled part of D* Lite (Koenig & Likhachev 2002, the optimised version). It searches from the target.
 
 Names are the paper's: ``g`` is the cost of a field to the target when it was last expanded, ``rhs`` the cost that its
-neighbours give it now. A field waits in the queue exactly while the two differ. Fields are numbered row after row. A step costs
-the same as in ``problem.path_cost``.
+neighbours give it now. A field waits in the queue exactly while the two differ. Fields are numbered row after row. A
+step costs the same as in ``problem.path_cost``.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ Floats = NDArray[np.float64]
 class Search(NamedTuple):
     """A search, kept between two plans.
 
-    ``weights``, ``g`` and ``rhs``: shape (fields,). ``least``: the cost of the cheapest step, for the heuristic. ``passed`` (the
-    paper's k_m): how far the start has moved since the search began, by the heuristic.
+    ``weights``, ``g`` and ``rhs``: shape (fields,). ``least``: the cost of the cheapest step, for the heuristic.
+    ``passed`` (the paper's k_m): how far the start has moved since the search began, by the heuristic.
     """
 
     weights: Floats
@@ -124,9 +124,9 @@ def settle(search: Search, slack: float) -> None:
     With a ``slack`` fields that cost up to so much more than the start are expanded too.
     """
     weights, width, start, passed = search.weights, search.width, search.start, search.passed
-    g, rhs, keys, heap, size = search.g, search.rhs, search.queue.keys, search.queue.heap, search.queue.size
-    while size[0] > 0:
-        here = heap[0]
+    g, rhs, keys, heap = search.g, search.rhs, search.queue.keys, search.queue.heap
+    while heap[0] > 0:
+        here = heap[1]
         cost = min(g[start], rhs[start])
         if keys[here, 0] > cost + passed + slack and g[start] == rhs[start]:
             break
@@ -171,3 +171,22 @@ def path_found(search: Search) -> CellArray:
         if here == search.target:
             return fields[:count].astype(np.int64)
         here, _ = cheapest_step(search, here)
+
+
+@njit(cache=True, nogil=True)
+def solve(search: Search, slack: float) -> CellArray:
+    """Search on until the start's cost is known; the fields of the path, no rows if there is none.
+
+    Rounding can make the order of expansion wrong, so that a field of the path is still waiting: then up to ``slack``
+    more is expanded.
+    """
+    if search.queue.heap[0] == 0 and search.g[search.target] != search.rhs[search.target]:
+        update(search, search.target)  # a new search
+    for more in (0.0, slack):
+        settle(search, more)
+        if search.g[search.start] == np.inf:
+            break
+        cells = path_found(search)
+        if len(cells) > 0:
+            return cells
+    return np.empty((0, 2), np.int64)

@@ -1,8 +1,8 @@
 """D* Lite: the cheapest path, found again with little work after a small change of the map.
 
-Koenig & Likhachev 2002. The planner remembers its last search. While target, map size and rules stay the same, it works in only
-what has changed in the map and how the start has moved; otherwise it searches anew. The cost of a path does not depend on earlier
-plans, but which of several equally cheap paths is found may.
+Koenig & Likhachev 2002. The planner remembers its last search. While target, map size and rules stay the same, it works
+in only what has changed in the map and how the start has moved; otherwise it searches anew. The cost of a path does not
+depend on earlier plans, but which of several equally cheap paths is found may.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from companion.core.grid import Weights
-from companion.planning.graph_search.dstar_kernel import Search, changes, note_changes, path_found, settle, update
+from companion.planning.graph_search.dstar_kernel import Search, changes, note_changes, solve
 from companion.planning.graph_search.heap import empty_queue
 from companion.planning.graph_search.steps import least_cost, octile
 from companion.planning.planner import Capabilities, CompletePlanner
 from companion.planning.problem import Path, PlanningProblem
-from companion.planning.raster import CellArray, cells_cost
+from companion.planning.raster import cells_cost
 from companion.settings import PlannerSettings
 
 ANEW_SHARE = 0.1
@@ -25,7 +25,10 @@ SLACK = 1e-6
 
 
 class DstarLite(CompletePlanner):
-    """The cheapest path, or the proof that there is none. Use one object for one drive and one thread: it has a memory."""
+    """The cheapest path, or the proof that there is none.
+
+    Use one object for one drive and one thread: it has a memory.
+    """
 
     name = "dstar-lite"
     capabilities = Capabilities(proves_no_path=True, optimal=True)
@@ -37,7 +40,7 @@ class DstarLite(CompletePlanner):
     def _path(self, problem: PlanningProblem, weights: Weights) -> Path | None:
         search = _updated(self._search, weights, problem) or _begun(weights, problem)
         self._search = None  # if this is interrupted, a half-finished search must not be remembered
-        cells = _settled(search)
+        cells = solve(search, SLACK)
         self._search = search
         return Path(cells, float(cells_cost(weights, cells))) if len(cells) else None
 
@@ -50,9 +53,7 @@ def _begun(weights: Weights, problem: PlanningProblem) -> Search:
     least = float(least_cost(flat, flat[target]))
     g, rhs = np.full(fields, np.inf), np.full(fields, np.inf)
     rhs[target] = 0.0
-    search = Search(flat, width, problem.corner_cutting, start, target, least, 0.0, g, rhs, empty_queue(fields))
-    update(search, target)
-    return search
+    return Search(flat, width, problem.corner_cutting, start, target, least, 0.0, g, rhs, empty_queue(fields))
 
 
 def _updated(search: Search | None, weights: Weights, problem: PlanningProblem) -> Search | None:
@@ -71,15 +72,3 @@ def _updated(search: Search | None, weights: Weights, problem: PlanningProblem) 
     search = search._replace(start=start, passed=search.passed + moved)
     note_changes(search, changed[:count])
     return search
-
-
-def _settled(search: Search) -> CellArray:
-    """Search on until the start's cost is known; the fields of the path, no rows if there is none."""
-    for slack in (0.0, SLACK):
-        settle(search, slack)
-        if search.g[search.start] == np.inf:
-            break
-        cells = path_found(search)
-        if len(cells) > 0:
-            return cells
-    return np.empty((0, 2), np.int64)

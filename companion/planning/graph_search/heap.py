@@ -15,20 +15,20 @@ Keys = NDArray[np.float64]
 class Queue(NamedTuple):
     """Waiting fields in the order of their keys.
 
-    ``heap[: size[0]]``: the numbers of the waiting fields. ``place``: for each field its index in the heap plus 1, 0 when it does
-    not wait. ``keys``: two numbers for each field; the smaller first number comes out first, of equal ones the smaller second.
-    The arrays may begin as zeros and have room for every field, so they never grow.
+    ``heap``: how many fields wait, then their numbers; ``heap[1]`` is the first to come out. ``place``: for each field
+    its index in the heap, 0 when it does not wait. ``keys``: two numbers for each field; the smaller first number comes
+    out first, of equal ones the smaller second. The arrays begin as zeros and have room for every field, so they never
+    grow.
     """
 
     heap: Fields
     place: Fields
     keys: Keys
-    size: NDArray[np.int64]
 
 
 def empty_queue(fields: int) -> Queue:
     """A queue with room for so many fields. numpy's zeros come from the system only when they are used."""
-    return Queue(np.zeros(fields, np.int32), np.zeros(fields, np.int32), np.zeros((fields, 2)), np.zeros(1, np.int64))
+    return Queue(np.zeros(fields + 1, np.int32), np.zeros(fields, np.int32), np.zeros((fields, 2)))
 
 
 @njit(cache=True, nogil=True)
@@ -38,49 +38,49 @@ def before(keys: Keys, a: int, b: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _sift(heap: Fields, place: Fields, keys: Keys, size: int, at: int) -> None:
+def _sift(heap: Fields, place: Fields, keys: Keys, at: int) -> None:
     """Move the field at this index of the heap up or down to where its keys belong."""
-    field = heap[at]
-    while at > 0 and before(keys, field, heap[(at - 1) >> 1]):
-        above = (at - 1) >> 1
+    field, last = heap[at], heap[0]
+    while at > 1 and before(keys, field, heap[at >> 1]):
+        above = at >> 1
         heap[at] = heap[above]
-        place[heap[at]] = at + 1
+        place[heap[at]] = at
         at = above
     while True:
-        below = 2 * at + 1
-        if below + 1 < size and before(keys, heap[below + 1], heap[below]):
+        below = 2 * at
+        if below < last and before(keys, heap[below + 1], heap[below]):
             below += 1
-        if below >= size or not before(keys, heap[below], field):
+        if below > last or not before(keys, heap[below], field):
             break
         heap[at] = heap[below]
-        place[heap[at]] = at + 1
+        place[heap[at]] = at
         at = below
     heap[at] = field
-    place[field] = at + 1
+    place[field] = at
 
 
 @njit(cache=True, nogil=True)
 def put(queue: Queue, field: int, first: float, second: float) -> None:
     """Add the field with these keys or, if it waits already, change its keys."""
-    heap, place, keys, size = queue
+    heap, place, keys = queue
     keys[field, 0], keys[field, 1] = first, second
-    at = place[field] - 1
-    if at < 0:
-        at = size[0]
+    at = place[field]
+    if at == 0:
+        heap[0] += 1
+        at = heap[0]
         heap[at] = field
-        size[0] += 1
-    _sift(heap, place, keys, size[0], at)
+    _sift(heap, place, keys, at)
 
 
 @njit(cache=True, nogil=True)
 def take_out(queue: Queue, field: int) -> None:
     """Remove the field, if it waits."""
-    heap, place, keys, size = queue
-    at = place[field] - 1
-    if at < 0:
+    heap, place, keys = queue
+    at, last = place[field], heap[0]
+    if at == 0:
         return
     place[field] = 0
-    size[0] -= 1
-    if at < size[0]:
-        heap[at] = heap[size[0]]
-        _sift(heap, place, keys, size[0], at)
+    heap[0] = last - 1
+    if at < last:
+        heap[at] = heap[last]
+        _sift(heap, place, keys, at)

@@ -1,11 +1,12 @@
 """Theta*: graph search whose path may turn at any angle. Compiled.
 
-Nash, Koenig & Tovey 2010 (Lazy Theta*). A field's predecessor need not be its neighbour: it may be any field in a straight line of
-sight. A new field is given its neighbour's predecessor without a check. The line is checked only when the field is expanded,
-once for each field. If it is blocked, or costlier than a step from a neighbour, the best neighbour becomes the predecessor.
+Nash, Koenig & Tovey 2010 (Lazy Theta*). A field's predecessor need not be its neighbour: it may be any field in a
+straight line of sight. A new field is given its neighbour's predecessor without a check. The line is checked only when
+the field is expanded, once for each field. If it is blocked, or costlier than a step from a neighbour, the best
+neighbour becomes the predecessor.
 
-In the paper ground is free or blocked. Here it has weights, so a straight line costs its length times the mean weight of the
-fields under it, and is used only where that is no costlier.
+In the paper ground is free or blocked. Here it has weights, so a straight line costs its length times the mean weight
+of the fields under it, and is used only where that is no costlier.
 """
 
 from __future__ import annotations
@@ -47,7 +48,8 @@ START_COST = 1e-300
 class Ground(NamedTuple):
     """The map, and what makes the cost of a line fast.
 
-    ``counts``: see ``others_before``; pieces of a line over ground of the weight ``even`` are not checked field by field.
+    ``counts``: see ``others_before``; pieces of a line over ground of the weight ``even`` are not checked field by
+    field.
     """
 
     weights: Floats
@@ -59,8 +61,9 @@ class Ground(NamedTuple):
 class Search(NamedTuple):
     """A search; arrays have an entry for each field.
 
-    ``reached``: the cost of a field, 0 not reached, positive before and negative after the check of its line. ``come_from``: its
-    predecessor; the start is its own. ``corridor``: True where corners of the path may be; empty: anywhere.
+    ``reached``: the cost of a field, 0 not reached, positive before and negative after the check of its line.
+    ``come_from``: its predecessor; the start is its own. ``corridor``: True where corners of the path may be; empty:
+    anywhere.
     """
 
     ground: Ground
@@ -78,7 +81,7 @@ def _length(x: int, y: int) -> float:
 
 @njit(cache=True, nogil=True)
 def others_before(weights: Floats, even: float) -> Fields:
-    """Shape (height + 1, width + 1): how many of the fields with smaller y and smaller x have another weight than this."""
+    """Shape (height + 1, width + 1): how many fields with smaller y and smaller x have another weight than this."""
     height, width = weights.shape
     counts = np.empty((height + 1, width + 1), np.int32)
     counts[0, :] = 0
@@ -98,9 +101,9 @@ def _is_even(counts: Fields, x0: int, y0: int, x1: int, y1: int) -> bool:
     return bool(counts[high, right] - counts[high, left] - counts[low, right] + counts[low, left] == 0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def line_cost(ground: Ground, x0: int, y0: int, x1: int, y1: int) -> float:
-    """The cost of the straight line between two different fields, drawn as by ``raster.polyline``; inf if it is blocked."""
+    """The cost of the line between two different fields, drawn as by ``raster.polyline``; inf if it is blocked."""
     weights, counts, even, corner_cutting = ground
     steps, step_x, step_y = fine_steps(x1 - x0, y1 - y0)
     fine_x, fine_y = x0 * ONE + HALF, y0 * ONE + HALF
@@ -144,7 +147,7 @@ def _piece_cost(
     return total
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, forceinline=True)
 def _check_line(search: Search, field: int) -> float:
     """Check the line to the field from its predecessor and, if need be, replace the predecessor. The field's cost."""
     ground, reached, come_from = search.ground, search.reached, search.come_from
@@ -176,8 +179,8 @@ def _is_found(search: Search, start: int, target: int) -> bool:
     least = least_cost(weights.ravel(), ground.even)
     reached[start], come_from[start] = START_COST, start
     put(queue, start, 0.0, 0.0)
-    while queue.size[0] > 0:
-        here = queue.heap[0]
+    while queue.heap[0] > 0:
+        here = queue.heap[1]
         take_out(queue, here)
         reached[here] = -_check_line(search, here) if here != start else -START_COST
         if here == target:

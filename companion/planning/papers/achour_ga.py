@@ -63,4 +63,4 @@ class AchourGa(RandomPlanner):
     def _search(self, problem: PlanningProblem, weights: Weights, budget: Budget, seed: int) -> Outcome:
         walk = walked(problem, self._settings, seed)
         path = path_through(problem, walk.nodes) if len(walk.nodes) else None
-        return Outcome(path, walk.evaluations, walk.iterations)
+        return path, walk.evaluations, walk.iterations, 0

@@ -1,7 +1,7 @@
 """The compiled part of the genetic algorithm of Achour & Chaalal 2011, whose chromosomes are segments.
 
-A segment has two nodes of two whole coordinates each. All segments of a generation begin at the last node of the path so far,
-so only their final nodes are stored: arrays of shape (n, 2), columns x and y.
+A segment has two nodes of two whole coordinates each. All segments of a generation begin at the last node of the path
+so far, so only their final nodes are stored: arrays of shape (n, 2), columns x and y.
 """
 
 from __future__ import annotations
@@ -43,9 +43,9 @@ class Effort(NamedTuple):
 def fitness(x: int, y: int, final_x: int, final_y: int, task: Task) -> float:
     """Equations 4 to 6 for the segment from (x, y) to another field; higher is better.
 
-    d is the length of the way to the target through the segment's final node (equation 5). theta is the magnitude of the slope of
-    the straight line from there to the target (equation 6). Where theta is 0 equation 4 has its limit 1 / d. No segment is
-    fitter than the one that ends at the target.
+    d is the length of the way to the target through the segment's final node (equation 5). theta is the magnitude of
+    the slope of the straight line from there to the target (equation 6). Where theta is 0 equation 4 has its limit 1/d.
+    No segment is fitter than the one that ends at the target.
     """
     to_x, to_y = abs(task.target_x - final_x), abs(task.target_y - final_y)
     way = (math.hypot(final_x - x, final_y - y) + math.hypot(to_x, to_y)) / task.unit_fields
@@ -97,8 +97,8 @@ def nearest_in_sight(
 def cross(weights: Weights, walk: CellArray, task: Task, finals: CellArray, count: int, state: State) -> int:
     """Pair the segments at random and exchange a coordinate of their final nodes (figure 3).
 
-    Offspring are left out that collide, that the initial node does not see, or that the walk has visited. Returns the number of
-    segments with the offspring.
+    Offspring are left out that collide, that the initial node does not see, or that the walk has visited. Returns the
+    number of segments with the offspring.
     """
     for i in range(count - 1, 0, -1):
         j = whole(state, 0, i)
@@ -162,8 +162,8 @@ def attempt(weights: Weights, task: Task, effort: Effort, walk: CellArray, state
 def search(weights: Weights, task: Task, effort: Effort, seed: int) -> tuple[CellArray, int, int, int, int]:
     """One whole search between two different free fields.
 
-    Returns the nodes of the path (no rows if none was found), the attempts made, the iterations of the last attempt and of all,
-    and the segments rated.
+    Returns the nodes of the path (no rows if none was found), the attempts made, the iterations of the last attempt and
+    of all, and the segments rated.
     """
     state = seeded(seed)
     walk = np.empty((effort.iterations + 1, 2), np.int64)

@@ -19,8 +19,8 @@ class Query:
     """The result of a search.
 
     ``nodes``: those of the path, shape (n, 2), columns x and y, start and target included; no rows if there is none.
-    ``roadmap``: how many samples were drawn (the paper's N). ``rounds``: how often in difficult regions. ``lines``: how many
-    lines were checked.
+    ``roadmap``: how many samples were drawn (the paper's N). ``rounds``: how often in difficult regions. ``lines``: how
+    many lines were checked.
     """
 
     nodes: CellArray
@@ -47,4 +47,4 @@ class Prm(RandomPlanner):
     def _search(self, problem: PlanningProblem, weights: Weights, budget: Budget, seed: int) -> Outcome:
         query = queried(problem, self._settings, seed)
         path = path_through(problem, query.nodes) if len(query.nodes) else None
-        return Outcome(path, query.lines, query.rounds + 1)
+        return path, query.lines, query.rounds + 1, 0

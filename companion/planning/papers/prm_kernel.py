@@ -1,7 +1,7 @@
 """The compiled part of PRM (probabilistic roadmap) with Lazy A*: Achour & Chaalal 2011, section IV.
 
-Nodes are fields, shape (n, 2), columns x and y; node 0 is the start, node 1 the target. A node or an edge is not checked until
-the query needs it.
+Nodes are fields, shape (n, 2), columns x and y; node 0 is the start, node 1 the target. A node or an edge is not
+checked until the query needs it.
 """
 
 from __future__ import annotations
@@ -106,12 +106,12 @@ def query(
 ) -> Ints:
     """Lazy A*: each node's predecessor on the best path from the start, -1 where none is known; the start is its own.
 
-    An edge waits in the queue with the cost it would have, and is checked only when it is expanded: first the node it leads to,
-    then the line. ``tried`` (columns: lines checked, lines blocked) is counted up for both ends of the line.
+    An edge waits in the queue with the cost it would have, and is checked only when it is expanded: first the node it
+    leads to, then the line. ``tried`` (columns: lines checked, lines blocked) is counted up for both ends of the line.
     """
     first, come_from, lead_to = edges_of(near)
     count = len(lead_to)
-    queue = Queue(np.empty(count + 1, np.int32), np.zeros(count, np.int32), np.empty((count, 2)), np.zeros(1, np.int64))
+    queue = Queue(np.zeros(count + 1, np.int32), np.zeros(count, np.int32), np.empty((count, 2)))
     parent, cost = np.full(len(nodes), -1, np.int32), np.zeros(len(nodes))
     parent[0] = 0
     here = 0
@@ -122,8 +122,8 @@ def query(
                 so_far = cost[here] + distance(nodes, here, there, effort)
                 put(queue, edge, so_far + distance(nodes, there, 1, effort), -so_far)
         here = -1
-        while queue.size[0] > 0 and here < 0:
-            edge = queue.heap[0]
+        while queue.heap[0] > 0 and here < 0:
+            edge = queue.heap[1]
             take_out(queue, edge)
             a, b = come_from[edge], lead_to[edge]
             blocked[b] = weights[nodes[b, 1], nodes[b, 0]] >= OBSTACLE
@@ -183,8 +183,8 @@ def sample_difficult(
 def search(weights: Weights, start: Cell, target: Cell, effort: Effort, seed: int) -> tuple[CellArray, int, int, int]:
     """One whole search between two different free fields.
 
-    Returns the nodes of the path (no rows if none was found), the number of nodes of the roadmap, the rounds of extra samples
-    and the lines checked.
+    Returns the nodes of the path (no rows if none was found), the number of nodes of the roadmap, the rounds of extra
+    samples and the lines checked.
     """
     state = seeded(seed)
     shape = weights.shape

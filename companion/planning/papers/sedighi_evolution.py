@@ -1,4 +1,7 @@
-"""Selection, crossover and mutation of Sedighi et al. 2004 and its two predecessors. Compiled: one call is one search."""
+"""Selection, crossover and mutation of Sedighi et al. 2004 and its two predecessors.
+
+Compiled: one call is one search.
+"""
 
 from __future__ import annotations
 
@@ -145,7 +148,8 @@ def breed(
 def elite_of(order: Numbers, measures: Numbers) -> int:
     """The fittest chromosome without collisions or, if there is none, the fittest of all.
 
-    By equations 1 and 2 alone, a free path that is the longest and has the most turns may be less fit than one that collides.
+    By equations 1 and 2 alone, a free path that is the longest and has the most turns may be less fit than one that
+    collides.
     """
     for i in order:
         if measures[i, 2] == 0:

@@ -1,7 +1,7 @@
 """The genetic algorithm of Sedighi et al. 2004 and its two predecessors: paths advance row by row or column by column.
 
-``geisler``: by rows only. ``hermanu``: by rows or by columns, one flag for the whole path. ``sedighi``: both in one path, with up to
-two switches.
+``geisler``: by rows only. ``hermanu``: by rows or by columns, one flag for the whole path. ``sedighi``: both in one
+path, with up to two switches.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ class SedighiGa(RandomPlanner):
 
     def _search(self, problem: PlanningProblem, weights: Weights, budget: Budget, seed: int) -> Outcome:
         found, cells, cost, generations = search(weights, problem.start, problem.target, self._tuning, seed)
-        return Outcome(Path(cells, cost) if found else None, generations * self._tuning.population, generations)
+        return Path(cells, cost) if found else None, generations * self._tuning.population, generations, 0
 
 
 def sedighi(settings: PlannerSettings) -> SedighiGa:

@@ -1,9 +1,10 @@
 """The path of a chromosome of Sedighi et al. 2004, and its length, turns and collisions. Compiled.
 
-A chromosome has n genes. Gene k stands for a row (row-wise movement) or a column (column-wise), and its location for the place
-in it: together vertex k of the path. Vertices are joined by a horizontal and a vertical line; the direction of gene k says
-which of the two comes first on the way to vertex k + 1. ``modes`` has the flag (0: begins row-wise, 1: column-wise) and two
-switch values: after gene s the movement is of the other kind; n - 1 is the paper's "no switch". Genes count from 0.
+A chromosome has n genes. Gene k stands for a row (row-wise movement) or a column (column-wise), and its location for
+the place in it: together vertex k of the path. Vertices are joined by a horizontal and a vertical line; the direction
+of gene k says which of the two comes first on the way to vertex k + 1. ``modes`` has the flag (0: begins row-wise, 1:
+column-wise) and two switch values: after gene s the movement is of the other kind; n - 1 is the paper's "no switch".
+Genes count from 0.
 """
 
 from __future__ import annotations
@@ -25,8 +26,8 @@ Counts = NDArray[np.int32]
 class Square(NamedTuple):
     """The search space, n x n, laid over the map: the map's row and column for each gene and for each location.
 
-    ``gene_rows``, ``gene_columns``: shape (n,), for each gene; the first and last vertex are always start and target (x, y).
-    ``place_rows``, ``place_columns``: shape (side of the map,), for each location.
+    ``gene_rows``, ``gene_columns``: shape (n,), for each gene; the first and last vertex are always start and target
+    (x, y). ``place_rows``, ``place_columns``: shape (side of the map,), for each location.
     """
 
     gene_rows: Numbers
@@ -59,7 +60,8 @@ class Chromosomes(NamedTuple):
 def spread(first: int, last: int, size: int, count: int) -> Numbers:
     """``count`` rows (or columns) from that of the start to that of the target, evenly.
 
-    If there are fewer than ``count`` between them, the range is widened to both sides as far as the map (``size``) allows.
+    If there are fewer than ``count`` between them, the range is widened to both sides as far as the map (``size``)
+    allows.
     """
     low, high = min(first, last), max(first, last)
     spare = max(min(count, size) - (high - low + 1), 0)

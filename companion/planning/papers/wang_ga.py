@@ -1,7 +1,7 @@
-"""The genetic algorithm of Wang, Sillitoe & Mulvaney 2007: paths along obstacle corners, with speeds, among moving obstacles.
+"""The genetic algorithm of Wang, Sillitoe & Mulvaney 2007: paths along obstacle corners, speeds, moving obstacles.
 
-``vertex++`` is the paper's planner. ``vertex`` is its predecessor for static environments: no speeds, no moving obstacles, shortest
-path. To replan on the way, plan anew from the robot's place with the obstacles' new tracks.
+``vertex++`` is the paper's planner. ``vertex`` is its predecessor for static environments: no speeds, no moving
+obstacles, shortest path. To replan on the way, plan anew from the robot's place with the obstacles' new tracks.
 """
 
 from __future__ import annotations
@@ -33,8 +33,9 @@ Floats = NDArray[np.float64]
 class Plan:
     """The result of a search.
 
-    ``corners``: shape (n, 2), the vertices of the path, columns x and y; no rows if nothing was found. ``speeds_fields_s``: shape
-    (n - 1,). ``value``: equation 1, or 3 plus the constant of equation 4. ``first_feasible``: the generation, -1 if there was none.
+    ``corners``: shape (n, 2), the vertices of the path, columns x and y; no rows if nothing was found.
+    ``speeds_fields_s``: shape (n - 1,). ``value``: equation 1, or 3 plus the constant of equation 4.
+    ``first_feasible``: the generation, -1 if there was none.
     """
 
     corners: Ints
@@ -133,10 +134,10 @@ class WangGa(RandomPlanner):
     def _search(self, problem: PlanningProblem, weights: Weights, budget: Budget, seed: int) -> Outcome:
         plan = planned(problem, self._settings, seed, timed=self._timed)
         if len(plan.corners) == 0:
-            return Outcome(None, plan.evaluations, plan.generations)
+            return None, plan.evaluations, plan.generations, 0
         cells, cost = _drawn(weights, plan.corners)
         speeds = plan.speeds_fields_s if self._timed else None
-        return Outcome(Path(cells, cost, plan.corners.astype(np.float64), speeds), plan.evaluations, plan.generations)
+        return Path(cells, cost, plan.corners.astype(np.float64), speeds), plan.evaluations, plan.generations, 0
 
 
 @njit(cache=True, nogil=True)

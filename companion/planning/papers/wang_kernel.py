@@ -1,8 +1,8 @@
 """Fitness, selection and the main loop of Wang, Sillitoe & Mulvaney 2007, section II. Compiled: one call is one search.
 
-A chromosome is a row of genes, start and target included: a field, the speed towards the next one (the number of a level) and
-whether the segment to it is infeasible. Fields are numbered row after row. Chromosomes are stored in rows of fixed length.
-``order`` lists these rows by fitness, best first; its last two entries are the rows for offspring.
+A chromosome is a row of genes, start and target included: a field, the speed towards the next one (the number of a
+level) and whether the segment to it is infeasible. Fields are numbered row after row. Chromosomes are stored in rows of
+fixed length. ``order`` lists these rows by fitness, best first; its last two entries are the rows for offspring.
 """
 
 from __future__ import annotations
@@ -180,11 +180,9 @@ def room_for(population: int, longest: int, fields: int) -> Population:
 
 @njit(cache=True, nogil=True)
 def settled(rules: Rules, generation: int, first: int, best: float, bound: float) -> bool:
-    """Whether to stop: all populations ended without a feasible path, all generations after the first feasible path are over,
-    or no path can be better.
-
-    A population that has no feasible path after its generations is replaced by a new one.
-    """
+    """Whether to stop: all populations ended without a feasible path, all generations after the first feasible path are
+    over, or no path can be better.  A population that has no feasible path after its generations is replaced by a new
+    one."""
     if first < 0:
         return generation >= rules.populations * rules.generations
     return generation >= first + rules.generations or rules.first_only or best <= bound * (1.0 + 1e-12)
@@ -194,8 +192,8 @@ def settled(rules: Rules, generation: int, first: int, best: float, bound: float
 def search(task: Task, seed: int) -> tuple[Ints, Ints, float, int, int, int]:
     """One whole search.
 
-    Returns fields and speeds of the best chromosome (none if none is feasible), its value, the generation of the first feasible
-    one (-1: there was none), generations and evaluations.
+    Returns fields and speeds of the best chromosome (none if none is feasible), its value, the generation of the first
+    feasible one (-1: there was none), generations and evaluations.
     """
     ground, fleet, rules, speeds, pool, start, target = task
     height, width = ground.owner.shape

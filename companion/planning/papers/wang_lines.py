@@ -17,10 +17,10 @@ Ints = NDArray[np.int64]
 
 
 class Ground(NamedTuple):
-    """``polygons.Polygons`` with corners as field numbers (-1: outside the map), the rule for corners, and a cache of lines.
+    """``polygons.Polygons`` with corners as field numbers (-1: outside the map), rule for corners, a cache of lines.
 
-    ``corner_fields`` is in the order of the rings. ``known_lines`` and ``known_counts`` are the cache: a line's place in it follows
-    from its ends, and a newer line replaces an older one.
+    ``corner_fields`` is in the order of the rings. ``known_lines`` and ``known_counts`` are the cache: a line's place
+    in it follows from its ends, and a newer line replaces an older one.
     """
 
     owner: NDArray[np.int32]
@@ -36,7 +36,8 @@ class Ground(NamedTuple):
 def crossings(ground: Ground, start: int, end: int, found: Ints) -> int:
     """How often a line between two free fields enters an obstacle; a cut corner counts too.
 
-    The first of these obstacles are written to ``found``: columns obstacle, last field before it, first field behind it.
+    The first of these obstacles are written to ``found``: columns obstacle, last field before it, first field behind
+    it.
     """
     owner = ground.owner
     width = owner.shape[1]
@@ -102,7 +103,7 @@ def ring_of(ground: Ground, corner: int) -> int:
 
 @njit(cache=True, nogil=True)
 def walk(ground: Ground, ring: int, begin: int, end: int, step: int, chain: Ints, used: int) -> int:
-    """Add the fields of the corners from ``begin`` to ``end``, forwards or backwards round the ring, to ``chain[:used]``.
+    """Add the fields of the corners from ``begin`` to ``end``, either way round the ring, to ``chain[:used]``.
 
     Returns how many are used then, or -1 if a corner is outside the map or there are too many.
     """

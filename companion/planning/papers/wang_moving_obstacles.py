@@ -1,9 +1,10 @@
 """When a robot on a straight line first meets a moving obstacle (Wang et al. 2007, II.A). Compiled.
 
-The paper takes the point where the robot's line crosses the obstacle's trajectory, and tests whether the obstacle's exclusion
-area covers it when the robot arrives. Here the robot's line is taken in the obstacle's frame, where it is straight while neither
-turns, and clipped with the exclusion area itself. So the first meeting is found exactly, also where there is no crossing point:
-head on, overtaking, or with an obstacle that stands still. In the code a moving obstacle is a *mover*.
+The paper takes the point where the robot's line crosses the obstacle's trajectory, and tests whether the obstacle's
+exclusion area covers it when the robot arrives. Here the robot's line is taken in the obstacle's frame, where it is
+straight while neither turns, and clipped with the exclusion area itself. So the first meeting is found exactly, also
+where there is no crossing point: head on, overtaking, or with an obstacle that stands still. In the code a moving
+obstacle is a *mover*.
 """
 
 from __future__ import annotations
@@ -81,8 +82,8 @@ def place(fleet: Fleet, mover: int, time_s: float) -> tuple[float, float, float,
 def exclusion(fleet: Fleet, mover: int, mover_speed: float, robot_speed: float) -> tuple[float, float]:
     """Half length (along the mover's heading) and half width of its exclusion area, an ellipse.
 
-    It extends beyond the mover by the safe distance and by timing margins: along its heading by what the mover covers in
-    ``timing_s``, as it may be early or late; across it by what the robot covers in that time.
+    It extends beyond the mover by the safe distance and by timing margins: along its heading by what the mover covers
+    in ``timing_s``, as it may be early or late; across it by what the robot covers in that time.
     """
     radius, share = fleet.radii[mover], fleet.shares[mover]
     if mover_speed == 0.0:
@@ -93,7 +94,7 @@ def exclusion(fleet: Fleet, mover: int, mover_speed: float, robot_speed: float) 
 
 @njit(cache=True, nogil=True)
 def first_inside(x: float, y: float, along_x: float, along_y: float, duration: float) -> float:
-    """When a point of constant velocity first enters the unit circle round the origin; inf if not within the duration."""
+    """When a point of constant velocity first enters the unit circle round the origin; inf: not within the duration."""
     inside = x * x + y * y - 1.0
     if inside < 0.0:
         return 0.0

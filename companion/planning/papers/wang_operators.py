@@ -40,8 +40,8 @@ class Rules(NamedTuple):
 class Task(NamedTuple):
     """What is to be solved, between two free fields.
 
-    ``speeds``: the levels, rising; a single one makes the planner for static environments, with three operators. ``pool``: the
-    vertices to choose from; the search shuffles them.
+    ``speeds``: the levels, rising; a single one makes the planner for static environments, with three operators.
+    ``pool``: the vertices to choose from; the search shuffles them.
     """
 
     ground: Ground
@@ -56,8 +56,8 @@ class Task(NamedTuple):
 class Population(NamedTuple):
     """Chromosomes, a row each, and scratch arrays.
 
-    ``marks``: a set of fields, one number for each field of the map. A field is in the set if its number is ``marked[0]``, so
-    adding 1 to that empties the set.
+    ``marks``: a set of fields, one number for each field of the map. A field is in the set if its number is
+    ``marked[0]``, so adding 1 to that empties the set.
     """
 
     fields: Ints
@@ -75,7 +75,7 @@ class Population(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def put(crowd: Population, child: int, length: int) -> bool:
-    """Make a chromosome of the genes in ``room`` (fields in its first row, speeds in its second), without repeated vertices.
+    """Make a chromosome of the genes in ``room`` (row 0: fields, row 1: speeds), without repeated vertices.
 
     Of repeated ones those of lower locus are dropped. False if the chromosome is still too long.
     """
