@@ -148,15 +148,15 @@ def test_dstar_lite_repeats_for_the_same_sequence(seed):
 def test_dstar_lite_repairs_instead_of_searching_anew():
     problem, planner = one_obstacle(4), DstarLite(SETTINGS)
     path = plan(planner, problem).path
-    begun = planner._memory
+    begun = planner._search
     weights = problem.weights.copy()
     x, y = path.cells[-5]  # near the target, where the search began: not even the easiest case
     weights[y, x] = 1.0
     changed = PlanningProblem(weights, path.cells[3], problem.target)
     assert_as_cheap(plan(planner, changed), plan(Dijkstra(SETTINGS), changed))
-    assert planner._memory.g is begun.g
+    assert planner._search.g is begun.g
     plan(planner, PlanningProblem(weights, path.cells[3], Cell(1, 1)))
-    assert planner._memory.g is not begun.g
+    assert planner._search.g is not begun.g
 
 
 def test_theta_star_goes_straight_at_any_angle():
