@@ -20,11 +20,13 @@ Found = Callable[[], CellArray] | None
 
 @dataclass(frozen=True, slots=True)
 class Contestant:
-    """One way to search. ``solve(weights, start, target, rng)`` is what is timed, all preparations for a new map included (but not the
+    """One way to search.
+
+    ``solve(weights, start, target, rng)`` is what is timed, all preparations for a new map included (but not the
     generator's: a vehicle has one).
 
-    ``random``: the seed matters. ``most_fields``: larger maps are not tried, as they would take hours or all memory. ``note``: what a
-    reader must know to compare it fairly.
+    ``random``: the seed matters. ``most_fields``: larger maps are not tried, as they would take hours or all memory.
+    ``note``: what a reader must know to compare it fairly.
     """
 
     name: str

@@ -25,7 +25,9 @@ DETERMINISTIC_RUNS = 20
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How much to measure. ``seeds``: of random planners. ``cell_s``: time for one contestant on one case, after which no new
+    """How much to measure. ``seeds``: of random planners.
+
+    ``cell_s``: time for one contestant on one case, after which no new
     search is begun; a contestant whose next larger map would take longer than this for one search is not sent there.
     """
 
@@ -36,7 +38,10 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One contestant on one case. ``ratios``: cost of each path over the best possible; ``faults``: what is wrong with its paths."""
+    """One contestant on one case.
+
+    ``ratios``: cost of each path over the best possible; ``faults``: what is wrong with its paths.
+    """
 
     contestant: str
     case: str

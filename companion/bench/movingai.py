@@ -17,7 +17,9 @@ class ScenarioFileError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """One problem. ``start`` and ``target`` are fields with y upward; ``optimum_fields`` is the shortest length as the file gives it.
+    """One problem.
+
+    ``start`` and ``target`` are fields with y upward; ``optimum_fields`` is the shortest length as the file gives it.
 
     Lengths count sqrt 2 for a diagonal step and forbid cutting corners (Sturtevant 2012).
     """

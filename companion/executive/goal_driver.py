@@ -22,7 +22,7 @@ from companion.navigation.field_step import (
     Part,
     SearchKind,
     abandon_path,
-    begin,
+    initial_state,
     is_clear,
     retrace,
     step,
@@ -96,7 +96,7 @@ class GoalDriver:
         self._epoch += 1
         cell = self.evidence.base.cell_at(pose.point)
         seed = (self.seed + self._epoch) % 2**63
-        self._state = begin(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
+        self._state = initial_state(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
         if way:
             self._state = retrace(self._state, way)
         self.route = None

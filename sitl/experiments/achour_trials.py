@@ -32,9 +32,10 @@ SETTINGS = PlannerSettings(achour=AchourSettings(unit_fields=FIELDS_A_METRE))
 class Trial:
     """One search.
 
-    ``at_once``: without a second attempt or extra samples. ``number`` is the paper's N: iterations of the last attempt (``achour``),
-    samples in the roadmap (``prm``). ``attempts``: how often samples were drawn. ``nodes``: of the path as the paper's method finds it, shape
-    (n, 2), columns x and y in fields, no rows if there is none; ``straight``: those that are left where each sees the next.
+    ``at_once``: without a second attempt or extra samples. ``number`` is the paper's N: iterations of the last attempt
+    (``achour``), samples in the roadmap (``prm``). ``attempts``: how often samples were drawn. ``nodes``: of the path
+    as the paper's method finds it, shape (n, 2), columns x and y in fields, no rows if there is none; ``straight``:
+    those that are left where each sees the next.
     """
 
     seed: int

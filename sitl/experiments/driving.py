@@ -183,9 +183,10 @@ class DrivingReport:
 
 `{self.options.command(NAME)}`
 
-The shipped missions in lock-step, with the rover's dynamics and sensor noise, with several planners in the navigator; each row is made of
-{self.options.runs} drives, with seeds {self.options.seed} to {self.options.seed + self.options.runs - 1}. *time* is the mean driving time, */ref* the same divided by the faster of `{REFERENCES[0]}` and `{REFERENCES[1]}`; *missed* counts
-drives in which a target was not reached.
+The shipped missions in lock-step, with the rover's dynamics and sensor noise, with several planners in the navigator;
+each row is made of {self.options.runs} drives, with seeds {self.options.seed} to
+{self.options.seed + self.options.runs - 1}. *time* is the mean driving time, */ref* the same divided by the faster of
+`{REFERENCES[0]}` and `{REFERENCES[1]}`; *missed* counts drives in which a target was not reached.
 
 {tables}
 
