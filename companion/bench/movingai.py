@@ -49,7 +49,8 @@ def _scenario(file: Path, number: int, line: str) -> Scenario:
         optimum_fields = float(parts[8])
     except (ValueError, IndexError):
         raise ScenarioFileError(
-            f"{file}: line {number}: nine columns are needed: bucket, map, width, height, start x and y, target x and y, length"
+            f"{file}: line {number}: nine columns are needed: "
+            "bucket, map, width, height, start x and y, target x and y, length"
         ) from None
     return Scenario(Cell(start_x, height - 1 - start_y), Cell(target_x, height - 1 - target_y), optimum_fields)
 

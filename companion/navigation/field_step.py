@@ -183,7 +183,7 @@ def _explore(state: NavState, grid: Grid, search: Search, *, entered: bool) -> t
 
 
 def _search(state: NavState, grid: Grid, search: Search) -> tuple[NavState, Decision]:
-    """Part C (figure 14): search thoroughly; in vain: simplify the past path and go on with part A in this same step."""
+    """Part C (figure 14): search thoroughly. Without success: simplify the past path and continue with part A."""
     had_path = state.current is not None
     result = search(SearchKind.THOROUGH, state.past[-1], state.target)
     if result.path is not None:
@@ -231,7 +231,7 @@ def _follow(state: NavState, reason: str, searches: tuple[SearchKind, ...]) -> D
 
 
 def _arrive(state: NavState, cell: Cell) -> NavState:
-    """Record the field entered: on the past path (its retraced end is dropped in return mode) and on the current path."""
+    """Record the field entered on the past path (its retraced end is dropped in return mode) and the current path."""
     if cell == state.past[-1]:
         return state
     if state.returning:
@@ -244,7 +244,7 @@ def _arrive(state: NavState, cell: Cell) -> NavState:
 
 
 def _retraced(past: tuple[Cell, ...], cell: Cell) -> tuple[Cell, ...]:
-    """The past path up to the field nearest to where the rover is now, and from there to here."""
+    """The past path up to its field nearest to the rover, and from there to the rover."""
     gaps = [max(abs(p.x - cell.x), abs(p.y - cell.y)) for p in past[:-1]]
     nearest = min(range(len(gaps)), key=lambda i: (gaps[i], -i), default=0)
     if not gaps:
@@ -255,7 +255,7 @@ def _retraced(past: tuple[Cell, ...], cell: Cell) -> tuple[Cell, ...]:
 
 
 def _place_on(cells: CellArray, index: int, cell: Cell) -> int:
-    """Where on the path the field is: itself, else the first neighbour at or after ``index``; -1 when the path is lost."""
+    """The index on the path of the field, else of its first neighbour, from ``index`` on; -1 if the path is lost."""
     gaps = np.abs(cells[index:] - cell).max(axis=1, initial=0)
     for reach in (0, 1):
         near = np.flatnonzero(gaps <= reach)

@@ -72,7 +72,7 @@ class InlineRunner:
 
 
 class NotedRunner:
-    """Another runner, with a note of what is unpredictable in a thread: that it works, and when its results are taken."""
+    """A runner that notes what a thread makes unpredictable: that it works, and when its results are taken."""
 
     def __init__(self, runner: StepRunner, note: Callable[[Mark], None]) -> None:
         self._runner = runner

@@ -20,7 +20,7 @@ REACH_RADII = 3.0
 
 
 def with_turning_cost(grid: Grid, pose: Pose, settings: GuidanceSettings, turning_radius_m: float = 0.0) -> Grid:
-    """A copy of the grid in which free fields behind the rover, up to ``turn_reach_m``, cost up to ``turn_cost`` more."""
+    """A copy of the grid where free fields behind the rover, up to ``turn_reach_m``, cost up to ``turn_cost`` more."""
     weights = grid.weights.copy()
     cell = grid.cell_at(pose.point)
     reach = round(max(settings.turn_reach_m, REACH_RADII * turning_radius_m) / grid.resolution_m)

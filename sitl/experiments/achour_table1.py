@@ -36,7 +36,7 @@ NAME = "achour-table1"
 
 @dataclass(frozen=True, slots=True)
 class Printed:
-    """A cell of the paper's table I: N and T; ``tries``: how often it was tried until it succeeded, where the text says so."""
+    """A cell of the paper's table I: N and T. ``tries``: attempts until success, where the text gives them."""
 
     number: int
     time_s: float
@@ -255,7 +255,7 @@ def _slowest_ms(report: AchourReport, method: str) -> float:
 
 
 def _longer(report: AchourReport, length: str) -> tuple[float, float]:
-    """The median length of the genetic paths over that of the roadmap's: the least and the greatest of the environments."""
+    """The median length of the genetic paths over that of the roadmap: the least and the greatest ratio."""
     ratios = []
     for name in report.problems:
         ours, theirs = (report.of(name, method).figures()[length] for method in (GENETIC, ROADMAP))

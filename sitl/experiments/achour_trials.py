@@ -1,4 +1,4 @@
-"""Single searches for ``achour-table1``: timed as a user makes them, then made again with the same seed to see what they did."""
+"""Single searches for ``achour-table1``: timed as a user calls them, then repeated with the same seed for details."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What happens when the companion falls dead: every shipped mission, cut off at a random moment and watched until the rover stands.
+"""What happens when the companion fails: every shipped mission, cut off at a random moment until the rover stands.
 
 The autopilot follows the last setpoint that it got, a position for ever and a velocity for three seconds. So no
 setpoint may be one that the rover cannot be left alone with.

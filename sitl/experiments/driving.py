@@ -1,4 +1,4 @@
-"""What the rover feels: the shipped missions driven in lock-step, with the rover's own dynamics, by several planners."""
+"""Driving times of several planners: the shipped missions in lock-step, with the rover's own dynamics."""
 
 from __future__ import annotations
 
@@ -218,8 +218,8 @@ def shortfalls(series: tuple[Series, ...]) -> str:
         return ""
     return (
         f"Aimed at with `{OURS}` on every mission: no more time than the faster of the references"
-        f" ({_misses(slower)}); at most {STEPS_FACTOR:g} times the steps of `{STEPS_REFERENCE}` ({_misses(longer)}); no target"
-        f" missed ({f'{missed} missed' if missed else 'reached'})."
+        f" ({_misses(slower)}); at most {STEPS_FACTOR:g} times the steps of `{STEPS_REFERENCE}` ({_misses(longer)});"
+        f" no target missed ({f'{missed} missed' if missed else 'reached'})."
     )
 
 

@@ -1,4 +1,4 @@
-"""Kwasniewski & Gosiewski 2018, sections 5 and 6: four unknown maps, many runs on each, times and steps as histograms."""
+"""Kwasniewski & Gosiewski 2018, sections 5 and 6: many runs on four unknown maps, times and steps as histograms."""
 
 from __future__ import annotations
 
@@ -250,7 +250,7 @@ def _legend(figure: Figure) -> None:
 
 
 def _bins(values: NDArray[Any], *, whole: bool) -> NDArray[np.float64]:
-    """Some 25 bars over nearly all of the values; what lies beyond (an interrupted computation) goes into the last one."""
+    """About 25 bars for nearly all values. The last one takes outliers, which come from interrupted computations."""
     low, high = float(values.min()), float(values.max())
     if whole:
         width = max(1, int(np.ceil((high - low + 1.0) / 25.0)))

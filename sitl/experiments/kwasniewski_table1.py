@@ -1,4 +1,4 @@
-"""Kwasniewski & Gosiewski 2018, Table 1: four known maps of growing complexity, Dijkstra and three settings of the GA."""
+"""Kwasniewski & Gosiewski 2018, Table 1: four known maps, Dijkstra and three settings of the genetic algorithm."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Every planner inside the navigator, through unknown ground, field by field: what better or faster planning is worth there."""
+"""Every planner in the navigator, through unknown ground, field by field: what better or faster planning achieves."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """All runs of one planner on the problems of one map; ``over``: steps of each run that arrived over the best possible."""
+    """All runs of one planner on one map. ``over``: steps of each run that arrived, over the least possible."""
 
     planner: str
     map_name: str
@@ -135,10 +135,10 @@ class NavigationReport:
         """How many runs a row is made of; column names between asterisks."""
         runs, first = self.options.runs, self.options.seed
         made = "1 run, with seed" if runs == 1 else f"{runs} runs, with seeds {first} to"
-        return f"""*reached* counts the runs that arrived, of all that were made: on each problem {made} {first + runs - 1}, of planners that draw random
-numbers, and 1 of others, whose run is always the same. A planner whose searches may end without a path or a proof (prm,
-achour and
-the genetic algorithms) sends the rover back when its budget is spent, which shows in *back*, and may give up a target that can be reached."""
+        return f"""*reached* counts the runs that arrived, of all that were made: on each problem {made}
+{first + runs - 1}, of planners that draw random numbers, and 1 of others, whose run is always the same. A planner whose
+searches may end without a path or a proof (prm, achour and the genetic algorithms) sends the rover back when its budget
+is spent, which shows in *back*, and may give up a target that can be reached."""
 
     def _names(self) -> list[str]:
         return list(dict.fromkeys(ground.name for ground in self.grounds))

@@ -1,4 +1,4 @@
-"""Many missions on random ground with random faults, one after the other in one process: does anything touch, fail, or grow?
+"""Many missions on random ground with random faults, in one process: does the rover touch anything, does memory grow?
 
 A person stands by, as the safety page asks for: where the companion says that it waits for one, the person looks for a
 while, arms if need be, and sets GUIDED again.

@@ -1,4 +1,4 @@
-"""Four environments of our own with as many static and moving obstacles as those of Wang, Sillitoe & Mulvaney 2007 (table I).
+"""Four environments with as many static and moving obstacles as those of Wang, Sillitoe & Mulvaney 2007 (table I).
 
 Fields are 1 m wide. The paper shows its environments in pictures only; ours fit its text: obstacles that travel to and
 fro between two places in the first two, along several segments at several speeds in the others. After the change they

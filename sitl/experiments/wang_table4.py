@@ -1,4 +1,4 @@
-"""Wang, Sillitoe & Mulvaney 2007, table IV: planning on the way among static and moving obstacles, for time and for length."""
+"""Wang, Sillitoe & Mulvaney 2007, table IV: replanning among static and moving obstacles, for time and for length."""
 
 from __future__ import annotations
 
@@ -109,7 +109,8 @@ class Entry:
 
 
 COLUMNS = (
-    "offline_length_m", "offline_time_s", "length_m", "time_s", "first_generations", "first_ms", "all_ms", "least_gap_m",
+    "offline_length_m", "offline_time_s", "length_m", "time_s", "first_generations", "first_ms", "all_ms",
+    "least_gap_m",
 )  # fmt: skip
 
 

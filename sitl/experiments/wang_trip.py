@@ -1,4 +1,4 @@
-"""One trip through an environment of ``wang_environments``: planned off-line, followed, planned anew when the obstacles change."""
+"""One trip through an environment of ``wang_environments``: plan off-line, follow, replan when the obstacles change."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def time_s(plan: Plan) -> float:
 
 
 def least_gap_m(plan: Plan, movers: tuple[ObstacleTrajectory, ...], until_s: float) -> float:
-    """The least distance from the edges of the moving obstacles, on the way or until then: both simulated in small steps."""
+    """The least distance from the edges of the moving obstacles until then, both simulated in small steps."""
     times_s = np.arange(0.0, min(until_s, time_s(plan)), CHECK_STEP_S)
     x, y = travel(plan.corners.astype(float), plan.speeds_fields_s, times_s)
     gaps = [
@@ -71,7 +71,7 @@ def least_gap_m(plan: Plan, movers: tuple[ObstacleTrajectory, ...], until_s: flo
 
 
 def make_trip(environment: Environment, settings: VertexSettings, seed: int) -> Trip:
-    """Plan, follow the plan until the obstacles change, plan again from there with their new motion (twice, to time it)."""
+    """Plan, follow the plan until the obstacles change, then replan with their new motion (twice, to time it)."""
     motion = VehicleMotion(speeds_fields_s=SPEEDS_M_S)
     weights, before, after = environment.weights(), environment.movers(), environment.movers_after()
     problem = PlanningProblem(weights, environment.start, environment.target, moving_obstacles=before, motion=motion)

@@ -65,7 +65,7 @@ def _wanderer(rng):
 
 
 def test_no_contact_with_moving_obstacles():
-    """200 worlds: nearly always a path, and every path keeps the safe distance from start to target, at every moment."""
+    """200 worlds: nearly always a path, and every path keeps the safe distance at every moment."""
     gaps = []
     for seed in range(200):
         problem = crowded(seed)
@@ -77,7 +77,7 @@ def test_no_contact_with_moving_obstacles():
 
 
 def test_the_obstacles_are_in_the_way():
-    """The same worlds planned without regard to what moves: contact in many of them, so the test above tests something."""
+    """The same worlds planned without moving obstacles: contact in many of them, so the test above is not trivial."""
     contacts = 0
     for seed in range(60):
         problem = crowded(seed)
@@ -87,7 +87,7 @@ def test_the_obstacles_are_in_the_way():
 
 
 def test_a_new_plan_when_the_motion_changes():
-    """On the way the obstacles get new tracks: from the field where the rover is then, the new plan keeps clear of them."""
+    """The obstacles get new tracks on the way: a new plan from the rover's field keeps clear of them."""
     found = 0
     for seed in range(60):
         problem = crowded(seed)
