@@ -13,7 +13,7 @@ from companion.checkpoint.snapshot import Snapshot
 from companion.checkpoint.writer import Update, Writer
 from companion.core.frames import NedPoint
 from companion.core.grid import Cell
-from companion.core.rounds import Mark
+from companion.core.round_marks import Mark
 from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_progress import Leg, MissionProgress

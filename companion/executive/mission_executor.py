@@ -33,7 +33,7 @@ from companion.mission.fence import AutopilotFence
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
-from companion.navigation.search_budget import Searcher
+from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import StepRunner
 from companion.perception.moving_obstacles import Moving, merged
 from companion.perception.object_tracker import ObjectTracker
@@ -95,7 +95,7 @@ class MissionExecutor:
         if rover.turning_radius_m > 0.0 and scan.is_narrow:
             tell("Single beams see too little for a rover that turns in arcs: give it a lidar", WARNING)
         planner = make_planner(settings.navigator.planner, settings.planner)
-        searcher = Searcher(planner, settings.navigator, rng)
+        searcher = PathSearcher(planner, settings.navigator, rng)
         self.driver = GoalDriver(layout.evidence, self._limits, settings, searcher, runner)
         self._tracker = ObjectTracker(layout.evidence, settings.traffic)
 

@@ -13,12 +13,12 @@ from typing import IO, NamedTuple
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from companion.core.rounds import Round, unpacked
 from companion.mavlink.framing import first_packet
 from companion.mission.as_json import from_json
 from companion.mission.mission import Mission, MissionError
 from companion.recording.recorded_files import RecordError
 from companion.recording.recorder import DECISIONS, FORMAT, META, MISSION, PACKETS, ROUNDS, STATE, run_sum, settings_sum
+from companion.recording.rounds import Round, unpacked
 from companion.settings import Settings, SettingsError, parse_settings
 from companion.settings.versions import versions
 from companion.storage.reading import open_file, read_at_most

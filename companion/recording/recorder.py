@@ -13,11 +13,12 @@ from pathlib import Path
 from typing import IO, Protocol
 
 from companion.core.clock import unix_time_us
-from companion.core.rounds import Mark, Round
+from companion.core.round_marks import Mark
 from companion.mission.as_json import to_json
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Decision
 from companion.recording.recorded_files import Copied, RecordError, copied, in_record
+from companion.recording.rounds import Round
 from companion.settings import Settings
 from companion.settings.versions import versions
 from companion.storage.beside import Beside, Job

@@ -15,7 +15,7 @@ from companion.checkpoint.checkpointer import Memory
 from companion.checkpoint.format import MAX_FILE_BYTES, StateError, decoded
 from companion.checkpoint.resume import Kept
 from companion.checkpoint.writer import Update
-from companion.core.rounds import Mark, Round
+from companion.core.round_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.naming import compared, named
@@ -26,6 +26,7 @@ from companion.navigation.step_runner import StepCall
 from companion.recording.reader import Heard, Record
 from companion.recording.recorded_files import RecordError
 from companion.recording.recorder import STATE, decision_line
+from companion.recording.rounds import Round
 from companion.storage.reading import read_at_most
 
 Answer = tuple[NavState, Decision]

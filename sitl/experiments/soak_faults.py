@@ -1,6 +1,7 @@
 """Random plans of faults: what a rover may meet on a bad day. Each ends by itself, so that there is a way on.
 
-A sensor that is stuck while it sees nothing cannot be told from one over open ground (docs/safety.md): here it has something in view.
+A sensor that is stuck while it sees nothing cannot be told from one over open ground (docs/safety.md): here it has
+something in view.
 """
 
 from __future__ import annotations

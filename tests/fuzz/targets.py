@@ -12,7 +12,6 @@ from pathlib import Path
 
 from companion.checkpoint.format import SUM_BYTES, StateError, decoded, encoded
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
-from companion.core.rounds import Round
 from companion.mapping.map_files import MapError, load_map
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -24,6 +23,7 @@ from companion.mission.mission import MissionError
 from companion.mission.resolve import resolve
 from companion.recording.reader import load_record
 from companion.recording.recorded_files import RecordError
+from companion.recording.rounds import Round
 from companion.settings import Settings, SettingsError, load_settings
 from companion.settings.tunable_parameters import with_tuned
 from companion.vehicle.state import VehicleState, fold

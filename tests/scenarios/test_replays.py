@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 from companion.app import Companion
 from companion.cli.commands import app
 from companion.cli.why_image import FREE_COLOUR
-from companion.core.rounds import CHECKED, Mark, unpacked
+from companion.core.round_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import Signer
@@ -33,6 +33,7 @@ from companion.navigation.step_runner import InlineRunner, StepCall
 from companion.recording.reader import Record, load_record
 from companion.recording.recorded_files import RecordError
 from companion.recording.recorder import Recorder, run_sum
+from companion.recording.rounds import CHECKED, unpacked
 from companion.replay.replay import replay
 from companion.settings import Settings
 from sitl.cli.commands import app as sitl_app

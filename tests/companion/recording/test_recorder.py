@@ -9,13 +9,14 @@ import pytest
 from pymavlink import mavutil
 
 from companion.core.grid import Cell
-from companion.core.rounds import Mark, Round, unpacked
+from companion.core.round_marks import Mark
 from companion.mission.as_json import from_json
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Action, Decision, Part, SearchKind
 from companion.planning.problem import Path as FieldPath
 from companion.recording.recorder import NullRecorder, Recorder, RecordError
+from companion.recording.rounds import Round, unpacked
 from companion.settings import Settings
 from tests.support.mavlink_vehicle import Station
 

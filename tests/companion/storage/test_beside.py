@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from companion.checkpoint.writer import StateFile, ThreadWriter, Update
-from companion.core.rounds import Mark
+from companion.core.round_marks import Mark
 from companion.recording.reader import load_record
 from companion.recording.recorder import MOST_WAITING_BYTES, Recorder
 from companion.settings import Settings

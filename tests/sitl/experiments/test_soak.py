@@ -1,4 +1,4 @@
-"""The soak: its ground can be driven, its faults end, its person helps only when asked, and what it counts is what happened."""
+"""The soak: its ground can be driven, its faults end, its person helps only when asked, and its counts are right."""
 
 from pathlib import Path
 

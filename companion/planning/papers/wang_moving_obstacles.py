@@ -1,9 +1,10 @@
-"""Where a robot on a straight line at an even speed first meets moving obstacles (Wang et al. 2007, II.A). Compiled.
+"""When a robot on a straight line first meets a moving obstacle (Wang et al. 2007, II.A). Compiled.
 
-The paper takes the point where the robot's line crosses the obstacle's trajectory and asks whether the obstacle's exclusion area
-lies over it when the robot gets there. Here the robot's way is taken in the obstacle's frame, where it is straight as long as
-neither turns, and clipped with the exclusion area itself. So the first crossing is found exactly, and so are meetings that have
-no crossing point: head on, overtaking, an obstacle that stands.
+The paper takes the point where the robot's line crosses the obstacle's trajectory, and tests whether the obstacle's
+exclusion area covers it when the robot arrives. Here the robot's line is taken in the obstacle's frame, where it is
+straight while neither turns, and clipped with the exclusion area itself. So the first meeting is found exactly, also
+where there is no crossing point: head on, overtaking, or with an obstacle that stands still. In the code a moving
+obstacle is a *mover*.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.planning.problem import Mover
+from companion.planning.problem import ObstacleTrajectory
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 class Fleet(NamedTuple):
-    """All moving obstacles: their tracks one after the other (rows time, x, y), where each begins, radius and margins.
+    """All moving obstacles: their tracks joined (columns time, x, y), where each begins, radii and safety margins.
 
-    ``shares`` is what is left of the margins for each obstacle; see ``fitting_shares``.
+    ``shares``: the share of the margins that is kept for each obstacle; see ``fit_shares``.
     """
 
     rows: Floats
@@ -35,22 +36,30 @@ class Fleet(NamedTuple):
     timing_s: float
 
 
-FleetValues = tuple[Floats, Ints, Floats, Floats, float, float]
+class Stretch(NamedTuple):
+    """A robot's motion along a straight line at a constant speed, from (x, y) at ``begin_s`` until ``end_s``."""
+
+    begin_s: float
+    end_s: float
+    x: float
+    y: float
+    speed_x: float
+    speed_y: float
 
 
-def fleet_of(movers: tuple[Mover, ...], safe_fields: float, timing_s: float) -> FleetValues:
-    """The movers as the kernels want them (a plain tuple: the dispatcher is quicker with it); margins in full."""
+def fleet_of(movers: tuple[ObstacleTrajectory, ...], safe_fields: float, timing_s: float) -> Fleet:
+    """The moving obstacles for the kernels, with full margins."""
     movers = tuple(mover for mover in movers if len(mover.track))
     rows = [np.asarray(mover.track, np.float64) for mover in movers]
     begins = np.cumsum([0, *(len(track) for track in rows)])
     radii = np.array([mover.radius_fields for mover in movers], np.float64)
     joined = np.concatenate(rows) if rows else np.empty((0, 3))
-    return np.ascontiguousarray(joined), begins, radii, np.ones(len(movers)), safe_fields, timing_s
+    return Fleet(np.ascontiguousarray(joined), begins, radii, np.ones(len(movers)), safe_fields, timing_s)
 
 
 @njit(cache=True, nogil=True)
 def place(fleet: Fleet, mover: int, time_s: float) -> tuple[float, float, float, float, float]:
-    """Where a mover is, x and y, how fast it goes, and until when it goes on like that."""
+    """A mover's place, x and y, its speed along x and y, and until when that speed stays the same."""
     low, high = fleet.begins[mover], fleet.begins[mover + 1] - 1
     rows = fleet.rows
     if time_s < rows[low, 0]:
@@ -73,8 +82,8 @@ def place(fleet: Fleet, mover: int, time_s: float) -> tuple[float, float, float,
 def exclusion(fleet: Fleet, mover: int, mover_speed: float, robot_speed: float) -> tuple[float, float]:
     """Half length (along the mover's heading) and half width of its exclusion area, an ellipse.
 
-    It reaches beyond the mover by the safe distance and by what either covers in ``timing_s``: a mover that is early or late is
-    elsewhere along its heading, a robot that is early or late elsewhere along its own line, across it.
+    It extends beyond the mover by the safe distance and by timing margins: along its heading by what the mover covers
+    in ``timing_s``, as it may be early or late; across it by what the robot covers in that time.
     """
     radius, share = fleet.radii[mover], fleet.shares[mover]
     if mover_speed == 0.0:
@@ -85,7 +94,7 @@ def exclusion(fleet: Fleet, mover: int, mover_speed: float, robot_speed: float) 
 
 @njit(cache=True, nogil=True)
 def first_inside(x: float, y: float, along_x: float, along_y: float, duration: float) -> float:
-    """When a point that moves evenly is first inside the unit circle round the origin; inf if not within the duration."""
+    """When a point of constant velocity first enters the unit circle round the origin; inf: not within the duration."""
     inside = x * x + y * y - 1.0
     if inside < 0.0:
         return 0.0
@@ -101,10 +110,9 @@ def first_inside(x: float, y: float, along_x: float, along_y: float, duration: f
 
 
 @njit(cache=True, nogil=True)
-def first_meeting(
-    fleet: Fleet, mover: int, time_s: float, x: float, y: float, speed_x: float, speed_y: float, until_s: float
-) -> float:
-    """When a robot that is at (x, y) at ``time_s`` first is in a mover's exclusion area, before ``until_s``; inf: never."""
+def first_meeting(fleet: Fleet, mover: int, stretch: Stretch) -> float:
+    """When a robot first is in a mover's exclusion area; inf: not on this stretch."""
+    time_s, end_s, x, y, speed_x, speed_y = stretch
     robot_speed = math.hypot(speed_x, speed_y)
     while True:
         mover_x, mover_y, mover_vx, mover_vy, change_s = place(fleet, mover, time_s)
@@ -112,7 +120,7 @@ def first_meeting(
         length, width = exclusion(fleet, mover, mover_speed, robot_speed)
         ux, uy = (mover_vx / mover_speed, mover_vy / mover_speed) if mover_speed > 0.0 else (1.0, 0.0)
         dx, dy, vx, vy = x - mover_x, y - mover_y, speed_x - mover_vx, speed_y - mover_vy
-        duration = min(change_s, until_s) - time_s
+        duration = min(change_s, end_s) - time_s
         when = first_inside(
             (dx * ux + dy * uy) / length,
             (dy * ux - dx * uy) / width,
@@ -122,14 +130,15 @@ def first_meeting(
         )
         if when < np.inf:
             return time_s + when
-        if change_s >= until_s:
+        if change_s >= end_s:
             return np.inf
         time_s, x, y = change_s, x + speed_x * duration, y + speed_y * duration
 
 
 @njit(cache=True, nogil=True)
 def fit_shares(fleet: Fleet, x: float, y: float, top_speed: float) -> None:
-    """Shrink the margins of movers that the robot, where it stands now, is too near to already; their radii stay."""
+    """Shrink the margins of movers whose exclusion area the robot is in already; their radii stay."""
+    stretch = Stretch(0.0, 1e-9, float(x), float(y), 0.0, top_speed)
     for mover in range(len(fleet.radii)):
-        while fleet.shares[mover] > 0.0 and first_meeting(fleet, mover, 0.0, x, y, 0.0, top_speed, 1e-9) < np.inf:
+        while fleet.shares[mover] > 0.0 and first_meeting(fleet, mover, stretch) < np.inf:
             fleet.shares[mover] = max(fleet.shares[mover] - 0.125, 0.0)

@@ -1,6 +1,6 @@
-"""Points in sight of each other: the straight lines that planners of points and lines are made of. Compiled.
+"""Line of sight between fields, free samples, and shortening a chain of points in sight of each other. Compiled.
 
-A line is drawn as ``raster.polyline`` draws it, from its first point to its second; what it touches is what a vehicle would.
+A line is drawn as by ``raster.polyline``, from its first point to its second.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from companion.planning.random_numbers import State, whole
 from companion.planning.raster import HALF, ONE, SHIFT, CellArray, fine_steps
 
 DRAWS_A_SAMPLE = 50
-"""So often a free field is drawn for before it is given up: by then less than a tenth of the ground is free, or luck was very bad."""
+"""Draws for each sample before it is given up. If a tenth of the ground is free, that hardly ever happens."""
 
 
 @njit(cache=True, nogil=True)
@@ -28,7 +28,7 @@ def sees(weights: Weights, x0: int, y0: int, x1: int, y1: int, corner_cutting: b
         x, y = fine_x >> SHIFT, fine_y >> SHIFT
         if weights[y, x] >= OBSTACLE:
             return False
-        if not corner_cutting and x != last_x and y != last_y:  # noqa: SIM102 - two plain tests
+        if not corner_cutting and x != last_x and y != last_y:  # noqa: SIM102 - two simple conditions
             if weights[last_y, x] >= OBSTACLE or weights[y, last_x] >= OBSTACLE:
                 return False
         last_x, last_y = x, y
@@ -37,7 +37,7 @@ def sees(weights: Weights, x0: int, y0: int, x1: int, y1: int, corner_cutting: b
 
 @njit(cache=True, nogil=True)
 def free_samples(weights: Weights, wanted: int, state: State) -> CellArray:
-    """Free fields, uniformly at random, shape (n, 2): as many as wanted, or fewer where there is hardly any free ground."""
+    """Free fields, uniformly at random, shape (n, 2): as many as wanted, or fewer where hardly any ground is free."""
     height, width = weights.shape
     samples = np.empty((wanted, 2), np.int64)
     used = 0
@@ -53,9 +53,9 @@ def free_samples(weights: Weights, wanted: int, state: State) -> CellArray:
 
 @njit(cache=True, nogil=True)
 def shortened(weights: Weights, points: CellArray, corner_cutting: bool) -> CellArray:
-    """The points that are left when each is followed by the last of the later ones that is in its sight; the ends stay.
+    """A shorter chain: each point is followed by the last of the later points in its sight. The ends stay.
 
-    Each point must see the next.
+    Each of the given points must see the next.
     """
     kept = np.empty_like(points)
     kept[0] = points[0]
