@@ -10,7 +10,7 @@ from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
-from sitl.autopilot.params import DEFAULTS, REAL32, steered_wheels
+from sitl.autopilot.parameters import DEFAULTS, REAL32, steered_wheels
 from sitl.faults.plan import FaultPlan, SensorFault
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.physics import Physics

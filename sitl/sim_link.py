@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sitl.autopilot.link import Channel
+from sitl.autopilot.channel import Channel
 from sitl.faults.link_faults import Way
 from sitl.faults.player import FaultPlayer
 

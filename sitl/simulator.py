@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 
 from sitl.autopilot.autopilot import Autopilot
-from sitl.autopilot.control import LOOP_HZ
+from sitl.autopilot.control.records import LOOP_HZ
+from sitl.autopilot.control.tasks import compile_begins
 from sitl.autopilot.lidar import LidarComponent
-from sitl.autopilot.plan import Storage
 from sitl.autopilot.signing import SECURE_PORT, StoredKey
+from sitl.autopilot.state import Storage
 from sitl.autopilot.traffic import Traffic
 from sitl.autopilot.vehicle import Vehicle
-from sitl.autopilot.warmup import begin_every_drive
 from sitl.faults.link_faults import Way
 from sitl.faults.plan import FaultPlan
 from sitl.faults.player import FaultPlayer
@@ -85,7 +85,7 @@ class Simulator:
         self._links: list[SimLink] = []
         self._signing_key = StoredKey()
         self._collisions: list[Collision] = []
-        self._solid, self._doors_move_s = world.layers(0.0).solid, world.next_change_s(0.0)
+        self._surroundings, self._doors_move_s = world.surroundings(0.0), world.next_change_s(0.0)
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
         self._player = FaultPlayer(faults or FaultPlan(), seed)
         self._has_faults = faults is not None and bool(faults.faults)
@@ -171,7 +171,7 @@ class Simulator:
         """
         self.connect()  # some sensors measure only for somebody
         self.advance_to_s(REHEARSAL_S)
-        begin_every_drive(self._vehicle)
+        compile_begins(self._vehicle.records)
 
     def connect(self, port: int = SECURE_PORT, name: str = "") -> SimLink:
         """A new link to the vehicle, through its serial port ``port`` (SERIALn); several may be open at once.
@@ -244,10 +244,8 @@ class Simulator:
     def _move_doors(self) -> None:
         """A door moves with the first main loop that begins at its time or after it."""
         if self.time_s >= self._doors_move_s:
-            self._solid, self._doors_move_s = (
-                self.world.layers(self.time_s).solid,
-                self.world.next_change_s(self.time_s),
-            )
+            self._surroundings = self.world.surroundings(self.time_s)
+            self._doors_move_s = self.world.next_change_s(self.time_s)
 
     def _loops_until_due(self) -> int:
         due_us = self._autopilot.next_due_us()
@@ -274,21 +272,20 @@ class Simulator:
 
     def _run(self, loops: int) -> None:
         """Run main loops until they are done or something happened that must be told at once."""
-        world, vehicle, rover = self.world, self._vehicle, self._rover[0]
+        vehicle, rover = self._vehicle, self._rover[0]
         contacts = int(rover["contacts"])
         if self._row == NOISE_ROWS:
             self._draws = self._rng.standard_normal((NOISE_ROWS, NOISE_COLUMNS))
             self._row = 0
         done = run_loops(
-            self._rover, vehicle.estimate, vehicle.control, vehicle.tuning, vehicle.origin_m, self._noise,
-            self._draws[self._row : self._row + loops],
-            self._solid, world.south_m, world.west_m, world.resolution_m, world.ground, *world.fleet, self.time_s,
+            self._rover, vehicle.records, vehicle.origin_m, self._noise, self._draws[self._row : self._row + loops],
+            self._surroundings, self.time_s,
         )  # fmt: skip
         self._row += done
         self._tick += done
         self._sensing.time_s = self.time_s
         if int(rover["contacts"]) > contacts:
-            self._collisions.append(collision_of(rover, world.movers, self.time_s))
+            self._collisions.append(collision_of(rover, self.world.movers, self.time_s))
 
     def _send(self) -> None:
         if not self.is_off:

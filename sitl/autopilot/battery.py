@@ -11,12 +11,16 @@ from dataclasses import dataclass
 from typing import Protocol
 
 FULL_A = 50.0
+
 RESISTANCE_OHM = 0.014
+
 CHARGE: Sequence[float] = (0.0, 0.1, 0.5, 1.0)
+
 SHARE_OF_VOLTS: Sequence[float] = (0.76, 0.86, 0.92, 1.0)
 """Voltage at rest by charge, as a share of that of a full pack: about that of lithium polymer cells. Our assumption."""
 
 OK, LOW, CRITICAL = 0, 1, 2
+
 NAMES = ("", "low", "critical")
 
 

@@ -8,17 +8,20 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.auto import AutoRunner
-from sitl.autopilot.control import LOOP_HZ
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.control.records import LOOP_HZ
+from sitl.autopilot.destination import change_speed, go_to, valid_place
 from sitl.autopilot.fence import enable_fence
-from sitl.autopilot.link import Channel
+from sitl.autopilot.mode_auto import AutoRunner
+from sitl.autopilot.mode_guided import GLOBAL_FRAMES
 from sitl.autopilot.modes import FORCE, arm, arming_faults, disarm, set_mode
+from sitl.autopilot.state import Mode
 from sitl.autopilot.streams import DEFAULT_INTERVAL_US, set_interval
-from sitl.autopilot.targets import GLOBAL_FRAMES, change_speed, go_to, valid_place
 from sitl.autopilot.telemetry import MESSAGES, streamable
-from sitl.autopilot.vehicle import CRITICAL, INFO, Mode, Vehicle
+from sitl.autopilot.vehicle import CRITICAL, INFO, Vehicle
 
 ACCEPTED, TRY_LATER, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
+
 LONGEST_US = 60_000_000
 
 Handler = Callable[[Vehicle, Channel, Any], int]
@@ -133,10 +136,10 @@ def _mission_start(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 def _set_mission_current(vehicle: Vehicle, channel: Channel, message: Any) -> int:
     seq = int(message.param1)
-    if seq < 0 or not vehicle.plan.mission.set_current(seq, AutoRunner(vehicle)):
+    if seq < 0 or not vehicle.mission.set_current(seq, AutoRunner(vehicle)):
         return FAILED
     if message.param2 == 1.0:
-        vehicle.plan.mission.jumps.clear()
+        vehicle.mission.jumps.clear()
     for listener in vehicle.channels.values():
         listener.requested.append(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
     return ACCEPTED

@@ -14,18 +14,26 @@ from enum import Enum
 import numpy as np
 
 STEP_S = 0.1
+
 GPS_SILENT_S = 4.0
 """The receiver's driver gives up after so long; the EKF then no longer counts as using GPS."""
+
 ALONE_S, ALONE_WITH_SPEED_S = 7.0, 10.0
 """A position that has not been confirmed for so long is given up: without GPS speed, and with it."""
+
 AIDING_ENDS_S = 15.0
+
 GATE_M = 2.7
 """EK3_POS_I_GATE of 5 standard deviations, each EK3_POSNE_M_NSE of 0.5 m and a little of the estimate's own."""
+
 FOLLOWS_S = 1.0
 """How fast the estimate follows a GPS that it believes. Our assumption: the gain depends on the EKF's state."""
+
 DRIFT_M_S2 = 0.03
 """Acceleration error (standard deviation) while only inertial sensors are left. Our assumption, of a small MEMS sensor."""
+
 GLITCH_SEEN_S, GLITCH_OVER_S = 1.0, 10.0
+
 FAILED_CHECKS = 10
 
 GOOD, NO_POSITION, CONSTANT_POSITION, GLITCH = 831, 37, 167, 32768

@@ -9,7 +9,9 @@ from __future__ import annotations
 import re
 
 MAGIC_1, MAGIC_2 = 0xFE, 0xFD
+
 SIGNED = 0x01
+
 HEADER_1, HEADER_2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 
 BEGINNING = re.compile(b"[\xfd\xfe]")

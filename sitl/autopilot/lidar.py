@@ -1,15 +1,102 @@
-"""The scanner on the simulated vehicle's network. The autopilot's router forwards its scans wherever somebody was heard."""
+"""The scanner: a MAVLink component of its own (196) on the vehicle's network, or on a line to a real autopilot."""
 
 from __future__ import annotations
 
-from sitl.autopilot.link import new_codec, packed
+import math
+import struct
+from collections import deque
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sitl.autopilot.channel import new_codec, packed
+from sitl.autopilot.framing import Framer
 from sitl.autopilot.proximity import take_in
-from sitl.autopilot.scanner import OBSTACLE_AVOIDANCE, Scanner
+from sitl.autopilot.routing import AUTOPILOT
 from sitl.autopilot.vehicle import Vehicle
 from sitl.sensors.range_sensors import Lidar, RangeSensing
 
+OBSTACLE_AVOIDANCE = 196
+
+HEARTBEAT_US = 1_000_000
+
+
+class Scanner:
+    """Scans and heartbeats at the scanner's rate, as messages that nobody has packed yet."""
+
+    def __init__(self, lidar: Lidar, sensing: RangeSensing) -> None:
+        """``sensing`` measures."""
+        self._lidar = lidar
+        self._sensing = sensing
+        self._interval_us = 1e6 / lidar.rate_hz
+        self._scan_us = self._interval_us
+        self._heartbeat_us = 0.0
+        self._late_us = lidar.flaws.latency_s * 1e6
+        self._waiting: deque[tuple[float, list[int]]] = deque()
+
+    def next_due_us(self) -> float:
+        """Time of the next message."""
+        return min(self._scan_us, self._heartbeat_us, self._waiting[0][0] if self._waiting else math.inf)
+
+    def due(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> list[Any]:
+        """What the scanner says at this moment; empty when nothing is due."""
+        messages: list[Any] = []
+        if time_us >= self._heartbeat_us:
+            self._heartbeat_us += HEARTBEAT_US
+            messages.append(mavlink.MAVLink_heartbeat_message(18, 8, 0, 0, 4, 3))
+        if time_us >= self._scan_us:
+            self._scan_us = max(self._scan_us + self._interval_us, float(time_us - HEARTBEAT_US))
+            cells = self._sensing.scan_cm(north_m, east_m, heading_rad)
+            if self._sensing.lidar_fault != "silent":
+                self._waiting.append((time_us + self._late_us, cells))
+        while self._waiting and self._waiting[0][0] <= time_us + 0.5:
+            messages.append(self._message(time_us, self._waiting.popleft()[1]))
+        return messages
+
+    def _message(self, time_us: int, cells: list[int]) -> Any:
+        """A late scan bears the time at which it is sent: few drivers know how long theirs took."""
+        lidar = self._lidar
+        return mavlink.MAVLink_obstacle_distance_message(
+            time_us, 0, cells, round(lidar.increment_deg), round(lidar.min_m * 100), round(lidar.max_m * 100),
+            lidar.increment_deg, lidar.offset_deg, 12,
+        )  # fmt: skip
+
+
+class ScannerPort:
+    """The scanner's own line to an autopilot elsewhere; it takes that autopilot's system id, and does not sign."""
+
+    def __init__(self) -> None:
+        """System 1 until another is heard."""
+        self._codec = new_codec(OBSTACLE_AVOIDANCE)
+        self._framer = Framer()
+        self._settled = False
+        self.system: int | None = None
+        """The autopilot's id; None until it is heard."""
+
+    def begin(self) -> None:
+        """The autopilot has started anew; it may have another id."""
+        self._settled = False
+
+    def hear(self, data: bytes) -> None:
+        """Bytes from the line. The first ArduPilot's heartbeat counts: later ones may be other vehicles'."""
+        for packet in self._framer.feed(data):
+            try:
+                message = self._codec.decode(bytearray(packet))
+            except (mavlink.MAVError, struct.error):  # damaged, or none that we know
+                continue
+            of_autopilot = message.get_type() == "HEARTBEAT" and message.get_srcComponent() == AUTOPILOT
+            if of_autopilot and message.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and not self._settled:
+                self._codec.srcSystem = self.system = message.get_srcSystem()
+                self._settled = True
+
+    def packed(self, messages: list[Any]) -> bytes:
+        """The messages as bytes for the line."""
+        return b"".join(packed(message, self._codec) for message in messages)
+
+
 OWN_CHANNEL = -1
 """The scanner's place in the router: packets for it are not for the autopilot, and it answers none."""
+
 SIGNING_LINK = 255
 """With a signing key on the vehicle the scanner signs as well, as a link of its own."""
 

@@ -10,12 +10,15 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
-from sitl.autopilot.items import JUMP, JUMP_TAG, JUMP_TO_TAG, Item
+from sitl.autopilot.mission_items import JUMP, JUMP_TAG, JUMP_TO_TAG, Item
 
 FOREVER = -1
+
 MOST_SEARCHED = 255
 """Items looked at between two navigation commands, so that jumps cannot go round for ever."""
+
 MOST_JUMPS = 64
+
 MOST_COUNTED_JUMPS = 100
 """So many jumps can be counted; further ones are not taken."""
 

@@ -5,24 +5,33 @@ from __future__ import annotations
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.battery import LOW, NAMES, OK, arming_complaint
-from sitl.autopilot.boot import ARMABLE_S, PREARM_S
-from sitl.autopilot.control import COAST, STOP, outputs_fault
+from sitl.autopilot.control.records import COAST, STOP
+from sitl.autopilot.control.servo_outputs import outputs_fault
+from sitl.autopilot.destination import begin_driving
 from sitl.autopilot.ekf import Change
 from sitl.autopilot.fence import arming_fault
-from sitl.autopilot.plan import GuidedTask, Submode
-from sitl.autopilot.vehicle import AUTOPILOT_MODES, CRITICAL, INFO, NOTICE, WARNING, Mode, Vehicle
-from sitl.autopilot.ways import begin_driving, begin_return, begin_way_back, remember_start
+from sitl.autopilot.mode_rtl import begin_return
+from sitl.autopilot.mode_smart_rtl import begin_smart_rtl, remember_start
+from sitl.autopilot.start_up import ARMABLE_S, PREARM_S
+from sitl.autopilot.state import AUTOPILOT_MODES, GuidedTask, Mode, Submode
+from sitl.autopilot.vehicle import CRITICAL, INFO, NOTICE, WARNING, Vehicle
 
 NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.INITIALISING}
+
 FORCE = {2989, 21196}
 """Magic numbers that arm or disarm against the checks."""
 
 GCS_SILENCE_S = 5.7
+
 PREARM_TEXT_EVERY_S = 30.0
+
 VARIANCE_TEXT_EVERY_S = 30.0
+
 NO_EKF_ACTION, REPORT_ONLY = 0, 2
 """FS_EKF_ACTION; anything else is HOLD."""
+
 DISARM_ACTION = 5
+
 BATTERY_MODES = {
     1: (Mode.RTL, Mode.HOLD),
     2: (Mode.HOLD,),
@@ -45,19 +54,19 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
         vehicle.say(WARNING, "Flight mode change failed")
         return False
     if vehicle.mode == Mode.AUTO:
-        vehicle.plan.mission.stop()
+        vehicle.mission.stop()
     vehicle.mode = mode
     _enter(vehicle)
-    if vehicle.plan.fence.breached:
+    if vehicle.fence.breached:
         # Whoever changes the mode now is taken to be driving back by hand.
-        vehicle.plan.fence.recovering_since_s = vehicle.time_s
+        vehicle.fence.recovering_since_s = vehicle.time_s
     for channel in vehicle.channels.values():
         channel.requested.append(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     return True
 
 
 def _may_enter(vehicle: Vehicle, mode: Mode) -> bool:
-    if mode == Mode.AUTO and not vehicle.plan.mission.present:
+    if mode == Mode.AUTO and not vehicle.mission.present:
         vehicle.say(NOTICE, "No Mission. Can't set AUTO.")
         return False
     if mode == Mode.DOCK:
@@ -67,7 +76,7 @@ def _may_enter(vehicle: Vehicle, mode: Mode) -> bool:
         return False
     if mode in (Mode.RTL, Mode.SMART_RTL, Mode.LOITER) and not vehicle.has_position:
         return False
-    if mode == Mode.SMART_RTL and not vehicle.plan.way_back.active:
+    if mode == Mode.SMART_RTL and not vehicle.smart_rtl.active:
         return False
     return not (vehicle.armed and mode in AUTOPILOT_MODES and not vehicle.has_position)
 
@@ -84,11 +93,11 @@ def _enter(vehicle: Vehicle) -> None:
     elif vehicle.mode == Mode.RTL:
         begin_return(vehicle)
     elif vehicle.mode == Mode.SMART_RTL:
-        begin_way_back(vehicle)
+        begin_smart_rtl(vehicle)
     elif vehicle.mode == Mode.AUTO:
-        vehicle.plan.auto.waiting = True
-        vehicle.plan.auto.submode = Submode.STOP
-        vehicle.plan.auto.guided = GuidedTask()
+        vehicle.auto.waiting = True
+        vehicle.auto.submode = Submode.STOP
+        vehicle.auto.guided = GuidedTask()
 
 
 def apply_sticks(vehicle: Vehicle) -> None:
@@ -141,7 +150,7 @@ def disarm(vehicle: Vehicle) -> None:
         vehicle.clocks.logging_s = vehicle.time_s
         vehicle.control["armed"] = 0
         if vehicle.mode != Mode.AUTO:
-            vehicle.plan.mission.reset()
+            vehicle.mission.reset()
         vehicle.say(INFO, "Throttle disarmed")
 
 

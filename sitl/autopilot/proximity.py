@@ -14,11 +14,17 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl.autopilot.vehicle import Vehicle
 
 MAVLINK_SOURCE = 2
+
 FIRST_ID = 10
+
 OCTANTS = 8
+
 AHEAD_DEG = 22.5
+
 STALE_S = 0.5
+
 UNKNOWN = 65535
+
 BODY_FRAME = 12
 
 

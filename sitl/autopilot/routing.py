@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 AUTOPILOT = 1
+
 MOST_ROUTES = 20
 
 

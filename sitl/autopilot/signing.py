@@ -14,13 +14,20 @@ from typing import Any
 from sitl.autopilot.framing import SIGNATURE
 
 KEY_BYTES = 32
+
 MINUTE = 60 * 100_000
 """Signing timestamps count 10 microseconds since 2015."""
+
 TIMESTAMPS = 1 << 48
+
 SAVED_EVERY_S = 30.0
+
 MOST_STREAMS = 16
+
 SECURE_PORT = 0
+
 RADIO, RADIO_STATUS = 166, 109
+
 ACCEPTED_UNSIGNED = {RADIO, RADIO_STATUS}
 
 

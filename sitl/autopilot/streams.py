@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from sitl.autopilot.boot import STREAMS_S
-from sitl.autopilot.link import Channel
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.start_up import STREAMS_S
 from sitl.autopilot.telemetry import MESSAGES, requested_messages
 from sitl.autopilot.vehicle import Vehicle
 

@@ -4,27 +4,45 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.battery import Battery, rest_volts
-from sitl.autopilot.boot import ATTITUDE_S, HOME_S, ORIGIN_S, POSITION_S, GpsLate
-from sitl.autopilot.control import CIRCLE, LEG, LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.control.records import (
+    CIRCLE,
+    LEG,
+    LOOP_HZ,
+    WAYPOINT,
+    MotionRecords,
+    Record,
+    new_control,
+    new_estimate,
+    new_tuning,
+)
 from sitl.autopilot.ekf import Ekf
-from sitl.autopilot.link import Channel
-from sitl.autopilot.params import Parameters
-from sitl.autopilot.plan import Plan, Storage, Submode, new_plan
+from sitl.autopilot.mission import Mission
+from sitl.autopilot.parameters import Parameters
 from sitl.autopilot.routing import Router
 from sitl.autopilot.signing import Signing
+from sitl.autopilot.start_up import ATTITUDE_S, HOME_S, ORIGIN_S, POSITION_S, GpsLate
+from sitl.autopilot.state import (
+    DRIVEN_MODES,
+    AutoState,
+    Clocks,
+    FenceState,
+    Mode,
+    Proximity,
+    SmartRtl,
+    Sticks,
+    Storage,
+    Submode,
+    Upload,
+)
 from sitl.sensors.range_sensors import RangeSensing
 from sitl.world import geodesy
-
-ALTITUDE_M = 120.0
-"""Height of the ground everywhere, above sea level."""
 
 MOST_TEXTS = 30
 """Texts that wait to be sent; more push the oldest ones out, as in the firmware's queue."""
@@ -32,66 +50,8 @@ MOST_TEXTS = 30
 EKF_UNINITIALISED, EKF_CONSTANT_POSITION = 1024, 167
 """EKF_STATUS_REPORT flags of the start-up: nothing yet; attitude and velocity but a constant position."""
 
-
 CRITICAL, ERROR, WARNING, NOTICE, INFO = 2, 3, 4, 5, 6
 """MAV_SEVERITY of what is said."""
-
-
-class Mode(IntEnum):
-    """ArduRover's flight modes."""
-
-    MANUAL = 0
-    ACRO = 1
-    STEERING = 3
-    HOLD = 4
-    LOITER = 5
-    FOLLOW = 6
-    SIMPLE = 7
-    DOCK = 8
-    CIRCLE = 9
-    AUTO = 10
-    RTL = 11
-    SMART_RTL = 12
-    GUIDED = 15
-    INITIALISING = 16
-
-
-AUTOPILOT_MODES = {Mode.LOITER, Mode.CIRCLE, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED}
-"""Modes that drive by themselves and need a position."""
-
-DRIVEN_MODES = {Mode.GUIDED, Mode.AUTO, Mode.RTL, Mode.SMART_RTL}
-"""Modes that may have a place to drive to."""
-
-
-@dataclass
-class Clocks:
-    """Times the autopilot remembers, seconds since boot."""
-
-    ground_station_s: float | None = None
-    prearm_text_s: float = 0.0
-    armed_s: float | None = None
-    variance_text_s: float = 0.0
-    logging_s: float = -math.inf
-    """When arming was last tried or ended; the log is written for a while after that."""
-
-
-@dataclass
-class Proximity:
-    """Obstacle distances the autopilot has taken in: nearest of each eighth of a turn, clockwise from ahead."""
-
-    octants_cm: list[int] = field(default_factory=list)
-    limits_cm: tuple[int, int] = (0, 0)
-    heard_s: float = -1.0
-
-
-@dataclass
-class Sticks:
-    """What the pilot gives, -1 to 1, by the transmitter or by a ground station's RC_CHANNELS_OVERRIDE."""
-
-    steering: float = 0.0
-    throttle: float = 0.0
-    overridden_s: float | None = None
-    """When an override was heard last; when none comes any more, the transmitter counts again."""
 
 
 class Vehicle:
@@ -117,6 +77,7 @@ class Vehicle:
         self.estimate: Record = new_estimate()
         self.control: Record = new_control()
         self.tuning: Record = new_tuning(self.parameters.as_dict())
+        self.records = MotionRecords(self.estimate, self.control, self.tuning)
         self.origin = origin
         self.origin_m = np.array(origin_m)
         self.home = origin
@@ -139,7 +100,18 @@ class Vehicle:
         self.stale_m: tuple[float, float] | None = None
         """The last position that was known, while none is; it is told again and again."""
         self.control["rest_v"] = self.parameters["SIM_BATT_VOLTAGE"]
-        self.plan: Plan = new_plan(storage or Storage())
+        self.storage = storage or Storage()
+        self.mission = Mission(self.storage.mission)
+        self.uploads: dict[int, Upload] = {}
+        """Transfers under way, by MAV_MISSION_TYPE."""
+        self.auto = AutoState()
+        self.fence = FenceState()
+        self.smart_rtl = SmartRtl()
+        self.rtl_arrival_said = False
+        self.complaints: set[tuple[int, str]] = set()
+        """Complaints about a transfer that were made already: type of list, text."""
+        self.onboard_controller: tuple[int, int, int] | None = None
+        """The first onboard controller that was heard: system, component, channel."""
 
     @property
     def time_us(self) -> int:
@@ -183,7 +155,7 @@ class Vehicle:
     @property
     def in_guided(self) -> bool:
         """Guided targets are obeyed: in GUIDED, and in AUTO while a mission item hands over."""
-        return self.mode == Mode.GUIDED or (self.mode == Mode.AUTO and self.plan.auto.submode == Submode.GUIDED)
+        return self.mode == Mode.GUIDED or (self.mode == Mode.AUTO and self.auto.submode == Submode.GUIDED)
 
     @property
     def has_target(self) -> bool:

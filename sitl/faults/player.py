@@ -10,11 +10,12 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sitl.autopilot.boot import HOME_S, ORIGIN_S, POSITION_S
-from sitl.autopilot.control import Record
+from sitl.autopilot.control.records import Record
 from sitl.autopilot.ekf import STEP_S
 from sitl.autopilot.modes import apply_sticks, set_mode, tell_of_ekf
-from sitl.autopilot.vehicle import Mode, Sticks, Vehicle
+from sitl.autopilot.start_up import HOME_S, ORIGIN_S, POSITION_S
+from sitl.autopilot.state import Mode, Sticks
+from sitl.autopilot.vehicle import Vehicle
 from sitl.faults.link_faults import Active, Way
 from sitl.faults.plan import (
     BatteryLow,

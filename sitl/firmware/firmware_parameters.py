@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sitl.autopilot.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
+from sitl.autopilot.control.servo_outputs import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
 from sitl.firmware.physics import MIDDLE_US, SPAN_US
 from sitl.sensors.range_sensors import SensorSuite
 

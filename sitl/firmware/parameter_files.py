@@ -12,8 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.storage.reading import open_file
-from sitl.autopilot.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT, functions_of, is_skid
-from sitl.autopilot.params import DEFAULTS, INT8, INT16, INT32, REAL32
+from sitl.autopilot.control.servo_outputs import (
+    GROUND_STEERING,
+    THROTTLE,
+    THROTTLE_LEFT,
+    THROTTLE_RIGHT,
+    functions_of,
+    is_skid,
+)
+from sitl.autopilot.parameters import DEFAULTS, INT8, INT16, INT32, REAL32
 from sitl.firmware.parameter_ranges import outside
 
 NAME = re.compile(r"[A-Z][A-Z0-9_]{0,15}")

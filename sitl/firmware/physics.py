@@ -13,14 +13,13 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numba import njit
 
-from sitl.autopilot.scanner import Scanner, ScannerPort
+from sitl.autopilot.lidar import Scanner, ScannerPort
 from sitl.firmware.json_frames import COUNTS, RANGES_MOST, BodyState, ServoFrame, decode, encode
 from sitl.plant.main_loop import NoiseSettings
 from sitl.plant.rover import GRAVITY_M_S2, drive, meet_movers, new_rover
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite
-from sitl.world.movers import Floats, Ints
 from sitl.world.truth import Collision, SimStart, collision_of
-from sitl.world.world import Ground, Obstacles, World
+from sitl.world.world import Surroundings, World
 
 PLANT_STEP_S = 0.005
 """The plant's longest step, as in our own vehicle."""
@@ -35,17 +34,14 @@ NO_PULSE_US = (800, 2200)
 
 @njit(cache=True, nogil=True)
 def advance(
-    rovers: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
-    mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats,
-    time_s: float, servo_1: float, servo_3: float, steps: int, step_s: float,
-) -> None:  # fmt: skip
-    """Move the rover by some steps from ``time_s`` on, with servo outputs -1 to 1."""
+    rovers: Any, surroundings: Surroundings, time_s: float, servos: tuple[float, float], steps: int, step_s: float
+) -> None:
+    """Move the rover by some steps from ``time_s`` on; ``servos``: outputs 1 and 3, -1 to 1."""
     rover = rovers[0]
     for step in range(steps):
-        drive(rover, obstacles, south_m, west_m, resolution_m, ground, servo_1, servo_3, step_s)
-        if mover_radii_m.size > 0:
-            now_s = time_s + (step + 1) * step_s
-            meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)
+        drive(rover, surroundings, servos[0], servos[1], step_s)
+        if surroundings.fleet.radii_m.size > 0:
+            meet_movers(rover, surroundings.fleet, time_s + (step + 1) * step_s)
 
 
 def servo_output(pwm_us: int) -> float:
@@ -124,7 +120,7 @@ class Physics:
         rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
         self._sensing = RangeSensing(suite, self.world, noise_m, rng)
         self._scanner = Scanner(suite.lidar, self._sensing) if suite.lidar and self._scans else None
-        self._solid, self._doors_move_s = self.world.layers(0.0).solid, self.world.next_change_s(0.0)
+        self._surroundings, self._doors_move_s = self.world.surroundings(0.0), self.world.next_change_s(0.0)
         self._ranges_m = [math.nan] * len(suite.beams)
         self._measured = 0
 
@@ -217,13 +213,10 @@ class Physics:
     def _move(self, servo_1: float, servo_3: float, step_s: float) -> None:
         world = self.world
         if world.doors and self.time_s >= self._doors_move_s:
-            self._solid, self._doors_move_s = world.layers(self.time_s).solid, world.next_change_s(self.time_s)
+            self._surroundings, self._doors_move_s = world.surroundings(self.time_s), world.next_change_s(self.time_s)
         contacts = int(self._rover[0]["contacts"])
         steps = max(1, math.ceil(step_s / PLANT_STEP_S - 1e-6))
-        advance(
-            self._rover, self._solid, world.south_m, world.west_m, world.resolution_m, world.ground, *world.fleet,
-            self.time_s, servo_1, servo_3, steps, step_s / steps,
-        )  # fmt: skip
+        advance(self._rover, self._surroundings, self.time_s, (servo_1, servo_3), steps, step_s / steps)
         self.time_s += step_s
         if int(self._rover[0]["contacts"]) > contacts:
             self.collisions += (collision_of(self._rover[0], world.movers, self.time_s),)

@@ -11,11 +11,10 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sitl.autopilot.battery import FULL_A, RESISTANCE_OHM
-from sitl.autopilot.control import LOOP_S
-from sitl.autopilot.loop import run_tasks
+from sitl.autopilot.control.records import LOOP_S, MotionRecords
+from sitl.autopilot.control.tasks import run_task
 from sitl.plant.rover import drive, meet_movers
-from sitl.world.movers import Floats, Ints
-from sitl.world.world import Ground, Obstacles
+from sitl.world.world import Surroundings
 
 SUBSTEPS = 4
 """Steps of the plant in one main loop."""
@@ -92,27 +91,25 @@ def draw_current(rover: Any, control: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def run_loops(
-    rovers: Any, estimates: Any, controls: Any, tunings: Any, origin: Any, noise: Any, draws: Any,
-    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
-    mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats, time_s: float,
-) -> int:  # fmt: skip
-    """Run main loops from ``time_s`` on, until the draws are used up or something happened that people must be told at once.
+    rovers: Any, records: MotionRecords, origin: Any, noise: Any, draws: Any, surroundings: Surroundings, time_s: float
+) -> int:
+    """Run main loops from ``time_s`` on until the draws are used up, or something happens that must be reported at once.
 
-    Returns how many loops were run (a target reached, a time-out, a new contact end the batch early).
+    ``noise``: see ``NoiseSettings.as_array``; ``draws``: shape (loops, NOISE_COLUMNS), normal variates. Returns how many loops
+    were run: a target reached, a time-out and a new contact end the batch early.
     """
-    rover, estimate, control, tuning = rovers[0], estimates[0], controls[0], tunings[0]
+    rover, estimate, control, tuning = rovers[0], records.estimates[0], records.controls[0], records.tunings[0]
     contacts = rover.contacts
     for loop in range(draws.shape[0]):
         control.tick += 1
         update_estimate(estimate, rover, origin, noise, draws[loop])
-        run_tasks(control, tuning, estimate)
+        run_task(control, tuning, estimate)
         draw_current(rover, control)
         first, third = control.servo_1 * rover.grip_1, control.servo_3 * rover.grip_3
         for _ in range(SUBSTEPS):
-            drive(rover, obstacles, south_m, west_m, resolution_m, ground, first, third, LOOP_S / SUBSTEPS)
-        if mover_radii_m.size > 0:
-            now_s = time_s + (loop + 1) * LOOP_S
-            meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)
+            drive(rover, surroundings, first, third, LOOP_S / SUBSTEPS)
+        if surroundings.fleet.radii_m.size > 0:
+            meet_movers(rover, surroundings.fleet, time_s + (loop + 1) * LOOP_S)
         if control.arrived or control.timed_out or rover.contacts != contacts:
             return loop + 1
     return int(draws.shape[0])

@@ -17,8 +17,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sitl.world.movers import Floats, Ints, nearest_mover
-from sitl.world.world import TOP_SPEED_M_S, Ground, Obstacles, clearance_m, ground_under
+from sitl.world.movers import Fleet, nearest_mover
+from sitl.world.world import TOP_SPEED_M_S, Surroundings, clearance_m, ground_under
 
 SPEED_LAG_S = 4.0 / 14.0
 TURN_RATE_RAD_S = math.radians(140.0)
@@ -82,7 +82,7 @@ def new_rover(
 
 
 @njit(cache=True, nogil=True)
-def wheel_curvature(wheel_rad: float, turning_radius_m: float) -> float:
+def wheel_curvature_per_m(wheel_rad: float, turning_radius_m: float) -> float:
     """Curvature of the way driven, 1/m, clockwise, with the steered wheels at this angle (bicycle model)."""
     return math.tan(wheel_rad) / (turning_radius_m * math.tan(WHEEL_MOST_RAD))
 
@@ -120,24 +120,21 @@ def slide(rover: Any, grip: float, wanted_m_s: float, wanted_rad_s: float, step_
 
 
 @njit(cache=True, nogil=True)
-def drive(
-    rover: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
-    servo_1: float, servo_3: float, step_s: float,
-) -> None:  # fmt: skip
+def drive(rover: Any, surroundings: Surroundings, servo_1: float, servo_3: float, step_s: float) -> None:
     """Move the rover for ``step_s`` (a few milliseconds) with servo outputs -1 to 1.
 
     As in the firmware they are the left and the right motor of a skid rover, steering and throttle of one with Ackermann steering.
     """
     ackermann = rover.turning_radius_m > 0.0
-    grip, pace = ground_under(ground, south_m, west_m, resolution_m, rover.north_m, rover.east_m)
+    grip, pace = ground_under(surroundings.ground, surroundings.solid, rover.north_m, rover.east_m)
     goal_m_s = servo_3 * TOP_SPEED_M_S if ackermann else 0.5 * (servo_1 + servo_3) * TOP_SPEED_M_S
     before_m_s, aside_m_s = rover.speed_m_s, 0.0
     speed_m_s = goal_m_s * pace + (before_m_s - goal_m_s * pace) * math.exp(-step_s / SPEED_LAG_S)
     from_rad = rover.heading_rad
     if ackermann:
         turn_wheels(rover, servo_1, step_s)
-        curvature = wheel_curvature(rover.wheel_rad, rover.turning_radius_m)
-        yaw_rate_rad_s = 0.5 * (before_m_s + speed_m_s) * curvature
+        curvature_per_m = wheel_curvature_per_m(rover.wheel_rad, rover.turning_radius_m)
+        yaw_rate_rad_s = 0.5 * (before_m_s + speed_m_s) * curvature_per_m
     else:
         yaw_rate_rad_s = (servo_1 - servo_3) * TURN_RATE_RAD_S * pace
     if grip < 1.0 or rover.slide_m_s != 0.0:
@@ -153,9 +150,9 @@ def drive(
         north_m -= aside_m_s * step_s * math.sin(rover.heading_rad)
         east_m += aside_m_s * step_s * math.cos(rover.heading_rad)
     reach_m = rover.radius_m + RELEASE_M
-    room_m = clearance_m(obstacles, south_m, west_m, resolution_m, north_m, east_m, reach_m)
+    room_m = clearance_m(surroundings.solid, north_m, east_m, reach_m)
     if room_m < rover.radius_m:
-        here_m = clearance_m(obstacles, south_m, west_m, resolution_m, rover.north_m, rover.east_m, reach_m)
+        here_m = clearance_m(surroundings.solid, rover.north_m, rover.east_m, reach_m)
         if room_m <= here_m:
             if rover.touching == 0:
                 rover.contacts += 1
@@ -177,9 +174,9 @@ def drive(
 
 
 @njit(cache=True, nogil=True)
-def meet_movers(rover: Any, rows: Floats, begins: Ints, radii_m: Floats, periods_s: Floats, time_s: float) -> None:
+def meet_movers(rover: Any, fleet: Fleet, time_s: float) -> None:
     """Notice that a mover and the rover touch: it counts once, and stops the rover; the mover goes on."""
-    gap_m, mover = nearest_mover(rows, begins, radii_m, periods_s, time_s, rover.north_m, rover.east_m)
+    gap_m, mover = nearest_mover(fleet, time_s, rover.north_m, rover.east_m)
     if gap_m >= rover.radius_m + RELEASE_M:
         rover.struck = 0
     elif gap_m < rover.radius_m and rover.struck != mover + 1:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.autopilot.control import LEG, WAYPOINT
+from sitl.autopilot.control.records import LEG, WAYPOINT
 from sitl.autopilot.vehicle import Vehicle
 from sitl.simulator import Simulator
 from sitl.view.sketch import Disc, Kind, Layer, Place, Scene

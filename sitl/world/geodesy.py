@@ -11,6 +11,10 @@ METRES_PER_UNIT = 0.011131884502145034
 """Metres along a meridian for 1e-7 degree (the firmware's scaling constant)."""
 
 HALF_TURN = 1_800_000_000
+"""180 degrees of longitude."""
+
+ALTITUDE_M = 120.0
+"""Height of the ground above sea level, everywhere."""
 
 
 def to_units(degrees: float) -> int:

@@ -24,7 +24,7 @@ from companion.mission.mission import MoverSpec
 from companion.mission.tables import FileName, Metres, Name, Pair, Positive, Table, named, read_table
 from companion.mission.toml_reader import MoverTable
 from sitl.world.doors import FOR_EVER_MS, Door, whole_ms
-from sitl.world.movers import Mover, timed_track
+from sitl.world.movers import Announcement, Mover, timed_track
 from sitl.world.world import FIRM, TOP_SPEED_M_S, Ground, World
 
 FINE_M = 0.1
@@ -173,7 +173,9 @@ def movers_of(specs: list[MoverSpec], origin_m: tuple[float, float]) -> tuple[Mo
     for one in specs:
         places_m = [(origin_m[0] + place.north_m, origin_m[1] + place.east_m) for place in one.route]
         track = timed_track(places_m, one.speed_m_s, one.start_s, repeats=one.repeat)
-        movers.append(Mover(one.name, one.radius_m, track, one.repeat, one.announce or ""))
+        movers.append(
+            Mover(one.name, one.radius_m, track, one.repeat, Announcement(one.announce) if one.announce else None)
+        )
     return tuple(movers)
 
 

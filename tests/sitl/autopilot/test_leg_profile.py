@@ -7,7 +7,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.autopilot.profile import DONE, LENGTH, SPEED, START_SPEED, along, leg_times, ramp, ramp_s, top_speed
+from sitl.autopilot.control.scurve import DONE, LENGTH, SPEED, START_SPEED, along, leg_times, ramp, ramp_s, top_speed
 
 STEP_S = 0.02
 ACCEL, JERK = st.floats(0.2, 5.0), st.floats(0.2, 20.0)

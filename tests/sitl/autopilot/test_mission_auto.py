@@ -347,7 +347,7 @@ def test_setpoints_in_auto_vanish_unless_it_hands_over() -> None:
 
 
 def test_steered_wheels_drive_a_mission() -> None:
-    from sitl.autopilot.params import steered_wheels
+    from sitl.autopilot.parameters import steered_wheels
 
     simulator = open_ground(parameters=steered_wheels(2.0), turning_radius_m=2.0)
     client = in_auto(simulator, [at(16, 20, 0), at(16, 20, 20), at(16, 0, 20)])

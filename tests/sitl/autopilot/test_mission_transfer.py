@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.items import KEPT, NAMES, Item, RefusedError, mission_item
+from sitl.autopilot.mission_items import KEPT, NAMES, Item, RefusedError, mission_item
 from tests.support.mission_client import FENCE, MISSION, RALLY, at, do, download, heard, home, in_auto, item, upload
 from tests.support.sitl_client import Client, open_ground, ready
 

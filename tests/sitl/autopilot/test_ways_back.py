@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.autopilot.ways import simplified, without_loops
+from sitl.autopilot.mode_smart_rtl import simplified, without_loops
 from tests.support.mission_client import FENCE, RALLY, at, place_m, run_until, upload
 from tests.support.sitl_client import Client, open_ground, ready
 
@@ -117,7 +117,7 @@ def test_a_long_crooked_drive_keeps_a_path_of_limited_length() -> None:
     client = ready(simulator)
     for turn in range(12):
         drive(client, (10.0 * turn, 6.0 * (turn % 2)))
-    way = simulator._vehicle.plan.way_back
+    way = simulator._vehicle.smart_rtl
     assert way.active
     assert 3 < len(way.points) <= 40
     assert client.set_mode(12) == ACCEPTED

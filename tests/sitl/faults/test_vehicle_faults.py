@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.params import steered_wheels
+from sitl.autopilot.parameters import steered_wheels
 from sitl.faults.plan import (
     BatteryLow,
     Fault,

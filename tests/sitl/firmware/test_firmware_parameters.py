@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sitl.autopilot.params import DEFAULTS, steered_wheels
+from sitl.autopilot.parameters import DEFAULTS, steered_wheels
 from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
 from sitl.firmware.parameter_files import ParameterFile
 from sitl.firmware.physics import servo_output

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
-from sitl.autopilot.params import DEFAULTS
+from sitl.autopilot.parameters import DEFAULTS
 from sitl.cli.commands import app
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.parameter_ranges import RANGES, outside

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint
-from sitl.autopilot.scanner import ScannerPort
+from sitl.autopilot.lidar import ScannerPort
 from sitl.firmware.json_frames import decode
 from sitl.firmware.physics import Physics, frame_step_s
 from sitl.plant.rover import SPEED_LAG_S

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from companion.core.grid import Grid
 from companion.mission.mission import HomePoint, Mission, RoverSpec, SitlSpec, Target
-from sitl.autopilot.params import steered_wheels
+from sitl.autopilot.parameters import steered_wheels
 from sitl.plant.rover import WHEEL_MOST_RAD, drive, new_rover
 from sitl.scenario import ScenarioError, scenario_from_mission
 from sitl.simulator import Simulator
@@ -95,11 +95,11 @@ def test_what_it_runs_into_does_not_turn_it() -> None:
     world = World.from_grid(Grid(weights, 1.0))
     rover = new_rover(9.0, 10.0, 0.0, 0.3, RADIUS_M)
     for _ in range(400):
-        drive(rover[0], world.obstacles, world.south_m, world.west_m, world.resolution_m, world.ground, 1.0, 0.5, 0.005)
+        drive(rover[0], world.surroundings(0.0), 1.0, 0.5, 0.005)
     heading = float(rover[0]["heading_rad"])
     assert rover[0]["contacts"] == 1
     for _ in range(400):
-        drive(rover[0], world.obstacles, world.south_m, world.west_m, world.resolution_m, world.ground, 1.0, 0.5, 0.005)
+        drive(rover[0], world.surroundings(0.0), 1.0, 0.5, 0.005)
     assert rover[0]["heading_rad"] == heading
 
 

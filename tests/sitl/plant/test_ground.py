@@ -26,8 +26,7 @@ def ground(grip: float = 1.0, pace: float = 1.0, north_m: float = 0.0) -> World:
 
 
 def step(rover: Any, world: World, servo_1: float, servo_3: float) -> None:
-    frame = (world.south_m, world.west_m, world.resolution_m)
-    drive(rover[0], world.obstacles, *frame, world.ground, servo_1, servo_3, STEP_S)
+    drive(rover[0], world.surroundings(0.0), servo_1, servo_3, STEP_S)
 
 
 def velocity(rover: Any) -> complex:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 
-from sitl.autopilot.control import GROUND_STEERING, OUTPUTS, THROTTLE
+from sitl.autopilot.control.servo_outputs import GROUND_STEERING, OUTPUTS, THROTTLE
 
 INT8, INT16, INT32, REAL32 = 2, 4, 6, 9
 """MAV_PARAM_TYPE."""

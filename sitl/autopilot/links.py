@@ -6,7 +6,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.link import Channel, new_channel
+from sitl.autopilot.channel import Channel, new_channel
 from sitl.autopilot.routing import AUTOPILOT
 from sitl.autopilot.signing import ACCEPTED_UNSIGNED, SECURE_PORT, StoredKey
 from sitl.autopilot.streams import start_streams

@@ -6,33 +6,34 @@ Each is an array of one record, so that compiled code changes it in place.
 from __future__ import annotations
 
 import math
-from typing import Any, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.autopilot.control.servo_outputs import is_skid
+
 LOOP_HZ = 50
+
 LOOP_S = 1.0 / LOOP_HZ
 
 STOP, WAYPOINT, HEADING, TURN_RATE, COAST, CIRCLE, LEG = 0, 1, 2, 3, 4, 5, 6
 """What the motion controller is doing: braking, driving to a place, holding a heading or a turn rate, nothing, circling,
 driving along a leg of a mission."""
 
-GROUND_STEERING, THROTTLE = 26, 70
-"""SERVO1_FUNCTION and SERVO3_FUNCTION of a rover with steered wheels."""
-THROTTLE_LEFT, THROTTLE_RIGHT = 73, 74
-"""The same of a skid rover."""
-
-THROTTLE_LEFT, THROTTLE_RIGHT = 73, 74
-"""The same of a rover with skid steering."""
-
-OUTPUTS = 16
-"""How many outputs, SERVOn_..., an autopilot has; the plant is wired to 1 and 3."""
-
 NEVER = -1_000_000
 """Tick of something that has not happened."""
 
 Record = NDArray[Any]
+
+
+class MotionRecords(NamedTuple):
+    """The three records of motion control, each an array of one."""
+
+    estimates: Record
+    controls: Record
+    tunings: Record
+
 
 ESTIMATE = np.dtype(
     [
@@ -172,33 +173,3 @@ def new_tuning(parameters: dict[str, float]) -> Record:
     tuning["throttle_max"] = most / 100.0
     tuning["throttle_min"] = min(max(parameters["MOT_THR_MIN"], 0.0), 20.0, most) / 100.0
     return tuning
-
-
-class Table(Protocol):
-    """Parameters by name, all of them or some."""
-
-    def __getitem__(self, name: str) -> float: ...
-    def __contains__(self, name: object) -> bool: ...
-
-
-def functions_of(parameters: Table) -> set[int]:
-    """The SERVOn_FUNCTION that any output has."""
-    names = [f"SERVO{number}_FUNCTION" for number in range(1, OUTPUTS + 1)]
-    return {int(parameters[name]) for name in names if name in parameters}
-
-
-def outputs_fault(parameters: Table) -> str:
-    """What the arming check says of outputs that make no rover; empty if they do (behaviour of AP_MotorsUGV's pre-arm check)."""
-    functions = functions_of(parameters)
-    left, right = THROTTLE_LEFT in functions, THROTTLE_RIGHT in functions
-    throttle, steering = THROTTLE in functions, GROUND_STEERING in functions
-    if not (left or right or throttle or steering):
-        return "no motor, sail or scripting outputs defined"
-    if left != right:
-        return "check skid steering config"
-    return "check steering and throttle config" if throttle != steering else ""
-
-
-def is_skid(parameters: Table) -> bool:
-    """Whether these parameters are of a rover with skid steering: both of its motors have an output."""
-    return {THROTTLE_LEFT, THROTTLE_RIGHT} <= functions_of(parameters)

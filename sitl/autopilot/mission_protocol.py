@@ -1,8 +1,4 @@
-"""Uploads of mission, fence and rally points (behaviour of MissionItemProtocol): one uploader at a time.
-
-Mission and rally points are written as they arrive, the fence only when it is whole. A cancelling MISSION_ACK is not
-listened to: an upload that nobody goes on with ends after eight seconds.
-"""
+"""Downloads of mission, fence and rally points (behaviour of MissionItemProtocol): how many there are, and one by one."""
 
 from __future__ import annotations
 
@@ -11,17 +7,9 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.download import (
-    MOST,
-    acknowledge,
-    request,
-    request_int,
-    request_list,
-    stored,
-    type_of,
-    warn_once,
-)
-from sitl.autopilot.items import (
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.destination import go_to
+from sitl.autopilot.mission_items import (
     JUMP,
     WAYPOINT,
     Item,
@@ -32,14 +20,107 @@ from sitl.autopilot.items import (
     mission_item,
     rally_item,
 )
-from sitl.autopilot.link import Channel
-from sitl.autopilot.plan import FENCE, MISSION, RALLY, Upload
-from sitl.autopilot.targets import go_to
-from sitl.autopilot.vehicle import INFO, WARNING, Mode, Vehicle, text_messages
+from sitl.autopilot.state import FENCE, MISSION, RALLY, Mode, Upload
+from sitl.autopilot.vehicle import INFO, WARNING, Vehicle, text_messages
+from sitl.world.geodesy import ALTITUDE_M
+
+MOST = {MISSION: 724, FENCE: 84, RALLY: 50}
+"""How many items fit into the storage of a usual flight controller (16 kB)."""
+
+
+def type_of(message: Any) -> int:
+    """MAV_MISSION_TYPE of a message; the first version of MAVLink knows missions only."""
+    return int(getattr(message, "mission_type", 0))
+
+
+def acknowledge(channel: Channel, message: Any, result: int) -> None:
+    """MISSION_ACK to the sender of a message."""
+    channel.send(
+        mavlink.MAVLink_mission_ack_message(
+            message.get_srcSystem(), message.get_srcComponent(), int(result), type_of(message)
+        )
+    )
+
+
+def warn_once(vehicle: Vehicle, kind: int, text: str) -> None:
+    """A complaint that is made once for each list."""
+    if (kind, text) not in vehicle.complaints:
+        vehicle.complaints.add((kind, text))
+        vehicle.say(WARNING, text)
+
+
+def stored(vehicle: Vehicle, kind: int) -> list[Item]:
+    """The items of a type as they are stored; the first of a mission is home."""
+    storage = vehicle.storage
+    return {MISSION: storage.mission, FENCE: storage.fence, RALLY: storage.rally}[kind]
+
+
+def request_list(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_REQUEST_LIST: how many items there are."""
+    kind = type_of(message)
+    if kind not in MOST:
+        acknowledge(channel, message, Result.UNSUPPORTED)
+    elif kind in vehicle.uploads:
+        acknowledge(channel, message, Result.DENIED)
+    else:
+        _send_count(vehicle, channel, message, kind)
+
+
+def _send_count(vehicle: Vehicle, channel: Channel, message: Any, kind: int) -> None:
+    channel.send(
+        mavlink.MAVLink_mission_count_message(
+            message.get_srcSystem(), message.get_srcComponent(), len(stored(vehicle, kind)), kind
+        )
+    )
+
+
+def request_int(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_REQUEST_INT: one item; not while a new list is arriving."""
+    kind = type_of(message)
+    if kind in vehicle.uploads:
+        acknowledge(channel, message, Result.DENIED)
+    elif kind in MOST:
+        _send_item(vehicle, channel, message, kind, as_int=True)
+
+
+def request(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_REQUEST: one item as the older MISSION_ITEM, which has places in single precision."""
+    kind = type_of(message)
+    if kind in MOST and _send_item(vehicle, channel, message, kind, as_int=False):
+        warn_once(vehicle, kind, "got MISSION_REQUEST; use MISSION_REQUEST_INT!")
+
+
+def _send_item(vehicle: Vehicle, channel: Channel, message: Any, kind: int, as_int: bool) -> bool:
+    """Answer with an item; False if there is none."""
+    items, seq = stored(vehicle, kind), int(message.seq)
+    if seq >= len(items) and not (kind == MISSION and seq == 0):
+        if kind == MISSION:
+            _send_count(vehicle, channel, message, kind)
+        beyond = kind == RALLY or (kind == FENCE and seq > len(items))
+        acknowledge(channel, message, Result.INVALID_SEQUENCE if beyond else Result.ERROR)
+        return False
+    one = Item(WAYPOINT, 0, x=vehicle.home[0], y=vehicle.home[1], z=ALTITUDE_M)
+    if kind != MISSION or seq > 0:
+        one = items[seq]
+    # The firmware compares the command, not the index, with the command under way.
+    current = int(kind == MISSION and one.command == vehicle.mission.nav_index)
+    scale = 1 if as_int or one.command in (mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE, 203) else 1e-7
+    kinds = (mavlink.MAVLink_mission_item_message, mavlink.MAVLink_mission_item_int_message)
+    channel.send(
+        kinds[as_int](
+            message.get_srcSystem(), message.get_srcComponent(), seq, one.frame, one.command, current,
+            int(kind == MISSION), *one.params, one.x * scale, one.y * scale, one.z, kind,
+        )
+    )  # fmt: skip
+    return True
+
 
 ASK_AGAIN_US, GIVE_UP_US = 1_000_000, 8_000_000
+
 DONE_TEXTS = {MISSION: "Flight plan received", RALLY: "Rally points received"}
+
 TIMEOUT_TEXTS = {MISSION: "Mission upload timeout", FENCE: "Fence upload timeout", RALLY: "Rally upload timeout"}
+
 TOTALS = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}
 
 Handler = Callable[[Vehicle, Channel, Any], None]
@@ -53,8 +134,8 @@ def _say(channel: Channel, severity: int, text: str) -> None:
 
 def keep_home(vehicle: Vehicle) -> None:
     """Home is known: it becomes item 0 of an empty mission."""
-    if not vehicle.plan.mission.items:
-        vehicle.plan.mission.write(0, Item(WAYPOINT))
+    if not vehicle.mission.items:
+        vehicle.mission.write(0, Item(WAYPOINT))
         _save_total(vehicle, MISSION)
 
 
@@ -70,7 +151,7 @@ def _save_total(vehicle: Vehicle, kind: int) -> None:
 
 def count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """MISSION_COUNT: somebody wants to upload."""
-    kind, uploads = type_of(message), vehicle.plan.uploads
+    kind, uploads = type_of(message), vehicle.uploads
     if kind not in MOST:
         acknowledge(channel, message, Result.UNSUPPORTED)
         return
@@ -86,7 +167,7 @@ def count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     items = stored(vehicle, kind)
     if kind != FENCE and len(items) > message.count:
         del items[message.count :]
-        vehicle.plan.mission.changes += 1
+        vehicle.mission.changes += 1
         _save_total(vehicle, kind)
     if message.count == 0:
         uploads.pop(kind, None)
@@ -102,7 +183,7 @@ def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     if kind not in MOST:
         acknowledge(channel, message, Result.UNSUPPORTED)
         return
-    if kind in vehicle.plan.uploads:
+    if kind in vehicle.uploads:
         acknowledge(channel, message, Result.DENIED)
         return
     items, first, last = stored(vehicle, kind), message.start_index, message.end_index
@@ -116,7 +197,7 @@ def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def _begin(vehicle: Vehicle, channel: Channel, message: Any, first: int, last: int, fence: list[Item | None]) -> None:
     now_us = vehicle.time_us
-    vehicle.plan.uploads[type_of(message)] = Upload(
+    vehicle.uploads[type_of(message)] = Upload(
         channel.number, message.get_srcSystem(), message.get_srcComponent(), first, last, now_us, now_us, fence
     )
     _ask(vehicle, type_of(message))
@@ -124,7 +205,7 @@ def _begin(vehicle: Vehicle, channel: Channel, message: Any, first: int, last: i
 
 def _ask(vehicle: Vehicle, kind: int) -> None:
     """MISSION_REQUEST for the next item; the answer may be MISSION_ITEM_INT all the same."""
-    upload = vehicle.plan.uploads[kind]
+    upload = vehicle.uploads[kind]
     upload.asked_us = vehicle.time_us
     channel = vehicle.channels.get(upload.channel)
     if channel is not None:
@@ -133,9 +214,9 @@ def _ask(vehicle: Vehicle, kind: int) -> None:
 
 def run_uploads(vehicle: Vehicle) -> None:
     """Ask again for what did not come, give up on who has gone silent."""
-    for kind, upload in list(vehicle.plan.uploads.items()):
+    for kind, upload in list(vehicle.uploads.items()):
         if vehicle.time_us - upload.heard_us > GIVE_UP_US:
-            del vehicle.plan.uploads[kind]
+            del vehicle.uploads[kind]
             channel = vehicle.channels.get(upload.channel)
             if channel is not None:
                 _say(channel, WARNING, TIMEOUT_TEXTS[kind])
@@ -157,7 +238,7 @@ def item(vehicle: Vehicle, channel: Channel, message: Any) -> None:
         else:
             if message.get_type() == "MISSION_ITEM":
                 warn_once(vehicle, kind, "got MISSION_ITEM; GCS should send MISSION_ITEM_INT")
-            if kind in vehicle.plan.uploads:
+            if kind in vehicle.uploads:
                 _take(vehicle, channel, message, kind)
                 return
             result = Result.ERROR
@@ -178,7 +259,7 @@ def _guided(vehicle: Vehicle, message: Any) -> Result:
 
 def _take(vehicle: Vehicle, channel: Channel, message: Any, kind: int) -> None:
     """One item of an upload: in its turn, and from who began it."""
-    upload = vehicle.plan.uploads[kind]
+    upload = vehicle.uploads[kind]
     reply = vehicle.channels.get(upload.channel, channel)
     if message.seq != upload.next:
         acknowledge(reply, message, Result.INVALID_SEQUENCE)
@@ -189,7 +270,7 @@ def _take(vehicle: Vehicle, channel: Channel, message: Any, kind: int) -> None:
     try:
         _write(vehicle, message, kind, upload)
     except RefusedError as refusal:
-        del vehicle.plan.uploads[kind]
+        del vehicle.uploads[kind]
         acknowledge(reply, message, refusal.result)
         return
     upload.heard_us = vehicle.time_us
@@ -197,7 +278,7 @@ def _take(vehicle: Vehicle, channel: Channel, message: Any, kind: int) -> None:
     if upload.next <= upload.last:
         _ask(vehicle, kind)
         return
-    del vehicle.plan.uploads[kind]
+    del vehicle.uploads[kind]
     _finish(vehicle, reply, message, kind, upload.fence)
 
 
@@ -217,7 +298,7 @@ def _write(vehicle: Vehicle, message: Any, kind: int, upload: Upload) -> None:
     if message.seq > total or message.seq >= MOST[kind]:
         raise RefusedError(Result.ERROR)
     if kind == MISSION:
-        vehicle.plan.mission.write(message.seq, new)
+        vehicle.mission.write(message.seq, new)
     elif message.seq < total:
         items[message.seq] = new
     else:
@@ -242,7 +323,7 @@ def _keep_fence(vehicle: Vehicle, items: list[Item]) -> bool:
         vehicle.say(WARNING, fault)
         vehicle.say(WARNING, "Fence validation failed")
         return False
-    vehicle.plan.storage.fence[:] = items
+    vehicle.storage.fence[:] = items
     _save_total(vehicle, FENCE)
     return True
 
@@ -253,9 +334,9 @@ def clear(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     if kind not in MOST:
         acknowledge(channel, message, Result.UNSUPPORTED)
         return
-    cleared = kind not in vehicle.plan.uploads
+    cleared = kind not in vehicle.uploads
     if cleared and kind == MISSION:
-        cleared = vehicle.plan.mission.clear()
+        cleared = vehicle.mission.clear()
     elif cleared:
         stored(vehicle, kind).clear()
     if cleared:
@@ -273,5 +354,3 @@ TRANSFERS: dict[str, Handler] = {
     "MISSION_REQUEST_LIST": request_list,
     "MISSION_WRITE_PARTIAL_LIST": write_partial,
 }
-
-__all__ = ["TRANSFERS", "keep_home", "run_uploads", "stored"]

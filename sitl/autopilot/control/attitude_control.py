@@ -7,14 +7,17 @@ from typing import Any
 
 from numba import njit
 
-from sitl.autopilot.control import LOOP_S
-from sitl.autopilot.shaping import limited
+from sitl.autopilot.control.records import LOOP_S
+from sitl.autopilot.control.shaping import limited
 
 GRAVITY_M_S2 = 9.80665
+
 MEMORY_TICKS = 10
 """A controller that has not run for 0.2 s starts anew."""
+
 STOPPED_TICKS = 15
 """Having stopped is remembered for 0.3 s."""
+
 STEER_SPEED_MIN_M_S = 1.0
 """Below this speed a lateral acceleration is turned into a turn rate as if at this speed."""
 

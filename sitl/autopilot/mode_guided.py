@@ -5,35 +5,26 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from sitl.autopilot.control import CIRCLE, HEADING, LEG, TURN_RATE, WAYPOINT
-from sitl.autopilot.guided import begin_target
-from sitl.autopilot.plan import Submode
-from sitl.autopilot.vehicle import DRIVEN_MODES, INFO, Mode, Vehicle
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.control.records import HEADING, TURN_RATE
+from sitl.autopilot.destination import go_to, valid_place
+from sitl.autopilot.vehicle import INFO, Vehicle
 from sitl.world import geodesy
 
 LOCAL_NED, LOCAL_OFFSET, BODY, BODY_OFFSET = 1, 7, 8, 9
+
 LOCAL_FRAMES = {LOCAL_NED, LOCAL_OFFSET, BODY, BODY_OFFSET}
+
 GLOBAL_FRAMES = {0, 3, 5, 6, 10, 11}
 
 NO_POSITION, NO_VELOCITY, NO_ACCELERATION = 0b11, 0b11 << 3, 0b111 << 6
+
 NO_YAW, NO_YAW_RATE = 1 << 10, 1 << 11
 
 SLOWEST_M_S = 0.05
 
 
-def go_to(vehicle: Vehicle, place: tuple[int, int]) -> None:
-    """Follow a position target, (latitude, longitude) in 1e-7 degree."""
-    vehicle.destination = place
-    north_m, east_m = geodesy.offset_m(vehicle.origin, place)
-    begin_target(vehicle.control[0], vehicle.tuning[0], vehicle.estimate[0], north_m, east_m)
-
-
-def valid_place(lat: int, lon: int) -> bool:
-    """Whether latitude and longitude exist on earth."""
-    return abs(lat) <= 900_000_000 and abs(lon) <= geodesy.HALF_TURN
-
-
-def local_target(vehicle: Vehicle, message: Any) -> None:
+def local_target(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """SET_POSITION_TARGET_LOCAL_NED."""
     frame, mask = message.coordinate_frame, message.type_mask
     if not vehicle.in_guided or not vehicle.has_origin or frame not in LOCAL_FRAMES:
@@ -54,7 +45,7 @@ def local_target(vehicle: Vehicle, message: Any) -> None:
     go_to(vehicle, geodesy.moved(start, north_m, east_m))
 
 
-def global_target(vehicle: Vehicle, message: Any) -> None:
+def global_target(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """SET_POSITION_TARGET_GLOBAL_INT; the altitude is ignored."""
     if not vehicle.in_guided or message.coordinate_frame not in GLOBAL_FRAMES:
         return
@@ -93,7 +84,7 @@ def _motion_target(vehicle: Vehicle, message: Any, body: bool) -> None:
     control["have_target"] = 1
 
 
-def attitude_target(vehicle: Vehicle, message: Any) -> None:
+def attitude_target(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """SET_ATTITUDE_TARGET: thrust is a share of WP_SPEED, with a heading or a turn rate."""
     if not vehicle.in_guided or message.type_mask & (1 << 6) or not math.isfinite(message.thrust):
         return
@@ -109,18 +100,3 @@ def attitude_target(vehicle: Vehicle, message: Any) -> None:
     control["target_speed"] = vehicle.parameters["WP_SPEED"] * min(max(message.thrust, -1.0), 1.0)
     control["target_tick"] = control["tick"]
     control["have_target"] = 1
-
-
-def change_speed(vehicle: Vehicle, speed_m_s: float) -> bool:
-    """DO_CHANGE_SPEED: while there is a place to drive to; AUTO takes it at any time."""
-    task = int(vehicle.control[0]["task"])
-    if vehicle.mode == Mode.AUTO and task == HEADING:
-        vehicle.control["target_speed"] = speed_m_s
-        return math.isfinite(speed_m_s)
-    waiting = vehicle.mode == Mode.AUTO and vehicle.plan.auto.submode == Submode.STOP
-    if vehicle.mode not in DRIVEN_MODES or not speed_m_s >= SLOWEST_M_S:
-        return False
-    if task not in (WAYPOINT, CIRCLE, LEG) and not waiting:
-        return False
-    vehicle.control["base_speed"] = speed_m_s
-    return True

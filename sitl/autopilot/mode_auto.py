@@ -3,34 +3,33 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot import items
-from sitl.autopilot.area import distance_m
-from sitl.autopilot.circle import begin_circle
-from sitl.autopilot.control import HEADING
-from sitl.autopilot.fence import enable_fence
-from sitl.autopilot.items import NAMES, Item
+from sitl.autopilot import mission_items as items
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.control.circle import begin_circle
+from sitl.autopilot.control.records import HEADING
+from sitl.autopilot.destination import arrived, begin_driving, change_speed, drive_to, stand
+from sitl.autopilot.fence import distance_m, enable_fence
+from sitl.autopilot.mission_items import NAMES, Item
+from sitl.autopilot.mode_rtl import begin_return, run_return
 from sitl.autopilot.modes import set_mode
-from sitl.autopilot.plan import GuidedTask, Submode
-from sitl.autopilot.targets import change_speed
-from sitl.autopilot.vehicle import ALTITUDE_M, INFO, NOTICE, WARNING, Mode, Vehicle
-from sitl.autopilot.ways import (
-    arrived,
-    begin_driving,
-    begin_return,
-    drive_to,
-    stand,
-)
+from sitl.autopilot.state import GuidedTask, Mode, Submode
+from sitl.autopilot.telemetry import mission_current
+from sitl.autopilot.vehicle import CRITICAL, INFO, NOTICE, WARNING, Vehicle
 from sitl.world import geodesy
+from sitl.world.geodesy import ALTITUDE_M
 
 SMALLEST_CIRCLE_M = 0.5
+
 STAY, LOITER, ACRO, MANUAL = 0, 1, 2, 3
 """MIS_DONE_BEHAVE."""
 
 ELSEWHERE = {181, 182, 183, 184, 202, 203, 205, 206, 208, 211, 215, 216, 218}
 """Servos, relays, cameras, grippers: begun without effect, done at once, as without the part."""
+
 DONE_AT_ONCE = {
     items.CHANGE_SPEED, items.SET_HOME, items.SET_REVERSE, items.FENCE_ENABLE, items.GUIDED_LIMITS, items.JUMP_TAG,
     195, 197, 201,
@@ -43,7 +42,7 @@ class AutoRunner:
     def __init__(self, vehicle: Vehicle) -> None:
         """Made anew whenever it is needed; all state is the vehicle's."""
         self.vehicle = vehicle
-        self.auto = vehicle.plan.auto
+        self.auto = vehicle.auto
 
     def completed(self) -> None:
         """The end of the mission: stay, unless MIS_DONE_BEHAVE says otherwise."""
@@ -115,9 +114,9 @@ class AutoRunner:
         self.auto.reached = False
         following = None
         if item.command == items.WAYPOINT and self.auto.loiter_s == 0.0:
-            after = self.vehicle.plan.mission.next_nav(index + 1)
+            after = self.vehicle.mission.next_nav(index + 1)
             if after is not None:
-                following = self.vehicle.plan.mission.items[after].place
+                following = self.vehicle.mission.items[after].place
         self.auto.submode = Submode.WAYPOINT
         drive_to(self.vehicle, self._sane(item.place), following if following != (0, 0) else None)
 
@@ -232,3 +231,88 @@ class AutoRunner:
         if self.auto.submode in (Submode.STOP, Submode.HEADING):
             return 0.0
         return distance_m(self.vehicle.place(), self.vehicle.destination)
+
+
+HANDED_OVER_EVERY_S = 1.0
+
+RELATIVE_INT, PLACE_ONLY = 6, 3576
+"""Frame and type mask of the place that is handed over."""
+
+TURNED_RAD = math.radians(5.0)
+
+
+def run_auto(vehicle: Vehicle) -> None:
+    """Run AUTO for one moment: begin, check and change mission commands."""
+    auto, mission, runner = vehicle.auto, vehicle.mission, AutoRunner(vehicle)
+    if not vehicle.armed and not mission.present:
+        auto.submode = Submode.STOP
+        stand(vehicle)
+    if auto.waiting:
+        if vehicle.has_origin:
+            auto.waiting = False
+            if vehicle.parameters["MIS_RESTART"] == 1.0:
+                mission.start(runner)
+            else:
+                mission.resume(runner)
+            _changed(vehicle)
+    else:
+        if _changed(vehicle) and auto.submode == Submode.WAYPOINT:
+            done = mission.restart_current(runner)
+            vehicle.say(
+                CRITICAL,
+                "Auto mission changed, restarted command"
+                if done
+                else "Auto mission changed but failed to restart command",
+            )
+        mission.update(runner)
+    if auto.submode == Submode.RETURN:
+        run_return(vehicle)
+    elif auto.submode == Submode.GUIDED:
+        _tell_target(vehicle)
+    elif auto.submode == Submode.HEADING:
+        _run_heading(vehicle)
+
+
+def _changed(vehicle: Vehicle) -> bool:
+    """Whether the command under way, or one of the next two, was written anew."""
+    auto, mission = vehicle.auto, vehicle.mission
+    same_index = auto.seen_index == mission.nav_index
+    if same_index and auto.seen_changes == mission.changes:
+        return False
+    before = auto.seen_items
+    auto.seen_index, auto.seen_changes, auto.seen_items = mission.nav_index, mission.changes, mission.ahead()
+    return same_index and mission.nav_running and before != auto.seen_items
+
+
+def _run_heading(vehicle: Vehicle) -> None:
+    """NAV_SET_YAW_SPEED: its target does not grow old; it stops when it has turned."""
+    auto, control = vehicle.auto, vehicle.control
+    control["target_tick"] = control["tick"]
+    error = (auto.heading_rad - vehicle.heading_rad() + math.pi) % (2.0 * math.pi) - math.pi
+    if not auto.turned and abs(error) < TURNED_RAD:
+        auto.turned = True
+        stand(vehicle)
+
+
+def _tell_target(vehicle: Vehicle) -> None:
+    """Guided within AUTO: once a second the place goes to the first onboard controller that was heard."""
+    task = vehicle.auto.guided
+    if task.place is None or (task.sent_s is not None and vehicle.time_s - task.sent_s <= HANDED_OVER_EVERY_S):
+        return
+    task.sent_s = vehicle.time_s
+    if vehicle.onboard_controller is None:
+        return
+    system, component, number = vehicle.onboard_controller
+    if number in vehicle.channels:
+        vehicle.channels[number].send(
+            mavlink.MAVLink_set_position_target_global_int_message(
+                vehicle.time_us // 1000, system, component, RELATIVE_INT, PLACE_ONLY, *task.place, task.height_m * 100.0,
+                *[0.0] * 8,
+            )
+        )  # fmt: skip
+
+
+def set_mission_current(vehicle: Vehicle, channel: Channel, message: Any) -> None:
+    """MISSION_SET_CURRENT: answered with MISSION_CURRENT of just this number, or not at all."""
+    if vehicle.mission.set_current(message.seq, AutoRunner(vehicle)):
+        channel.send(mission_current(vehicle, message.seq))

@@ -11,15 +11,20 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.link import Channel
+from sitl.autopilot.channel import Channel
 from sitl.autopilot.vehicle import Vehicle
 
 HEADER = struct.Struct("<HBBBBBxI")
 """Number, session, operation, size, operation that is answered, end of a burst, (padding), offset."""
+
 PAYLOAD_BYTES = 251
+
 TERMINATE, RESET, READ, WRITE, BURST = 1, 2, 5, 7, 15
+
 OF_A_SESSION, OPERATIONS = {READ, WRITE, BURST}, range(1, 16)
+
 ACK, NAK = 128, 129
+
 INVALID_SESSION, UNKNOWN_COMMAND, FILE_NOT_FOUND = 4, 7, 10
 
 

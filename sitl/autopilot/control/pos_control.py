@@ -1,9 +1,4 @@
-"""Compiled guided motion: to a place, along a heading, with a turn rate (behaviour of ModeGuided, AR_WPNav, AR_PosControl).
-
-A position target is shaped: an inner target runs ahead of the rover with limited speed, acceleration and jerk, and
-the rover is steered after it. A target farther to the side than WP_PIVOT_ANGLE is first faced on the spot; a rover with steered
-wheels cannot, and drives an arc.
-"""
+"""Compiled: follow an inner target, turning on the spot first where it lies far to the side (behaviour of AR_PosControl, AR_PivotTurn)."""
 
 from __future__ import annotations
 
@@ -12,10 +7,7 @@ from typing import Any
 
 from numba import njit
 
-from sitl.autopilot.control import COAST, HEADING, LOOP_S, NEVER, TURN_RATE, WAYPOINT
-from sitl.autopilot.motors import has_steered_wheels, run_motors
-from sitl.autopilot.shaping import approach_rate, approach_vector, limited, shaped_accel, shortened
-from sitl.autopilot.speed import (
+from sitl.autopilot.control.attitude_control import (
     GRAVITY_M_S2,
     accel_limited,
     filter_share,
@@ -26,36 +18,20 @@ from sitl.autopilot.speed import (
     run_steering,
     run_stop,
 )
+from sitl.autopilot.control.motors import has_steered_wheels
+from sitl.autopilot.control.records import LOOP_S, NEVER
+from sitl.autopilot.control.shaping import approach_vector, limited, shortened
 
 ACTIVE_TICKS = 5
 """Navigation that has not run for 0.1 s begins anew."""
+
 PIVOT_ACCURACY_RAD = math.radians(5.0)
-ARRIVED_M = 0.01
-"""The inner target must have come this near to the destination before a target counts as reached."""
+
 SPEED_CHANGE_TICKS = 25
 """Changes of the top speed are taken over no more often than every 0.5 s."""
-UNLIMITED_ACCEL_M_S2 = 20.0
+
 AVOID_PROXIMITY = 2
 """Bit of AVOID_ENABLE: slow down for what proximity sensors see, with half the deceleration."""
-PLAN_FROM_REST = 64
-"""Bit of GUID_OPTIONS: every target is planned anew from standstill, so that quick repeats keep the rover standing."""
-
-
-@njit(cache=True, nogil=True)
-def begin_guided(control: Any, tuning: Any) -> None:
-    """Enter GUIDED: no target, speed and acceleration limits from the parameters."""
-    slowest = tuning.accel_max
-    if tuning.decel_max > 0.0:
-        slowest = min(slowest, tuning.decel_max)
-    if slowest <= 0.0:
-        slowest = UNLIMITED_ACCEL_M_S2
-    control.base_speed = control.speed_max = max(tuning.wp_speed, 0.05)
-    control.accel_max = min(tuning.wp_accel, slowest) if tuning.wp_accel > 0.0 else slowest
-    control.jerk_max = tuning.wp_jerk if tuning.wp_jerk > 0.0 else control.accel_max
-    control.pivoting = 0
-    control.reached = 0
-    control.have_target = 0
-    control.reversed = 0
 
 
 @njit(cache=True, nogil=True)
@@ -91,43 +67,6 @@ def restart_shaping(control: Any, estimate: Any) -> None:
     control.shaped_n, control.shaped_e = estimate.north_m, estimate.east_m
     control.shaped_vn, control.shaped_ve = estimate.vel_n, estimate.vel_e
     control.shaped_an, control.shaped_ae = estimate.accel_n, estimate.accel_e
-
-
-@njit(cache=True, nogil=True)
-def begin_target(control: Any, tuning: Any, estimate: Any, north_m: float, east_m: float) -> None:
-    """Take a new position target, metres from the EKF origin."""
-    control.dest_n = north_m
-    control.dest_e = east_m
-    control.reached = 0
-    control.arrived = 0
-    control.fresh_target = 1
-    control.task = WAYPOINT
-    if int(tuning.guided_options) & PLAN_FROM_REST:
-        restart_shaping(control, estimate)
-        control.shaped_vn = control.shaped_ve = control.shaped_an = control.shaped_ae = 0.0
-    check_pivot(control, tuning, estimate)
-
-
-@njit(cache=True, nogil=True)
-def shape_target(control: Any, tuning: Any, estimate: Any) -> None:
-    """Move the inner target one loop on, and see whether the rover has arrived."""
-    if control.tick - control.place_tick >= ACTIVE_TICKS:
-        restart_shaping(control, estimate)
-    control.shaped_n += control.shaped_vn * LOOP_S + 0.5 * control.shaped_an * LOOP_S * LOOP_S
-    control.shaped_e += control.shaped_ve * LOOP_S + 0.5 * control.shaped_ae * LOOP_S * LOOP_S
-    control.shaped_vn += control.shaped_an * LOOP_S
-    control.shaped_ve += control.shaped_ae * LOOP_S
-    accel_max = min(control.accel_max, tuning.turn_max_g * GRAVITY_M_S2)
-    control.shaped_an, control.shaped_ae = shaped_accel(
-        control.dest_n - control.shaped_n, control.dest_e - control.shaped_e,
-        control.shaped_vn, control.shaped_ve, control.shaped_an, control.shaped_ae,
-        control.speed_max, accel_max, control.jerk_max, LOOP_S,
-    )  # fmt: skip
-    control.place_valid = 1
-    if not control.reached:
-        left = math.hypot(control.dest_n - control.shaped_n, control.dest_e - control.shaped_e)
-        behind = math.hypot(control.shaped_n - estimate.north_m, control.shaped_e - estimate.east_m)
-        control.reached = 1 if left < ARRIVED_M and behind < tuning.wp_radius else 0
 
 
 @njit(cache=True, nogil=True)
@@ -180,20 +119,6 @@ def follow_shaped(control: Any, tuning: Any, estimate: Any) -> None:
 
 
 @njit(cache=True, nogil=True)
-def run_waypoint(control: Any, tuning: Any, estimate: Any) -> None:
-    """One loop of driving to the position target."""
-    if control.armed:
-        control.nav_tick = control.tick
-        if control.base_speed != control.speed_max and control.tick - control.speed_change_tick >= SPEED_CHANGE_TICKS:
-            control.speed_change_tick = control.tick
-            control.speed_max = control.base_speed
-        if not control.pivoting:
-            shape_target(control, tuning, estimate)
-        follow_shaped(control, tuning, estimate)
-    steer_waypoint(control, tuning, estimate)
-
-
-@njit(cache=True, nogil=True)
 def steer_waypoint(control: Any, tuning: Any, estimate: Any) -> None:
     """Throttle and steering after the inner target, or for turning on the spot."""
     if control.armed:
@@ -225,42 +150,3 @@ def run_throttle(control: Any, tuning: Any, estimate: Any, speed: float) -> None
         run_stop(control, tuning, estimate)
     else:
         run_speed(control, tuning, estimate, speed)
-
-
-@njit(cache=True, nogil=True)
-def run_heading_or_rate(control: Any, tuning: Any, estimate: Any) -> None:
-    """One loop of holding a heading or turn rate at a speed; stops when no new target comes in time."""
-    elapsed_s = (control.tick - control.target_tick) * LOOP_S
-    if control.have_target and elapsed_s > max(tuning.guided_timeout_s, 0.1):
-        control.have_target = 0
-        control.timed_out = 1
-    if not control.have_target:
-        run_stop(control, tuning, estimate)
-        control.steering = 0.0
-        return
-    rate = control.target_turn_rate
-    if control.task == HEADING:
-        rate = rate_to_heading(tuning, estimate, control.target_heading, 0.0)
-    run_steering(control, tuning, estimate, rate)
-    run_throttle(control, tuning, estimate, control.target_speed)
-
-
-@njit(cache=True, nogil=True)
-def run_control(control: Any, tuning: Any, estimate: Any) -> None:
-    """One main loop: from the task to motor outputs."""
-    if control.task == WAYPOINT and not control.reached:
-        run_waypoint(control, tuning, estimate)
-    elif control.task in (HEADING, TURN_RATE):
-        run_heading_or_rate(control, tuning, estimate)
-    elif control.task == COAST:
-        control.throttle, control.steering = control.stick_throttle, control.stick_steering
-    else:
-        if control.task == WAYPOINT and control.fresh_target:
-            control.fresh_target = 0
-            control.arrived = 1
-        run_stop(control, tuning, estimate)
-        control.steering = 0.0
-    run_motors(control, tuning, estimate)
-
-
-__all__ = ["approach_rate", "begin_guided", "begin_target", "run_control"]

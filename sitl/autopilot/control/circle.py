@@ -7,10 +7,10 @@ from typing import Any
 
 from numba import njit
 
-from sitl.autopilot.control import CIRCLE, LOOP_S
-from sitl.autopilot.guided import ACTIVE_TICKS, follow_shaped, restart_shaping, steer_waypoint
-from sitl.autopilot.shaping import limited, shaped_accel
-from sitl.autopilot.speed import GRAVITY_M_S2
+from sitl.autopilot.control.attitude_control import GRAVITY_M_S2
+from sitl.autopilot.control.pos_control import ACTIVE_TICKS, follow_shaped, restart_shaping, steer_waypoint
+from sitl.autopilot.control.records import CIRCLE, LOOP_S
+from sitl.autopilot.control.shaping import ShapingLimits, limited, shaped_accel
 
 EDGE_M = 0.5
 """So near to the edge the rover counts as being on the circle (or TURN_RADIUS, if that is more)."""
@@ -65,12 +65,14 @@ def move_on_circle(control: Any, tuning: Any, estimate: Any) -> None:
     control.shaped_e += control.shaped_ve * LOOP_S + 0.5 * control.shaped_ae * LOOP_S * LOOP_S
     control.shaped_vn += control.shaped_an * LOOP_S
     control.shaped_ve += control.shaped_ae * LOOP_S
+    accel_max = min(control.accel_max, tuning.turn_max_g * GRAVITY_M_S2)
     # Seen from the moving point the inner target comes to rest on it.
     gain_n, gain_e = shaped_accel(
-        control.dest_n + radius * out_n - control.shaped_n, control.dest_e + radius * out_e - control.shaped_e,
-        control.shaped_vn - vel_n, control.shaped_ve - vel_e,
-        beside_n, beside_e,
-        control.speed_max, min(control.accel_max, tuning.turn_max_g * GRAVITY_M_S2), control.jerk_max, LOOP_S,
-    )  # fmt: skip
+        (control.dest_n + radius * out_n - control.shaped_n, control.dest_e + radius * out_e - control.shaped_e),
+        (control.shaped_vn - vel_n, control.shaped_ve - vel_e),
+        (beside_n, beside_e),
+        ShapingLimits(control.speed_max, accel_max, control.jerk_max),
+        LOOP_S,
+    )
     control.shaped_an, control.shaped_ae = gain_n - inwards * out_n, gain_e - inwards * out_e
     control.place_valid = 1

@@ -11,8 +11,9 @@ from typing import Any
 
 from numba import njit
 
-from sitl.autopilot.control import LEG, LOOP_S, NEVER
-from sitl.autopilot.guided import (
+from sitl.autopilot.control.attitude_control import GRAVITY_M_S2, run_stop
+from sitl.autopilot.control.motors import has_steered_wheels
+from sitl.autopilot.control.pos_control import (
     ACTIVE_TICKS,
     PIVOT_ACCURACY_RAD,
     SPEED_CHANGE_TICKS,
@@ -21,8 +22,8 @@ from sitl.autopilot.guided import (
     follow_shaped,
     steer_waypoint,
 )
-from sitl.autopilot.motors import has_steered_wheels
-from sitl.autopilot.profile import (
+from sitl.autopilot.control.records import LEG, LOOP_S, NEVER
+from sitl.autopilot.control.scurve import (
     AHEAD_E,
     AHEAD_N,
     DONE,
@@ -35,10 +36,11 @@ from sitl.autopilot.profile import (
     ramp_s,
     top_speed,
 )
-from sitl.autopilot.speed import GRAVITY_M_S2, run_stop
+from sitl.autopilot.control.shaping import Vector
 
 BEFORE, THIS, NEXT = 0, 1, 2
 """Rows of ``control.legs``: the leg that still ends, the one under way, the one after it."""
+
 PACE_BUFFER = 0.05
 
 
@@ -72,10 +74,9 @@ def clear_leg(control: Any, row: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def begin_leg(
-    control: Any, tuning: Any, estimate: Any, to_n: float, to_e: float, after_n: float, after_e: float, onwards: bool
-) -> None:
-    """Drive to a place (metres from the EKF origin); ``onwards``: and from there to the next without stopping."""
+def begin_leg(control: Any, tuning: Any, estimate: Any, to: Vector, after: Vector, onwards: bool) -> None:
+    """Drive to a place (metres from the EKF origin); with ``onwards`` on to ``after`` without stopping there."""
+    (to_n, to_e), (after_n, after_e) = to, after
     control.halts = 0
     moving = control.task == LEG and control.tick - control.nav_tick < ACTIVE_TICKS and control.reached
     from_n, from_e = control.dest_n, control.dest_e

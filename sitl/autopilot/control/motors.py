@@ -7,9 +7,10 @@ from typing import Any
 
 from numba import njit
 
-from sitl.autopilot.control import COAST, GROUND_STEERING, LOOP_S, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
-from sitl.autopilot.shaping import limited
-from sitl.autopilot.speed import forward_speed
+from sitl.autopilot.control.attitude_control import forward_speed
+from sitl.autopilot.control.records import COAST, LOOP_S
+from sitl.autopilot.control.servo_outputs import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
+from sitl.autopilot.control.shaping import limited
 
 EVEN_MIX = 0.5
 """MOT_STR_THR_MIX: what does not fit is taken from throttle and steering alike."""

@@ -7,13 +7,26 @@ acceleration when large; a target is pulled along with limited speed, accelerati
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from numba import njit
 
 APPROACH_SHARE = 0.5
 """Share of the acceleration, and of the gain, with which a shaped approach to a place at rest is planned."""
+
 CORNER_SHARE = 1.0 / math.sqrt(2.0)
 """Share of the acceleration that stays available across the direction of travel."""
+
+Vector = tuple[float, float]
+"""North and east."""
+
+
+class ShapingLimits(NamedTuple):
+    """What a shaped target keeps to, in m/s, m/s^2 and m/s^3; a speed of 0 is no limit."""
+
+    speed_max: float
+    accel_max: float
+    jerk_max: float
 
 
 @njit(cache=True, nogil=True)
@@ -80,10 +93,11 @@ def corner_limited(
 
 @njit(cache=True, nogil=True)
 def shaped_accel(
-    error_n: float, error_e: float, speed_n: float, speed_e: float, accel_n: float, accel_e: float,
-    speed_max: float, accel_max: float, jerk_max: float, step_s: float,
-) -> tuple[float, float]:  # fmt: skip
-    """The next acceleration of a target that is pulled to a place at rest (position error, present motion)."""
+    error: Vector, speed: Vector, accel: Vector, limits: ShapingLimits, step_s: float
+) -> tuple[float, float]:
+    """The next acceleration of a target that is pulled to a place at rest; ``error``: metres to that place."""
+    (error_n, error_e), (speed_n, speed_e), (accel_n, accel_e) = error, speed, accel
+    speed_max, accel_max, jerk_max = limits
     gain = jerk_max / accel_max
     goal_n, goal_e = approach_vector(error_n, error_e, APPROACH_SHARE * gain, APPROACH_SHARE * accel_max, step_s)
     if speed_max > 0.0:
