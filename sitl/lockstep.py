@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from enum import StrEnum
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
@@ -67,12 +68,21 @@ class TrackPoint:
     part: str
 
 
+class Outcome(StrEnum):
+    """How a run ended; the values are those of ``--json``."""
+
+    REACHED = "reached"
+    INCOMPLETE = "incomplete"
+    COLLISION = "collision"
+    TIME_LIMIT = "time limit"
+
+
 @dataclass
 class Report:
     """What a lock-step run came to; ``as_json`` gives the documented keys."""
 
     seed: int
-    outcome: str = "time limit"
+    outcome: Outcome = Outcome.TIME_LIMIT
     targets: list[tuple[str, str]] = field(default_factory=list)
     steps: int = 0
     return_steps: int = 0
@@ -96,7 +106,7 @@ class Report:
         """0 all targets reached without a collision, 3 a target missed, 4 a collision."""
         if self.collisions:
             return 4
-        return 0 if self.outcome == "reached" else 3
+        return 0 if self.outcome is Outcome.REACHED else 3
 
     def as_json(self) -> dict[str, object]:
         """For ``--json``: everything but track and texts."""
@@ -175,6 +185,6 @@ class Drive:
         seconds = sorted(companion.outcome.step_seconds)
         report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0
         if report.collisions:
-            report.outcome = "collision"
+            report.outcome = Outcome.COLLISION
         elif companion.done:
-            report.outcome = "reached" if companion.outcome.complete else "incomplete"
+            report.outcome = Outcome.REACHED if companion.outcome.complete else Outcome.INCOMPLETE

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from sitl.autopilot.channel import Channel
-from sitl.faults.link_faults import Way
+from sitl.faults.link_faults import LinkQueue
 from sitl.faults.player import FaultPlayer
 
 MAGIC_1, MAGIC_2, SIGNED = 0xFE, 0xFD, 1
@@ -55,7 +55,7 @@ class SimLink:
         self.name = name
         self.inbox = bytearray()
         self.dropped = False
-        self.ways: tuple[Way, Way] | None = None
+        self.queues: tuple[LinkQueue, LinkQueue] | None = None
         """Where packets are under way to the vehicle and from it, on links with faults."""
         self.heard = PacketCounter()
         self.sent = PacketCounter()
@@ -68,7 +68,7 @@ class SimLink:
 
     def take(self) -> bytes:
         """What was sent to this link since the last call."""
-        if self.ways is None:
+        if self.queues is None:
             data = self.channel.take()
         else:
             data = bytes(self._arrived)
@@ -80,13 +80,13 @@ class SimLink:
         """What reaches the vehicle now."""
         data = bytes(self.inbox)
         self.inbox.clear()
-        if self.ways is None:
+        if self.queues is None:
             return data
-        player.pass_on(self.ways[0], data, now_s)
-        return self.ways[0].arrived(now_s)
+        player.pass_on(self.queues[0], data, now_s)
+        return self.queues[0].arrived(now_s)
 
     def pass_out(self, player: FaultPlayer, now_s: float) -> None:
         """What the vehicle has sent goes on its way, what was under way arrives."""
-        if self.ways is not None:
-            player.pass_on(self.ways[1], self.channel.take(), now_s)
-            self._arrived += self.ways[1].arrived(now_s)
+        if self.queues is not None:
+            player.pass_on(self.queues[1], self.channel.take(), now_s)
+            self._arrived += self.queues[1].arrived(now_s)

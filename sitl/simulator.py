@@ -19,7 +19,7 @@ from sitl.autopilot.signing import SECURE_PORT, StoredKey
 from sitl.autopilot.state import Storage
 from sitl.autopilot.traffic import Traffic
 from sitl.autopilot.vehicle import Vehicle
-from sitl.faults.link_faults import Way
+from sitl.faults.link_faults import LinkQueue
 from sitl.faults.plan import FaultPlan
 from sitl.faults.player import FaultPlayer
 from sitl.plant.main_loop import NOISE_COLUMNS, NoiseSettings, run_loops
@@ -182,7 +182,7 @@ class Simulator:
         number = next(n for n in range(1, len(taken) + 2) if n not in taken)
         link = SimLink(self._autopilot.open_channel(port), number, name)
         if self._player.touches_links:
-            link.ways = (Way(link.number, "to_vehicle"), Way(link.number, "from_vehicle"))
+            link.queues = (LinkQueue(link.number, "to_vehicle"), LinkQueue(link.number, "from_vehicle"))
         self._links.append(link)
         return link
 
@@ -223,7 +223,7 @@ class Simulator:
 
     def _receive(self) -> None:
         for link in self._links:
-            data = link.pass_in(self._player, self.time_s) if link.inbox or link.ways else b""
+            data = link.pass_in(self._player, self.time_s) if link.inbox or link.queues else b""
             if data and not self.is_off:
                 self._autopilot.receive(link.channel, data)
                 link.pass_out(self._player, self.time_s)
@@ -266,8 +266,8 @@ class Simulator:
         """When a fault begins or ends, power returns, or a packet that is late comes through."""
         due_s = min(self._player.due_s, self._off_until_s) if self.is_off else self._player.due_s
         for link in self._links:
-            if link.ways is not None:
-                due_s = min(due_s, link.ways[0].next_due_s(), link.ways[1].next_due_s())
+            if link.queues is not None:
+                due_s = min(due_s, link.queues[0].next_due_s(), link.queues[1].next_due_s())
         return due_s
 
     def _run(self, loops: int) -> None:

@@ -14,7 +14,7 @@ from sitl.autopilot.framing import Framer
 from sitl.autopilot.proximity import take_in
 from sitl.autopilot.routing import AUTOPILOT
 from sitl.autopilot.vehicle import Vehicle
-from sitl.sensors.range_sensors import Lidar, RangeSensing
+from sitl.sensors.range_sensors import Defect, Lidar, RangeSensing
 
 OBSTACLE_AVOIDANCE = 196
 
@@ -47,7 +47,7 @@ class Scanner:
         if time_us >= self._scan_us:
             self._scan_us = max(self._scan_us + self._interval_us, float(time_us - HEARTBEAT_US))
             cells = self._sensing.scan_cm(north_m, east_m, heading_rad)
-            if self._sensing.lidar_fault != "silent":
+            if self._sensing.lidar_fault is not Defect.SILENT:
                 self._waiting.append((time_us + self._late_us, cells))
         while self._waiting and self._waiting[0][0] <= time_us + 0.5:
             messages.append(self._message(time_us, self._waiting.popleft()[1]))

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
+from sitl.map_mission import field_at, mission_in_world, mission_on_map
 from sitl.scenario import Scenario
-from sitl.world.any_map import field_at, mission_in_world, mission_on_map
 from sitl.world.world_file import ground_grid
 
 

@@ -16,17 +16,17 @@ from companion.navigation.field_step import Decision, Part
 from sitl.cli.said import Said
 from sitl.cli.viewer import Viewer
 from sitl.lockstep import Drive, Report
-from sitl.view.sketch import Kind, Layer, Place, Scene
+from sitl.view.sketch import Kind, Layer, Place, PlaceState, Scene
 from sitl.view.view import Fact, Section, View
 from sitl.view.watching import Watching, world_layers
 
 STATES = {
-    TargetStatus.PENDING: "pending",
-    TargetStatus.REACHED: "reached",
-    TargetStatus.UNREACHABLE: "lost",
-    TargetStatus.SKIPPED: "lost",
+    TargetStatus.PENDING: PlaceState.PENDING,
+    TargetStatus.REACHED: PlaceState.REACHED,
+    TargetStatus.UNREACHABLE: PlaceState.LOST,
+    TargetStatus.SKIPPED: PlaceState.LOST,
 }
-PARTS = {"A": "returning", "B": "exploring", "C": "new path"}
+PARTS = {Part.RETURN: "returning", Part.EXPLORE: "exploring", Part.SEARCH: "new path"}
 
 
 def run_with_view(run: Drive, console: Console, pace: Callable[[float], None]) -> tuple[Report, Viewer]:
@@ -81,14 +81,14 @@ class DriveView:
     def _view(self, status: Status, now_s: float) -> View:
         watching = self._watching
         sections = (watching.vehicle_section(now_s), mission_section(status, self._run), watching.links_section())
-        return View(watching.title, self._scene(), sections, tuple(watching.news))
+        return View(watching.title, self._scene(), sections, tuple(watching.events))
 
     def _scene(self) -> Scene:
         """The truth faintly, and over it what the companion knows."""
         scene, simulator, companion = self._watching.scene(), self._run.simulator, self._run.companion
         evidence, progress = companion.evidence, companion.progress
         layers = world_layers(simulator.world, simulator.time_s, Kind.HIDDEN)
-        places = [place for place in scene.places if place.state == "start"]
+        places = [place for place in scene.places if place.state is PlaceState.START]
         if evidence is not None and progress is not None and companion.origin is not None:
             # An autopilot that has rebooted counts from where it did so, and with it the companion.
             north_m, east_m = self._run.scenario.start.place_of(companion.origin)
@@ -118,7 +118,7 @@ def mission_section(status: Status, run: Drive) -> Section:
     left = ""
     if goal is not None and status.pose is not None and status.target:
         left = f", {status.pose.point.distance_m(goal.point):.0f} m"
-    part = f"{decision.part.value}, {PARTS[decision.part.value]}" if decision else "-"
+    part = f"{decision.part.value}, {PARTS[decision.part]}" if decision else "-"
     searches = len(companion.driver.searcher.seconds) if companion.driver else 0
     facts = (
         Fact("doing", status.doing),

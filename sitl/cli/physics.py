@@ -19,11 +19,11 @@ from sitl.cli.serve import BAD_INPUT, say, stop_signals
 from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
 from sitl.firmware.parameter_files import ParameterFileError
 from sitl.firmware.physics import Physics
-from sitl.firmware.physics_news import PhysicsNews, summary
+from sitl.firmware.physics_log import PhysicsLog, summary
 from sitl.firmware.physics_server import open_port, run
 from sitl.network import ListenError
-from sitl.network.client import FORMS, ClientLink, open_link
-from sitl.network.told import ToldLink
+from sitl.network.client_log import LoggedLink
+from sitl.network.mavlink_client import FORMS, ClientLink, open_link
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission
 
 
@@ -61,12 +61,12 @@ def physics(
         raise typer.Exit(BAD_INPUT) from error
     tell = (lambda line: None) if quiet else say
     if link is not None and mavlink is not None:
-        link = ToldLink(link, mavlink, tell, lambda: behind.system)
+        link = LoggedLink(link, mavlink, tell, lambda: behind.system)
     for line in _greeting(behind, host, port, mavlink, write_params):
         tell(line)
     stop = stop_signals()
     try:
-        run(behind, listening, link, clock.now_s, lambda: not stop, PhysicsNews(behind, tell, clock.now_s).look)
+        run(behind, listening, link, clock.now_s, lambda: not stop, PhysicsLog(behind, tell, clock.now_s).look)
     finally:
         listening.close()
         if link is not None:

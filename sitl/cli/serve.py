@@ -20,7 +20,7 @@ from sitl.cli.equipment import equipped, simulated
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.faults.fault_file import FaultFileError
 from sitl.network import FORMS, Endpoint, ListenError, open_endpoint
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.network.server import serve as run_server
 from sitl.scenario import Scenario, ScenarioError
 from sitl.view.watching import Watching
@@ -61,9 +61,9 @@ def serve(
         simulator = scenario.simulator(seed)
         watching = Watching(name, simulator)
         tell = watching.tell if view else say
-        news = News() if quiet else News(tell, clock.now_s)
+        log = EventLog() if quiet else EventLog(tell, clock.now_s)
         for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
-            endpoints.append(open_endpoint(url, simulator, news, serial_port))
+            endpoints.append(open_endpoint(url, simulator, log, serial_port))
     except (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ViewError) as error:
         for endpoint in endpoints:
             endpoint.close()
@@ -77,7 +77,7 @@ def serve(
     stop = stop_signals()
     try:
         with _viewed(console, watching, clock) as observe:
-            run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, news, observe)
+            run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, log, observe)
     finally:
         for endpoint in endpoints:
             endpoint.close()

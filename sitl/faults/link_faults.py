@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sitl.autopilot.framing import BEGINNING, packet_size
-from sitl.faults.plan import Direction, LinkFault
+from sitl.faults.plan import Direction, LinkEffect, LinkFault
 
 WORST_BYTES = 3
 """A damaged packet has one to so many wrong bytes."""
@@ -47,7 +47,7 @@ class Packets:
 
 
 @dataclass
-class Way:
+class LinkQueue:
     """One direction of one link: packets under way, and how late the last one in order is."""
 
     link: int
@@ -69,16 +69,16 @@ class Way:
         copies, lateness_s, overtaken_s = 1, 0.0, 0.0
         for fault, rng in faults:
             struck = bool(rng.random() < fault.probability)
-            if fault.what == "delay":
+            if fault.effect is LinkEffect.DELAY:
                 jitter_s = fault.jitter_s * float(rng.random())
                 lateness_s += fault.delay_s + jitter_s if struck else 0.0
             elif not struck:
                 continue
-            elif fault.what in ("loss", "outage"):
+            elif fault.effect in (LinkEffect.LOSS, LinkEffect.OUTAGE):
                 return
-            elif fault.what == "duplicate":
+            elif fault.effect is LinkEffect.DUPLICATE:
                 copies += 1
-            elif fault.what == "reorder":
+            elif fault.effect is LinkEffect.REORDER:
                 overtaken_s += fault.delay_s
             else:
                 packet = damaged(packet, rng)

@@ -8,7 +8,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from typing import Literal
+
+from sitl.sensors.range_sensors import Defect
+
+
+class LinkEffect(Enum):
+    """What a link fault does to a packet."""
+
+    LOSS = "loss"
+    DELAY = "delay"
+    REORDER = "reorder"
+    DUPLICATE = "duplicate"
+    CORRUPT = "corrupt"
+    OUTAGE = "outage"
+
 
 Since = Literal["boot", "driving"]
 Direction = Literal["both", "to_vehicle", "from_vehicle"]
@@ -48,7 +63,7 @@ class LinkFault(Fault):
     ``links``: numbers of links from 1, empty for all.
     """
 
-    what: Literal["loss", "delay", "reorder", "duplicate", "corrupt", "outage"] = "loss"
+    effect: LinkEffect = LinkEffect.LOSS
     probability: float = 1.0
     delay_s: float = 0.0
     jitter_s: float = 0.0
@@ -105,7 +120,7 @@ class SensorFault(Fault):
     ``beams``: numbers of the suite's rangefinders from 1; empty for all, and for the lidar.
     """
 
-    what: Literal["stuck", "stuck in view", "silent"] = "silent"
+    defect: Defect = Defect.SILENT
     beams: tuple[int, ...] = ()
 
 

@@ -16,7 +16,7 @@ from sitl.autopilot.modes import apply_sticks, set_mode, tell_of_ekf
 from sitl.autopilot.start_up import HOME_S, ORIGIN_S, POSITION_S
 from sitl.autopilot.state import Mode, Sticks
 from sitl.autopilot.vehicle import Vehicle
-from sitl.faults.link_faults import Active, Way
+from sitl.faults.link_faults import Active, LinkQueue
 from sitl.faults.plan import (
     BatteryLow,
     Fault,
@@ -152,7 +152,7 @@ class FaultPlayer:
     def _apply(self, vehicle: Vehicle, rover: Record, sensing: RangeSensing) -> None:
         """Everything that is simply there or not."""
         grips = [1.0, 1.0]
-        lidar: Defect = ""
+        lidar: Defect | None = None
         beams: dict[int, Defect] = {}
         volts = math.inf
         for _, fault in self._present():
@@ -161,9 +161,9 @@ class FaultPlayer:
                     for side, name in enumerate(("left", "right")):
                         grips[side] *= 1.0 - fault.share if fault.side in ("both", name) else 1.0
                 case SensorFault():
-                    lidar = lidar if fault.beams else fault.what
+                    lidar = lidar if fault.beams else fault.defect
                     numbers = [number - 1 for number in fault.beams] or sensing.numbers()
-                    beams |= dict.fromkeys(numbers, fault.what)
+                    beams |= dict.fromkeys(numbers, fault.defect)
                 case BatteryLow():
                     volts = min(volts, fault.volts)
                 case _:
@@ -236,9 +236,9 @@ class FaultPlayer:
 
     # Links -----------------------------------------------------------------------------------------------------------
 
-    def pass_on(self, way: Way, data: bytes, now_s: float) -> None:
-        """Put bytes on their way through a link with its faults."""
-        way.pass_on(data, now_s, lambda fault: self.is_active(fault, now_s), self._links)
+    def pass_on(self, queue: LinkQueue, data: bytes, now_s: float) -> None:
+        """Put bytes on their queue through a link with its faults."""
+        queue.pass_on(data, now_s, lambda fault: self.is_active(fault, now_s), self._links)
 
 
 def _hold_sticks(vehicle: Vehicle, sticks: Sticks) -> None:

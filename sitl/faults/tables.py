@@ -15,6 +15,7 @@ from sitl.faults.plan import (
     GpsGlitch,
     GpsLoss,
     GpsNoise,
+    LinkEffect,
     LinkFault,
     PilotTakesOver,
     Reboot,
@@ -22,6 +23,7 @@ from sitl.faults.plan import (
     Since,
     WheelSlip,
 )
+from sitl.sensors.range_sensors import Defect
 
 REBOOT_S = 3.0
 OVERTAKEN_S = 0.2
@@ -73,10 +75,10 @@ class OnLink(FaultTable):
     links: Numbers = [1]
     """Replaced by all links where a plan names none."""
 
-    def link_fault(self, what: Any, **strength: Any) -> LinkFault:
+    def link_fault(self, effect: LinkEffect, **strength: Any) -> LinkFault:
         """The fault on the links that are meant."""
         links = tuple(self.links) if "links" in self.model_fields_set else ()
-        return LinkFault(**self.window(), what=what, direction=self.direction, links=links, **strength)
+        return LinkFault(**self.window(), effect=effect, direction=self.direction, links=links, **strength)
 
 
 class Loss(OnLink):
@@ -86,7 +88,7 @@ class Loss(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("loss", probability=self.probability)
+        return self.link_fault(LinkEffect.LOSS, probability=self.probability)
 
 
 class Delay(OnLink):
@@ -98,7 +100,9 @@ class Delay(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("delay", probability=self.probability, delay_s=self.delay_s, jitter_s=self.jitter_s)
+        return self.link_fault(
+            LinkEffect.DELAY, probability=self.probability, delay_s=self.delay_s, jitter_s=self.jitter_s
+        )
 
 
 class Reorder(OnLink):
@@ -109,7 +113,7 @@ class Reorder(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("reorder", probability=self.probability, delay_s=self.delay_s)
+        return self.link_fault(LinkEffect.REORDER, probability=self.probability, delay_s=self.delay_s)
 
 
 class Duplicate(OnLink):
@@ -119,7 +123,7 @@ class Duplicate(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("duplicate", probability=self.probability)
+        return self.link_fault(LinkEffect.DUPLICATE, probability=self.probability)
 
 
 class Corrupt(OnLink):
@@ -129,7 +133,7 @@ class Corrupt(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("corrupt", probability=self.probability)
+        return self.link_fault(LinkEffect.CORRUPT, probability=self.probability)
 
 
 class Outage(OnLink):
@@ -137,7 +141,7 @@ class Outage(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("outage")
+        return self.link_fault(LinkEffect.OUTAGE)
 
 
 class RebootTable(FaultTable):
@@ -202,8 +206,8 @@ class Stuck(FaultTable):
 
     def fault(self) -> Fault:
         """As a value."""
-        what: Literal["stuck", "stuck in view"] = "stuck in view" if self.in_view else "stuck"
-        return SensorFault(**self.window(), what=what, beams=tuple(self.beams or ()))
+        defect = Defect.STUCK_IN_VIEW if self.in_view else Defect.STUCK
+        return SensorFault(**self.window(), defect=defect, beams=tuple(self.beams or ()))
 
 
 class Silent(FaultTable):
@@ -213,7 +217,7 @@ class Silent(FaultTable):
 
     def fault(self) -> Fault:
         """As a value."""
-        return SensorFault(**self.window(), what="silent", beams=tuple(self.beams or ()))
+        return SensorFault(**self.window(), defect=Defect.SILENT, beams=tuple(self.beams or ()))
 
 
 class SlipTable(FaultTable):

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from enum import Enum, auto
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -75,6 +76,16 @@ class Tally:
     """Firmware starts."""
 
 
+class FrameKind(Enum):
+    """What a frame is, compared with the last one."""
+
+    START = auto()
+    NEXT = auto()
+    REPEATED = auto()
+    LATE = auto()
+    STRANGER = auto()
+
+
 class Motion(NamedTuple):
     """Where the rover is and how it moves, world frame."""
 
@@ -131,17 +142,17 @@ class Physics:
             self.tally.bad += 1
             return b""
         kind = self._kind(frame, sender)
-        if kind == "stranger":
+        if kind is FrameKind.STRANGER:
             self.tally.strangers += 1
             return b""
-        if kind == "late":
+        if kind is FrameKind.LATE:
             self.tally.late += 1
             return b""
         self._sender = sender
-        if kind == "repeated":
+        if kind is FrameKind.REPEATED:
             self.tally.repeated += 1
             return self._answer
-        if kind == "start":
+        if kind is FrameKind.START:
             self.tally.starts += 1
             self._begin()
         elif self._last is not None:
@@ -150,19 +161,19 @@ class Physics:
         self._answer = self._stepped(frame)
         return self._answer
 
-    def _kind(self, frame: ServoFrame, sender: object) -> Literal["start", "next", "repeated", "late", "stranger"]:
+    def _kind(self, frame: ServoFrame, sender: object) -> FrameKind:
         """What a frame is after the last one. A firmware counts from 0, and one that goes on where it was may have moved."""
         if self._last is None:
-            return "start"
+            return FrameKind.START
         ahead = (frame.count - self._last.count) % COUNTS
         moved = sender != self._sender
         if frame.count == 0 and ahead != 1 and (moved or ahead != 0):
-            return "start"
+            return FrameKind.START
         if ahead == 0:
-            return "repeated"
+            return FrameKind.REPEATED
         if moved and ahead != 1:
-            return "stranger"
-        return "next" if ahead <= COUNTS // 2 else "late"
+            return FrameKind.STRANGER
+        return FrameKind.NEXT if ahead <= COUNTS // 2 else FrameKind.LATE
 
     def rehearse(self) -> None:
         """Take one step and forget it: compiles what is not compiled yet, before anybody waits for an answer."""

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from sitl.firmware.physics import Physics
 from sitl.network import ListenError
-from sitl.network.client import ClientLink
+from sitl.network.mavlink_client import ClientLink
 
 WAIT_S = 0.2
 """How often it looks whether it shall end, and after its MAVLink line, when the firmware says nothing."""

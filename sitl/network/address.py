@@ -6,7 +6,7 @@ import errno
 import os
 
 from sitl.network.endpoint import Endpoint, ListenError, network_address
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.network.serial import DEFAULT_BAUD, HIGHEST_BAUD, Device, PseudoTerminal, SerialEndpoint
 from sitl.network.tcp import TcpServer
 from sitl.network.udp import UdpEndpoint
@@ -20,21 +20,21 @@ REMEDIES = {
 }
 
 
-def open_endpoint(url: str, simulator: Simulator, news: News | None = None, serial_port: int = 0) -> Endpoint:
+def open_endpoint(url: str, simulator: Simulator, log: EventLog | None = None, serial_port: int = 0) -> Endpoint:
     """Open one of ``FORMS``; whoever connects comes through the vehicle's serial port ``serial_port`` (SERIALn).
 
     ``tcp`` listens, ``udpout`` sends first, ``udpin`` waits, ``serial`` is a device, ``pty`` makes a pseudo-terminal and a link
-    to it. ``news`` is told who comes and goes. Raises ListenError.
+    to it. ``log`` is told who comes and goes. Raises ListenError.
     """
     kind, _, place = url.partition(":")
-    news = news or News()
+    log = log or EventLog()
     try:
         if kind in ("serial", "pty") and place:
             return SerialEndpoint(_line(kind, place), simulator, serial_port)
         host, port = network_address(url, FORMS)
         if kind == "tcp":
-            return TcpServer(host, port, news, serial_port)
-        return UdpEndpoint(host, port, kind == "udpin", simulator, news, serial_port)
+            return TcpServer(host, port, log, serial_port)
+        return UdpEndpoint(host, port, kind == "udpin", simulator, log, serial_port)
     except (OSError, ValueError) as error:
         number = getattr(error, "errno", None)
         # pyserial puts the path and the number of the error into its text as well.

@@ -6,7 +6,7 @@ import select
 from collections.abc import Callable
 
 from sitl.network import Endpoint
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.simulator import Simulator
 
 STEP_S = 0.02
@@ -20,14 +20,14 @@ def serve(
     now_s: Callable[[], float],
     speedup: float,
     running: Callable[[], bool],
-    news: News | None = None,
+    log: EventLog | None = None,
     observe: Callable[[], None] = lambda: None,
 ) -> None:
     """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no.
 
-    ``news`` tells of it; ``observe`` is called in every round, and must not take long.
+    ``log`` tells of it; ``observe`` is called in every round, and must not take long.
     """
-    news = news or News()
+    log = log or EventLog()
     began_s = now_s() - simulator.time_s / speedup
     while running():
         _exchange(simulator, endpoints, now_s())
@@ -37,7 +37,7 @@ def serve(
             goal_s = simulator.time_s + STEP_S
         simulator.advance_to_s(goal_s)
         _exchange(simulator, endpoints, now_s())
-        news.look(simulator)
+        log.look(simulator)
         observe()
         wait_s = (simulator.time_s + STEP_S) / speedup + began_s - now_s()
         if wait_s > 0.0:

@@ -7,7 +7,7 @@ import socket
 from dataclasses import dataclass, field
 
 from sitl.network.endpoint import BACKLOG_BYTES, READ_BYTES, place_text
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.sim_link import SimLink
 from sitl.simulator import Simulator
 
@@ -56,10 +56,10 @@ class TcpClient:
 class TcpServer:
     """Listens on one port; every client has a link of its own."""
 
-    def __init__(self, host: str, port: int, news: News, serial_port: int) -> None:
+    def __init__(self, host: str, port: int, log: EventLog, serial_port: int) -> None:
         """Raises OSError when the port is in use."""
         self._url = f"tcp:{host}:{port}"
-        self._news = news
+        self._log = log
         self._serial_port = serial_port
         self._clients: list[TcpClient] = []
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -87,11 +87,11 @@ class TcpServer:
                 name = place_text(place)
                 link = simulator.connect(self._serial_port, f"tcp:{name}")
                 self._clients.append(TcpClient(caller, link, name))
-                self._news.came(self._clients[-1].name, self._url)
+                self._log.connected(self._clients[-1].name, self._url)
         for client in self._clients:
             client.exchange()
             if client.gone or client.link.dropped:
-                self._news.left(client.name, self._url, dropped=not client.gone)
+                self._log.disconnected(client.name, self._url, dropped=not client.gone)
                 simulator.disconnect(client.link)
                 client.socket.close()
         self._clients = [client for client in self._clients if not (client.gone or client.link.dropped)]

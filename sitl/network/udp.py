@@ -7,7 +7,7 @@ import socket
 from dataclasses import dataclass
 
 from sitl.network.endpoint import READ_BYTES, datagrams, place_text
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.sim_link import SimLink
 from sitl.simulator import Simulator
 
@@ -30,10 +30,12 @@ class Partner:
 class UdpEndpoint:
     """Every partner has a link of its own; with ``listens`` they come by themselves, else there is just the one."""
 
-    def __init__(self, host: str, port: int, listens: bool, simulator: Simulator, news: News, serial_port: int) -> None:
+    def __init__(
+        self, host: str, port: int, listens: bool, simulator: Simulator, log: EventLog, serial_port: int
+    ) -> None:
         """Raises OSError when the address cannot be used."""
         self._url = f"{'udpin' if listens else 'udpout'}:{host}:{port}"
-        self._news = news
+        self._log = log
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         self._listens = listens
@@ -63,7 +65,7 @@ class UdpEndpoint:
                 break
             except OSError:  # a partner's port is closed; it may open again
                 continue
-            self._news.heard(place_text(sender), self._url)
+            self._log.heard(place_text(sender), self._url)
             self._partner(sender, simulator, now_s).link.receive(data)
         self._forget_silent(simulator, now_s)
         for address, partner in self._partners.items():

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from enum import Enum, auto
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,8 +33,12 @@ def spread_rad(middle_deg: NDArray[np.float64], width_deg: float, rays: int) -> 
     return np.asarray(np.radians(middle_deg[:, None] + spread[None, :] * width_deg), dtype=np.float64)
 
 
-Defect = Literal["", "stuck", "stuck in view", "silent"]
-"""What is wrong with a sensor: it repeats its last reading, or gives none."""
+class Defect(Enum):
+    """What is wrong with a sensor: it repeats its last reading, its first reading that shows something, or gives none."""
+
+    STUCK = auto()
+    STUCK_IN_VIEW = auto()
+    SILENT = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,7 +145,7 @@ class RangeSensing:
         self.suite = suite
         self.time_s = 0.0
         """The world's time at which is measured; the simulator keeps it."""
-        self.lidar_fault: Defect = ""
+        self.lidar_fault: Defect | None = None
         self.beam_faults: dict[int, Defect] = {}
         """What is wrong with which rangefinder or proximity sector, by the number it is told with."""
         self._last_scan_cm: list[int] = []
@@ -232,11 +237,11 @@ class RangeSensing:
         """Without what silent rangefinders say; a stuck one says again what it said last."""
         told = []
         for reading in readings:
-            fault = self.beam_faults.get(reading.number, "")
+            fault = self.beam_faults.get(reading.number)
             last = self._last_readings.get(reading.number, reading)
             if _repeats(fault, last.range_cm < last.max_cm):
                 told.append(last)
-            elif fault != "silent":
+            elif fault is not Defect.SILENT:
                 self._last_readings[reading.number] = reading
                 told.append(reading)
         return told
@@ -259,9 +264,9 @@ class RangeSensing:
         return self._rng.standard_normal(count) * self._noise_m
 
 
-def _repeats(defect: Defect, in_view: bool) -> bool:
+def _repeats(defect: Defect | None, in_view: bool) -> bool:
     """Whether a sensor says its last reading again; ``in_view``: whether that shows something."""
-    return defect == "stuck" or (defect == "stuck in view" and in_view)
+    return defect is Defect.STUCK or (defect is Defect.STUCK_IN_VIEW and in_view)
 
 
 def _sampler(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum, auto
 from typing import NamedTuple
 
 import numpy as np
@@ -62,14 +62,23 @@ class Disc(NamedTuple):
     radius_m: float
 
 
+class PlaceState(Enum):
+    """What a place is, or what has become of a target."""
+
+    PENDING = auto()
+    REACHED = auto()
+    LOST = auto()
+    START = auto()
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place with a name: a target, the start. ``state``: pending, reached or lost."""
+    """A place with a name: the start or a target."""
 
     name: str
     north_m: float
     east_m: float
-    state: str = "pending"
+    state: PlaceState = PlaceState.PENDING
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
+from typing import NamedTuple
 
 from rich.console import Group, RenderableType
 from rich.layout import Layout
@@ -18,7 +19,7 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from sitl.view.sketch import Dots, Frame, Kind, Scene, frame_for, paint
+from sitl.view.sketch import Dots, Frame, Kind, PlaceState, Scene, frame_for, paint
 
 PANEL_COLUMNS = (32, 44)
 """At least and at most; between them a third of the terminal."""
@@ -29,9 +30,22 @@ LEGEND_SHARE = 4
 """Of the map's rows, the legend takes at most one in so many."""
 
 ARROWS = "↑↗→↘↓↙←↖"
-STATE_SIGNS = {"pending": "◎", "reached": "✓", "lost": "✗", "start": "⌂"}
-STATE_NAMES = {"pending": "target", "reached": "reached", "lost": "given up", "start": "start"}
-STATE_STYLES = {"pending": "bold #ff5f5f", "reached": "bold #5fd75f", "lost": "bold #ffaf00", "start": "bold #5fd75f"}
+
+
+class PlaceLook(NamedTuple):
+    """How a place looks: its sign, its name in the legend, its style."""
+
+    sign: str
+    name: str
+    style: str
+
+
+PLACE_LOOKS = {
+    PlaceState.PENDING: PlaceLook("◎", "target", "bold #ff5f5f"),
+    PlaceState.REACHED: PlaceLook("✓", "reached", "bold #5fd75f"),
+    PlaceState.LOST: PlaceLook("✗", "given up", "bold #ffaf00"),
+    PlaceState.START: PlaceLook("⌂", "start", "bold #5fd75f"),
+}
 ROVER_STYLE = "bold #000000 on #ffd700"
 
 
@@ -80,12 +94,12 @@ class Section:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class View:
-    """The state that is shown. ``news``: what was told, the newest last."""
+    """The state that is shown. ``events``: what was told, the newest last."""
 
     title: str
     scene: Scene
     sections: tuple[Section, ...]
-    news: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
 
 
 def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableType:
@@ -154,7 +168,7 @@ def _character(upper: Kind, lower: Kind, *, colour: bool) -> tuple[str, str]:
 def _marks(scene: Scene, frame: Frame) -> dict[int, dict[int, tuple[str, str]]]:
     """Signs that take a whole character, and their styles, by row and column of characters; the rover is on top."""
     marks: dict[int, dict[int, tuple[str, str]]] = {}
-    signs = [(one.north_m, one.east_m, STATE_SIGNS[one.state], STATE_STYLES[one.state]) for one in scene.places]
+    signs = [(one.north_m, one.east_m, *PLACE_LOOKS[one.state][::2]) for one in scene.places]
     signs.append((scene.rover.north_m, scene.rover.east_m, arrow(scene.heading_rad), ROVER_STYLE))
     for north_m, east_m, sign, style in signs:
         where = frame.dot(north_m, east_m)
@@ -170,7 +184,7 @@ def arrow(heading_rad: float) -> str:
 
 def _legend(scene: Scene, frame: Frame, dots: Dots, columns: int, *, colour: bool) -> list[Text]:
     """What the signs and colours mean that the map shows, the most important first, in as many lines as it takes."""
-    entries = [Text(f"{STATE_SIGNS[state]} {name}", no_wrap=True) for state, name in _states_shown(scene, frame)]
+    entries = [Text(f"{look.sign} {look.name}", no_wrap=True) for look in _places_shown(scene, frame)]
     there = set(dots.ravel().tolist())
     for kind, look in sorted(LOOKS.items(), reverse=True):
         if look.name and kind in there:
@@ -187,14 +201,14 @@ def _legend(scene: Scene, frame: Frame, dots: Dots, columns: int, *, colour: boo
     return lines or [Text()]
 
 
-def _states_shown(scene: Scene, frame: Frame) -> list[tuple[str, str]]:
-    """The states of places in sight, and what they are called."""
+def _places_shown(scene: Scene, frame: Frame) -> list[PlaceLook]:
+    """The looks of the places in sight."""
     there = {one.state for one in scene.places if frame.dot(one.north_m, one.east_m) is not None}
-    return [(state, name) for state, name in STATE_NAMES.items() if state in there]
+    return [look for state, look in PLACE_LOOKS.items() if state in there]
 
 
 def _facts(view: View, columns: int, rows: int) -> Table:
-    """All sections, long facts whole where there is room for more than a line each, then as much of the news as still fits."""
+    """All sections, long facts whole where there is room for more than a line each, then as much of the events as still fits."""
     table = Table.grid()
     table.add_column(width=columns, no_wrap=True, overflow="ellipsis")
     room = rows
@@ -208,9 +222,9 @@ def _facts(view: View, columns: int, rows: int) -> Table:
         for line in lines[: max(room, 0)]:
             table.add_row(line)
         room -= len(lines)
-    if room > 1 and view.news:
-        table.add_row(Text("News", "bold"))
-        for text in _newest(view.news, columns, room - 1):
+    if room > 1 and view.events:
+        table.add_row(Text("Events", "bold"))
+        for text in _newest(view.events, columns, room - 1):
             table.add_row(text)
     return table
 
@@ -234,10 +248,10 @@ def _told(fact: Fact, columns: int, most: int) -> list[Text]:
     return lines
 
 
-def _newest(news: Iterable[str], columns: int, rows: int) -> list[Text]:
+def _newest(events: Iterable[str], columns: int, rows: int) -> list[Text]:
     """The last lines that fit, broken where they are too long; a text that does not fit whole is left out."""
     lines: list[Text] = []
-    for text in reversed(tuple(news)):
+    for text in reversed(tuple(events)):
         wrapped = _wrapped(text, columns)
         if len(lines) + len(wrapped) > rows:
             return lines

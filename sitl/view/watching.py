@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from sitl.autopilot.control.records import LEG, WAYPOINT
 from sitl.autopilot.vehicle import Vehicle
 from sitl.simulator import Simulator
-from sitl.view.sketch import Disc, Kind, Layer, Place, Scene
+from sitl.view.sketch import Disc, Kind, Layer, Place, PlaceState, Scene
 from sitl.view.view import Fact, Section, View
 from sitl.world.world import World
 
 TRACK_STEP_M = 0.2
 TRACK_POINTS = 20_000
-NEWS_KEPT = 50
+EVENTS_KEPT = 50
 RATE_SPAN_S = 2.0
 """Rates are counted over so many seconds of the rover's time, at least."""
 
@@ -54,7 +54,7 @@ class _Being:
         self._mode = vehicle.mode.name
         self._armed = "armed" if vehicle.armed else "disarmed"
 
-    def news_since(self, was: _Being) -> Iterator[str]:
+    def events_since(self, was: _Being) -> Iterator[str]:
         """What has changed, a line each."""
         if self._is_off:
             if not was._is_off:
@@ -74,27 +74,27 @@ class Watching:
 
     title: str
     simulator: Simulator
-    news: deque[str] = field(default_factory=lambda: deque(maxlen=NEWS_KEPT))
+    events: deque[str] = field(default_factory=lambda: deque(maxlen=EVENTS_KEPT))
     _track: array[float] = field(default_factory=lambda: array("d"))
     _rates: Rates = field(default_factory=Rates)
     _began: tuple[float, float] | None = None
     _was: _Being | None = None
 
     def tell(self, line: str) -> None:
-        """A line for the news."""
-        self.news.append(line)
+        """A line for the events."""
+        self.events.append(line)
 
     def view(self, now_s: float) -> View:
         """What there is to see at a moment (real seconds)."""
         sections = (self.vehicle_section(now_s), self.links_section())
-        return View(self.title, self.scene(), sections, tuple(self.news))
+        return View(self.title, self.scene(), sections, tuple(self.events))
 
     def scene(self) -> Scene:
         """The truth: world, rover and track."""
         simulator, truth = self.simulator, self.simulator.truth
         self.note()
         world = simulator.world
-        start = Place("start", simulator.start.north_m, simulator.start.east_m, "start")
+        start = Place("start", simulator.start.north_m, simulator.start.east_m, PlaceState.START)
         return Scene(
             layers=world_layers(world, simulator.time_s),
             rover=Disc(truth.north_m, truth.east_m, simulator.rover_radius_m),
@@ -116,7 +116,7 @@ class Watching:
         simulator = self.simulator
         was, now = self._was, _Being(simulator.vehicle, simulator.is_off)
         self._was = now
-        for line in now.news_since(was) if was else ():
+        for line in now.events_since(was) if was else ():
             self.tell(f"{simulator.time_s:.0f} s: {line}")
 
     def _note_track(self) -> None:

@@ -22,6 +22,7 @@ from sitl.faults.plan import (
     SensorFault,
     WheelSlip,
 )
+from sitl.sensors.range_sensors import Defect
 from sitl.simulator import Simulator
 from sitl.world.truth import SimStart
 from sitl.world.world import World
@@ -451,7 +452,7 @@ def towards_a_wall(suite: str, *faults: Fault, north_m: int = 6) -> Client:
 
 
 def test_a_silent_lidar_keeps_its_heartbeat() -> None:
-    client = towards_a_wall("lidar-90", SensorFault(46.0, 50.0, what="silent"))
+    client = towards_a_wall("lidar-90", SensorFault(46.0, 50.0, defect=Defect.SILENT))
     scans = []
     while client.simulator.time_s < 54.0:
         scans += [client.simulator.time_s for m in client.run_for(0.1) if m.get_type() == "OBSTACLE_DISTANCE"]
@@ -462,7 +463,7 @@ def test_a_silent_lidar_keeps_its_heartbeat() -> None:
 
 
 def test_a_stuck_lidar_repeats_itself() -> None:
-    client = towards_a_wall("lidar-90", SensorFault(46.0, 50.0, what="stuck"))
+    client = towards_a_wall("lidar-90", SensorFault(46.0, 50.0, defect=Defect.STUCK))
     client.run_to(46.2)
     client.received.clear()
     client.run_to(49.9)
@@ -473,9 +474,9 @@ def test_a_stuck_lidar_repeats_itself() -> None:
     assert len({tuple(m.distances) for m in client.of("OBSTACLE_DISTANCE")}) > 20
 
 
-@pytest.mark.parametrize("what", ["stuck", "stuck in view"])
-def test_a_lidar_that_is_stuck_in_view_shows_something_for_ever(what: Any) -> None:
-    client = towards_a_wall("lidar-90", SensorFault(46.0, what=what), north_m=9)
+@pytest.mark.parametrize("defect", [Defect.STUCK, Defect.STUCK_IN_VIEW])
+def test_a_lidar_that_is_stuck_in_view_shows_something_for_ever(defect: Defect) -> None:
+    client = towards_a_wall("lidar-90", SensorFault(46.0, defect=defect), north_m=9)
     client.received.clear()
     for _ in range(6):
         client.drive_at(0.5)
@@ -483,12 +484,12 @@ def test_a_lidar_that_is_stuck_in_view_shows_something_for_ever(what: Any) -> No
     scans = [tuple(m.distances) for m in client.of("OBSTACLE_DISTANCE")]
     nothing, *shown = [scan for number, scan in enumerate(scans) if not number or scan != scans[number - 1]]
     assert min(nothing) == 451
-    assert [min(scan) <= 450 for scan in shown] == ([True] if what == "stuck in view" else [])
+    assert [min(scan) <= 450 for scan in shown] == ([True] if defect is Defect.STUCK_IN_VIEW else [])
     assert len(scans) > 80
 
 
 def test_single_beams_fail_on_their_own() -> None:
-    faults = (SensorFault(45.0, what="silent", beams=(1,)), SensorFault(45.0, what="stuck", beams=(3,)))
+    faults = (SensorFault(45.0, defect=Defect.SILENT, beams=(1,)), SensorFault(45.0, defect=Defect.STUCK, beams=(3,)))
     client = towards_a_wall("beams", *faults)
     client.command(511, 132, 100_000)
     client.run_to(45.3)

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint
 from sitl.firmware.physics import LONGEST_STEP_S, Physics, servo_output
-from sitl.firmware.physics_news import PhysicsNews, summary
+from sitl.firmware.physics_log import PhysicsLog, summary
 from sitl.plant.rover import SPEED_LAG_S, TOP_SPEED_M_S, TURN_RATE_RAD_S, WHEEL_MOST_RAD, WHEEL_RATE_RAD_S
 from sitl.sensors.range_flaws import Flaws
 from sitl.sensors.range_sensors import SUITES, Beam, SensorSuite
@@ -448,8 +448,8 @@ def test_news_are_told_once_and_summed_up() -> None:
     behind = physics(walled())
     said: list[str] = []
     now_s = 0.0
-    news = PhysicsNews(behind, said.append, lambda: now_s)
-    news.look()
+    log = PhysicsLog(behind, said.append, lambda: now_s)
+    log.look()
     assert said == []
     one = firmware(behind)
     while len(behind.collisions) < 1:
@@ -459,8 +459,8 @@ def test_news_are_told_once_and_summed_up() -> None:
     behind.answer(frame(5), "another")
     one.count += 2
     one.update()
-    news.look()
-    news.look()
+    log.look()
+    log.look()
     assert [line.split(";")[0].split(":")[0] for line in said] == [
         "the firmware has started and is answered",
         "something that is no frame of ArduPilot's JSON interface came",
@@ -473,5 +473,5 @@ def test_news_are_told_once_and_summed_up() -> None:
         f"since the firmware's last start {behind.time_s:.0f} s and 1 collision"
     )
     behind.answer(frame(0, 1500, 1500))
-    news.look()
+    log.look()
     assert said[-1].startswith("the firmware has started again")

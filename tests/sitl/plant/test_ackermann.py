@@ -29,17 +29,7 @@ def car(radius_m: float = RADIUS_M, **changes: float) -> Simulator:
 
 def pushed(rover, servo_1: float, servo_3: float, seconds: float, step_s: float = 0.005):
     for _ in range(round(seconds / step_s)):
-        drive(
-            rover[0],
-            OPEN.obstacles,
-            OPEN.south_m,
-            OPEN.west_m,
-            OPEN.resolution_m,
-            OPEN.ground,
-            servo_1,
-            servo_3,
-            step_s,
-        )
+        drive(rover[0], OPEN.surroundings(0.0), servo_1, servo_3, step_s)
     return rover[0]
 
 

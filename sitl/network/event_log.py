@@ -14,7 +14,7 @@ COLLISIONS_EVERY_S = 1.0
 """A rover that scrapes along a wall touches it many times; that is one line a second at most."""
 
 
-class News:
+class EventLog:
     """Puts each happening into one line and gives it to ``tell``; ``now_s`` reads real seconds. By default nobody listens."""
 
     def __init__(
@@ -26,18 +26,18 @@ class News:
         self._collisions = 0
         self._collisions_told_s = -math.inf
 
-    def came(self, who: str, url: str) -> None:
+    def connected(self, who: str, url: str) -> None:
         """A client has connected."""
         self._tell(f"{who} has come ({url})")
 
-    def left(self, who: str, url: str, *, dropped: bool) -> None:
+    def disconnected(self, who: str, url: str, *, dropped: bool) -> None:
         """A client is gone, or has been ``dropped`` by the vehicle."""
         self._tell(f"{who} has {'been dropped: the autopilot restarts' if dropped else 'left'} ({url})")
 
     def heard(self, who: str, url: str) -> None:
         """Somebody spoke on a connection that knows no coming and going."""
         if (who, url) not in self._heard_s:
-            self.came(who, url)
+            self.connected(who, url)
         self._heard_s[who, url] = self._now_s()
 
     def look(self, simulator: Simulator) -> None:

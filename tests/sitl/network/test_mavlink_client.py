@@ -9,7 +9,7 @@ from contextlib import closing, contextmanager
 import pytest
 
 from sitl.network import ListenError
-from sitl.network.client import BACKLOG_BYTES, RETRY_S, ClientLink, open_link
+from sitl.network.mavlink_client import BACKLOG_BYTES, RETRY_S, ClientLink, open_link
 from tests.sitl.network.test_server import free_port
 
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Callable
 
 from sitl.firmware.physics import Physics
-from sitl.network.news import COLLISIONS_EVERY_S, collision_line
+from sitl.network.event_log import COLLISIONS_EVERY_S, collision_line
 
 
-class PhysicsNews:
+class PhysicsLog:
     """Puts what has happened since the last look into lines and gives them to ``tell``; ``now_s`` reads real seconds."""
 
     def __init__(self, physics: Physics, tell: Callable[[str], None], now_s: Callable[[], float]) -> None:

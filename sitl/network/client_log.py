@@ -7,9 +7,9 @@ import socket
 from collections.abc import Callable
 from enum import Enum, auto
 
-from sitl.network.client import ClientLink
 from sitl.network.endpoint import packets
-from sitl.network.news import SILENT_S
+from sitl.network.event_log import SILENT_S
+from sitl.network.mavlink_client import ClientLink
 
 
 class State(Enum):
@@ -22,7 +22,7 @@ class State(Enum):
     SILENT = auto()
 
 
-class ToldLink:
+class LoggedLink:
     """Passes everything on to ``link``; each change of it is a line for ``tell``. ``system``: the autopilot that was heard there, if any."""
 
     def __init__(
