@@ -1,6 +1,6 @@
-"""Companion and simulator in one process on one simulated clock, real MAVLink bytes between them.
+"""Companion and simulator in one process on one simulated clock, connected by real MAVLink bytes.
 
-The companion's sleep moves the world: nothing waits, and the same seed gives the same run.
+When the companion sleeps, the world advances: nothing waits, and the same seed gives the same run.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ TRACK_PERIOD_S = 0.5
 
 
 class LockstepClock:
-    """The simulator's time; sleeping exchanges the bytes and moves the world."""
+    """The simulator's clock; sleeping exchanges bytes and advances the world."""
 
     def __init__(self, simulator: Simulator, vehicle_end: SimLink, companion_end: MemoryLink) -> None:
         self._simulator = simulator
@@ -36,14 +36,14 @@ class LockstepClock:
         self._companion_end = companion_end
         self._now_s = simulator.time_s
         self.overhear: Callable[[float, bytes], None] | None = None
-        """Told what the companion has written, and until when the world moves on with that."""
+        """Called with the time to which the world advances, and the bytes that the companion has written."""
 
     def now_s(self) -> float:
         """Simulated seconds since the autopilot booted."""
         return self._now_s
 
     def sleep_until_s(self, time_s: float) -> None:
-        """Deliver what was written, let the world move on, and bring back what the vehicle sent."""
+        """Deliver what the companion has written, advance the world, and fetch what the vehicle has sent."""
         if time_s <= self._now_s:
             return
         said = self._companion_end.read()
@@ -53,14 +53,14 @@ class LockstepClock:
         self._simulator.advance_to_s(time_s)
         self._companion_end.write(self._vehicle_end.take())
         if self._vehicle_end.dropped:
-            # The autopilot has rebooted: whoever holds the line opens it again at once.
+            # The autopilot has rebooted: connect again at once.
             self._vehicle_end = self._simulator.connect(name="companion")
         self._now_s = time_s
 
 
 @dataclass(frozen=True, slots=True)
 class TrackPoint:
-    """Where the rover really was (world frame), and which part of the navigator had led it there."""
+    """The rover's true position (world frame), and the navigator's part at that moment."""
 
     time_s: float
     north_m: float
@@ -79,7 +79,7 @@ class Outcome(StrEnum):
 
 @dataclass
 class Report:
-    """What a lock-step run came to; ``as_json`` gives the documented keys."""
+    """Result of a lock-step run; ``as_json`` gives the documented keys."""
 
     seed: int
     outcome: Outcome = Outcome.TIME_LIMIT
@@ -91,7 +91,7 @@ class Report:
     distance_m: float = 0.0
     collisions: int = 0
     refused: int = 0
-    """Setpoints that the companion's own last look before sending turned down."""
+    """Setpoints rejected by the companion's own check before sending."""
     sim_time_s: float = 0.0
     driving_time_s: float = 0.0
     wall_time_s: float = 0.0
@@ -109,7 +109,7 @@ class Report:
         return 0 if self.outcome is Outcome.REACHED else 3
 
     def as_json(self) -> dict[str, object]:
-        """For ``--json``: everything but track and texts."""
+        """The figures for ``--json``: everything except track and texts."""
         hidden = {"track", "said", "targets"}
         result: dict[str, object] = {key: value for key, value in vars(self).items() if key not in hidden}
         result["targets"] = [{"name": name, "status": status} for name, status in self.targets]
@@ -118,7 +118,7 @@ class Report:
 
 @dataclass
 class Drive:
-    """One mission in lock-step; after ``run`` the companion's map and the simulator's truth can be looked at."""
+    """One mission in lock-step; after ``run`` the companion and the simulator can be inspected."""
 
     mission: Mission
     scenario: Scenario

@@ -1,4 +1,4 @@
-"""A mission on any map: from one field to another, on a grid whose fields suit the rover."""
+"""Missions on any map, for ``drive --world``: from one field to another, on a grid with suitable fields."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from companion.core.grid import Cell, Grid
 from companion.mission.mission import GridSpec, HomePoint, Mission, MissionError, SitlSpec, Target
 
 FINE_FIELD_M = 0.25
-"""Finer maps are planned on in fields of at least this size."""
+"""Smallest field for planning; fields of finer maps are combined."""
 COARSE_FIELD_M = 0.6
-"""Fields from this size on are divided by three, so that a passage of one field stays open when sensors are not exact."""
+"""From this size on fields are divided by three, so that a passage of one field stays open despite sensor errors."""
 MAX_FIELDS = 1_000_000
 
 
 def field_at(ground: Grid, text: str, option: str, *, top_left: bool) -> Cell:
-    """The field that a user wrote as X,Y. Raises MissionError when it is none, lies outside, or is an obstacle."""
+    """The field given as X,Y. Raises MissionError if it is malformed, outside the map, or an obstacle."""
     try:
         x, y = (int(part) for part in text.split(","))
     except ValueError:
-        raise MissionError(f"{option} {text}: not two whole numbers X,Y") from None
+        raise MissionError(f"{option} {text}: not two integers X,Y") from None
     cell = Cell(x, ground.height - 1 - y if top_left else y)
     if not ground.contains(cell):
         raise MissionError(f"{option} {text}: outside the map of {ground.width} x {ground.height} fields")
     if ground.is_obstacle(cell):
         raise MissionError(
-            f"{option} {text}: this field of the map is an obstacle or unknown ground (fields of {ground.resolution_m:g} m)"
+            f"{option} {text}: this field of the map is an obstacle or unknown (fields of {ground.resolution_m:g} m)"
         )
     return cell
 
 
 def mission_on_map(path: Path, ground: Grid, start: Cell, target: Cell, *, prior: bool) -> Mission:
-    """Drive from the middle of one field of the map to the middle of another.
+    """A mission from the centre of one field of the map to the centre of another.
 
-    The companion's fields are a third of large map fields and several of tiny ones; its grid covers the map. With ``prior`` it knows
-    the map from the start.
+    The companion's fields are a third of large map fields, or several small ones; its grid covers the map. With
+    ``prior`` it knows the map from the start.
     """
     scale = _planning_scale(ground)
     resolution_m = ground.resolution_m * scale
@@ -56,7 +56,7 @@ def mission_on_map(path: Path, ground: Grid, start: Cell, target: Cell, *, prior
 
 
 def mission_in_world(mission: Mission, path: Path, ground: Grid, start: Cell | None, *, prior: bool) -> Mission:
-    """A mission that knows no world of its own, in this one: its home stands in the middle of ``start``.
+    """A mission in this world; its home is at the centre of ``start``.
 
     Without ``start`` that is the mission's own start field, or else the middle of the map.
     """
@@ -64,7 +64,7 @@ def mission_in_world(mission: Mission, path: Path, ground: Grid, start: Cell | N
     begin = start or sitl.start or mission.grid.home or Cell(ground.width // 2, ground.height // 2)
     if not ground.contains(begin) or ground.is_obstacle(begin):
         raise MissionError(
-            f"{path}: field {begin.x},{begin.y} is no place to start from; give --start X,Y of a free field"
+            f"{path}: field {begin.x},{begin.y} is not free to start from; give --start X,Y of a free field"
         )
     sitl = replace(sitl, world=path, resolution_m=ground.resolution_m, start=begin)
     corner = HomePoint(-(begin.y + 0.5) * ground.resolution_m, -(begin.x + 0.5) * ground.resolution_m)
@@ -73,7 +73,7 @@ def mission_in_world(mission: Mission, path: Path, ground: Grid, start: Cell | N
 
 
 def _planning_scale(ground: Grid) -> float:
-    """Size of the companion's fields in fields of the map."""
+    """Side of the companion's fields, in fields of the map."""
     if ground.resolution_m < FINE_FIELD_M:
         return float(math.ceil(FINE_FIELD_M / ground.resolution_m))
     if ground.resolution_m >= COARSE_FIELD_M and 9 * ground.width * ground.height <= MAX_FIELDS:

@@ -6,7 +6,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.channel import Channel
 from sitl.autopilot.fence import run_fence
-from sitl.autopilot.links import close_channel, open_channel, pass_on
+from sitl.autopilot.links import close_channel, forward, open_channel
 from sitl.autopilot.messages import HANDLERS
 from sitl.autopilot.mission_protocol import keep_home, run_uploads
 from sitl.autopilot.mode_auto import run_auto
@@ -24,42 +24,42 @@ from sitl.autopilot.vehicle import INFO, WARNING, Vehicle, parameter_message
 PARAMETERS_PER_LOOP = 5
 TIMESYNC_S = 10.0
 TICK_US = 100_000
-"""How often the mission is looked at; arriving somewhere is noticed at once."""
+"""Interval at which the modes are run; an arrival is noticed at once."""
 
 BUSY_MODES = {Mode.AUTO, Mode.RTL, Mode.SMART_RTL}
 
 
 class Autopilot:
-    """Packets in, packets out, one main loop at a time; motion itself is in the vehicle's compiled records."""
+    """Handles packets and sends what is due; the motion itself is computed by compiled code in ``control``."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """An autopilot that has just been booted."""
+        """An autopilot that has just booted."""
         self.vehicle = vehicle
         self._opened = 0
         self._next_event = 0
         self._next_second_us = 0
 
     def open_channel(self, port: int = SECURE_PORT) -> Channel:
-        """A new connection through a serial port; it is streamed to at once."""
+        """Open a channel through a serial port; streams start at once."""
         self._opened += 1
         return open_channel(self.vehicle, self._opened - 1, port)
 
     def close_channel(self, channel: Channel) -> None:
-        """Forget a connection and who was heard there."""
+        """Close a channel and forget its routes."""
         close_channel(self.vehicle, channel)
         if self.vehicle.onboard_controller is not None and self.vehicle.onboard_controller[2] == channel.number:
             self.vehicle.onboard_controller = None
 
     def receive(self, channel: Channel, data: bytes) -> None:
-        """Handle what arrived on a channel."""
+        """Handle bytes that arrived on a channel."""
         for message in channel.parse(data):
             handler = HANDLERS.get(message.get_type())
-            if pass_on(self.vehicle, channel, message) and handler is not None:
+            if forward(self.vehicle, channel, message) and handler is not None:
                 handler(self.vehicle, channel, message)
         self.vehicle.flush_texts()
 
     def next_due_us(self) -> float:
-        """When something must be sent or said next."""
+        """Time of the next message or text that is due."""
         due_us = float(self._next_second_us)
         if self._next_event < len(TIMETABLE):
             due_us = min(due_us, self._event_s() * 1e6)
@@ -72,7 +72,7 @@ class Autopilot:
         return due_us
 
     def run_due(self) -> None:
-        """Say and send what is due, tell of targets reached and of time-outs."""
+        """Run the modes, report arrivals and time-outs, send what is due."""
         vehicle = self.vehicle
         self._report_motion()
         self._follow_timetable()
@@ -106,7 +106,7 @@ class Autopilot:
             vehicle.say(WARNING, f"target not received last {vehicle.parameters['GUID_TIMEOUT']:.0f}secs, stopping")
 
     def _event_s(self) -> float:
-        """When the next event of the timetable is, which for some is later when the GPS is."""
+        """Time of the next event of the start-up; some are delayed without GPS."""
         moment_s, late = TIMETABLE[self._next_event][0], self.vehicle.gps_late
         return moment_s + {HOME_S: late.home_s, ORIGIN_S: late.origin_s, POSITION_S: late.position_s}.get(moment_s, 0.0)
 
@@ -124,7 +124,7 @@ class Autopilot:
 
 
 def run_modes(vehicle: Vehicle) -> None:
-    """What missions, ways back and fences have to do at this moment."""
+    """Run uploads, fence and the present mode for this moment."""
     now_us = vehicle.time_us
     if vehicle.uploads:
         run_uploads(vehicle)
@@ -144,6 +144,6 @@ def run_modes(vehicle: Vehicle) -> None:
 def modes_due_us(vehicle: Vehicle) -> float:
     """When ``run_modes`` is to be called next."""
     if vehicle.uploads or vehicle.fence.enabled or vehicle.mode in BUSY_MODES:
-        # On the beat of the streams, so that both are done at once.
+        # In step with the streams, so that both are done together.
         return min(vehicle.smart_rtl.due_us, (vehicle.time_us // TICK_US + 1) * TICK_US)
     return vehicle.smart_rtl.due_us

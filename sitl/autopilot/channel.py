@@ -1,4 +1,4 @@
-"""One MAVLink channel of the vehicle: its bytes in and out, its version and signatures, its own sequence numbers and rates."""
+"""One MAVLink channel of the vehicle: bytes in and out, protocol version, signatures, sequence numbers, rates."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ LONGEST_SIGNING_TIME = (1 << 48) - 1
 
 
 def new_codec(component: int, system: int = 1) -> Any:
-    """A packer with sequence numbers of its own."""
+    """A new packer with its own sequence numbers."""
     return mavlink.MAVLink(None, srcSystem=system, srcComponent=component)
 
 
 def packed(message: Any, codec: Any, version_1: bool = False) -> bytes:
-    """A message as bytes, with the sender's next sequence number; empty if MAVLink 1 cannot say it."""
+    """A message as bytes, with the sender's next sequence number; empty if MAVLink 1 does not know it."""
     if codec.signing.timestamp > LONGEST_SIGNING_TIME:
         codec.signing.timestamp = 0
     data = _packed_1(message, codec) if version_1 else bytes(message.pack(codec))
@@ -32,7 +32,7 @@ def packed(message: Any, codec: Any, version_1: bool = False) -> bytes:
 
 
 def _packed_1(message: Any, codec: Any) -> bytes:
-    """MAVLink 1 has no message ids above 255, and none of the fields that were added later."""
+    """Pack for MAVLink 1, which has no message ids above 255 and no extension fields."""
     known = mavlink_1.mavlink_map.get(message.get_msgId())
     if known is None:
         return b""
@@ -46,8 +46,8 @@ def _packed_1(message: Any, codec: Any) -> bytes:
 class Channel:
     """A connection of the vehicle through its serial port ``port``.
 
-    ``codec`` packs and signs, ``reader`` unpacks. ``due_us``: next time of each streamed message, ``interval_us``: how often.
-    ``spoken``: somebody was heard here.
+    ``codec`` packs and signs, ``reader`` unpacks. ``due_us`` and ``interval_us``: next time and interval of each
+    streamed message. ``spoken``: a packet was received here.
     """
 
     number: int
@@ -66,7 +66,7 @@ class Channel:
     text_id: int = 0
 
     def parse(self, data: bytes) -> list[Any]:
-        """Whole messages in the bytes so far, those with a wrong checksum or without a good signature left out."""
+        """The messages completed by these bytes; those with a wrong checksum or signature are dropped."""
         found = (self._message(packet) for packet in self.framer.feed(data))
         return [message for message in found if message is not None]
 
@@ -75,7 +75,7 @@ class Channel:
             message = self.reader.decode(bytearray(packet))
         except (mavlink.MAVError, struct.error):  # a wrong checksum
             return None
-        if message.get_msgId() < 0:  # none that we know, so its checksum cannot be checked
+        if message.get_msgId() < 0:  # unknown, so its checksum cannot be verified
             return None
         identity = (message.get_srcSystem(), message.get_srcComponent(), message.get_msgId())
         signed = packet[0] == MAGIC_2 and bool(packet[2] & SIGNED)
@@ -87,7 +87,7 @@ class Channel:
         self.outbox += packed(message, self.codec, self.version_1)
 
     def take(self) -> bytes:
-        """Everything queued, and forget it."""
+        """Return everything that is queued, and clear the queue."""
         data = bytes(self.outbox)
         self.outbox.clear()
         return data
@@ -96,7 +96,7 @@ class Channel:
 def new_channel(
     number: int, system: int, signing: Signing, port: int = SECURE_PORT, version_1: bool = False
 ) -> Channel:
-    """A channel with nothing streamed yet. A port set to MAVLink 1 starts without signing, even with a key."""
+    """A channel without streams. A port set to MAVLink 1 starts without signing, even with a key."""
     channel = Channel(number, new_codec(AUTOPILOT, system), signing, port, version_1)
     if not version_1:
         signing.prepare(channel.codec, number)

@@ -1,4 +1,4 @@
-"""Commands (COMMAND_LONG, COMMAND_INT) and their answers (measured)."""
+"""MAVLink commands (COMMAND_LONG, COMMAND_INT) and their acknowledgements (measured)."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def answer(vehicle: Vehicle, channel: Channel, message: Any) -> None:
         handler = HANDLERS.get(message.command)
         try:
             result = UNSUPPORTED if handler is None else handler(vehicle, channel, message)
-        except (ValueError, OverflowError):  # a number that is none, or fits nowhere
+        except (ValueError, OverflowError):  # NaN, infinity or out of range
             result = DENIED
     channel.send(
         mavlink.MAVLink_command_ack_message(
@@ -154,7 +154,7 @@ def _return(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 
 def _place_of(message: Any) -> tuple[int, tuple[int, int]]:
-    """Frame, latitude and longitude in 1e-7 degree; COMMAND_LONG has degrees, in the frame GLOBAL."""
+    """Frame, and latitude and longitude in 1e-7 degree; COMMAND_LONG has degrees, in the frame GLOBAL."""
     if message.get_type() == "COMMAND_INT":
         return message.frame, (message.x, message.y)
     degrees = (0.0 if math.isnan(value) else value for value in (message.param5, message.param6))
@@ -163,7 +163,7 @@ def _place_of(message: Any) -> tuple[int, tuple[int, int]]:
 
 
 def _set_home(vehicle: Vehicle, channel: Channel, message: Any) -> int:
-    """DO_SET_HOME: here (param1 is 1, or no place given), or at a place."""
+    """DO_SET_HOME: here (param1 = 1, or no place given) or at a place."""
     if math.isnan(message.param1):
         return DENIED
     frame, place = _place_of(message)
@@ -187,11 +187,11 @@ def _get_home(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 
 def _check_arming(vehicle: Vehicle, channel: Channel, message: Any) -> int:
-    """RUN_PREARM_CHECKS: accepted whatever comes out; the complaints follow as texts."""
+    """RUN_PREARM_CHECKS: accepted whatever the result; complaints follow as texts."""
     if vehicle.armed:
         return TRY_LATER
-    for reason in arming_faults(vehicle):
-        vehicle.say(CRITICAL, f"PreArm: {reason}")
+    for fault in arming_faults(vehicle):
+        vehicle.say(CRITICAL, f"PreArm: {fault.text}")
     return ACCEPTED
 
 

@@ -1,4 +1,4 @@
-"""Driving to a place, as GUIDED, AUTO, RTL and SMART_RTL do: set it, change the speed, see whether it is reached."""
+"""Driving to a place in GUIDED, AUTO, RTL and SMART_RTL: set the destination, change the speed, check for arrival."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ SLOWEST_M_S = 0.05
 
 
 def begin_driving(vehicle: Vehicle, speed_m_s: float = 0.0) -> None:
-    """Start anew with the limits of the parameters; a speed of 0 is WP_SPEED."""
+    """Reset motion control to the limits of the parameters; a speed of 0 means WP_SPEED."""
     begin_guided(vehicle.control[0], vehicle.tuning[0])
     if speed_m_s > 0.0:
         vehicle.control["base_speed"] = vehicle.control["speed_max"] = max(speed_m_s, SLOWEST_M_S)
 
 
 def drive_to(vehicle: Vehicle, place: Place, following: Place | None = None) -> None:
-    """Drive to a place; if it is known where to go from there, without stopping in between."""
+    """Drive to a place along a leg; with ``following``, on to that place without stopping."""
     vehicle.destination = place
     north_m, east_m = geodesy.offset_m(vehicle.origin, place)
     after = (0.0, 0.0) if following is None else geodesy.offset_m(vehicle.origin, following)
@@ -32,30 +32,30 @@ def drive_to(vehicle: Vehicle, place: Place, following: Place | None = None) -> 
 
 
 def stand(vehicle: Vehicle) -> None:
-    """Brake and stay."""
+    """Brake and stand still."""
     vehicle.control["task"] = STOP
 
 
 def arrived(vehicle: Vehicle) -> bool:
-    """Whether the place that is driven to has been reached."""
+    """Whether the end of the present leg has been reached."""
     control = vehicle.control[0]
     return int(control["task"]) == LEG and bool(control["reached"])
 
 
 def go_to(vehicle: Vehicle, place: tuple[int, int]) -> None:
-    """Follow a position target, (latitude, longitude) in 1e-7 degree."""
+    """Drive to a position target, (latitude, longitude) in 1e-7 degree."""
     vehicle.destination = place
     north_m, east_m = geodesy.offset_m(vehicle.origin, place)
     begin_target(vehicle.control[0], vehicle.tuning[0], vehicle.estimate[0], north_m, east_m)
 
 
 def valid_place(lat: int, lon: int) -> bool:
-    """Whether latitude and longitude exist on earth."""
+    """Whether latitude and longitude are within their ranges."""
     return abs(lat) <= 900_000_000 and abs(lon) <= geodesy.HALF_TURN
 
 
 def change_speed(vehicle: Vehicle, speed_m_s: float) -> bool:
-    """DO_CHANGE_SPEED: while there is a place to drive to; AUTO takes it at any time."""
+    """DO_CHANGE_SPEED: accepted while there is a destination, and in AUTO at any time."""
     task = int(vehicle.control[0]["task"])
     if vehicle.mode == Mode.AUTO and task == HEADING:
         vehicle.control["target_speed"] = speed_m_s

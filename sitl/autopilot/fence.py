@@ -1,4 +1,4 @@
-"""Driving to places in AUTO, RTL and SMART_RTL, and the path that SMART_RTL drives back."""
+"""The fence: polygons, circles, the circle around home; breaches and actions (AC_Fence, AC_PolyFence_loader)."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from sitl.autopilot.vehicle import NOTICE, Vehicle
 from sitl.world import geodesy
 
 CIRCLE_FENCE, POLYGON_FENCE = 2, 4
-"""Bits of FENCE_TYPE: the circle round home, and what was uploaded."""
+"""Bits of FENCE_TYPE: the circle around home, and the uploaded fence."""
 
 UNION = 2
-"""Bit of FENCE_OPTIONS: it is enough to be inside one of the inclusion areas."""
+"""Bit of FENCE_OPTIONS: being inside one of the inclusion areas is enough."""
 
 Place = tuple[int, int]
 
@@ -27,7 +27,7 @@ def inside(place: Place, corners: Sequence[Place]) -> bool:
     lat, lon = place
     for (lat_a, lon_a), (lat_b, lon_b) in zip(corners, [*corners[1:], corners[0]], strict=True):
         if (lon_a > lon) != (lon_b > lon):
-            # Whole numbers, so that a place on the border does not depend on rounding.
+            # Integers, so that rounding cannot decide about a place on the border.
             side = (lat - lat_a) * (lon_b - lon_a) - (lat_b - lat_a) * (lon - lon_a)
             within ^= (side < 0) == (lon_b > lon_a)
     return within
@@ -39,7 +39,7 @@ def distance_m(place: Place, other: Place) -> float:
 
 
 def shapes(items: Sequence[Item]) -> list[tuple[int, Sequence[Place], float]]:
-    """The items put together: command, corners (a circle's centre alone), radius in metres."""
+    """The areas of the fence: command, corners (of a circle its centre), radius in metres."""
     found: list[tuple[int, Sequence[Place], float]] = []
     at = 0
     while at < len(items):
@@ -55,7 +55,7 @@ def shapes(items: Sequence[Item]) -> list[tuple[int, Sequence[Place], float]]:
 
 
 def outside(items: Sequence[Item], place: Place, options: int = 0) -> bool:
-    """Whether the place breaches the fence: outside of an inclusion area, or within an exclusion area."""
+    """Whether a place breaches the fence: outside an inclusion area or inside an exclusion area."""
     areas = missed = 0
     for command, corners, radius_m in shapes(items):
         if command == FENCE_POLYGON_IN:
@@ -72,12 +72,12 @@ def outside(items: Sequence[Item], place: Place, options: int = 0) -> bool:
 
 
 def nearest(place: Place, places: Sequence[Place]) -> Place | None:
-    """The nearest of some places."""
+    """The nearest of several places; None if there are none."""
     return min(places, key=lambda one: distance_m(place, one), default=None)
 
 
 def allowed(vehicle: Vehicle, place: Place) -> bool:
-    """Whether no enabled fence forbids a place."""
+    """Whether a place lies inside all enabled fences."""
     kinds = vehicle.fence.enabled
     if kinds & CIRCLE_FENCE and distance_m(vehicle.home, place) > vehicle.parameters["FENCE_RADIUS"]:
         return False
@@ -102,18 +102,18 @@ FENCE_STATUS = 162
 
 
 def fence_names(kinds: int) -> str:
-    """The firmware's words for some kinds of fence."""
+    """The firmware's words for these kinds of fence."""
     found = [name for bit, name in NAMES.items() if kinds & bit]
     return " and ".join(found) + (" fences" if len(found) > 1 else " fence")
 
 
 def configured(vehicle: Vehicle) -> int:
-    """The kinds of fence that FENCE_TYPE chooses."""
+    """The kinds of fence selected by FENCE_TYPE."""
     return int(vehicle.parameters["FENCE_TYPE"]) & (CIRCLE_FENCE | POLYGON_FENCE)
 
 
 def enable_fence(vehicle: Vehicle, action: int, spoken: bool = False) -> bool:
-    """DO_FENCE_ENABLE, as a command or in a mission (then it says so); False if it cannot be done."""
+    """DO_FENCE_ENABLE, as a command or in a mission (``spoken``: with a text); False if it is refused."""
     kinds = configured(vehicle)
     if action not in (ON, OFF, FLOOR_OFF):
         return False
@@ -130,13 +130,13 @@ def enable_fence(vehicle: Vehicle, action: int, spoken: bool = False) -> bool:
 
 
 def present(vehicle: Vehicle) -> bool:
-    """Whether any fence could be breached: the circle always, polygons once there are some."""
+    """Whether there is a fence to breach: the circle always, the uploaded fence if there is one."""
     kinds = configured(vehicle)
     return bool(kinds & CIRCLE_FENCE) or (bool(kinds & POLYGON_FENCE) and bool(vehicle.storage.fence))
 
 
 def arming_fault(vehicle: Vehicle) -> str | None:
-    """Why the fence forbids arming, in the firmware's words."""
+    """Why the fence forbids arming, in the firmware's words; None if it does not."""
     on = vehicle.parameters["FENCE_ENABLE"] > 0.0
     if on and not present(vehicle):
         return "Fences enabled, but none selected"
@@ -158,7 +158,7 @@ def arming_fault(vehicle: Vehicle) -> str | None:
 
 
 def run_fence(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool], disarm: Callable[[Vehicle], None]) -> None:
-    """Look for breaches; a new one while armed is told and acted on."""
+    """Check for breaches; report a new one while armed, and take FENCE_ACTION."""
     fence, setting = vehicle.fence, vehicle.parameters["FENCE_ENABLE"]
     if setting != fence.seen_setting:
         fence.seen_setting = setting
@@ -177,7 +177,7 @@ def run_fence(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool], disarm
 
 
 def _look(vehicle: Vehicle) -> tuple[int, float]:
-    """Freshly breached kinds, and how far beyond the circle the rover is."""
+    """The newly breached kinds, and how many metres beyond the circle the rover is."""
     fence, here, fresh, beyond_m = vehicle.fence, vehicle.place(), 0, 0.0
     if not vehicle.has_position:
         return 0, 0.0
@@ -218,7 +218,7 @@ def _record(vehicle: Vehicle, fresh: int) -> None:
 def _act(
     vehicle: Vehicle, beyond_m: float, set_mode: Callable[[Vehicle, int], bool], disarm: Callable[[Vehicle], None]
 ) -> None:
-    """FENCE_ACTION; far outside the circle there is only HOLD."""
+    """Take FENCE_ACTION; far outside the circle that is always HOLD."""
     action = int(vehicle.parameters["FENCE_ACTION"])
     if action == DISARM and beyond_m <= GIVE_UP_M:
         disarm(vehicle)
@@ -239,7 +239,7 @@ def _act(
 
 
 def fence_status(vehicle: Vehicle) -> list[mavlink.MAVLink_fence_status_message]:
-    """FENCE_STATUS; only sent while a fence is enabled."""
+    """FENCE_STATUS, which is only sent while a fence is enabled."""
     fence = vehicle.fence
     if not fence.enabled:
         return []

@@ -1,7 +1,7 @@
-"""MAVLink's file service of a vehicle without files: every request is answered, none finds anything.
+"""MAVLink FTP of a vehicle without files: every request is answered, and no file is ever found.
 
-A ground station that asks for a file of parameters or missions first (`@PARAM/param.pck`) then goes on to the list at once,
-instead of asking again for ten seconds.
+A ground station that first asks for a file of parameters or missions (`@PARAM/param.pck`) then falls back to the list
+at once, instead of repeating its request for ten seconds.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from sitl.autopilot.channel import Channel
 from sitl.autopilot.vehicle import Vehicle
 
 HEADER = struct.Struct("<HBBBBBxI")
-"""Number, session, operation, size, operation that is answered, end of a burst, (padding), offset."""
+"""Sequence number, session, operation, size, operation that is answered, end of a burst, (padding), offset."""
 
 PAYLOAD_BYTES = 251
 
@@ -29,7 +29,7 @@ INVALID_SESSION, UNKNOWN_COMMAND, FILE_NOT_FOUND = 4, 7, 10
 
 
 def answer_file_request(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """FILE_TRANSFER_PROTOCOL: sessions may be ended, files are not found."""
+    """Answer FILE_TRANSFER_PROTOCOL: ending a session succeeds, opening a file does not."""
     number, session, operation, *_ = HEADER.unpack_from(bytes(message.payload))
     if operation in (ACK, NAK):
         return
@@ -45,7 +45,7 @@ def answer_file_request(vehicle: Vehicle, channel: Channel, message: Any) -> Non
 
 
 def _error(operation: int) -> int:
-    """Why it cannot be done: no session is ever open, no file is ever there."""
+    """The error code: no session is ever open, no file exists."""
     if operation not in OPERATIONS:
         return UNKNOWN_COMMAND
     return INVALID_SESSION if operation in OF_A_SESSION else FILE_NOT_FOUND

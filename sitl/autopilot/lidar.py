@@ -1,4 +1,4 @@
-"""The scanner: a MAVLink component of its own (196) on the vehicle's network, or on a line to a real autopilot."""
+"""The lidar: a MAVLink component (196) on the vehicle's network, or on a link to a real autopilot."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ HEARTBEAT_US = 1_000_000
 
 
 class Scanner:
-    """Scans and heartbeats at the scanner's rate, as messages that nobody has packed yet."""
+    """Scans at the lidar's rate, and heartbeats, as messages that are not packed yet."""
 
     def __init__(self, lidar: Lidar, sensing: RangeSensing) -> None:
-        """``sensing`` measures."""
+        """``sensing`` takes the measurements."""
         self._lidar = lidar
         self._sensing = sensing
         self._interval_us = 1e6 / lidar.rate_hz
@@ -39,7 +39,7 @@ class Scanner:
         return min(self._scan_us, self._heartbeat_us, self._waiting[0][0] if self._waiting else math.inf)
 
     def due(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> list[Any]:
-        """What the scanner says at this moment; empty when nothing is due."""
+        """The messages due at this moment."""
         messages: list[Any] = []
         if time_us >= self._heartbeat_us:
             self._heartbeat_us += HEARTBEAT_US
@@ -54,7 +54,7 @@ class Scanner:
         return messages
 
     def _message(self, time_us: int, cells: list[int]) -> Any:
-        """A late scan bears the time at which it is sent: few drivers know how long theirs took."""
+        """A delayed scan carries the time at which it is sent: few drivers know how old a scan is."""
         lidar = self._lidar
         return mavlink.MAVLink_obstacle_distance_message(
             time_us, 0, cells, round(lidar.increment_deg), round(lidar.min_m * 100), round(lidar.max_m * 100),
@@ -63,26 +63,26 @@ class Scanner:
 
 
 class ScannerPort:
-    """The scanner's own line to an autopilot elsewhere; it takes that autopilot's system id, and does not sign."""
+    """The lidar's own link to an autopilot elsewhere; it takes over that autopilot's system id and does not sign."""
 
     def __init__(self) -> None:
-        """System 1 until another is heard."""
+        """System 1 until an autopilot is heard."""
         self._codec = new_codec(OBSTACLE_AVOIDANCE)
         self._framer = Framer()
         self._settled = False
         self.system: int | None = None
-        """The autopilot's id; None until it is heard."""
+        """The autopilot's system id; None until it is heard."""
 
     def begin(self) -> None:
-        """The autopilot has started anew; it may have another id."""
+        """The autopilot has restarted and may have another id."""
         self._settled = False
 
     def hear(self, data: bytes) -> None:
-        """Bytes from the line. The first ArduPilot's heartbeat counts: later ones may be other vehicles'."""
+        """Take in bytes. The first heartbeat of an ArduPilot counts: later ones may be other vehicles'."""
         for packet in self._framer.feed(data):
             try:
                 message = self._codec.decode(bytearray(packet))
-            except (mavlink.MAVError, struct.error):  # damaged, or none that we know
+            except (mavlink.MAVError, struct.error):  # damaged or unknown
                 continue
             of_autopilot = message.get_type() == "HEARTBEAT" and message.get_srcComponent() == AUTOPILOT
             if of_autopilot and message.autopilot == mavlink.MAV_AUTOPILOT_ARDUPILOTMEGA and not self._settled:
@@ -90,22 +90,25 @@ class ScannerPort:
                 self._settled = True
 
     def packed(self, messages: list[Any]) -> bytes:
-        """The messages as bytes for the line."""
+        """The messages as bytes."""
         return b"".join(packed(message, self._codec) for message in messages)
 
 
 OWN_CHANNEL = -1
-"""The scanner's place in the router: packets for it are not for the autopilot, and it answers none."""
+"""The lidar's channel in the router: packets addressed to it are not for the autopilot, and it answers none."""
 
 SIGNING_LINK = 255
-"""With a signing key on the vehicle the scanner signs as well, as a link of its own."""
+"""Link id of the lidar's signatures: with a signing key on the vehicle it signs as well."""
 
 
 class LidarComponent:
-    """Packs what the scanner says, and lets the vehicle hear it."""
+    """The lidar on the simulated vehicle: packs its messages and passes its scans to the autopilot.
+
+    The autopilot's router forwards them to every link on which somebody was heard.
+    """
 
     def __init__(self, lidar: Lidar, sensing: RangeSensing, vehicle: Vehicle) -> None:
-        """``sensing`` measures, ``vehicle`` hears the scans as everybody on its network does."""
+        """``sensing`` takes the measurements; ``vehicle`` receives the scans as every component on its network does."""
         self._scanner = Scanner(lidar, sensing)
         self._vehicle = vehicle
         vehicle.router.learn(vehicle.system, OBSTACLE_AVOIDANCE, OWN_CHANNEL)
@@ -116,7 +119,7 @@ class LidarComponent:
         return self._scanner.next_due_us()
 
     def packets(self, time_us: int, north_m: float, east_m: float, heading_rad: float) -> bytes:
-        """What the scanner sends at this moment; empty when nothing is due."""
+        """The bytes due at this moment."""
         data = b""
         self._vehicle.signing.follow(self._codec, SIGNING_LINK)
         for message in self._scanner.due(time_us, north_m, east_m, heading_rad):

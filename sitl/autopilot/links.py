@@ -1,4 +1,4 @@
-"""The vehicle's links together: opened on its serial ports, packets passed on between them, one signing key for all."""
+"""All links of the vehicle: open and close them, forward packets between them, set their common signing key."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from sitl.autopilot.streams import start_streams
 from sitl.autopilot.vehicle import ERROR, Vehicle, text_messages
 
 MAVLINK_1 = 1
-"""Severity of a text."""
+"""SERIALn_PROTOCOL."""
 
 
 def open_channel(vehicle: Vehicle, number: int, port: int = SECURE_PORT) -> Channel:
-    """A new connection through a serial port, streamed to at once, in the version that SERIALn_PROTOCOL says."""
+    """Open a channel through a serial port, with the protocol version of SERIALn_PROTOCOL; streams start at once."""
     name = f"SERIAL{port}_PROTOCOL"
     version_1 = name in vehicle.parameters and vehicle.parameters[name] == MAVLINK_1
     channel = new_channel(number, vehicle.system, vehicle.signing, port, version_1)
@@ -27,21 +27,21 @@ def open_channel(vehicle: Vehicle, number: int, port: int = SECURE_PORT) -> Chan
 
 
 def close_channel(vehicle: Vehicle, channel: Channel) -> None:
-    """Forget a connection and who was heard there."""
+    """Forget a channel and its routes."""
     vehicle.channels.pop(channel.number, None)
     vehicle.router.forget(channel.number)
 
 
-def pass_on(vehicle: Vehicle, channel: Channel, message: Any) -> bool:
-    """Send copies of a packet where they belong; True if the autopilot shall act on it as well."""
+def forward(vehicle: Vehicle, channel: Channel, message: Any) -> bool:
+    """Forward a packet to other channels; True if the autopilot must handle it as well."""
     system, component, kind = message.get_srcSystem(), message.get_srcComponent(), message.get_msgId()
     channel.spoken |= kind not in ACCEPTED_UNSIGNED
     if (system, component) == (vehicle.system, AUTOPILOT):
-        return False  # our own words, from a line that is wired back to us
+        return False  # our own packet, from a link that is looped back
     router = vehicle.router
     router.learn(system, component, channel.number)
     if kind in ACCEPTED_UNSIGNED:
-        return True  # what a radio says of itself is for its own end only
+        return True  # the status of a radio is for its own end only
     if kind == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
         active = (number for number, other in vehicle.channels.items() if other.spoken)
         _copy(vehicle, message, router.heartbeat_to(system, component, channel.number, active))
@@ -53,14 +53,14 @@ def pass_on(vehicle: Vehicle, channel: Channel, message: Any) -> bool:
 
 
 def _copy(vehicle: Vehicle, message: Any, channels: set[int]) -> None:
-    """The packet itself, byte for byte: its version, its sequence number, its signature."""
+    """Forward the packet unchanged: same version, sequence number and signature."""
     for number in sorted(channels):
         if number in vehicle.channels:
             vehicle.channels[number].outbox += message.get_msgbuf()
 
 
 def set_up_signing(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """SETUP_SIGNING: a new key for all links at once; a key of zeros with the timestamp 0 ends it."""
+    """SETUP_SIGNING: a new key for all links; a key of zeros with timestamp 0 ends signing."""
     if vehicle.armed:
         for text in text_messages(channel, ERROR, "ERROR: Won't setup signing when armed"):
             channel.send(text)

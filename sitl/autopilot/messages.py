@@ -40,7 +40,7 @@ def _list_parameters(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 def _set_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     name = _text_of(message.param_id)
     if not vehicle.parameters.set(name, message.param_value):
-        return  # without a word: no such name, or no number
+        return  # no answer: unknown name, or not a number
     vehicle.retune()
     for listener in vehicle.channels.values():
         listener.send(parameter_message(vehicle.parameters, name))
@@ -61,7 +61,7 @@ def _heartbeat(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 
 def _override(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """RC_CHANNELS_OVERRIDE of the ground station: steering and throttle; 0 lets go, 65535 leaves as it is."""
+    """RC_CHANNELS_OVERRIDE of the ground station: steering and throttle; 0 releases, 65535 means unchanged."""
     sticks = vehicle.sticks
     steering, throttle = (
         before if raw_us == UNCHANGED else None if raw_us == 0 else (raw_us - 1500) / 500.0
@@ -71,14 +71,14 @@ def _override(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 
 def _manual_control(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MANUAL_CONTROL, a joystick: y steers, z is the throttle, in thousandths; the largest number lets go."""
+    """MANUAL_CONTROL, a joystick: y is steering, z throttle, in thousandths; 32767 releases."""
     if message.target == vehicle.system:
         axes = (None if axis == RELEASED else axis / 1000.0 for axis in (message.y, message.z))
         _take_sticks(vehicle, message, *axes)
 
 
 def _take_sticks(vehicle: Vehicle, message: Any, steering: float | None, throttle: float | None) -> None:
-    """The ground station's sticks, -1 to 1, None where it lets go. They are a sign of life as well."""
+    """Set the ground station's sticks, -1 to 1, None where released. They also count as a sign of life."""
     is_station = message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"])
     if not is_station:
         return
@@ -125,4 +125,4 @@ HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
     "TIMESYNC": _timesync,
     **TRANSFERS,
 }
-"""Everything else is taken in and ignored."""
+"""By message name; all other messages are ignored."""

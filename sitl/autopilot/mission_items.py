@@ -1,6 +1,7 @@
-"""Mission, fence and rally items: what the firmware keeps of each, what it gives back, and with which code it refuses.
+"""Mission, fence and rally items: what the firmware stores of each, and the codes with which it refuses one.
 
-ArduPilot packs an item into 15 bytes: fields that a command does not use are lost, numbers are cut to the size of their place.
+ArduPilot packs an item into 15 bytes: fields that a command does not use are lost, and numbers are truncated to the
+size of their field.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ ABSOLUTE, RELATIVE, TERRAIN = 0, 3, 10
 MISSION_FRAME = 2
 
 FRAMES = {0: ABSOLUTE, MISSION_FRAME: ABSOLUTE, 5: ABSOLUTE, 3: RELATIVE, 6: RELATIVE, 10: TERRAIN, 11: TERRAIN}
-"""Frames a place may come in, and the one it is given back in."""
+"""Accepted frames, and the frame in which an item is returned."""
 
 HIGHEST_M = 83_000.0
 
@@ -66,7 +67,7 @@ class Result(IntEnum):
 
 
 class RefusedError(Exception):
-    """An item that cannot be kept; ``result`` says why."""
+    """An item that cannot be stored; ``result`` says why."""
 
     def __init__(self, result: Result) -> None:
         """The code for MISSION_ACK."""
@@ -92,50 +93,51 @@ class Item:
 
     @property
     def navigates(self) -> bool:
-        """Whether it is a navigation command: one at a time, the others run beside it."""
+        """Whether it is a navigation command; these run one at a time, the others alongside."""
         return self.command <= LAST_NAV_COMMAND or self.command == SET_YAW_SPEED
 
 
 NO, U8, I8, U16, I16, F32, SIGN, FLAG, RADIUS = "-", "B", "b", "H", "h", "f", "s", "?", "r"
 
 KEPT: dict[int, str] = {
-    16: "H---", 17: "--r-", 19: "H-s?", 20: "----", 21: "H--s", 22: "H---", 30: "H---", 31: "-r-?", 82: "H---", 83: "fff-",
-    84: "----", 85: "----", 92: "H---", 93: "fbbb", 94: "f---", 112: "f---", 114: "f---", 115: "ffbB", 176: "H---",
-    177: "Hh--", 178: "Bff-", 179: "H---", 181: "BB--", 182: "Bhf-", 183: "BH--", 184: "BHhf", 188: "----", 189: "----",
-    191: "----", 194: "H---", 195: "H---", 197: "H---", 201: "H---", 202: "BBBB", 203: "BBbB", 205: "fff-", 206: "f-B-",
-    207: "H---", 208: "H---", 210: "H---", 211: "BB--", 212: "H---", 213: "ffB-", 215: "H---", 216: "H---", 218: "HH--",
-    222: "Hfff", 223: "??f-", 600: "H---", 601: "Hh--", 3000: "B---", 42600: "BBff",
+    16: "H---", 17: "--r-", 19: "H-s?", 20: "----", 21: "H--s", 22: "H---", 30: "H---", 31: "-r-?", 82: "H---",
+    83: "fff-", 84: "----", 85: "----", 92: "H---", 93: "fbbb", 94: "f---", 112: "f---", 114: "f---", 115: "ffbB",
+    176: "H---", 177: "Hh--", 178: "Bff-", 179: "H---", 181: "BB--", 182: "Bhf-", 183: "BH--", 184: "BHhf",
+    188: "----", 189: "----", 191: "----", 194: "H---", 195: "H---", 197: "H---", 201: "H---", 202: "BBBB",
+    203: "BBbB", 205: "fff-", 206: "f-B-", 207: "H---", 208: "H---", 210: "H---", 211: "BB--", 212: "H---",
+    213: "ffB-", 215: "H---", 216: "H---", 218: "HH--", 222: "Hfff", 223: "??f-", 600: "H---", 601: "Hh--",
+    3000: "B---", 42600: "BBff",
 }  # fmt: skip
-"""How each of a command's four parameters is kept; commands that are not here are unsupported.
+"""How each of a command's four parameters is stored; commands that are not listed are unsupported.
 
 ``LOITER_TURNS`` has rules of its own.
 """
 
 AT_A_PLACE = {16, 17, 18, 19, 21, 22, 30, 31, 82, 84, 85, 92, 94, 179, 188, 189, 191, 195, 201}
-"""Commands kept with latitude, longitude and height; of the others they are lost."""
+"""Commands stored with latitude, longitude and height; other commands lose them."""
 
 RAW_PLACES = {202, 203}
-"""Camera commands, whose x and y are numbers like any other."""
+"""Camera commands, whose x and y are not coordinates."""
 
 NAN_HEADING = {16, 21, 22, 84, 85}
-"""Commands whose fourth parameter may be no number."""
+"""Commands whose fourth parameter may be NaN."""
 
 NAMES: dict[int, str] = {
     16: "WP", 17: "LoitUnlim", 18: "LoitTurns", 19: "LoitTime", 20: "RTL", 21: "Land", 22: "Takeoff",
-    30: "ContinueAndChangeAlt", 31: "LoitAltitude", 82: "SplineWP", 83: "AltitudeWait", 84: "VTOLTakeoff", 85: "VTOLLand",
-    92: "GuidedEnable", 93: "Delay", 94: "PayloadPlace", 112: "CondDelay", 114: "CondDist", 115: "CondYaw",
-    177: "Jump", 178: "ChangeSpeed", 179: "SetHome", 181: "SetRelay", 182: "RepeatRelay", 183: "SetServo",
-    184: "RepeatServo", 188: "ReturnPathStart", 189: "LandStart", 191: "GoAround", 194: "SetReverse",
+    30: "ContinueAndChangeAlt", 31: "LoitAltitude", 82: "SplineWP", 83: "AltitudeWait", 84: "VTOLTakeoff",
+    85: "VTOLLand", 92: "GuidedEnable", 93: "Delay", 94: "PayloadPlace", 112: "CondDelay", 114: "CondDist",
+    115: "CondYaw", 177: "Jump", 178: "ChangeSpeed", 179: "SetHome", 181: "SetRelay", 182: "RepeatRelay",
+    183: "SetServo", 184: "RepeatServo", 188: "ReturnPathStart", 189: "LandStart", 191: "GoAround", 194: "SetReverse",
     195: "SetROI", 197: "SetROI", 201: "SetROI", 202: "DigiCamCfg", 203: "DigiCamCtrl", 205: "MountControl",
     206: "SetCamTrigDst", 207: "FenceEnable", 208: "Parachute", 210: "InvertedFlight", 211: "Gripper",
     212: "AutoTuneEnable", 213: "SetYawSpd", 215: "SetRepeatDist", 216: "Sprayer", 218: "AuxFunction",
     222: "GuidedLimits", 223: "EngineControl", 600: "Tag", 601: "JumpToTag", 3000: "VTOLTransition", 42600: "Winch",
 }  # fmt: skip
-"""What the firmware calls them in its texts."""
+"""The commands' names in the firmware's texts."""
 
 
 def _wrapped(value: float, kind: str) -> float:
-    """A number cut to an integer of one or two bytes."""
+    """A number truncated to an integer of one or two bytes."""
     bits = 8 if kind in (U8, I8) else 16
     number = int(value) & ((1 << bits) - 1)
     if kind in (I8, I16) and number >= 1 << (bits - 1):
@@ -158,7 +160,7 @@ def _kept(value: float, kind: str) -> float:
 
 
 def _kept_turns(turns: float, radius_m: float, tangent: float) -> tuple[float, float, float, float]:
-    """LOITER_TURNS: turns and radius share two bytes, so small turns are in 256ths and large radii in tens of metres."""
+    """LOITER_TURNS: turns and radius share two bytes, so few turns are in 256ths and large radii in tens of metres."""
     few = 0.0 < turns < 1.0
     kept = math.floor(turns * 256.0) / 256.0 if few else _wrapped(turns, U8)
     metres = abs(radius_m)
@@ -183,7 +185,7 @@ def _check_place(x: int, y: int) -> None:
 
 
 def units(message: Any) -> tuple[int, int]:
-    """x and y of MISSION_ITEM_INT, or of MISSION_ITEM times 1e7 in single precision, as the firmware computes."""
+    """x and y of MISSION_ITEM_INT, or those of MISSION_ITEM times 1e7 in single precision, as in the firmware."""
     if message.get_type() == "MISSION_ITEM_INT":
         return int(message.x), int(message.y)
     if message.command in RAW_PLACES:
@@ -199,12 +201,12 @@ def units(message: Any) -> tuple[int, int]:
 
 
 def _raw_place(x: int, y: int, z: float) -> tuple[int, int, float]:
-    """Numbers of a camera command, cut to one byte each."""
+    """Numbers of a camera command, truncated to one byte each."""
     return int(_wrapped(x, U8)), int(_wrapped(y, U8)), _wrapped(z, U8) if math.isfinite(z) else 0.0
 
 
 def mission_item(message: Any) -> Item:
-    """What is kept of MISSION_ITEM(_INT) in the mission. Raises RefusedError."""
+    """A mission item, as stored from MISSION_ITEM(_INT). Raises RefusedError."""
     command = int(message.command)
     if command == 0:
         raise RefusedError(Result.INVALID)
@@ -231,7 +233,7 @@ def mission_item(message: Any) -> Item:
 
 
 def fence_item(message: Any) -> Item:
-    """What is kept of MISSION_ITEM(_INT) in the fence. Raises RefusedError."""
+    """A fence item, as stored from MISSION_ITEM(_INT). Raises RefusedError."""
     if message.frame not in FRAMES or message.frame == MISSION_FRAME:
         raise RefusedError(Result.UNSUPPORTED_FRAME)
     if message.command in (FENCE_POLYGON_IN, FENCE_POLYGON_OUT):
@@ -246,7 +248,7 @@ def fence_item(message: Any) -> Item:
 
 
 def rally_item(message: Any) -> Item:
-    """What is kept of MISSION_ITEM(_INT) among the rally points. Raises RefusedError."""
+    """A rally point, as stored from MISSION_ITEM(_INT). Raises RefusedError."""
     if message.command != RALLY_POINT:
         raise RefusedError(Result.UNSUPPORTED)
     if message.frame not in FRAMES or message.frame == MISSION_FRAME:
@@ -259,7 +261,7 @@ def rally_item(message: Any) -> Item:
 
 
 def fence_fault(items: list[Item]) -> str | None:
-    """What is wrong with these fence items taken together, in the firmware's words."""
+    """What is wrong with these fence items together, in the firmware's words; None if nothing."""
     missing, count, kind, seen_return = 0, 0, 0, False
     types = {
         FENCE_POLYGON_IN: 98,

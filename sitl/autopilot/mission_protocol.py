@@ -1,4 +1,8 @@
-"""Downloads of mission, fence and rally points (behaviour of MissionItemProtocol): how many there are, and one by one."""
+"""Upload and download of mission, fence and rally points (behaviour of MissionItemProtocol).
+
+One uploader at a time. Mission and rally points are written as they arrive, the fence only when it is complete. A
+cancelling MISSION_ACK is ignored: an abandoned upload ends after eight seconds.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +29,7 @@ from sitl.autopilot.vehicle import INFO, WARNING, Vehicle, text_messages
 from sitl.world.geodesy import ALTITUDE_M
 
 MOST = {MISSION: 724, FENCE: 84, RALLY: 50}
-"""How many items fit into the storage of a usual flight controller (16 kB)."""
+"""Number of items that fit into the storage of a common flight controller (16 kB)."""
 
 
 def type_of(message: Any) -> int:
@@ -43,14 +47,14 @@ def acknowledge(channel: Channel, message: Any, result: int) -> None:
 
 
 def warn_once(vehicle: Vehicle, kind: int, text: str) -> None:
-    """A complaint that is made once for each list."""
+    """Send a complaint, once for each type of list."""
     if (kind, text) not in vehicle.complaints:
         vehicle.complaints.add((kind, text))
         vehicle.say(WARNING, text)
 
 
 def stored(vehicle: Vehicle, kind: int) -> list[Item]:
-    """The items of a type as they are stored; the first of a mission is home."""
+    """The stored items of a type; the first of a mission is home."""
     storage = vehicle.storage
     return {MISSION: storage.mission, FENCE: storage.fence, RALLY: storage.rally}[kind]
 
@@ -84,14 +88,14 @@ def request_int(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 
 def request(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_REQUEST: one item as the older MISSION_ITEM, which has places in single precision."""
+    """MISSION_REQUEST: one item as the older MISSION_ITEM, with coordinates in single precision."""
     kind = type_of(message)
     if kind in MOST and _send_item(vehicle, channel, message, kind, as_int=False):
         warn_once(vehicle, kind, "got MISSION_REQUEST; use MISSION_REQUEST_INT!")
 
 
 def _send_item(vehicle: Vehicle, channel: Channel, message: Any, kind: int, as_int: bool) -> bool:
-    """Answer with an item; False if there is none."""
+    """Send an item; False if there is none."""
     items, seq = stored(vehicle, kind), int(message.seq)
     if seq >= len(items) and not (kind == MISSION and seq == 0):
         if kind == MISSION:
@@ -102,7 +106,7 @@ def _send_item(vehicle: Vehicle, channel: Channel, message: Any, kind: int, as_i
     one = Item(WAYPOINT, 0, x=vehicle.home[0], y=vehicle.home[1], z=ALTITUDE_M)
     if kind != MISSION or seq > 0:
         one = items[seq]
-    # The firmware compares the command, not the index, with the command under way.
+    # The firmware compares the command, not the index, with the present index.
     current = int(kind == MISSION and one.command == vehicle.mission.nav_index)
     scale = 1 if as_int or one.command in (mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE, 203) else 1e-7
     kinds = (mavlink.MAVLink_mission_item_message, mavlink.MAVLink_mission_item_int_message)
@@ -127,30 +131,30 @@ Handler = Callable[[Vehicle, Channel, Any], None]
 
 
 def _say(channel: Channel, severity: int, text: str) -> None:
-    """A text for this connection alone."""
+    """Send a text on this channel alone."""
     for piece in text_messages(channel, severity, text):
         channel.send(piece)
 
 
 def keep_home(vehicle: Vehicle) -> None:
-    """Home is known: it becomes item 0 of an empty mission."""
+    """Make home item 0 of an empty mission, once it is known."""
     if not vehicle.mission.items:
         vehicle.mission.write(0, Item(WAYPOINT))
         _save_total(vehicle, MISSION)
 
 
 def _save_total(vehicle: Vehicle, kind: int) -> None:
-    """MIS_TOTAL and its kin follow the storage; whoever listens is told."""
+    """Update MIS_TOTAL, FENCE_TOTAL or RALLY_TOTAL, and send it on every channel."""
     total = len(stored(vehicle, kind))
     if kind == FENCE:
         corners = sum(item.command != mavlink.MAV_CMD_NAV_FENCE_RETURN_POINT for item in stored(vehicle, kind))
         total = corners + 2 if corners >= 3 else 0
     vehicle.parameters.set(TOTALS[kind], total)
-    vehicle.tell_parameter(TOTALS[kind])
+    vehicle.send_parameter(TOTALS[kind])
 
 
 def count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_COUNT: somebody wants to upload."""
+    """MISSION_COUNT: begin an upload."""
     kind, uploads = type_of(message), vehicle.uploads
     if kind not in MOST:
         acknowledge(channel, message, Result.UNSUPPORTED)
@@ -178,7 +182,7 @@ def count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 
 def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_WRITE_PARTIAL_LIST: somebody wants to upload a few items."""
+    """MISSION_WRITE_PARTIAL_LIST: begin an upload of a few items."""
     kind = type_of(message)
     if kind not in MOST:
         acknowledge(channel, message, Result.UNSUPPORTED)
@@ -187,7 +191,7 @@ def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
         acknowledge(channel, message, Result.DENIED)
         return
     items, first, last = stored(vehicle, kind), message.start_index, message.end_index
-    # A negative index is a very large one to the firmware.
+    # The firmware takes a negative index for a very large one.
     if not 0 <= first <= last <= len(items):
         acknowledge(channel, message, Result.ERROR)
         vehicle.say(WARNING, "Flight plan update rejected")
@@ -204,7 +208,7 @@ def _begin(vehicle: Vehicle, channel: Channel, message: Any, first: int, last: i
 
 
 def _ask(vehicle: Vehicle, kind: int) -> None:
-    """MISSION_REQUEST for the next item; the answer may be MISSION_ITEM_INT all the same."""
+    """Send MISSION_REQUEST for the next item; it may be answered with MISSION_ITEM_INT as well."""
     upload = vehicle.uploads[kind]
     upload.asked_us = vehicle.time_us
     channel = vehicle.channels.get(upload.channel)
@@ -213,7 +217,7 @@ def _ask(vehicle: Vehicle, kind: int) -> None:
 
 
 def run_uploads(vehicle: Vehicle) -> None:
-    """Ask again for what did not come, give up on who has gone silent."""
+    """Request missing items again, and end uploads that have fallen silent."""
     for kind, upload in list(vehicle.uploads.items()):
         if vehicle.time_us - upload.heard_us > GIVE_UP_US:
             del vehicle.uploads[kind]
@@ -249,7 +253,7 @@ def item(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 def _guided(vehicle: Vehicle, message: Any) -> Result:
     target = mission_item(message)
-    if message.current == 3:  # a height, which a rover has not
+    if message.current == 3:  # a change of height, which a rover ignores
         return Result.ACCEPTED
     if vehicle.mode != Mode.GUIDED or not vehicle.has_origin:
         return Result.ERROR
@@ -258,7 +262,7 @@ def _guided(vehicle: Vehicle, message: Any) -> Result:
 
 
 def _take(vehicle: Vehicle, channel: Channel, message: Any, kind: int) -> None:
-    """One item of an upload: in its turn, and from who began it."""
+    """One item of an upload; it must be the next one, from the same sender."""
     upload = vehicle.uploads[kind]
     reply = vehicle.channels.get(upload.channel, channel)
     if message.seq != upload.next:
@@ -308,7 +312,7 @@ def _write(vehicle: Vehicle, message: Any, kind: int, upload: Upload) -> None:
 
 
 def _finish(vehicle: Vehicle, channel: Channel, message: Any, kind: int, fence: list[Item | None]) -> None:
-    """The transfer is complete; only now is a fence looked at as a whole."""
+    """End a complete transfer; a fence is only now validated as a whole."""
     result = Result.ACCEPTED
     if kind == FENCE and not _keep_fence(vehicle, [part for part in fence if part is not None]):
         result = Result.ERROR
@@ -329,7 +333,7 @@ def _keep_fence(vehicle: Vehicle, items: list[Item]) -> bool:
 
 
 def clear(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_CLEAR_ALL; refused during an upload, and for a mission that is running."""
+    """MISSION_CLEAR_ALL; refused during an upload, and while the mission is running."""
     kind = type_of(message)
     if kind not in MOST:
         acknowledge(channel, message, Result.UNSUPPORTED)

@@ -28,7 +28,7 @@ STAY, LOITER, ACRO, MANUAL = 0, 1, 2, 3
 """MIS_DONE_BEHAVE."""
 
 ELSEWHERE = {181, 182, 183, 184, 202, 203, 205, 206, 208, 211, 215, 216, 218}
-"""Servos, relays, cameras, grippers: begun without effect, done at once, as without the part."""
+"""Commands for servos, relays, cameras, grippers: no effect, done at once."""
 
 DONE_AT_ONCE = {
     items.CHANGE_SPEED, items.SET_HOME, items.SET_REVERSE, items.FENCE_ENABLE, items.GUIDED_LIMITS, items.JUMP_TAG,
@@ -37,15 +37,15 @@ DONE_AT_ONCE = {
 
 
 class AutoRunner:
-    """Begins and checks the commands of the mission for one vehicle."""
+    """Begins mission commands on one vehicle and checks whether they are done (a ``mission.Runner``)."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """Made anew whenever it is needed; all state is the vehicle's."""
+        """Created whenever needed; all state is in the vehicle."""
         self.vehicle = vehicle
         self.auto = vehicle.auto
 
     def completed(self) -> None:
-        """The end of the mission: stay, unless MIS_DONE_BEHAVE says otherwise."""
+        """End of the mission: stop, or do what MIS_DONE_BEHAVE says."""
         self.vehicle.say(NOTICE, "Mission Complete")
         behaviour = int(self.vehicle.parameters["MIS_DONE_BEHAVE"])
         self._stop()
@@ -55,7 +55,7 @@ class AutoRunner:
             set_mode(self.vehicle, Mode.MANUAL)
 
     def jumped(self, index: int, times: int, of: int) -> None:
-        """Tell of a jump."""
+        """Report a jump."""
         self.vehicle.say(INFO, f"Mission: {index} Jump {times}/{of}")
 
     def _stop(self) -> None:
@@ -88,7 +88,7 @@ class AutoRunner:
         return True
 
     def _do(self, item: Item) -> bool:
-        """Begin a command that is done at once; False if a rover has none such."""
+        """Begin a command that is done at once; False if a rover does not know it."""
         command, first = item.command, item.params[0]
         if command == items.CHANGE_SPEED:
             if change_speed(self.vehicle, item.params[1]):
@@ -108,7 +108,7 @@ class AutoRunner:
         return True
 
     def _go(self, index: int, item: Item) -> None:
-        """Drive to a place; past it without stopping if the next is known and nothing is to be done there."""
+        """Drive to a place; on to the next without stopping if it is known and there is no time to wait here."""
         hold_s = item.params[0] if item.command != items.LOITER_UNLIMITED else 0.0
         self.auto.loiter_s = 0.0 if hold_s >= 32768.0 else hold_s
         self.auto.reached = False
@@ -121,7 +121,7 @@ class AutoRunner:
         drive_to(self.vehicle, self._sane(item.place), following if following != (0, 0) else None)
 
     def _sane(self, place: tuple[int, int]) -> tuple[int, int]:
-        """A place of zeros is where the rover is."""
+        """The place, or the rover's own where the item has zeros."""
         return self.vehicle.place() if place == (0, 0) else place
 
     def _circle(self, item: Item) -> None:
@@ -133,7 +133,7 @@ class AutoRunner:
         self.auto.submode = Submode.CIRCLE
 
     def _hand_over(self, item: Item) -> None:
-        """Guided within AUTO; with 0 nothing begins."""
+        """NAV_GUIDED_ENABLE: guided within AUTO; with 0 nothing begins."""
         if not item.params[0] > 0.0:
             return
         old = self.auto.guided
@@ -159,7 +159,7 @@ class AutoRunner:
         control["target_tick"] = control["tick"]
 
     def _wait(self, item: Item) -> None:
-        """NAV_DELAY; the vehicle has no clock, so a time of day is now."""
+        """NAV_DELAY; without a clock, a time of day means no delay."""
         self._stop()
         self.auto.delay_since_s = self.vehicle.time_s
         self.auto.delay_s = max(item.params[0], 0.0)
@@ -168,7 +168,7 @@ class AutoRunner:
     # Checking -------------------------------------------------------------------------------------------------------
 
     def verify(self, index: int, item: Item) -> bool:
-        """Whether a command is done; every end is told with MISSION_ITEM_REACHED."""
+        """Whether a command is done; each end is reported with MISSION_ITEM_REACHED."""
         if item.command in ELSEWHERE:
             return True
         done = self._done(index, item)
@@ -205,7 +205,7 @@ class AutoRunner:
         return True
 
     def _there(self, index: int) -> bool:
-        """A waypoint is done when it was reached and stayed at for as long as wanted."""
+        """Whether a waypoint was reached and its loiter time has passed."""
         if not arrived(self.vehicle):
             return False
         auto = self.auto
@@ -216,7 +216,7 @@ class AutoRunner:
         return self.vehicle.time_s - auto.loitering_since_s >= auto.loiter_s
 
     def _handed_back(self) -> bool:
-        """Near the given place, or a limit of time or distance is passed."""
+        """Whether guided within AUTO ends: near its place, or beyond a limit of time or distance."""
         task, here = self.auto.guided, self.vehicle.place()
         if self.auto.submode != Submode.GUIDED:
             return True
@@ -227,7 +227,7 @@ class AutoRunner:
         return 0.0 < task.limit_m < distance_m(here, task.began_at)
 
     def _left_m(self) -> float:
-        """Metres to the place that is driven to; 0 where there is none."""
+        """Metres to the destination; 0 without one."""
         if self.auto.submode in (Submode.STOP, Submode.HEADING):
             return 0.0
         return distance_m(self.vehicle.place(), self.vehicle.destination)
@@ -236,7 +236,7 @@ class AutoRunner:
 HANDED_OVER_EVERY_S = 1.0
 
 RELATIVE_INT, PLACE_ONLY = 6, 3576
-"""Frame and type mask of the place that is handed over."""
+"""Frame and type mask of the target that is sent."""
 
 TURNED_RAD = math.radians(5.0)
 
@@ -268,13 +268,13 @@ def run_auto(vehicle: Vehicle) -> None:
     if auto.submode == Submode.RETURN:
         run_return(vehicle)
     elif auto.submode == Submode.GUIDED:
-        _tell_target(vehicle)
+        _send_target(vehicle)
     elif auto.submode == Submode.HEADING:
         _run_heading(vehicle)
 
 
 def _changed(vehicle: Vehicle) -> bool:
-    """Whether the command under way, or one of the next two, was written anew."""
+    """Whether the present command or one of the next two was replaced."""
     auto, mission = vehicle.auto, vehicle.mission
     same_index = auto.seen_index == mission.nav_index
     if same_index and auto.seen_changes == mission.changes:
@@ -285,7 +285,7 @@ def _changed(vehicle: Vehicle) -> bool:
 
 
 def _run_heading(vehicle: Vehicle) -> None:
-    """NAV_SET_YAW_SPEED: its target does not grow old; it stops when it has turned."""
+    """NAV_SET_YAW_SPEED: its target does not time out; the rover stops when it has turned."""
     auto, control = vehicle.auto, vehicle.control
     control["target_tick"] = control["tick"]
     error = (auto.heading_rad - vehicle.heading_rad() + math.pi) % (2.0 * math.pi) - math.pi
@@ -294,8 +294,8 @@ def _run_heading(vehicle: Vehicle) -> None:
         stand(vehicle)
 
 
-def _tell_target(vehicle: Vehicle) -> None:
-    """Guided within AUTO: once a second the place goes to the first onboard controller that was heard."""
+def _send_target(vehicle: Vehicle) -> None:
+    """Guided within AUTO: once a second, send the place to the first onboard controller that was heard."""
     task = vehicle.auto.guided
     if task.place is None or (task.sent_s is not None and vehicle.time_s - task.sent_s <= HANDED_OVER_EVERY_S):
         return
@@ -306,13 +306,14 @@ def _tell_target(vehicle: Vehicle) -> None:
     if number in vehicle.channels:
         vehicle.channels[number].send(
             mavlink.MAVLink_set_position_target_global_int_message(
-                vehicle.time_us // 1000, system, component, RELATIVE_INT, PLACE_ONLY, *task.place, task.height_m * 100.0,
+                vehicle.time_us // 1000, system, component, RELATIVE_INT, PLACE_ONLY, *task.place,
+                task.height_m * 100.0,
                 *[0.0] * 8,
             )
         )  # fmt: skip
 
 
 def set_mission_current(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MISSION_SET_CURRENT: answered with MISSION_CURRENT of just this number, or not at all."""
+    """MISSION_SET_CURRENT: answered with MISSION_CURRENT of this number, or not at all."""
     if vehicle.mission.set_current(message.seq, AutoRunner(vehicle)):
         channel.send(mission_current(vehicle, message.seq))

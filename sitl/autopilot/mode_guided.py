@@ -1,4 +1,4 @@
-"""Guided targets: which messages move the rover, which are refused, which vanish without a word (measured)."""
+"""Guided targets: which messages move the rover, are refused, or are silently ignored (measured; ModeGuided)."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def global_target(vehicle: Vehicle, channel: Channel, message: Any) -> None:
 
 
 def _motion_target(vehicle: Vehicle, message: Any, body: bool) -> None:
-    """Velocity, heading and turn rate in their five allowed combinations."""
+    """A target of velocity, heading and turn rate, in the five valid combinations."""
     mask = message.type_mask
     has_velocity, has_yaw, has_rate = not mask & NO_VELOCITY, not mask & NO_YAW, not mask & NO_YAW_RATE
     values = (message.vx, message.vy, message.yaw, message.yaw_rate)
@@ -85,7 +85,7 @@ def _motion_target(vehicle: Vehicle, message: Any, body: bool) -> None:
 
 
 def attitude_target(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """SET_ATTITUDE_TARGET: thrust is a share of WP_SPEED, with a heading or a turn rate."""
+    """SET_ATTITUDE_TARGET: thrust as a share of WP_SPEED, with a heading or a turn rate."""
     if not vehicle.in_guided or message.type_mask & (1 << 6) or not math.isfinite(message.thrust):
         return
     w, x, y, z = message.q

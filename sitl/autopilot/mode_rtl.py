@@ -1,4 +1,4 @@
-"""RTL: back to home or to a rally point (behaviour of ModeRTL, AP_Rally)."""
+"""RTL: return to home or to a rally point (behaviour of ModeRTL, AP_Rally)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from sitl.autopilot.vehicle import INFO, Vehicle
 
 
 def destination_of_rtl(vehicle: Vehicle) -> Place:
-    """Where RTL goes: home, or the nearest rally point that is allowed and not too far."""
+    """Home, or the nearest rally point inside the fence that is not too far away."""
     here = vehicle.place()
     points = [item.place for item in vehicle.storage.rally if allowed(vehicle, item.place)]
     point = nearest(here, points)
@@ -23,7 +23,7 @@ def destination_of_rtl(vehicle: Vehicle) -> Place:
 
 
 def begin_return(vehicle: Vehicle) -> None:
-    """RTL, as a mode or as an item of a mission."""
+    """Begin RTL, as a mode or as a mission item."""
     begin_driving(vehicle, vehicle.parameters["RTL_SPEED"])
     vehicle.rtl_arrival_said = False
     drive_to(vehicle, destination_of_rtl(vehicle))
@@ -31,7 +31,7 @@ def begin_return(vehicle: Vehicle) -> None:
 
 
 def run_return(vehicle: Vehicle) -> None:
-    """Tell once of having arrived."""
+    """Report the arrival, once."""
     if arrived(vehicle) and not vehicle.rtl_arrival_said:
         vehicle.rtl_arrival_said = True
         vehicle.say(INFO, "Reached destination")

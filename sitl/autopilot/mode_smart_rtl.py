@@ -1,4 +1,4 @@
-"""SMART_RTL: remembers the path driven and drives it back (behaviour of ModeSmartRTL, AP_SmartRTL)."""
+"""SMART_RTL: record the path driven, simplify it, drive it back (behaviour of ModeSmartRTL, AP_SmartRTL)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from sitl.world import geodesy
 SAVE_EVERY_US = 300_000
 
 SIMPLIFY_AT = 50
-"""New points on the path after which it is simplified."""
+"""After this many new points the path is simplified."""
 
 
 def begin_smart_rtl(vehicle: Vehicle) -> None:
-    """SMART_RTL: brake, and tidy the path up."""
+    """Begin SMART_RTL: brake and simplify the path."""
     begin_driving(vehicle, vehicle.parameters["RTL_SPEED"])
     path = vehicle.smart_rtl
     path.points = without_loops(simplified(path.points, _tolerance_m(vehicle)), _tolerance_m(vehicle))
@@ -27,7 +27,7 @@ def begin_smart_rtl(vehicle: Vehicle) -> None:
 
 
 def run_smart_rtl(vehicle: Vehicle) -> None:
-    """SMART_RTL: from point to point back to where it was armed."""
+    """Drive from point to point back to where the rover was armed."""
     path = vehicle.smart_rtl
     if path.done:
         return
@@ -48,7 +48,7 @@ def run_smart_rtl(vehicle: Vehicle) -> None:
 
 
 def remember_start(vehicle: Vehicle) -> None:
-    """On arming: the path begins here."""
+    """Begin the path here; called on arming."""
     if vehicle.parameters["SRTL_POINTS"] <= 0.0 or vehicle.parameters["SRTL_ACCURACY"] <= 0.0:
         return
     path = vehicle.smart_rtl
@@ -59,7 +59,7 @@ def remember_start(vehicle: Vehicle) -> None:
 
 
 def remember_path(vehicle: Vehicle) -> None:
-    """Three times a second: one more point, SRTL_ACCURACY away from the last; not on the way back."""
+    """Three times a second: add a point at least SRTL_ACCURACY from the last one; not in SMART_RTL itself."""
     path = vehicle.smart_rtl
     if not path.home_saved and vehicle.has_position:
         remember_start(vehicle)
@@ -88,7 +88,7 @@ def _give_up(vehicle: Vehicle, path: SmartRtl) -> None:
 
 
 def _tolerance_m(vehicle: Vehicle) -> float:
-    """How far the tidied path may be from the recorded one."""
+    """How far the simplified path may be from the recorded one, metres."""
     return float(vehicle.parameters["SRTL_ACCURACY"]) * 0.5
 
 
@@ -96,7 +96,7 @@ Point = tuple[float, float]
 
 
 def simplified(points: list[Point], tolerance_m: float) -> list[Point]:
-    """The path with fewer points, nowhere farther than the tolerance from the old one (Ramer, Douglas, Peucker)."""
+    """The path with fewer points, within the tolerance of the old one (Ramer-Douglas-Peucker)."""
     keep, stack = {0, len(points) - 1}, [(0, len(points) - 1)]
     while stack:
         first, last = stack.pop()
@@ -112,7 +112,7 @@ def simplified(points: list[Point], tolerance_m: float) -> list[Point]:
 
 
 def without_loops(points: list[Point], near_m: float) -> list[Point]:
-    """The path without the loops between legs that come near to each other; what is left may be driven both ways."""
+    """The path without loops: what lies between two segments within ``near_m`` of each other is cut out."""
     kept = list(points)
     first = 0
     while first < len(kept) - 3:
@@ -126,12 +126,12 @@ def without_loops(points: list[Point], near_m: float) -> list[Point]:
 
 
 def _from_segment_m(point: Point, start: Point, end: Point) -> float:
-    """Metres from a point to a straight piece."""
+    """Metres from a point to a segment."""
     return math.dist(point, _on_segment(point, start, end))
 
 
 def _on_segment(point: Point, start: Point, end: Point) -> Point:
-    """The place of a straight piece that is nearest to a point."""
+    """The point of a segment that is nearest to a point."""
     north, east = end[0] - start[0], end[1] - start[1]
     length = north * north + east * east
     share = 0.0
@@ -142,7 +142,7 @@ def _on_segment(point: Point, start: Point, end: Point) -> Point:
 
 
 def _meeting(a: Point, b: Point, c: Point, d: Point, near_m: float) -> Point | None:
-    """Half-way between two straight pieces where they are nearest, if they are near; None otherwise."""
+    """Midpoint of the shortest connection of two segments if they are near each other; else None."""
     crossing = _crossing(a, b, c, d)
     if crossing is not None:
         return crossing
@@ -154,7 +154,7 @@ def _meeting(a: Point, b: Point, c: Point, d: Point, near_m: float) -> Point | N
 
 
 def _crossing(a: Point, b: Point, c: Point, d: Point) -> Point | None:
-    """Where two straight pieces cross."""
+    """Where two segments cross; None if they do not."""
     ab, cd, ac = (b[0] - a[0], b[1] - a[1]), (d[0] - c[0], d[1] - c[1]), (c[0] - a[0], c[1] - a[1])
     across = ab[0] * cd[1] - ab[1] * cd[0]
     if across == 0.0:

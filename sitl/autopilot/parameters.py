@@ -1,4 +1,4 @@
-"""ArduRover's parameters as far as the simulator has them: names, types, values of the simulated skid rover."""
+"""ArduRover's parameters that the simulator knows: names, types, defaults of the simulated skid rover."""
 
 from __future__ import annotations
 
@@ -123,19 +123,19 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "WP_RADIUS": (3.0, REAL32),
     "WP_SPEED": (3.0, REAL32),
 }
-"""Value and type of each parameter, those that the simulator acts on and those that people look at."""
+"""Value and type of each parameter, both those that have an effect and those that people look at."""
 
 LIMITS = {INT8: (-128.0, 127.0), INT16: (-32768.0, 32767.0), INT32: (-(2.0**31), 2.0**31 - 1.0)}
 
 
-class Parameters:
+class Parameters(Mapping[str, float]):
     """The parameter table: read by name or index, set with the firmware's rounding of integers."""
 
     def __init__(self, changes: Mapping[str, float] | None = None, kept: Mapping[str, int] | None = None) -> None:
-        """Start from the defaults, with ``changes``.
+        """The defaults with ``changes``.
 
-        ``kept``: types of names that are not simulated: they can be read and set, and change nothing. KeyError names a parameter
-        of ``changes`` that is neither.
+        ``kept``: types of further parameters that can be read and set but have no effect. Raises KeyError for a
+        parameter of ``changes`` that is neither known nor kept.
         """
         self._types = {name: kind for name, (_, kind) in DEFAULTS.items()} | dict(kept or {})
         self._values = {name: float(value) for name, (value, _) in DEFAULTS.items()} | dict.fromkeys(kept or (), 0.0)
@@ -157,7 +157,7 @@ class Parameters:
         return name in self._values
 
     def name_of(self, index: int) -> str | None:
-        """The name at an index, None outside the table."""
+        """The name at an index; None outside the table."""
         return self._names[index] if 0 <= index < len(self._names) else None
 
     def index_of(self, name: str) -> int:
@@ -169,7 +169,7 @@ class Parameters:
         return self._types[name]
 
     def set(self, name: str, value: float) -> bool:
-        """Change a parameter; False if there is none of this name or the value is no number."""
+        """Set a parameter; False if the name is unknown or the value is not finite."""
         if name not in self._values or not math.isfinite(value):
             return False
         limits = LIMITS.get(self._types[name])
@@ -184,9 +184,10 @@ class Parameters:
 
 
 def steered_wheels(turning_radius_m: float) -> dict[str, float]:
-    """ArduRover's parameters for a rover with steered wheels: outputs, TURN_RADIUS, and steering tuned to it.
+    """ArduRover's parameters for a rover with steered wheels: outputs, TURN_RADIUS, and the steering feed-forward.
 
-    At MOT_SPD_SCA_BASE, 1 m/s, a turn rate of 1 rad/s is a turn of 1 m radius, so the feed-forward is the radius at full lock.
+    At MOT_SPD_SCA_BASE, 1 m/s, a turn rate of 1 rad/s is a turn of 1 m radius, so the feed-forward equals the radius
+    at full lock.
     """
     return {
         "SERVO1_FUNCTION": float(GROUND_STEERING),

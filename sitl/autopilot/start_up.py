@@ -1,4 +1,4 @@
-"""ArduRover's start-up: what is available from when on, what is said when, and how much later without GPS."""
+"""ArduRover's start-up: when each part becomes available, which texts are sent when, and delays without GPS."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ ARMABLE_S = 43.0
 
 @dataclass
 class GpsLate:
-    """How much later than without faults the parts of the start-up come that need GPS, seconds."""
+    """By how many seconds the parts of the start-up that need GPS are delayed."""
 
     home_s: float = 0.0
     origin_s: float = 0.0
@@ -46,4 +46,4 @@ TIMETABLE: tuple[tuple[float, tuple[str, ...]], ...] = (
     (ORIGIN_S, ("EKF3 IMU0 origin set", "EKF3 IMU1 origin set", f"Field Elevation Set: {ALTITUDE_M:.0f}m")),
     (POSITION_S, ("EKF3 IMU0 is using GPS", "EKF3 IMU1 is using GPS", "AHRS: EKF3 active")),
 )
-"""What is said when, seconds since boot (measured)."""
+"""Texts of the start-up, by seconds since boot (measured)."""

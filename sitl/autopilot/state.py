@@ -155,7 +155,7 @@ class FenceState:
 
 @dataclass
 class SmartRtl:
-    """The path that SMART_RTL drives back, metres north and east of the EKF origin, and how far along it the rover is."""
+    """The path that SMART_RTL drives back, metres north and east of the EKF origin, and the progress along it."""
 
     points: list[tuple[float, float]] = field(default_factory=list)
     active: bool = False

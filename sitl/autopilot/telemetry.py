@@ -1,4 +1,4 @@
-"""SYS_STATUS: which parts of the autopilot are there, in use and well, as measured over a boot and in each mode."""
+"""Telemetry: each message that the autopilot streams or sends on request, built from the vehicle's state."""
 
 from __future__ import annotations
 
@@ -28,14 +28,14 @@ MOTORS_AND_RC, GEOFENCE, AHRS, LOGGING, BATTERY, PREARM = 1 << 15 | 1 << 16, 1 <
 ALWAYS = GYRO_ACCEL_MAG_BARO | MOTORS_AND_RC | BATTERY
 
 AHRS_USED_S = 22.0
-"""The estimate counts as in use from here on (measured)."""
+"""From here on the estimate counts as in use (measured)."""
 
 LOGGING_S = 15.0
-"""The log goes on for so long after disarming or a refused arming."""
+"""The log continues for this long after disarming or a refused arming."""
 
 
 def sys_status(vehicle: Vehicle) -> list[Any]:
-    """SYS_STATUS of this moment."""
+    """SYS_STATUS: which parts are present, in use and healthy, as measured over a boot and in each mode."""
     gps = GPS if vehicle.has_home and vehicle.ekf.gps_has_fix else 0
     laser = LASER if vehicle.sensing.suite.beams else 0
     control = 0 if vehicle.mode in (Mode.MANUAL, Mode.HOLD, Mode.INITIALISING) else STABILISED
@@ -60,7 +60,7 @@ def sys_status(vehicle: Vehicle) -> list[Any]:
 
 
 class BatteryReadings(NamedTuple):
-    """What the battery monitor tells, each as far as its field in a message goes (a parameter may ask for more)."""
+    """Readings of the battery monitor, each limited to the range of its field in a message."""
 
     volts_mv: int
     amps_ca: int
@@ -83,7 +83,7 @@ def battery_readings(vehicle: Vehicle) -> BatteryReadings:
 
 
 def _within(value: float, low: int, high: int) -> int:
-    """Whole, and between the two; what is no number is the lower one."""
+    """The value as an integer between two limits; NaN becomes the lower one."""
     return int(min(max(value, low), high)) if value > low else low
 
 
@@ -98,7 +98,7 @@ BOAT = 2
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
 
 CAPABILITIES = 61935
-"""The firmware's (measured). That of files is among them; what is asked about files is answered (`files`)."""
+"""The firmware's capabilities (measured). File transfer is among them, see ``ftp``."""
 
 Builder = Callable[[Vehicle], list[Any]]
 
@@ -154,7 +154,7 @@ def _ekf_status(vehicle: Vehicle) -> list[Any]:
 
 def _gps_raw(vehicle: Vehicle) -> list[Any]:
     if vehicle.has_home and vehicle.ekf.gps_has_fix and not vehicle.ekf.gps.talks:
-        return []  # while a receiver counts as there, only what is new is sent
+        return []  # while the receiver counts as present, only new fixes are sent
     if not vehicle.has_home or not vehicle.ekf.gps_has_fix:
         return [mavlink.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, 65535, 65535, 0, 0, 0)]
     lat, lon = vehicle.gps_place()
@@ -169,8 +169,8 @@ def _gps_raw(vehicle: Vehicle) -> list[Any]:
     ]  # fmt: skip
 
 
-def _beside_leg_m(vehicle: Vehicle) -> float:
-    """Metres left (positive) or right of the leg that is driven; 0 where there is none."""
+def _cross_track_m(vehicle: Vehicle) -> float:
+    """Metres left (positive) or right of the present leg; 0 without one."""
     control, (north_m, east_m) = vehicle.control[0], vehicle.position_m()
     leg_n, leg_e = float(control["dest_n"] - control["from_n"]), float(control["dest_e"] - control["from_e"])
     length_m = math.hypot(leg_n, leg_e)
@@ -183,15 +183,15 @@ def _navigation(vehicle: Vehicle) -> list[Any]:
     if vehicle.mode not in AUTOPILOT_MODES:
         return []
     bearing = distance = 0
-    beside_m = 0.0
+    cross_track_m = 0.0
     if vehicle.has_target:
         north, east = geodesy.offset_m(vehicle.place(), vehicle.destination)
         bearing = round(math.degrees(math.atan2(east, north))) % 360
         distance = int(math.hypot(north, east))
-        beside_m = _beside_leg_m(vehicle)
+        cross_track_m = _cross_track_m(vehicle)
     return [
         mavlink.MAVLink_nav_controller_output_message(
-            0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, beside_m
+            0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, cross_track_m
         )
     ]
 
@@ -234,7 +234,7 @@ def _rangefinder(vehicle: Vehicle) -> list[Any]:
 
 
 def read_beams(vehicle: Vehicle) -> list[Reading]:
-    """What the rangefinders say at this moment."""
+    """The readings of the rangefinders at this moment."""
     rover = vehicle.rover[0]
     return vehicle.sensing.wired(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
 
@@ -310,7 +310,7 @@ def _rc_channels(vehicle: Vehicle) -> list[Any]:
 
 
 def stick_us(share: float) -> int:
-    """A stick's place, -1 to 1, as the length of its pulse in microseconds."""
+    """A stick's position, -1 to 1, as a pulse length in microseconds."""
     return 1500 + round(500.0 * share)
 
 
@@ -356,7 +356,7 @@ MESSAGES: dict[int, Builder] = {
     173: _rangefinder,
     162: fence_status,
 }
-"""Streamed at 1 Hz unless asked otherwise; a builder gives nothing while there is nothing to tell."""
+"""Streamed at 1 Hz unless requested otherwise; a builder returns nothing while there is nothing to send."""
 
 ON_REQUEST: dict[int, Builder] = {0: heartbeat, 49: _gps_origin, 148: _version, 242: _home}
 
@@ -367,6 +367,6 @@ def streamable(number: int) -> bool:
 
 
 def requested_messages(vehicle: Vehicle, number: int) -> list[Any]:
-    """One message made now; empty if there is nothing to tell."""
+    """The message with this id, built now; empty if there is nothing to send."""
     builder = MESSAGES.get(number) or ON_REQUEST[number]
     return builder(vehicle)

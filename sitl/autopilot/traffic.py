@@ -1,7 +1,7 @@
-"""Moving obstacles that tell of themselves, as a rover hears them on its autopilot's links.
+"""Moving obstacles that announce themselves over MAVLink: as vehicles, by ADS-B or by AIS.
 
-A ``vehicle`` is a MAVLink system of its own on the same network: HEARTBEAT and GLOBAL_POSITION_INT. What ``adsb`` and ``ais``
-send on the air reaches the autopilot's receivers, and the autopilot passes it on as ADSB_VEHICLE and AIS_VESSEL.
+A vehicle is a MAVLink system of its own on the same network: HEARTBEAT and GLOBAL_POSITION_INT. ADS-B and AIS reach the
+autopilot's receivers by radio, and the autopilot sends them on as ADSB_VEHICLE and AIS_VESSEL.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ AIS_FLAGS = mavlink.AIS_FLAGS_VALID_COG | mavlink.AIS_FLAGS_VALID_VELOCITY | mav
 
 
 class Traffic:
-    """Sends what every announced mover tells; vehicles have sequence numbers of their own."""
+    """Sends the messages of every mover that announces itself; vehicles have sequence numbers of their own."""
 
     def __init__(self, world: World, origin: tuple[int, int], origin_m: tuple[float, float]) -> None:
         """``origin``: a place on earth, 1e-7 degree; ``origin_m``: the same place in the world frame."""
@@ -60,7 +60,7 @@ class Traffic:
         return bool(self._talkers)
 
     def next_due_s(self) -> float:
-        """Time of the next packet; inf when nobody talks."""
+        """Time of the next packet; inf without announced movers."""
         return min(self._due_s.values(), default=math.inf)
 
     def send_due(self, time_s: float, channels: Iterable[Channel]) -> None:

@@ -94,9 +94,7 @@ class Person:
             return
         self._in_vain += 1
         if self._in_vain == PATIENCE:
-            self.gave_up = (
-                f"The autopilot does not let it be armed: {'; '.join(arming_faults(vehicle)) or 'GUIDED refused'}"
-            )
+            self.gave_up = f"The autopilot does not let it be armed: {'; '.join(fault.text for fault in arming_faults(vehicle)) or 'GUIDED refused'}"
             drive.companion.stop()
 
 

@@ -1,7 +1,8 @@
-"""The world behind the real firmware: servo outputs in, the rover's state out, one time step for each new frame.
+"""Physics for the real firmware: servo outputs in, the rover's state out, one time step for each new frame.
 
-Plant, world and sensors are those of our own simulated vehicle; autopilot and estimator are the firmware's. Time passes only with
-answers: the firmware waits for each, and its clock is the answers' timestamp. So a run is a function of mission, seed and frames.
+Plant, world and sensors are those of the simulated vehicle; autopilot and estimator are the firmware's. Time passes
+only with answers: the firmware waits for each, and takes its clock from the answer's timestamp. So a run is a
+function of mission, seed and frames.
 """
 
 from __future__ import annotations
@@ -23,14 +24,14 @@ from sitl.world.truth import Collision, SimStart, collision_of
 from sitl.world.world import Surroundings, World
 
 PLANT_STEP_S = 0.005
-"""The plant's longest step, as in our own vehicle."""
+"""The plant's longest step, as in the simulated vehicle."""
 LONGEST_STEP_S = 0.09
-"""The firmware takes no step of 0.1 s or more for one; slower frame rates get this one."""
+"""The firmware rejects steps of 0.1 s and more; slower frame rates get this step."""
 RANGE_INTERVAL_S = 0.02
-"""How often rangefinders without a rate of their own measure: with every main loop of ArduRover."""
+"""Interval of rangefinders without their own rate: every main loop of ArduRover."""
 MIDDLE_US, SPAN_US = 1500, 500
 NO_PULSE_US = (800, 2200)
-"""Outside of these a motor controller takes it for no signal and stops; 0 is an output that is off."""
+"""Outside these limits a motor controller sees no signal and stops; 0 is an output that is off."""
 
 
 @njit(cache=True, nogil=True)
@@ -46,30 +47,30 @@ def advance(
 
 
 def servo_output(pwm_us: int) -> float:
-    """What a pulse asks for, -1 to 1."""
+    """The servo output of a pulse, -1 to 1."""
     if not NO_PULSE_US[0] <= pwm_us <= NO_PULSE_US[1]:
         return 0.0
     return min(max((pwm_us - MIDDLE_US) / SPAN_US, -1.0), 1.0)
 
 
 def frame_step_s(rate_hz: int) -> float:
-    """How far a frame moves the world."""
+    """The time step of a frame."""
     return min(1.0 / rate_hz, LONGEST_STEP_S)
 
 
 @dataclass(slots=True)
 class Tally:
-    """What has come in so far, from all firmware starts."""
+    """Counts of what was received, over all starts of the firmware."""
 
     steps: int = 0
     repeated: int = 0
-    """Frames asked for again, answered as before."""
+    """Repeated frames, answered as before."""
     lost: int = 0
-    """Frames that never came, by their numbers."""
+    """Missing frames, by their numbers."""
     late: int = 0
-    """Copies that came after newer frames; not answered."""
+    """Copies that arrived after newer frames; not answered."""
     bad: int = 0
-    """Datagrams that are no frames; not answered."""
+    """Datagrams that are not frames; not answered."""
     strangers: int = 0
     """Frames from a second firmware; not answered."""
     starts: int = 0
@@ -87,7 +88,7 @@ class FrameKind(Enum):
 
 
 class Motion(NamedTuple):
-    """Where the rover is and how it moves, world frame."""
+    """Position, heading and velocity of the rover, world frame."""
 
     north_m: float
     east_m: float
@@ -103,12 +104,12 @@ class Physics:
         self, world: World, start: SimStart, suite: SensorSuite, seed: int = 0, rover_radius_m: float = 0.35,
         turning_radius_m: float = 0.0, range_noise_m: float = NoiseSettings().range_m, *, scans: bool = False,
     ) -> None:  # fmt: skip
-        """``scans``: whether the suite's lidar has a line of its own, see ``take``; ``turning_radius_m``: 0 for skid steering.
+        """``scans``: the lidar publishes on a link of its own, see ``take``; ``turning_radius_m``: 0 for skid steering.
 
-        Raises ValueError for more rangefinders than the firmware takes.
+        Raises ValueError for more rangefinders than the firmware accepts.
         """
         if len(suite.beams) > RANGES_MOST:
-            raise ValueError(f"{len(suite.beams)} rangefinders: the firmware takes {RANGES_MOST} at most")
+            raise ValueError(f"{len(suite.beams)} rangefinders: the firmware accepts at most {RANGES_MOST}")
         self.world, self.start, self.suite = world, start, suite
         self.tally = Tally()
         self._make = (seed, rover_radius_m, turning_radius_m, range_noise_m)
@@ -121,7 +122,7 @@ class Physics:
         self._begin()
 
     def _begin(self) -> None:
-        """The rover at its start, at rest, at time 0; the world as it is then."""
+        """Put the rover at its start, at rest, at time 0."""
         seed, rover_radius_m, turning_radius_m, noise_m = self._make
         start, suite = self.start, self.suite
         self.time_s = 0.0
@@ -136,7 +137,7 @@ class Physics:
         self._measured = 0
 
     def answer(self, datagram: bytes, sender: object = None) -> bytes:
-        """What to send back to ``sender``; nothing (empty) to what is no frame, or not this firmware's next one."""
+        """The answer to ``sender``; empty if there is none."""
         frame = decode(datagram)
         if frame is None:
             self.tally.bad += 1
@@ -162,7 +163,7 @@ class Physics:
         return self._answer
 
     def _kind(self, frame: ServoFrame, sender: object) -> FrameKind:
-        """What a frame is after the last one. A firmware counts from 0, and one that goes on where it was may have moved."""
+        """Compare a frame with the last one. The firmware counts from 0; its address may change while it runs."""
         if self._last is None:
             return FrameKind.START
         ahead = (frame.count - self._last.count) % COUNTS
@@ -176,7 +177,7 @@ class Physics:
         return FrameKind.NEXT if ahead <= COUNTS // 2 else FrameKind.LATE
 
     def rehearse(self) -> None:
-        """Take one step and forget it: compiles what is not compiled yet, before anybody waits for an answer."""
+        """Take one step and start over, so that everything is compiled before the firmware waits for an answer."""
         self._move(0.0, 0.0, PLANT_STEP_S)
         self._measure(self.motion)
         self._outbox.clear()
@@ -185,22 +186,22 @@ class Physics:
 
     @property
     def system(self) -> int | None:
-        """Id of the autopilot that was heard on the lidar's line, if any."""
+        """System id of the autopilot heard on the lidar's link; None if none was."""
         return self._port.system
 
     def hear(self, data: bytes) -> None:
-        """Bytes from the lidar's line."""
+        """Take in bytes from the lidar's link."""
         self._port.hear(data)
 
     def take(self) -> bytes:
-        """What the lidar has sent on its line since the last call: MAVLink, whole packets."""
+        """The packets that the lidar has sent since the last call."""
         data = bytes(self._outbox)
         self._outbox.clear()
         return data
 
     @property
     def motion(self) -> Motion:
-        """The truth."""
+        """The rover's true motion."""
         rover = self._rover[0]
         heading_rad, speed_m_s, slide_m_s = float(rover["heading_rad"]), float(rover["speed_m_s"]), rover["slide_m_s"]
         ahead_n, ahead_e = math.cos(heading_rad), math.sin(heading_rad)
@@ -233,9 +234,10 @@ class Physics:
             self.collisions += (collision_of(self._rover[0], world.movers, self.time_s),)
 
     def _body(self, before: Motion, now: Motion, step_s: float) -> BodyState:
-        """Mean turn rate and acceleration of the step: integrated, they give the heading and the velocity that are told.
+        """The reported state, with mean turn rate and acceleration of the step.
 
-        That holds for a collision too, which stops the rover within the step.
+        Integrated, these give the reported heading and velocity. That holds for a collision too, which stops the
+        rover within the step.
         """
         turned_rad = (now.heading_rad - before.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
         accel_n = (now.vel_north_m_s - before.vel_north_m_s) / step_s
@@ -249,7 +251,7 @@ class Physics:
         )  # fmt: skip
 
     def _measure(self, now: Motion) -> None:
-        """Let every sensor whose time has come measure."""
+        """Measure with every sensor that is due."""
         sensing, here = self._sensing, now[:3]
         sensing.time_s = self.time_s
         if sensing.samples and self.time_s >= sensing.next_due_s() - 1e-9:
@@ -258,7 +260,7 @@ class Physics:
             self._measured = math.floor(self.time_s / RANGE_INTERVAL_S + 1e-6) + 1
             self._ranges_m = [math.nan] * len(self.suite.beams)
             for reading in sensing.wired(*here):
-                # What the firmware takes for out of range lies beyond its maximum.
+                # For the firmware a range beyond the maximum means that nothing was seen.
                 seen_cm = reading.range_cm if reading.range_cm < reading.max_cm else reading.max_cm + 1
                 self._ranges_m[reading.number] = seen_cm / 100.0
         time_us = round(self.time_s * 1e6)

@@ -1,4 +1,4 @@
-"""A line to a network that tells who is at its other end, and what it has carried."""
+"""Log lines of the lidar's client link: who is at its other end, and how much was sent."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sitl.network.mavlink_client import ClientLink
 
 
 class State(Enum):
-    """How a line stands."""
+    """State of a link."""
 
     BEGUN = auto()
     NOBODY = auto()
@@ -23,7 +23,7 @@ class State(Enum):
 
 
 class LoggedLink:
-    """Passes everything on to ``link``; each change of it is a line for ``tell``. ``system``: the autopilot that was heard there, if any."""
+    """Wraps ``link`` and reports changes of its state to ``tell``; ``system``: the autopilot heard there, if any."""
 
     def __init__(
         self, link: ClientLink, url: str, tell: Callable[[str], None], system: Callable[[], int | None]
@@ -39,15 +39,15 @@ class LoggedLink:
 
     @property
     def peer(self) -> str:
-        """Who is there; empty for nobody."""
+        """As of the link."""
         return self._link.peer
 
     def sockets(self) -> list[socket.socket]:
-        """What to wait on for input."""
+        """As of the link."""
         return self._link.sockets()
 
     def exchange(self, data: bytes, now_s: float) -> bytes:
-        """As the link does; whatever has changed is told."""
+        """As the link does; then report a change of state."""
         heard = self._link.exchange(data, now_s)
         if data and self._link.peer:
             self._sent += len(packets(data))
@@ -63,9 +63,9 @@ class LoggedLink:
         return heard
 
     def close(self) -> None:
-        """Let go of all sockets, and say what was carried."""
+        """Close all sockets, and report how much was sent."""
         self._link.close()
-        lost = f", {self._lost} lost with nobody there" if self._lost else ""
+        lost = f", {self._lost} lost without a peer" if self._lost else ""
         self._tell(f"{self._url}: {self._sent} packets of the lidar sent{lost}")
 
     def _state(self, now_s: float) -> State:
@@ -84,7 +84,7 @@ class LoggedLink:
             case State.NOBODY if self._known[0] is not State.NOBODY:
                 return f"{self._peer}: link lost; waiting for {self._url}"
             case State.CONNECTED:
-                return f"scans go to {peer}, where no autopilot was heard yet ({self._url})"
+                return f"scans go to {peer}, where no autopilot has been heard yet ({self._url})"
             case State.ANSWERED:
                 return f"scans go to {peer} (system {system})"
             case State.SILENT:

@@ -1,4 +1,4 @@
-"""What is worth a line while a simulator is served: clients that come and go, and collisions."""
+"""Log lines of a served simulator: clients that connect and disconnect, and collisions."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from sitl.simulator import Simulator
 from sitl.world.truth import Collision, SimStart
 
 SILENT_S = 5.0
-"""A UDP partner that has said nothing for so long has gone: there is no other way to know."""
+"""A UDP client that has been silent for this long counts as gone."""
 COLLISIONS_EVERY_S = 1.0
-"""A rover that scrapes along a wall touches it many times; that is one line a second at most."""
+"""Minimum time between lines about collisions: a rover that scrapes along a wall touches it many times."""
 
 
 class EventLog:
-    """Puts each happening into one line and gives it to ``tell``; ``now_s`` reads real seconds. By default nobody listens."""
+    """Reports each event in one line to ``tell`` (by default nowhere); ``now_s`` reads real seconds."""
 
     def __init__(
         self, tell: Callable[[str], None] = lambda line: None, now_s: Callable[[], float] = lambda: 0.0
@@ -24,37 +24,37 @@ class EventLog:
         self._now_s = now_s
         self._heard_s: dict[tuple[str, str], float] = {}
         self._collisions = 0
-        self._collisions_told_s = -math.inf
+        self._collisions_reported_s = -math.inf
 
     def connected(self, who: str, url: str) -> None:
         """A client has connected."""
-        self._tell(f"{who} has come ({url})")
+        self._tell(f"{who} has connected ({url})")
 
     def disconnected(self, who: str, url: str, *, dropped: bool) -> None:
-        """A client is gone, or has been ``dropped`` by the vehicle."""
-        self._tell(f"{who} has {'been dropped: the autopilot restarts' if dropped else 'left'} ({url})")
+        """A client has disconnected, or was ``dropped`` by the vehicle."""
+        self._tell(f"{who} has {'been dropped: the autopilot restarts' if dropped else 'disconnected'} ({url})")
 
     def heard(self, who: str, url: str) -> None:
-        """Somebody spoke on a connection that knows no coming and going."""
+        """A client has sent something over a protocol without connections."""
         if (who, url) not in self._heard_s:
             self.connected(who, url)
         self._heard_s[who, url] = self._now_s()
 
     def look(self, simulator: Simulator) -> None:
-        """Who has fallen silent, and what the rover has touched since the last look."""
+        """Report clients that have fallen silent, and collisions since the last look."""
         now_s = self._now_s()
         for (who, url), last_s in list(self._heard_s.items()):
             if now_s - last_s > SILENT_S:
                 del self._heard_s[who, url]
                 self._tell(f"{who} has been silent for {SILENT_S:g} s ({url})")
         collisions = simulator.collisions
-        if len(collisions) > self._collisions and now_s - self._collisions_told_s >= COLLISIONS_EVERY_S:
-            self._collisions, self._collisions_told_s = len(collisions), now_s
+        if len(collisions) > self._collisions and now_s - self._collisions_reported_s >= COLLISIONS_EVERY_S:
+            self._collisions, self._collisions_reported_s = len(collisions), now_s
             self._tell(collision_line(collisions[-1], len(collisions), simulator.start))
 
 
 def collision_line(collision: Collision, count: int, start: SimStart) -> str:
-    """What was touched, when and where; the place counts from where the rover was switched on, as LOCAL_POSITION_NED does."""
+    """What was touched, when and where; relative to the rover's start, like LOCAL_POSITION_NED."""
     north_m, east_m = collision.north_m - start.north_m, collision.east_m - start.east_m
     what = "an obstacle" if collision.mover is None else collision.mover
     where = f"north {north_m:.1f} m, east {east_m:.1f} m of its start"

@@ -1,4 +1,4 @@
-"""A line to a MAVLink network where somebody else listens: TCP that connects again whenever it has to, or UDP."""
+"""Client links to a MAVLink network: TCP that reconnects when needed, or UDP."""
 
 from __future__ import annotations
 
@@ -11,35 +11,35 @@ from sitl.network.endpoint import READ_BYTES, ListenError, network_address, plac
 
 RETRY_S = 1.0
 CONNECT_S = 0.2
-"""A computer that does not answer is not waited for longer."""
+"""Timeout of a connection attempt."""
 BACKLOG_BYTES = 65536
-"""Somebody who does not read is hung up on when so much is waiting for him."""
+"""The connection is closed when this much waits for a peer that does not read."""
 FORMS = "tcp:HOST:PORT, udpout:HOST:PORT or udpin:HOST:PORT"
 
 
 class ClientLink(Protocol):
-    """Bytes to and from the network; what cannot be sent is lost."""
+    """A link to the network; bytes that cannot be sent are lost."""
 
     @property
     def peer(self) -> str:
-        """Who is at the other end; empty for nobody."""
+        """Address of the other end; empty if there is none."""
         ...
 
     def sockets(self) -> list[socket.socket]:
-        """What to wait on for input."""
+        """Sockets to wait on for input."""
         ...
 
     def exchange(self, data: bytes, now_s: float) -> bytes:
-        """Send some bytes, whole packets; return what has arrived. ``now_s``: real seconds."""
+        """Send bytes (complete packets) and return what has arrived. ``now_s``: real seconds."""
         ...
 
     def close(self) -> None:
-        """Let go of all sockets."""
+        """Close all sockets."""
         ...
 
 
 def open_link(url: str) -> ClientLink:
-    """Open one of ``FORMS``. Raises ListenError."""
+    """Open an address of one of the ``FORMS``. Raises ListenError."""
     host, port = network_address(url, FORMS)
     listens = url.startswith("udpin")
     try:
@@ -47,16 +47,16 @@ def open_link(url: str) -> ClientLink:
             return TcpLink((socket.gethostbyname(host), port))
         return UdpLink(host, port, listens=listens)
     except (OSError, UnicodeError) as error:
-        remedy = "choose another port" if listens else "is that a computer's name or address?"
+        remedy = "choose another port" if listens else "is that the name or address of a computer?"
         raise ListenError(f"{url}: cannot be opened: {getattr(error, 'strerror', None) or error}; {remedy}") from error
 
 
 class UdpLink:
-    """One UDP partner: a fixed one (udpout) or whoever spoke last (udpin)."""
+    """A UDP link to a fixed peer (udpout), or to the last sender (udpin)."""
 
     def __init__(self, host: str, port: int, *, listens: bool) -> None:
         """Raises OSError when the address cannot be used."""
-        self._partner: tuple[str, int] | None = None if listens else (socket.gethostbyname(host), port)
+        self._peer: tuple[str, int] | None = None if listens else (socket.gethostbyname(host), port)
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         try:
@@ -67,23 +67,23 @@ class UdpLink:
 
     @property
     def peer(self) -> str:
-        """Who is sent to, there or not; empty before anybody has spoken."""
-        return "" if self._partner is None else place_text(self._partner)
+        """The peer, present or not; empty before one has sent anything."""
+        return "" if self._peer is None else place_text(self._peer)
 
     def sockets(self) -> list[socket.socket]:
         """The one socket."""
         return [self._socket]
 
     def exchange(self, data: bytes, now_s: float) -> bytes:
-        """An absent partner is no error."""
+        """Send and receive; an absent peer is not an error."""
         heard = b""
         with contextlib.suppress(OSError):
             while True:
-                datagram, self._partner = self._socket.recvfrom(READ_BYTES)
+                datagram, self._peer = self._socket.recvfrom(READ_BYTES)
                 heard += datagram
-        if data and self._partner is not None:
+        if data and self._peer is not None:
             with contextlib.suppress(OSError):
-                self._socket.sendto(data, self._partner)
+                self._socket.sendto(data, self._peer)
         return heard
 
     def close(self) -> None:
@@ -92,7 +92,7 @@ class UdpLink:
 
 
 class TcpLink:
-    """A TCP client. The firmware hangs up when it restarts."""
+    """A TCP client that reconnects. The firmware closes the connection when it restarts."""
 
     def __init__(self, place: tuple[str, int]) -> None:
         """Connects with the first exchange."""
@@ -103,15 +103,15 @@ class TcpLink:
 
     @property
     def peer(self) -> str:
-        """The other side, while there is a connection."""
+        """The peer, while connected."""
         return place_text(self._place) if self._socket else ""
 
     def sockets(self) -> list[socket.socket]:
-        """The one socket, while there is a connection."""
+        """The socket, while connected."""
         return [self._socket] if self._socket else []
 
     def exchange(self, data: bytes, now_s: float) -> bytes:
-        """Connects if there is no connection, once a second at most; ``data`` is lost then."""
+        """Send and receive; without a connection, try to connect at most once a second, and drop ``data``."""
         if self._socket is None:
             self._connect(now_s)
         if self._socket is None:
@@ -126,7 +126,7 @@ class TcpLink:
         return heard
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         if self._socket is not None:
             self._socket.close()
         self._socket = None
@@ -146,7 +146,7 @@ class TcpLink:
         with contextlib.suppress(BlockingIOError):
             while data := connection.recv(READ_BYTES):
                 heard += data
-            raise ConnectionResetError("the other side has hung up")
+            raise ConnectionResetError("the peer has closed the connection")
         return heard
 
     def _send(self, connection: socket.socket) -> None:
@@ -154,4 +154,4 @@ class TcpLink:
             while self._waiting:
                 del self._waiting[: connection.send(self._waiting)]
         if len(self._waiting) > BACKLOG_BYTES:
-            raise ConnectionAbortedError("the other side does not read")
+            raise ConnectionAbortedError("the peer does not read")

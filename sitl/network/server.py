@@ -1,4 +1,4 @@
-"""The simulator in real time, or so many times as fast, for whoever is at its endpoints."""
+"""Runs the simulator in real time, or a multiple of it, for the clients at its endpoints."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from sitl.simulator import Simulator
 
 STEP_S = 0.02
 LATE_S = 1.0
-"""When the machine cannot keep up, the clock is moved by what is later than this."""
+"""A delay beyond this is dropped when the machine cannot keep up."""
 
 
 def serve(
@@ -23,9 +23,9 @@ def serve(
     log: EventLog | None = None,
     observe: Callable[[], None] = lambda: None,
 ) -> None:
-    """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no.
+    """Run the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` returns False.
 
-    ``log`` tells of it; ``observe`` is called in every round, and must not take long.
+    ``log`` reports events; ``observe`` is called in every round, and must not take long.
     """
     log = log or EventLog()
     began_s = now_s() - simulator.time_s / speedup

@@ -1,4 +1,4 @@
-"""TCP: a port that any number of clients may connect to."""
+"""TCP server endpoint: a port to which several clients may connect."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from sitl.simulator import Simulator
 
 MOST_CLIENTS = 32
 MOST_READS = 16
-"""Taken in at once from one client; what comes faster waits, so that a flood does not stop the vehicle."""
+"""Reads per round and client; more must wait, so that a flood does not stop the vehicle."""
 
 
 @dataclass
 class TcpClient:
-    """A connected client, its link and what it has not read yet."""
+    """A connected client, its link, and bytes that it has not read yet."""
 
     socket: socket.socket
     link: SimLink
@@ -27,7 +27,7 @@ class TcpClient:
     gone: bool = False
 
     def exchange(self) -> None:
-        """Read what is there, write what fits."""
+        """Read what has arrived, write what fits."""
         self._read()
         self.waiting += self.link.take()
         try:
@@ -54,7 +54,7 @@ class TcpClient:
 
 
 class TcpServer:
-    """Listens on one port; every client has a link of its own."""
+    """Listens on one port; every client has its own link."""
 
     def __init__(self, host: str, port: int, log: EventLog, serial_port: int) -> None:
         """Raises OSError when the port is in use."""
@@ -78,7 +78,7 @@ class TcpServer:
         return listener + [client.socket.fileno() for client in self._clients]
 
     def exchange(self, simulator: Simulator, now_s: float) -> None:
-        """Let new clients in, serve the others, forget those that left."""
+        """Accept new clients, serve all, remove those that disconnected."""
         with contextlib.suppress(BlockingIOError, ConnectionError):
             while len(self._clients) < MOST_CLIENTS:
                 caller, place = self._socket.accept()

@@ -1,4 +1,4 @@
-"""The compiled main loop: estimate, controllers, plant, a batch of loops in one call."""
+"""The compiled main loop: estimate, motion control, battery, plant; runs a batch of loops in one call."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from sitl.plant.rover import drive, meet_movers
 from sitl.world.world import Surroundings
 
 SUBSTEPS = 4
-"""Steps of the plant in one main loop."""
+"""Steps of the plant per main loop."""
 
 NOISE_COLUMNS = 5
 """Normal variates per loop: velocity error north, east; position jitter north, east; heading error."""
@@ -25,18 +25,18 @@ NOISE_COLUMNS = 5
 
 @dataclass(frozen=True, slots=True)
 class NoiseSettings:
-    """How far the autopilot's estimate and the sensors are from the truth (standard deviations)."""
+    """Errors of the autopilot's estimate and of the range sensors (standard deviations)."""
 
     position_bias_m: float = 0.12
     position_jitter_m: float = 0.01
     heading_bias_deg: float = 0.5
     range_m: float = 0.02
     bias_time_s: float = 20.0
-    """How slowly the position error wanders."""
+    """Time constant with which the position error wanders."""
 
     @classmethod
     def none(cls) -> NoiseSettings:
-        """Estimates and sensors that tell the truth."""
+        """No errors at all."""
         return cls(0.0, 0.0, 0.0, 0.0)
 
     def as_array(self) -> NDArray[np.float64]:
@@ -51,7 +51,7 @@ class NoiseSettings:
 
 @njit(cache=True, nogil=True)
 def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: Any) -> None:
-    """What the autopilot believes after one loop: the truth, a slowly wandering error, a little jitter."""
+    """Update the autopilot's estimate: the truth, a slowly wandering error, some jitter."""
     keep = math.exp(-LOOP_S / noise[1])
     kick = noise[0] * math.sqrt(1.0 - keep * keep)
     estimate.drift_n = keep * estimate.drift_n + kick * draw[0]
@@ -80,7 +80,7 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
 
 @njit(cache=True, nogil=True)
 def draw_current(rover: Any, control: Any) -> None:
-    """Take one loop's current from the battery, and count it: by the motors' mean output, on steered wheels by the throttle."""
+    """Draw one loop's current from the battery and count it: by mean motor output, with steered wheels by throttle."""
     first, third = abs(control.servo_1), abs(control.servo_3)
     control.amps = FULL_A * (third if rover.turning_radius_m > 0.0 else 0.5 * (first + third))
     drawn_ah = control.amps * LOOP_S / 3600.0
@@ -93,10 +93,10 @@ def draw_current(rover: Any, control: Any) -> None:
 def run_loops(
     rovers: Any, records: MotionRecords, origin: Any, noise: Any, draws: Any, surroundings: Surroundings, time_s: float
 ) -> int:
-    """Run main loops from ``time_s`` on until the draws are used up, or something happens that must be reported at once.
+    """Run main loops from ``time_s`` on until the draws are used up, or something must be reported at once.
 
-    ``noise``: see ``NoiseSettings.as_array``; ``draws``: shape (loops, NOISE_COLUMNS), normal variates. Returns how many loops
-    were run: a target reached, a time-out and a new contact end the batch early.
+    ``noise``: see ``NoiseSettings.as_array``; ``draws``: shape (loops, NOISE_COLUMNS), normal variates. Returns how
+    many loops were run: a target reached, a time-out and a new contact end the batch early.
     """
     rover, estimate, control, tuning = rovers[0], records.estimates[0], records.controls[0], records.tunings[0]
     contacts = rover.contacts

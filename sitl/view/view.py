@@ -1,7 +1,7 @@
-"""What ``--view`` shows: map, rover and figures, as something that rich can print. A pure function of the state.
+"""The screen of ``--view``: map, rover and figures as a rich renderable; a pure function of the state.
 
-Two dots, one above the other, make one character. With colours that is an upper half block on a ground of its own; without them
-every kind has a sign of its own.
+Two dots, one above the other, make one character: with colours an upper half block on a background, without colours a
+sign per kind.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from rich.text import Text
 from sitl.view.sketch import Dots, Frame, Kind, PlaceState, Scene, frame_for, paint
 
 PANEL_COLUMNS = (32, 44)
-"""At least and at most; between them a third of the terminal."""
+"""Smallest and largest width; between them a third of the terminal."""
 NAME_COLUMNS = 11
 SMALLEST = (60, 16)
-"""Columns and rows below which there is no room for a picture."""
+"""Smallest number of columns and rows for a picture."""
 LEGEND_SHARE = 4
-"""Of the map's rows, the legend takes at most one in so many."""
+"""The legend takes at most one of this many rows of the map."""
 
 ARROWS = "↑↗→↘↓↙←↖"
 
@@ -51,7 +51,7 @@ ROVER_STYLE = "bold #000000 on #ffd700"
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a kind of dot looks: its colour, its sign where there are none, and its name in the legend."""
+    """How a kind of dot looks: its colour, its sign without colours, and its name in the legend."""
 
     colour: str
     sign: str
@@ -77,7 +77,7 @@ LOOKS = {
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One line of the panel; ``alarm``: it should be seen."""
+    """One line of the panel; ``alarm``: highlighted."""
 
     name: str
     value: str
@@ -94,7 +94,7 @@ class Section:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class View:
-    """The state that is shown. ``events``: what was told, the newest last."""
+    """The state that is shown. ``events``: texts, the newest last."""
 
     title: str
     scene: Scene
@@ -103,7 +103,7 @@ class View:
 
 
 def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableType:
-    """The whole screen of so many characters."""
+    """The whole screen, with this many columns and rows of characters."""
     if columns < SMALLEST[0] or rows < SMALLEST[1]:
         small = f"{columns} x {rows} characters are too few for a picture (at least {SMALLEST[0]} x {SMALLEST[1]})"
         return Group(Text(small), *(_line(fact, columns) for section in view.sections for fact in section.facts))
@@ -116,7 +116,7 @@ def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableTy
 
 
 def _map_panel(view: View, columns: int, rows: int, *, colour: bool) -> Panel:
-    """The map with its legend below, so many characters inside the border."""
+    """The map with its legend below, with this many characters inside the border."""
     frame = frame_for(view.scene, 2 * rows, columns)
     dots = paint(view.scene, frame)
     legend = _legend(view.scene, frame, dots, columns, colour=colour)[: max(1, rows // LEGEND_SHARE)]
@@ -129,7 +129,7 @@ def _map_panel(view: View, columns: int, rows: int, *, colour: bool) -> Panel:
 
 
 def _size(scene: Scene) -> str:
-    """The world's, whatever part of it is shown; nothing for open ground."""
+    """The world's size as text; empty for open ground."""
     if scene.bounds_m is None:
         return ""
     south_m, west_m, north_m, east_m = scene.bounds_m
@@ -137,14 +137,14 @@ def _size(scene: Scene) -> str:
 
 
 def map_lines(scene: Scene, frame: Frame, dots: Dots, *, colour: bool) -> list[Text]:
-    """The map, a text for each row of characters; ``frame.rows`` is even."""
+    """The map, one text per row of characters; ``frame.rows`` is even."""
     marks = _marks(scene, frame)
     lines = []
     for row in range(0, frame.rows, 2):
         pairs = zip(dots[row].tolist(), dots[row + 1].tolist(), strict=True)
         characters = [_character(Kind(upper), Kind(lower), colour=colour) for upper, lower in pairs]
         for column, (sign, style) in marks.get(row // 2, {}).items():
-            # A mark lies on the ground that is there, unless it brings its own.
+            # A mark keeps the background of its dot, unless its style has its own.
             ground = "" if " on " in style or not colour else f" on {LOOKS[Kind(int(dots[row, column]))].colour}"
             characters[column] = (sign, style + ground)
         line = Text(no_wrap=True, overflow="crop")
@@ -166,7 +166,7 @@ def _character(upper: Kind, lower: Kind, *, colour: bool) -> tuple[str, str]:
 
 
 def _marks(scene: Scene, frame: Frame) -> dict[int, dict[int, tuple[str, str]]]:
-    """Signs that take a whole character, and their styles, by row and column of characters; the rover is on top."""
+    """Signs of places and rover with their styles, by row and column of characters; the rover is on top."""
     marks: dict[int, dict[int, tuple[str, str]]] = {}
     signs = [(one.north_m, one.east_m, *PLACE_LOOKS[one.state][::2]) for one in scene.places]
     signs.append((scene.rover.north_m, scene.rover.east_m, arrow(scene.heading_rad), ROVER_STYLE))
@@ -178,12 +178,12 @@ def _marks(scene: Scene, frame: Frame) -> dict[int, dict[int, tuple[str, str]]]:
 
 
 def arrow(heading_rad: float) -> str:
-    """The arrow that is nearest to a heading, clockwise from north."""
+    """The arrow nearest to a heading, clockwise from north."""
     return ARROWS[round(heading_rad / (math.pi / 4.0)) % 8]
 
 
 def _legend(scene: Scene, frame: Frame, dots: Dots, columns: int, *, colour: bool) -> list[Text]:
-    """What the signs and colours mean that the map shows, the most important first, in as many lines as it takes."""
+    """Meaning of the signs and colours on the map, the most important first."""
     entries = [Text(f"{look.sign} {look.name}", no_wrap=True) for look in _places_shown(scene, frame)]
     there = set(dots.ravel().tolist())
     for kind, look in sorted(LOOKS.items(), reverse=True):
@@ -208,7 +208,7 @@ def _places_shown(scene: Scene, frame: Frame) -> list[PlaceLook]:
 
 
 def _facts(view: View, columns: int, rows: int) -> Table:
-    """All sections, long facts whole where there is room for more than a line each, then as much of the events as still fits."""
+    """All sections, with long facts on several lines if there is room, then the events that still fit."""
     table = Table.grid()
     table.add_column(width=columns, no_wrap=True, overflow="ellipsis")
     room = rows
@@ -216,9 +216,9 @@ def _facts(view: View, columns: int, rows: int) -> Table:
     for section in view.sections:
         lines = [Text(section.title, "bold")]
         for fact in section.facts:
-            told = _told(fact, columns, max(spare, 0) + 1)
-            spare -= len(told) - 1
-            lines += told
+            lines_of_fact = _fact_lines(fact, columns, max(spare, 0) + 1)
+            spare -= len(lines_of_fact) - 1
+            lines += lines_of_fact
         for line in lines[: max(room, 0)]:
             table.add_row(line)
         room -= len(lines)
@@ -230,11 +230,11 @@ def _facts(view: View, columns: int, rows: int) -> Table:
 
 
 def _line(fact: Fact, columns: int) -> Text:
-    return _told(fact, columns, 1)[0]
+    return _fact_lines(fact, columns, 1)[0]
 
 
-def _told(fact: Fact, columns: int, most: int) -> list[Text]:
-    """A fact in so many lines at most, the later ones under the value; what does not fit ends in dots."""
+def _fact_lines(fact: Fact, columns: int, most: int) -> list[Text]:
+    """A fact in at most ``most`` lines; text that does not fit is cut with an ellipsis."""
     style = "bold not dim #ff5f5f" if fact.alarm else "not dim"
     values = _broken(fact.value, max(columns - NAME_COLUMNS, 1))
     if len(values) > most:
@@ -249,7 +249,7 @@ def _told(fact: Fact, columns: int, most: int) -> list[Text]:
 
 
 def _newest(events: Iterable[str], columns: int, rows: int) -> list[Text]:
-    """The last lines that fit, broken where they are too long; a text that does not fit whole is left out."""
+    """The newest texts that fit, wrapped; a text that does not fit completely is left out."""
     lines: list[Text] = []
     for text in reversed(tuple(events)):
         wrapped = _wrapped(text, columns)
@@ -260,12 +260,12 @@ def _newest(events: Iterable[str], columns: int, rows: int) -> list[Text]:
 
 
 def _wrapped(text: str, columns: int) -> list[Text]:
-    """Lines of a text, the later ones set in by a space."""
+    """Lines of a text; all but the first are indented by a space."""
     return [Text(line, no_wrap=True) for line in _broken(text, columns, " ")]
 
 
 def _broken(text: str, columns: int, indent: str = "") -> list[str]:
-    """A text in lines of at most so many characters, at least one; words longer than a line are cut through."""
+    """A text in lines of at most ``columns`` characters, at least one; longer words are split."""
     lines = [""]
     for word in text.split():
         if lines[-1].strip() and len(lines[-1]) + 1 + len(word) > columns:

@@ -1,7 +1,7 @@
 """Moving obstacles: discs on timed routes of straight segments, and the distance to them along rays and from places.
 
-Times are the simulator's, in seconds since it was created. Movers react to nothing: they pass through walls, each other and
-the rover.
+Times are the simulator's, in seconds since it was created. Movers react to nothing: they pass through walls, each
+other and the rover.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Announcement(Enum):
 class Mover:
     """A disc that moves; world frame.
 
-    ``track`` has shape (n, 3): columns time in seconds (rising), north and east in metres. Before the first row and after the
-    last the disc stands still; with ``repeats`` it starts over at the first row instead.
+    ``track`` has shape (n, 3): columns time in seconds (rising), north and east in metres. Before the first row and
+    after the last the disc stands still; with ``repeats`` it starts over at the first row instead.
     """
 
     name: str
@@ -44,7 +44,7 @@ class Mover:
 
 
 class Fleet(NamedTuple):
-    """All movers, for compiled code: their tracks one after the other, where each begins, radii, periods (0: no repeat)."""
+    """All movers, for compiled code: tracks one after the other, where each begins, radii, periods (0: no repeat)."""
 
     rows: Floats
     begins: Ints
@@ -104,7 +104,7 @@ def motion_of(fleet: Fleet, mover: int, time_s: float) -> tuple[float, float, fl
 def shorten_rays(
     fleet: Fleet, time_s: float, north_m: float, east_m: float, bearings_rad: Floats, lengths_m: Floats
 ) -> None:
-    """Shorten ``lengths_m`` to the nearest mover that a ray of each row of bearings (sectors x rays) meets at this moment.
+    """Shorten ``lengths_m`` to the nearest mover met by a ray of each row of bearings (sectors x rays).
 
     From inside a disc every ray is 0.
     """
@@ -125,7 +125,7 @@ def shorten_rays(
 
 @njit(cache=True, nogil=True)
 def nearest_mover(fleet: Fleet, time_s: float, north_m: float, east_m: float) -> tuple[float, int]:
-    """Metres from a place to the nearest mover's edge, negative inside it, and its number; inf and -1 without movers."""
+    """Metres from a place to the nearest mover's edge (negative inside) and its number; inf, -1 without movers."""
     nearest_m, which = math.inf, -1
     for mover in range(fleet.radii_m.size):
         mover_n, mover_e, _, _ = motion_of(fleet, mover, time_s)

@@ -21,7 +21,8 @@ from sitl.world.movers import Fleet, Mover, fleet_of, motion_of, nearest_mover, 
 Obstacles = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Ground = NDArray[np.float32]
-"""Shape (2, height, width): grip and the share of its speed that the rover keeps on a field, both 0 to 1; size 0: 1 everywhere."""
+"""Shape (2, height, width): grip and the share of its speed that the rover keeps on a field, both 0 to 1; size 0: 1
+everywhere."""
 
 TOP_SPEED_M_S = 4.0
 """The rover's top speed on firm ground; rough fields allow a share of it."""
@@ -31,7 +32,7 @@ FIRM: Ground = np.ones((2, 0, 0), dtype=np.float32)
 
 
 class FieldGrid(NamedTuple):
-    """Fields of the world, ``fields[y, x]``, and where they lie: their outer south-west corner and the side of a field."""
+    """Fields of the world, ``fields[y, x]``, with their outer south-west corner and the side of a field."""
 
     fields: Obstacles
     south_m: float
@@ -40,7 +41,7 @@ class FieldGrid(NamedTuple):
 
 
 class Layers(NamedTuple):
-    """The obstacles at a moment: those the rover touches, those that reflect rays, those that absorb them (None: none)."""
+    """The obstacles at a moment: those that the rover touches, that reflect rays, that absorb rays (None: none)."""
 
     solid: FieldGrid
     echoing: FieldGrid
@@ -115,7 +116,7 @@ def ray_lengths(
 
 @njit(cache=True, nogil=True)
 def ground_under(ground: Ground, grid: FieldGrid, north_m: float, east_m: float) -> tuple[float, float]:
-    """Grip, and the share of its speed that the rover keeps, at a place; ``grid`` says where the ground's fields lie."""
+    """Grip, and the share of its speed that the rover keeps, at a place; ``grid`` locates the ground's fields."""
     if ground.size == 0:
         return 1.0, 1.0
     x, y = in_fields(grid, north_m, east_m)
@@ -143,10 +144,10 @@ def clearance_m(grid: FieldGrid, north_m: float, east_m: float, reach_m: float) 
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Obstacles, ``obstacles[y, x]``, with the south-west corner of field (0, 0) in metres; doors, moving obstacles, ground.
+    """Obstacles, ``obstacles[y, x]``, with the south-west corner of field (0, 0); doors, movers, ground.
 
-    ``glass``: obstacle fields that rays pass through; ``black``: those that absorb them. ``doors`` have fields of their own,
-    in addition to ``obstacles``; these may be glass or black too. All arrays have the same shape.
+    ``glass``: obstacle fields that rays pass through; ``black``: those that absorb them. ``doors`` have fields of
+    their own, in addition to ``obstacles``; these may be glass or black too. All arrays have the same shape.
     """
 
     obstacles: Obstacles
@@ -251,7 +252,7 @@ class World:
             shorten_rays(self.fleet, time_s, north_m, east_m, bearings_rad, lengths_m)
 
     def mover_gap_m(self, north_m: float, east_m: float, time_s: float) -> tuple[float, int]:
-        """Metres from a place to the nearest mover's edge, negative inside it, and its number; inf and -1 without movers."""
+        """Metres from a place to the nearest mover's edge (negative inside) and its number; inf, -1 without movers."""
         gap_m, which = nearest_mover(self.fleet, time_s, north_m, east_m)
         return float(gap_m), int(which)
 

@@ -1,4 +1,4 @@
-"""Compiled speed and turn-rate controllers, from a wish to throttle and steering (behaviour of AR_AttitudeControl, AC_PID)."""
+"""Speed and turn-rate controllers that set throttle and steering (AR_AttitudeControl, AC_PID; compiled)."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from sitl.autopilot.control.shaping import limited
 GRAVITY_M_S2 = 9.80665
 
 MEMORY_TICKS = 10
-"""A controller that has not run for 0.2 s starts anew."""
+"""A controller that has not run for 0.2 s is reset."""
 
 STOPPED_TICKS = 15
-"""Having stopped is remembered for 0.3 s."""
+"""A stop is remembered for 0.3 s."""
 
 STEER_SPEED_MIN_M_S = 1.0
-"""Below this speed a lateral acceleration is turned into a turn rate as if at this speed."""
+"""At lower speeds a lateral acceleration is converted to a turn rate as if at this speed."""
 
 
 @njit(cache=True, nogil=True)
 def filter_share(cutoff_hz: float) -> float:
-    """Weight of a new value in a first-order low-pass at the loop's rate; no cutoff lets everything through."""
+    """Weight of a new value in a first-order low-pass at the loop's rate; 1 without a cutoff."""
     if cutoff_hz <= 0.0:
         return 1.0
     return LOOP_S / (LOOP_S + 1.0 / (2.0 * math.pi * cutoff_hz))
@@ -32,14 +32,14 @@ def filter_share(cutoff_hz: float) -> float:
 
 @njit(cache=True, nogil=True)
 def forward_speed(estimate: Any) -> float:
-    """Estimated speed along the rover's own axis."""
+    """Estimated forward speed."""
     ahead_m_s: float = estimate.vel_n * math.cos(estimate.heading_rad)
     return ahead_m_s + float(estimate.vel_e * math.sin(estimate.heading_rad))
 
 
 @njit(cache=True, nogil=True)
 def accel_limited(control: Any, tuning: Any, speed: float) -> float:
-    """The wished speed, no farther from the last one than acceleration or deceleration allow in one loop."""
+    """The desired speed, limited to what acceleration or deceleration allow in one loop."""
     if control.tick - control.speed_tick > MEMORY_TICKS or tuning.accel_max <= 0.0:
         return speed
     change = tuning.accel_max
@@ -58,7 +58,7 @@ def rate_of_lateral(accel: float, speed: float) -> float:
 
 @njit(cache=True, nogil=True)
 def integrated(integral: float, error: float, gain: float, limit: float, saturated: int) -> float:
-    """The integral one loop later; while the output is saturated it may only shrink."""
+    """The integral one loop later; while the output is saturated it can only shrink."""
     if saturated == 0 or (integral > 0.0 and error < 0.0) or (integral < 0.0 and error > 0.0):
         return limited(integral + error * gain * LOOP_S, limit)
     return integral
@@ -69,7 +69,7 @@ def filtered(
     before: tuple[float, float, float], target: float, actual: float, fresh: int,
     target_hz: float, error_hz: float, slope_hz: float,
 ) -> tuple[float, float, float]:  # fmt: skip
-    """Target, error and the error's slope, each low-passed (AC_PID's FLTT, FLTE and FLTD); ``before``: the same a loop ago."""
+    """Target, error and slope of the error, each low-passed (AC_PID: FLTT, FLTE, FLTD); ``before``: a loop ago."""
     if fresh:
         return target, target - actual, 0.0
     if target_hz > 0.0:
@@ -81,7 +81,7 @@ def filtered(
 
 @njit(cache=True, nogil=True)
 def run_speed(control: Any, tuning: Any, estimate: Any, speed: float) -> None:
-    """Set the throttle for a wished speed."""
+    """Set the throttle for a desired speed."""
     actual = forward_speed(estimate)
     if control.tick - control.speed_tick > MEMORY_TICKS:
         control.speed_error_fresh = 1
@@ -103,7 +103,7 @@ def run_speed(control: Any, tuning: Any, estimate: Any, speed: float) -> None:
     )
     throttle = control.speed_error * tuning.speed_p + control.speed_integral + base
     throttle += control.speed_slope * tuning.speed_d + control.speed_target * tuning.speed_ff
-    # Without ATC_BRAKE the motors never push against the way the rover is to go.
+    # Without ATC_BRAKE the motors never push against the desired direction of travel.
     against = throttle <= 0.0 if control.desired_speed >= 0.0 else throttle >= 0.0
     control.throttle_withheld = 1 if tuning.brake == 0.0 and against else 0
     control.throttle = 0.0 if control.throttle_withheld else throttle
@@ -111,10 +111,10 @@ def run_speed(control: Any, tuning: Any, estimate: Any, speed: float) -> None:
 
 @njit(cache=True, nogil=True)
 def run_stop(control: Any, tuning: Any, estimate: Any) -> None:
-    """Brake to a stop, then let the motors rest."""
+    """Brake to a stop, then switch the throttle off."""
     stopped = control.tick - control.stop_tick < STOPPED_TICKS
-    wish = accel_limited(control, tuning, 0.0)
-    if wish == 0.0 and abs(forward_speed(estimate)) <= tuning.stop_speed:
+    desired = accel_limited(control, tuning, 0.0)
+    if desired == 0.0 and abs(forward_speed(estimate)) <= tuning.stop_speed:
         stopped = True
     if stopped:
         control.stop_tick = control.tick
@@ -124,12 +124,12 @@ def run_stop(control: Any, tuning: Any, estimate: Any) -> None:
         control.desired_speed = 0.0
         control.throttle = 0.0
         return
-    run_speed(control, tuning, estimate, wish)
+    run_speed(control, tuning, estimate, desired)
 
 
 @njit(cache=True, nogil=True)
 def rate_to_heading(tuning: Any, estimate: Any, heading_rad: float, rate_max: float) -> float:
-    """Turn rate that brings the rover to a heading and can still be stopped there; no limit if ``rate_max`` is 0."""
+    """Turn rate that leads to a heading and still allows to stop there; unlimited if ``rate_max`` is 0."""
     error = (heading_rad - estimate.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
     rate: float = tuning.steer_angle_p * error
     if rate_max > 0.0:
@@ -141,7 +141,7 @@ def rate_to_heading(tuning: Any, estimate: Any, heading_rad: float, rate_max: fl
 
 @njit(cache=True, nogil=True)
 def run_steering(control: Any, tuning: Any, estimate: Any, rate: float) -> None:
-    """Set the steering output for a wished turn rate, limited in rate, acceleration and lateral force."""
+    """Set the steering for a desired turn rate, with limited rate, angular and lateral acceleration."""
     if control.tick - control.steer_tick > MEMORY_TICKS:
         control.steer_error_fresh = 1
         control.steer_integral = 0.0

@@ -1,4 +1,4 @@
-"""Compiled circling round a place (behaviour of ModeCircle, which LOITER_TURNS uses): to the edge, then along it."""
+"""Driving circles around a place, as LOITER_TURNS does (behaviour of ModeCircle; compiled)."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from sitl.autopilot.control.records import CIRCLE, LOOP_S
 from sitl.autopilot.control.shaping import ShapingLimits, limited, shaped_accel
 
 EDGE_M = 0.5
-"""So near to the edge the rover counts as being on the circle (or TURN_RADIUS, if that is more)."""
+"""Distance from the circle within which the rover counts as on it (or TURN_RADIUS, if that is larger)."""
 
 
 @njit(cache=True, nogil=True)
 def begin_circle(control: Any, estimate: Any, centre_n: float, centre_e: float, radius: float) -> None:
-    """Circle a place (metres from the EKF origin); a negative radius is anticlockwise."""
+    """Begin to circle a place (metres from the EKF origin); a negative radius means anticlockwise."""
     control.dest_n, control.dest_e = centre_n, centre_e
     control.circle_radius = radius
     control.circle_turned = control.circle_speed = 0.0
@@ -43,12 +43,12 @@ def run_circle(control: Any, tuning: Any, estimate: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def move_on_circle(control: Any, tuning: Any, estimate: Any) -> None:
-    """Move the point on the edge, and the inner target after it."""
+    """Move the point on the circle, and the inner target after it."""
     radius = abs(control.circle_radius)
     from_centre = math.hypot(estimate.north_m - control.dest_n, estimate.east_m - control.dest_e)
     if abs(from_centre - radius) <= max(tuning.turn_radius_m, EDGE_M):
         control.on_circle = 1
-    # The pull to the centre comes and goes with the moving point; only what is beside it is shaped.
+    # The centripetal acceleration belongs to the moving point; only the rest is shaped.
     inwards = control.circle_speed**2 / radius
     beside_n = control.shaped_an + inwards * math.cos(control.circle_angle)
     beside_e = control.shaped_ae + inwards * math.sin(control.circle_angle)
@@ -66,7 +66,7 @@ def move_on_circle(control: Any, tuning: Any, estimate: Any) -> None:
     control.shaped_vn += control.shaped_an * LOOP_S
     control.shaped_ve += control.shaped_ae * LOOP_S
     accel_max = min(control.accel_max, tuning.turn_max_g * GRAVITY_M_S2)
-    # Seen from the moving point the inner target comes to rest on it.
+    # Relative to the moving point, the inner target comes to rest on it.
     gain_n, gain_e = shaped_accel(
         (control.dest_n + radius * out_n - control.shaped_n, control.dest_e + radius * out_e - control.shaped_e),
         (control.shaped_vn - vel_n, control.shaped_ve - vel_e),

@@ -1,8 +1,8 @@
-"""Compiled guided motion: to a place, along a heading, with a turn rate (behaviour of ModeGuided, AR_WPNav, AR_PosControl).
+"""Guided motion: to a position target, along a heading, with a turn rate (behaviour of ModeGuided; compiled).
 
 A position target is shaped: an inner target runs ahead of the rover with limited speed, acceleration and jerk, and
-the rover is steered after it. A target farther to the side than WP_PIVOT_ANGLE is first faced on the spot; a rover with steered
-wheels cannot, and drives an arc.
+the rover follows it. If the target lies farther to the side than WP_PIVOT_ANGLE, the rover first turns on the spot;
+with steered wheels it drives an arc instead.
 """
 
 from __future__ import annotations
@@ -31,17 +31,17 @@ from sitl.autopilot.control.records import HEADING, LOOP_S, WAYPOINT
 from sitl.autopilot.control.shaping import ShapingLimits, shaped_accel
 
 ARRIVED_M = 0.01
-"""The inner target must have come this near to the destination before a target counts as reached."""
+"""The target counts as reached only when the inner target is this near to it."""
 
 UNLIMITED_ACCEL_M_S2 = 20.0
 
 PLAN_FROM_REST = 64
-"""Bit of GUID_OPTIONS: every target is planned anew from standstill, so that quick repeats keep the rover standing."""
+"""Bit of GUID_OPTIONS: every target is planned from standstill, so that frequent targets keep the rover from moving."""
 
 
 @njit(cache=True, nogil=True)
 def begin_guided(control: Any, tuning: Any) -> None:
-    """Enter GUIDED: no target, speed and acceleration limits from the parameters."""
+    """Begin without a target, with the speed, acceleration and jerk limits of the parameters."""
     slowest = tuning.accel_max
     if tuning.decel_max > 0.0:
         slowest = min(slowest, tuning.decel_max)
@@ -73,7 +73,7 @@ def begin_target(control: Any, tuning: Any, estimate: Any, north_m: float, east_
 
 @njit(cache=True, nogil=True)
 def shape_target(control: Any, tuning: Any, estimate: Any) -> None:
-    """Move the inner target one loop on, and see whether the rover has arrived."""
+    """Move the inner target on by one loop, and check whether the rover has arrived."""
     if control.tick - control.place_tick >= ACTIVE_TICKS:
         restart_shaping(control, estimate)
     control.shaped_n += control.shaped_vn * LOOP_S + 0.5 * control.shaped_an * LOOP_S * LOOP_S
@@ -111,7 +111,7 @@ def run_waypoint(control: Any, tuning: Any, estimate: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def run_heading_or_rate(control: Any, tuning: Any, estimate: Any) -> None:
-    """One loop of holding a heading or turn rate at a speed; stops when no new target comes in time."""
+    """One loop of holding a heading or turn rate at a speed; stops when targets time out (GUID_TIMEOUT)."""
     elapsed_s = (control.tick - control.target_tick) * LOOP_S
     if control.have_target and elapsed_s > max(tuning.guided_timeout_s, 0.1):
         control.have_target = 0

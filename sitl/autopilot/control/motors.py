@@ -1,4 +1,4 @@
-"""Compiled motor outputs, from throttle and steering to the two servo outputs that the plant is wired to (behaviour of AP_MotorsUGV)."""
+"""Motor outputs: throttle and steering become the plant's two servo outputs (behaviour of AP_MotorsUGV; compiled)."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from sitl.autopilot.control.servo_outputs import GROUND_STEERING, THROTTLE, THRO
 from sitl.autopilot.control.shaping import limited
 
 EVEN_MIX = 0.5
-"""MOT_STR_THR_MIX: what does not fit is taken from throttle and steering alike."""
+"""MOT_STR_THR_MIX at which throttle and steering are reduced equally when both do not fit."""
 
 
 @njit(cache=True, nogil=True)
 def has_steered_wheels(tuning: Any) -> bool:
-    """Whether it cannot turn on the spot: not both of its motors have an output."""
+    """Whether the rover cannot turn on the spot, because not both skid motors have an output."""
     return bool(tuning.skids == 0.0)
 
 
 @njit(cache=True, nogil=True)
 def thrust(output: float, tuning: Any) -> float:
-    """What a motor is given: no less than MOT_THR_MIN once it turns, bent by MOT_THST_EXPO."""
+    """The output of a motor: at least MOT_THR_MIN once it turns, shaped by MOT_THST_EXPO."""
     if output == 0.0:
         return output
     if tuning.throttle_min > 0.0:
@@ -38,9 +38,9 @@ def thrust(output: float, tuning: Any) -> float:
 
 @njit(cache=True, nogil=True)
 def mixed(throttle: float, steering: float, mix: float, asymmetry: float) -> tuple[float, float]:
-    """Throttle and steering that fit together on two motors which push backwards ``asymmetry`` times more weakly.
+    """Throttle and steering that fit together on two motors that are ``asymmetry`` times weaker in reverse.
 
-    ``mix`` (MOT_STR_THR_MIX): from 0, throttle has its way, to 1, steering has.
+    ``mix`` (MOT_STR_THR_MIX): from 0, throttle has priority, to 1, steering has.
     """
     lowest = -1.0 / asymmetry
     middle = 0.5 * (1.0 + lowest)
@@ -61,7 +61,7 @@ def mixed(throttle: float, steering: float, mix: float, asymmetry: float) -> tup
 
 @njit(cache=True, nogil=True)
 def run_skid(control: Any, tuning: Any, throttle: float, steering: float) -> tuple[float, float]:
-    """Left and right motor; what does not fit is scaled down."""
+    """Outputs of the left and right motor; together they are scaled down to fit."""
     total = abs(throttle) + abs(steering)
     asymmetry, mix = max(tuning.asymmetry, 1.0), min(max(tuning.mix, 0.0), 1.0)
     if asymmetry == 1.0 and mix == EVEN_MIX:
@@ -81,9 +81,9 @@ def run_skid(control: Any, tuning: Any, throttle: float, steering: float) -> tup
 
 @njit(cache=True, nogil=True)
 def run_wheels(control: Any, tuning: Any, speed: float, throttle: float, steering: float) -> float:
-    """Steering of steered wheels: the faster, the less; the other way round when rolling backwards.
+    """Steering output of steered wheels: scaled down with speed, and reversed when the rover rolls backwards.
 
-    Up to MOT_SPD_SCA_BASE steering is not scaled, and counts as limited, so that its integral does not wind up.
+    Up to MOT_SPD_SCA_BASE it is not scaled and counts as limited, so that the integral does not wind up.
     """
     fast = tuning.steering_base_m_s > 0.0 and abs(speed) > tuning.steering_base_m_s
     control.left_limited = 1 if not fast or steering <= -1.0 else 0
@@ -96,7 +96,7 @@ def run_wheels(control: Any, tuning: Any, speed: float, throttle: float, steerin
 
 @njit(cache=True, nogil=True)
 def routed(function: float, left: float, right: float, throttle: float, steering: float) -> float:
-    """What an output with this SERVOn_FUNCTION carries."""
+    """The value of an output with this SERVOn_FUNCTION."""
     if function == THROTTLE_LEFT:
         return left
     if function == THROTTLE_RIGHT:
@@ -108,7 +108,7 @@ def routed(function: float, left: float, right: float, throttle: float, steering
 
 @njit(cache=True, nogil=True)
 def run_motors(control: Any, tuning: Any, estimate: Any) -> None:
-    """From throttle and steering to the outputs 1 and 3, as their parameters say."""
+    """Set the outputs 1 and 3 from throttle and steering."""
     throttle = limited(control.throttle, tuning.throttle_max)
     if tuning.slew_rate > 0.0:
         change = tuning.slew_rate * LOOP_S * 0.01
@@ -121,7 +121,7 @@ def run_motors(control: Any, tuning: Any, estimate: Any) -> None:
     control.throttle_before = throttle
     left = right = 0.0
     if has_steered_wheels(tuning):
-        # In MANUAL nothing is scaled; then the throttle tells which way it rolls.
+        # In MANUAL nothing is scaled; the sign of the throttle then gives the direction.
         speed = forward_speed(estimate) if control.task != COAST else 0.0 if throttle >= 0.0 else -1e-9
         steering = run_wheels(control, tuning, speed, throttle, steering)
     else:

@@ -1,4 +1,4 @@
-"""Compiled: follow an inner target, turning on the spot first where it lies far to the side (behaviour of AR_PosControl, AR_PivotTurn)."""
+"""Follows a moving inner target, after a turn on the spot if needed (AR_PosControl, AR_PivotTurn; compiled)."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from sitl.autopilot.control.records import LOOP_S, NEVER
 from sitl.autopilot.control.shaping import approach_vector, limited, shortened
 
 ACTIVE_TICKS = 5
-"""Navigation that has not run for 0.1 s begins anew."""
+"""Navigation that has not run for 0.1 s is reset."""
 
 PIVOT_ACCURACY_RAD = math.radians(5.0)
 
 SPEED_CHANGE_TICKS = 25
-"""Changes of the top speed are taken over no more often than every 0.5 s."""
+"""Changes of the top speed take effect at most every 0.5 s."""
 
 AVOID_PROXIMITY = 2
 """Bit of AVOID_ENABLE: slow down for what proximity sensors see, with half the deceleration."""
@@ -36,7 +36,7 @@ AVOID_PROXIMITY = 2
 
 @njit(cache=True, nogil=True)
 def bearing_to_target(control: Any, estimate: Any) -> float:
-    """Heading that the rover needs to drive to the target, tail first when reversed."""
+    """Heading for driving straight to the target, or for reversing to it."""
     bearing = math.atan2(control.dest_e - estimate.east_m, control.dest_n - estimate.north_m)
     return bearing + math.pi if control.reversed else bearing
 
@@ -63,7 +63,7 @@ def check_pivot(control: Any, tuning: Any, estimate: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def restart_shaping(control: Any, estimate: Any) -> None:
-    """Put the inner target where the rover is, moving as it moves."""
+    """Put the inner target at the rover's position, with its velocity and acceleration."""
     control.shaped_n, control.shaped_e = estimate.north_m, estimate.east_m
     control.shaped_vn, control.shaped_ve = estimate.vel_n, estimate.vel_e
     control.shaped_an, control.shaped_ae = estimate.accel_n, estimate.accel_e
@@ -71,7 +71,7 @@ def restart_shaping(control: Any, estimate: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def error_limit(speed_max: float, gain: float, accel: float) -> float:
-    """The position error at which the approach reaches the top speed."""
+    """Position error in metres at which the approach reaches the top speed."""
     linear_speed = accel / gain
     if speed_max <= linear_speed:
         return speed_max / gain
@@ -80,13 +80,13 @@ def error_limit(speed_max: float, gain: float, accel: float) -> float:
 
 @njit(cache=True, nogil=True)
 def turn_speed(tuning: Any) -> float:
-    """The speed at which a turn of TURN_RADIUS takes half the lateral acceleration that is allowed."""
+    """The speed at which a turn of TURN_RADIUS needs half of the permitted lateral acceleration."""
     return math.sqrt(max(0.5 * tuning.turn_max_g * GRAVITY_M_S2 * tuning.turn_radius_m, 0.0))
 
 
 @njit(cache=True, nogil=True)
 def follow_shaped(control: Any, tuning: Any, estimate: Any) -> None:
-    """Speed and turn rate that keep the rover with the inner target."""
+    """Set speed and turn rate that follow the inner target."""
     if control.tick - control.place_tick >= ACTIVE_TICKS:
         control.vel_error_fresh = 1
     control.place_tick = control.tick
@@ -111,7 +111,7 @@ def follow_shaped(control: Any, tuning: Any, estimate: Any) -> None:
     accel_e = control.vel_error_e * tuning.vel_p + feed_e
     ahead_n, ahead_e = math.cos(estimate.heading_rad), math.sin(estimate.heading_rad)
     speed = goal_n * ahead_n + goal_e * ahead_e
-    # Who cannot turn on the spot must keep rolling to come round to a target that is not ahead.
+    # A rover with steered wheels must keep rolling to turn towards a target that is not ahead.
     rolling = min(math.hypot(goal_n, goal_e), turn_speed(tuning)) if has_steered_wheels(tuning) else 0.0
     speed = min(-rolling, speed) if control.reversed else max(rolling, speed)
     control.nav_speed = accel_limited(control, tuning, speed)
@@ -120,7 +120,7 @@ def follow_shaped(control: Any, tuning: Any, estimate: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def steer_waypoint(control: Any, tuning: Any, estimate: Any) -> None:
-    """Throttle and steering after the inner target, or for turning on the spot."""
+    """Set throttle and steering for following the inner target or for turning on the spot."""
     if control.armed:
         if control.pivoting:
             control.nav_speed = accel_limited(control, tuning, 0.0)
@@ -141,7 +141,7 @@ def steer_waypoint(control: Any, tuning: Any, estimate: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def run_throttle(control: Any, tuning: Any, estimate: Any, speed: float) -> None:
-    """Throttle for a wished speed; a wish of zero is a controlled stop."""
+    """Set the throttle for a desired speed; a speed of zero is a controlled stop."""
     speed = accel_limited(control, tuning, speed)
     if int(tuning.avoid) & AVOID_PROXIMITY and speed > 0.0:
         room_m = max(control.room_m - tuning.avoid_margin_m, 0.0)

@@ -1,6 +1,6 @@
-"""Records shared by the compiled controllers: what they know, what they want, what they were tuned to.
+"""Records shared by the compiled controllers: the estimate, the state of the controllers, their tuning parameters.
 
-Each is an array of one record, so that compiled code changes it in place.
+Each is an array of one record, so that compiled code can change it in place.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ LOOP_HZ = 50
 LOOP_S = 1.0 / LOOP_HZ
 
 STOP, WAYPOINT, HEADING, TURN_RATE, COAST, CIRCLE, LEG = 0, 1, 2, 3, 4, 5, 6
-"""What the motion controller is doing: braking, driving to a place, holding a heading or a turn rate, nothing, circling,
-driving along a leg of a mission."""
+"""Tasks of motion control: brake, drive to a position target, hold a heading or a turn rate, pass the sticks through,
+circle a place, drive along a leg between two waypoints."""
 
 NEVER = -1_000_000
 """Tick of something that has not happened."""
@@ -44,9 +44,9 @@ ESTIMATE = np.dtype(
         )
     ]
 )  # fmt: skip
-"""What the autopilot believes, from the EKF origin, and the slowly wandering errors in it.
+"""The autopilot's estimate, in metres from the EKF origin, and the slowly wandering errors in it.
 
-``offset_...``: what a faulty GPS adds to place and speed.
+``offset_...``: what a faulty GPS adds to position and velocity.
 """
 
 CONTROL = np.dtype(
@@ -76,11 +76,11 @@ CONTROL = np.dtype(
     ]
     + [("legs", "f8", (3, 7))]
 )  # fmt: skip
-"""Everything the motion controllers remember; metres, m/s, radians, outputs -1 to 1.
+"""State of the motion controllers; metres, m/s, radians, outputs -1 to 1.
 
-``servo_1`` and ``servo_3`` are the left and right motor of a skid rover, steering and throttle of one with steered wheels.
-``stick_...``: what the pilot gives in MANUAL; ``amps``: what the motors take; ``used_...``: what the battery monitor has counted;
-``rest_v``: the battery's voltage at rest.
+``servo_1`` and ``servo_3``: left and right motor with skid steering, steering and throttle with steered wheels.
+``stick_...``: the pilot's sticks in MANUAL; ``amps``: current of the motors; ``used_...``: what the battery monitor
+has counted; ``rest_v``: the battery's voltage at rest; ``legs``: rows and columns see ``wp_nav`` and ``scurve``.
 """
 
 TUNING_NAMES = {
@@ -133,13 +133,13 @@ TUNING_NAMES = {
     "turn_radius_m": "TURN_RADIUS",
     "steering_base_m_s": "MOT_SPD_SCA_BASE",
 }
-"""Fields of a tuning record and the parameters they come from."""
+"""Fields of a tuning record, and the parameters they come from."""
 
 LEAST = {"turn_max_g": 0.1, "pos_p": 0.001}
-"""What the controllers divide by is never less, whatever the parameter says (0.1 g is the firmware's own limit)."""
+"""Lower limits of values that the controllers divide by (0.1 g is the firmware's own limit)."""
 
 DERIVED = ("skids", "servo_1_sign", "servo_3_sign", "throttle_min", "throttle_max")
-"""Fields that take more than one parameter, or other units; ``skids`` is 1 with both motors of a skid rover on outputs."""
+"""Fields made of several parameters, or in other units; ``skids`` is 1 with skid steering."""
 
 TUNING = np.dtype([(name, "f8") for name in (*TUNING_NAMES, *DERIVED)])
 

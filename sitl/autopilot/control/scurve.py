@@ -1,6 +1,6 @@
-"""Compiled: how an inner target moves along one leg, with limited speed, acceleration and jerk (behaviour of SCurve).
+"""Motion along one leg with limited speed, acceleration and jerk (behaviour of SCurve; compiled).
 
-The jerk changes at once, where the firmware lets it swell.
+Here the jerk changes in steps; in the firmware it rises and falls smoothly.
 """
 
 from __future__ import annotations
@@ -11,12 +11,13 @@ from typing import Any
 from numba import njit
 
 AHEAD_N, AHEAD_E, LENGTH, START_SPEED, SPEED, TIME, DONE = 0, 1, 2, 3, 4, 5, 6
-"""Columns: direction, metres, m/s at the beginning and on the way, seconds since, metres before the time began."""
+"""Columns of a leg: direction, length in metres, speeds at the start and in the middle, time since the start in
+seconds, metres driven before the time started."""
 
 
 @njit(cache=True, nogil=True)
 def ramp_s(change: float, accel: float, jerk: float) -> float:
-    """How long a change of speed takes with limited acceleration and jerk."""
+    """Duration of a change of speed with limited acceleration and jerk."""
     if change <= accel * accel / jerk:
         return 2.0 * math.sqrt(change / jerk)
     return change / accel + accel / jerk
@@ -24,7 +25,7 @@ def ramp_s(change: float, accel: float, jerk: float) -> float:
 
 @njit(cache=True, nogil=True)
 def ramp(time_s: float, change: float, accel: float, jerk: float) -> tuple[float, float, float]:
-    """Metres, m/s and m/s^2 gained after a time in a change of speed from rest."""
+    """Distance, speed and acceleration gained after a time within a change of speed from rest."""
     total_s = ramp_s(change, accel, jerk)
     rise_s = min(accel / jerk, 0.5 * total_s)
     if time_s < rise_s:
@@ -51,7 +52,7 @@ def ramp_m(start: float, end: float, accel: float, jerk: float) -> float:
 
 @njit(cache=True, nogil=True)
 def top_speed(length_m: float, start: float, wish: float, accel: float, jerk: float) -> float:
-    """The highest speed up to a wish from which there is room to stop at the end of a leg; negative if there is none."""
+    """The highest speed up to ``wish`` that still allows to stop at the end of a leg; negative if there is none."""
     if ramp_m(start, wish, accel, jerk) + ramp_m(wish, 0.0, accel, jerk) <= length_m:
         return wish
     low, high = min(start, wish), min(wish, start + math.sqrt(accel * length_m))
@@ -68,7 +69,7 @@ def top_speed(length_m: float, start: float, wish: float, accel: float, jerk: fl
 
 @njit(cache=True, nogil=True)
 def leg_times(leg: Any, accel: float, jerk: float) -> tuple[float, float]:
-    """Seconds until a leg begins to brake, and until it ends."""
+    """Seconds until braking begins, and until the leg ends."""
     speed, start = leg[SPEED], leg[START_SPEED]
     if speed <= 0.0:
         return 0.0, 0.0
@@ -79,7 +80,7 @@ def leg_times(leg: Any, accel: float, jerk: float) -> tuple[float, float]:
 
 @njit(cache=True, nogil=True)
 def along(leg: Any, time_s: float, accel: float, jerk: float) -> tuple[float, float, float]:
-    """Metres along a leg, speed and acceleration at a time of it."""
+    """Metres along a leg, speed and acceleration at a time since its start."""
     speed, start = leg[SPEED], leg[START_SPEED]
     braking_s, end_s = leg_times(leg, accel, jerk)
     if time_s >= end_s:

@@ -1,7 +1,7 @@
-"""Compiled motion laws that the firmware's controllers share: square-root approach, acceleration and jerk limits.
+"""Motion laws that the controllers share: square-root approach, acceleration and jerk limits (compiled).
 
-Behaviour of ArduPilot's ``AP_Math/control``: an error is reduced proportionally when small and with a constant
-acceleration when large; a target is pulled along with limited speed, acceleration and jerk.
+Behaviour of ArduPilot's ``AP_Math/control``: a small error is reduced in proportion, a large one with constant
+acceleration; a target moves with limited speed, acceleration and jerk.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import NamedTuple
 from numba import njit
 
 APPROACH_SHARE = 0.5
-"""Share of the acceleration, and of the gain, with which a shaped approach to a place at rest is planned."""
+"""Share of the acceleration and of the gain with which the approach to a place is planned."""
 
 CORNER_SHARE = 1.0 / math.sqrt(2.0)
 """Share of the acceleration that stays available across the direction of travel."""
@@ -31,7 +31,7 @@ class ShapingLimits(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def limited(value: float, limit: float) -> float:
-    """The value within plus or minus the limit; what is no number becomes the middle, as in the firmware."""
+    """The value within plus or minus the limit; NaN becomes 0, as in the firmware."""
     if math.isnan(value):
         return 0.0
     return min(max(value, -limit), limit)
@@ -39,7 +39,7 @@ def limited(value: float, limit: float) -> float:
 
 @njit(cache=True, nogil=True)
 def shortened(x: float, y: float, length: float) -> tuple[float, float]:
-    """The vector, shortened to a length if it is longer."""
+    """The vector, shortened to ``length`` if it is longer."""
     size = math.hypot(x, y)
     if size > length and size > 0.0:
         return x * length / size, y * length / size
@@ -48,9 +48,9 @@ def shortened(x: float, y: float, length: float) -> tuple[float, float]:
 
 @njit(cache=True, nogil=True)
 def approach_rate(error: float, gain: float, acceleration: float, step_s: float) -> float:
-    """Rate at which to close a non-negative error: proportional when small, square root beyond.
+    """Rate at which to reduce a non-negative error: proportional while it is small, square root beyond.
 
-    ``step_s`` > 0 keeps one step from overshooting.
+    With ``step_s`` > 0 one step does not overshoot.
     """
     if acceleration <= 0.0:
         rate = error * gain
@@ -76,7 +76,7 @@ def approach_vector(x: float, y: float, gain: float, acceleration: float, step_s
 def corner_limited(
     goal_n: float, goal_e: float, accel_n: float, accel_e: float, accel_max: float
 ) -> tuple[float, float]:
-    """Acceleration limited in size, with room left across the wished direction of travel."""
+    """Acceleration limited in size, with some kept for turning across the direction of travel."""
     size = math.hypot(goal_n, goal_e)
     if size <= 0.0:
         return shortened(accel_n, accel_e, accel_max)

@@ -1,7 +1,8 @@
-"""Compiled driving along legs, as AUTO, RTL and SMART_RTL do (behaviour of AR_WPNav with S-curves).
+"""Driving along straight legs between waypoints, for AUTO, RTL and SMART_RTL (behaviour of AR_WPNav; compiled).
 
-An inner target runs along the straight leg with limited speed, acceleration and jerk, and no faster than the rover can follow;
-before a corner that is no pivot turn the next leg begins while this one ends, so that the corner is rounded without stopping.
+An inner target moves along the leg with limited speed, acceleration and jerk, and no faster than the rover can
+follow. Before a corner without a pivot turn, the next leg begins while this one ends, so that the rover rounds the
+corner without stopping.
 """
 
 from __future__ import annotations
@@ -39,7 +40,7 @@ from sitl.autopilot.control.scurve import (
 from sitl.autopilot.control.shaping import Vector
 
 BEFORE, THIS, NEXT = 0, 1, 2
-"""Rows of ``control.legs``: the leg that still ends, the one under way, the one after it."""
+"""Rows of ``control.legs``: the previous leg, which may still be ending, the present one, the next one."""
 
 PACE_BUFFER = 0.05
 
@@ -58,7 +59,7 @@ def lay_leg(control: Any, row: int, from_n: float, from_e: float, to_n: float, t
 
 @njit(cache=True, nogil=True)
 def change_leg_speed(control: Any, row: int) -> None:
-    """Plan what is left of a leg with the new top speed; one that already brakes stays as it is."""
+    """Replan the rest of a leg for a new top speed, unless it already brakes."""
     leg, accel, jerk = control.legs[row], control.accel_max, control.jerk_max
     done_m, speed, _ = along(leg, leg[TIME], accel, jerk)
     wish = top_speed(leg[LENGTH] - done_m, speed, control.speed_max, accel, jerk)
@@ -115,14 +116,14 @@ def begin_leg(control: Any, tuning: Any, estimate: Any, to: Vector, after: Vecto
 
 @njit(cache=True, nogil=True)
 def off_course(control: Any, estimate: Any) -> float:
-    """How far the heading is from the one to the place, in radians."""
+    """Angle between the heading and the direction of the destination, in radians."""
     error = bearing_to_target(control, estimate) - estimate.heading_rad
     return float(abs((error + math.pi) % (2.0 * math.pi) - math.pi))
 
 
 @njit(cache=True, nogil=True)
 def turns_on_the_spot(control: Any, tuning: Any, from_n: float, from_e: float, after_n: float, after_e: float) -> bool:
-    """Whether the corner at the end of the leg is so sharp that the rover stops there and pivots."""
+    """Whether the corner at the end of the leg is sharp enough for a stop and a pivot turn."""
     limit = math.radians(tuning.pivot_angle_deg)
     if limit <= PIVOT_ACCURACY_RAD or has_steered_wheels(tuning):
         return False
@@ -133,7 +134,7 @@ def turns_on_the_spot(control: Any, tuning: Any, from_n: float, from_e: float, a
 
 @njit(cache=True, nogil=True)
 def may_turn(control: Any, tuning: Any) -> bool:
-    """Whether the next leg may begin: the corner is cut by no more than WP_RADIUS and no harder than allowed."""
+    """Whether the next leg may begin: within WP_RADIUS of the corner, and within the lateral acceleration."""
     this, after, accel, jerk = control.legs[THIS], control.legs[NEXT], control.accel_max, control.jerk_max
     braking_s, end_s = leg_times(this, accel, jerk)
     next_end_s = leg_times(after, accel, jerk)[1]
@@ -158,7 +159,7 @@ def may_turn(control: Any, tuning: Any) -> bool:
 
 @njit(cache=True, nogil=True)
 def add_leg(control: Any, row: int, step_s: float, from_end: bool) -> None:
-    """Move on a leg and add it to the inner target; ``from_end``: counted from where it ends."""
+    """Advance on a leg and add its motion to the inner target; ``from_end``: measured from the end of the leg."""
     leg = control.legs[row]
     leg[TIME] += step_s
     done, speed, accel = along(leg, leg[TIME], control.accel_max, control.jerk_max)
@@ -174,7 +175,7 @@ def add_leg(control: Any, row: int, step_s: float, from_end: bool) -> None:
 
 @njit(cache=True, nogil=True)
 def keep_pace(control: Any, tuning: Any, estimate: Any) -> float:
-    """Seconds by which the inner target moves on: fewer while the rover falls behind it."""
+    """Seconds by which the inner target advances: fewer while the rover falls behind."""
     pace, speed = 1.0, math.hypot(control.shaped_vn, control.shaped_ve)
     if control.tick - control.place_tick >= ACTIVE_TICKS:
         speed = 0.0
@@ -190,7 +191,7 @@ def keep_pace(control: Any, tuning: Any, estimate: Any) -> float:
 
 @njit(cache=True, nogil=True)
 def shape_legs(control: Any, tuning: Any, estimate: Any) -> None:
-    """Move the inner target one loop on along the legs, and see whether this one is done."""
+    """Advance the inner target along the legs by one loop, and check whether the present leg is done."""
     step_s = keep_pace(control, tuning, estimate)
     control.shaped_n, control.shaped_e = control.from_n, control.from_e
     control.shaped_vn = control.shaped_ve = control.shaped_an = control.shaped_ae = 0.0
@@ -220,7 +221,7 @@ def is_past(control: Any, estimate: Any) -> bool:
 
 @njit(cache=True, nogil=True)
 def run_leg(control: Any, tuning: Any, estimate: Any) -> None:
-    """One loop of driving along the leg; the one in which it ends is told to the autopilot."""
+    """One loop of driving along the leg; sets ``arrived`` in the loop in which it ends."""
     if control.armed:
         control.nav_tick = control.tick
         changed = control.base_speed != control.speed_max

@@ -55,7 +55,7 @@ def test_what_becomes_of_a_users_own_parameters_is_told() -> None:
     file = ParameterFile(Path("x.parm"), own, {})
     told = firmware_parameters(own, SUITES["beams"], steered=False)
     assert file.firmware_notes(told) == (
-        "x.parm: outside of the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); see if they are meant",
+        "x.parm: outside the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); is that intended?",
         "x.parm: SERVO1_FUNCTION 74 becomes 73, as our rover is built",
         "x.parm: RNGFND1_TYPE 10 becomes 100, as our rover is built",
         "x.parm: 1 parameters that are not known here are passed on as they are: FOO",

@@ -441,7 +441,7 @@ def test_without_a_firmware_there_is_nothing_to_sum_up() -> None:
     behind = physics()
     assert summary(behind) == "stopped; no firmware has asked"
     behind.answer(b"noise")
-    assert summary(behind) == "stopped; no firmware has asked (1 no frames)"
+    assert summary(behind) == "stopped; no firmware has asked (1 not frames)"
 
 
 def test_news_are_told_once_and_summed_up() -> None:
@@ -469,7 +469,7 @@ def test_news_are_told_once_and_summed_up() -> None:
         "collision 1",
     ]
     assert summary(behind) == (
-        f"stopped; {behind.tally.steps} steps, 2 lost, 1 from strangers, 3 no frames; "
+        f"stopped; {behind.tally.steps} steps, 2 lost, 1 from another firmware, 3 not frames; "
         f"since the firmware's last start {behind.time_s:.0f} s and 1 collision"
     )
     behind.answer(frame(0, 1500, 1500))

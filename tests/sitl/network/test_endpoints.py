@@ -177,7 +177,7 @@ def test_a_speed_that_no_line_has(bench: Bench, tmp_path: Path, baud: str) -> No
     """Zero would hang up, and what does not fit into the system's field is no speed."""
     name = tmp_path / "ttyV0"
     bench.open(f"pty:{name}")
-    with pytest.raises(ListenError, match=f"ttyV0:{baud}: {baud} baud is no speed of a line; choose one up to 4000000"):
+    with pytest.raises(ListenError, match=f"ttyV0:{baud}: {baud} is not a baud rate; choose one up to 4000000"):
         bench.open(f"serial:{name}:{baud}")
 
 

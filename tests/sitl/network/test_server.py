@@ -103,9 +103,9 @@ def test_tcp_clients_that_come_and_go_are_told_of(bench: Bench) -> None:
     with socket.create_connection(("127.0.0.1", port)) as client:
         who = f"127.0.0.1:{client.getsockname()[1]}"
         bench.run(1.0)
-        assert bench.said == [f"{who} has come (tcp:127.0.0.1:{port})"]
+        assert bench.said == [f"{who} has connected (tcp:127.0.0.1:{port})"]
     bench.run(1.0)
-    assert bench.said[1:] == [f"{who} has left (tcp:127.0.0.1:{port})"]
+    assert bench.said[1:] == [f"{who} has disconnected (tcp:127.0.0.1:{port})"]
 
 
 def test_a_udp_partner_that_falls_silent_is_told_of_once(bench: Bench) -> None:
@@ -116,14 +116,14 @@ def test_a_udp_partner_that_falls_silent_is_told_of_once(bench: Bench) -> None:
             partner.sendto(request_version(), ("127.0.0.1", port))
             bench.run(1.0)
         who = f"127.0.0.1:{partner.getsockname()[1]}"
-        assert bench.said == [f"{who} has come (udpin:127.0.0.1:{port})"]
+        assert bench.said == [f"{who} has connected (udpin:127.0.0.1:{port})"]
         for real_s in (4.0, 6.0, 12.0):
             bench.real_s = real_s
             bench.run(1.0)
         assert bench.said[1:] == [f"{who} has been silent for 5 s (udpin:127.0.0.1:{port})"]
         partner.sendto(request_version(), ("127.0.0.1", port))
         bench.run(1.0)
-        assert len(bench.said) == 3 and "has come" in bench.said[2]
+        assert len(bench.said) == 3 and "has connected" in bench.said[2]
 
 
 def test_collisions_are_told_of_with_their_place_not_more_than_one_a_second() -> None:
@@ -230,7 +230,7 @@ def test_bad_addresses_are_told(bench: Bench, url: str) -> None:
 
 @pytest.mark.parametrize("port", ["0", "65536", "99999", "9" * 5000])
 def test_a_port_that_is_none_is_told(bench: Bench, port: str) -> None:
-    with pytest.raises(ListenError, match=r"is no port; choose one from 1 to 65535"):
+    with pytest.raises(ListenError, match=r"is not a port; choose one from 1 to 65535"):
         bench.open(f"udpin:127.0.0.1:{port}")
 
 

@@ -14,7 +14,7 @@ from companion.mission.mission import MissionError
 from companion.mission.sensor_tables import SensorsTable
 from sitl.cli.commands import app
 from sitl.scenario import scenario_from_mission, with_sensors
-from sitl.sensors.range_flaws import Flaws, Sun, spoiled
+from sitl.sensors.range_flaws import Flaws, Sun, with_flaws
 from sitl.sensors.range_sensors import UNKNOWN, RangeSensing, SensorSuite
 from sitl.sensors.suites import suite_of
 from sitl.simulator import Simulator
@@ -31,7 +31,7 @@ MISSIONS = Path(__file__).resolve().parents[3] / "missions"
 def ranges(true_m: float, flaws: Flaws, bearing_rad: float = 0.0, noise_m: float = 0.0) -> Any:
     """Many ranges of something that is ``true_m`` away."""
     bearings_rad = np.full(COUNT, bearing_rad)
-    return spoiled(np.full(COUNT, true_m), bearings_rad, LIMITS_M, flaws, noise_m, np.random.default_rng(7))
+    return with_flaws(np.full(COUNT, true_m), bearings_rad, LIMITS_M, flaws, noise_m, np.random.default_rng(7))
 
 
 def share_within(found: float, expected: float) -> bool:
