@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.network import Endpoint, ListenError, open_endpoint
 from sitl.network.serial import SerialEndpoint
-from sitl.network.udp import MOST_PARTNERS, SILENT_S
+from sitl.network.udp import MOST_CLIENTS, SILENT_S
 from sitl.simulator import Simulator
 from tests.sitl.network.test_server import free_port
 from tests.support.party import split
@@ -290,11 +290,11 @@ def test_when_there_are_too_many_the_longest_silent_goes(bench: Bench) -> None:
     port = free_port(socket.SOCK_DGRAM)
     bench.open(f"udpin:127.0.0.1:{port}")
     with contextlib.ExitStack() as stack:
-        partners = [stack.enter_context(udp(port)) for _ in range(MOST_PARTNERS + 1)]
+        partners = [stack.enter_context(udp(port)) for _ in range(MOST_CLIENTS + 1)]
         for partner in partners:
             partner.send(beat())
             bench.run(0.5)
         for partner in partners:
             read_all(partner)
         bench.run(2.0)
-        assert [bool(read_all(partner)) for partner in partners] == [False] + [True] * MOST_PARTNERS
+        assert [bool(read_all(partner)) for partner in partners] == [False] + [True] * MOST_CLIENTS

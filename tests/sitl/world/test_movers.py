@@ -166,6 +166,6 @@ def test_bad_movers_get_one_line(tmp_path: Path, text: str, words: str) -> None:
 def test_a_mover_must_not_begin_on_the_rover(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text(HEAD + "radius_m = 0.5\nspeed_m_s = 1.0\nroute_m = [[0.5, 0.0], [5, 9]]")
-    with pytest.raises(ScenarioError, match=r"sitl.movers 1: begins where the rover stands") as caught:
+    with pytest.raises(ScenarioError, match=r"sitl.movers 1: starts where the rover stands") as caught:
         scenario_from_mission(load_mission(path))
     assert "\n" not in str(caught.value)

@@ -185,7 +185,7 @@ def test_a_ros_map_says_how_large_its_fields_are(tmp_path: Path) -> None:
         ('base = "gone.png"\n', "gone.png: no such file; check the path"),
         ('base = "world.toml"\n', "it must be a map"),
         ('base = "map.png"\nresolution_m = 0.3\n', "does not divide"),
-        ('base = "map.png"\n' + SIZE, "says how large the world is"),
+        ('base = "map.png"\n' + SIZE, "already has a size"),
     ],
 )  # fmt: skip
 def test_a_bad_world_gets_one_line(tmp_path: Path, text: str, words: str) -> None:
@@ -229,7 +229,7 @@ def test_the_rover_stands_in_a_field_of_the_mission(tmp_path: Path) -> None:
     [
         (SIZE + POST.replace("10.0", "2.0").replace("5.0", "2.0"), "", "touches an obstacle"),
         (SIZE + POST, "start = [99, 3]\n", "lies outside"),
-        (SIZE + "[[mover]]\nradius_m = 0.5\nspeed_m_s = 1.0\nroute_m = [[2.2, 2.2], [9, 9]]\n", "", "world.toml: mover 1: begins"),
+        (SIZE + "[[mover]]\nradius_m = 0.5\nspeed_m_s = 1.0\nroute_m = [[2.2, 2.2], [9, 9]]\n", "", "world.toml: mover 1: starts"),
     ],
 )  # fmt: skip
 def test_a_start_where_something_is_gets_one_line(tmp_path: Path, world: str, sitl: str, words: str) -> None:
