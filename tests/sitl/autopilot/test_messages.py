@@ -1,4 +1,4 @@
-"""Commands and messages that ground stations send besides those that were measured: home, arming checks on request, joysticks."""
+"""Messages that ground stations send besides the measured ones: home, arming checks, joysticks."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ class Plant:
 
 
 def everything(changes: dict[str, float], radius_m: float = 0.0) -> np.ndarray[Any, Any]:
-    """Ahead, then to the right behind, then turning while it drives, then by the pilot's sticks, forwards and backwards."""
+    """Ahead, then to the right behind, then turning while driving, then with the sticks, forwards and backwards."""
     plant = Plant(changes, radius_m)
     plant.drive_to(10.0, 0.0, 11.0)
     plant.drive_to(8.0, 8.0, 8.0)

@@ -1,4 +1,4 @@
-"""What link faults do to packets: how many are lost, late, doubled, damaged and overtaken, in the direction and on the links meant."""
+"""Link faults: shares of packets lost, late, duplicated, damaged and reordered; directions and links."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ from tests.sitl.network.test_server import free_port
 from tests.support.sitl_client import Client, open_ground, ready
 
 SENT = 4000
-"""Packets in each statistic. With probability p the share differs by more than 5 standard deviations in one run of 1.7 million."""
+"""Packets in each statistic. With probability p the share differs by more than 5 standard deviations in one run of
+1.7 million."""
 
 
 def packets(count: int) -> list[bytes]:

@@ -118,7 +118,8 @@ def test_known_ones_count_and_unknown_ones_are_kept(tmp_path: Path) -> None:
 def test_only_the_first_unknown_names_are_told() -> None:
     file = ParameterFile(Path("x.param"), {f"NO_{n}": 1.0 for n in range(700)} | {"WP_SPEED": 1.0}, {})
     assert file.note() == (
-        "x.param: 700 of 701 parameters are not simulated and only stored to be read back: NO_0, NO_1, NO_2, NO_3, NO_4, ..."
+        "x.param: 700 of 701 parameters are not simulated and only stored to be read back: "
+        "NO_0, NO_1, NO_2, NO_3, NO_4, ..."
     )
 
 

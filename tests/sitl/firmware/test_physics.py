@@ -278,7 +278,8 @@ def test_a_firmware_may_go_on_from_another_address() -> None:
 @pytest.mark.parametrize(
     "datagram",
     [
-        b"", b"\x1a", frame(0)[:-1], frame(0) + b"\0", frame(0, channels=32)[:40], frame(0)[:2] + frame(0, channels=32)[2:],
+        b"", b"\x1a", frame(0)[:-1], frame(0) + b"\0", frame(0, channels=32)[:40],
+        frame(0)[:2] + frame(0, channels=32)[2:],
         struct.pack("<HHI16H", 18459, 400, 0, *[1500] * 16), frame(0, rate_hz=0), b"\n{}\n", bytes(70000),
     ],
 )  # fmt: skip

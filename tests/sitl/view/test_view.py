@@ -1,4 +1,4 @@
-"""The terminal view: a pure function of the state, looked at as text; what it is made of; the terminal that it needs."""
+"""The terminal view as text, what it collects from the simulator, and the terminal that it needs."""
 
 import io
 import math
@@ -254,7 +254,7 @@ def test_without_a_terminal_there_is_one_line(tmp_path: Path, command: str) -> N
     mission = tmp_path / "open.toml"
     mission.write_text(MISSION)
     result = CliRunner().invoke(app, [command, str(mission), "--view"])
-    assert result.exit_code == 2 and result.output.count("\n") == 1 and "no terminal" in result.output
+    assert result.exit_code == 2 and result.output.count("\n") == 1 and "not a terminal" in result.output
 
 
 def on_a_terminal(arguments: list[str], until: bytes, number: signal.Signals, **variables: str) -> tuple[int, bytes]:

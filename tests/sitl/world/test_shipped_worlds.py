@@ -179,6 +179,7 @@ def test_the_fence_of_the_field_mission_lies_across_the_straight_way() -> None:
     assert mission.planned_home is not None
     result = resolve(mission, LocalFrame(mission.planned_home), NedPoint(0.0, 0.0))
     second, third = result.targets[1].point, result.targets[2].point
-    steps = [NedPoint(*(a + t / 100 * (b - a) for a, b in ((second.north_m, third.north_m), (second.east_m, third.east_m)))) for t in range(101)]  # fmt: skip
+    ends = ((second.north_m, third.north_m), (second.east_m, third.east_m))
+    steps = [NedPoint(*(a + t / 100 * (b - a) for a, b in ends)) for t in range(101)]
     assert any(result.grid.is_obstacle(result.grid.cell_at(step)) for step in steps)
     assert all(point.distance_m(NedPoint(0.0, 0.0)) < 100.0 for point in (second, third))
