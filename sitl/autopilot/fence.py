@@ -223,14 +223,14 @@ def _act(
     if action == DISARM and beyond_m <= GIVE_UP_M:
         disarm(vehicle)
         return
-    wishes: dict[int, tuple[Mode, ...]] = {
+    fallbacks: dict[int, tuple[Mode, ...]] = {
         REPORT: (),
         RETURN: (Mode.RTL, Mode.HOLD),
         HOLD: (Mode.HOLD,),
         SMART_RETURN: (Mode.SMART_RTL, Mode.RTL, Mode.HOLD),
         SMART_RETURN_OR_HOLD: (Mode.SMART_RTL, Mode.HOLD),
     }
-    modes = wishes.get(action, ())
+    modes = fallbacks.get(action, ())
     if modes and beyond_m > GIVE_UP_M:
         modes = (Mode.HOLD,)
     for mode in modes:

@@ -104,7 +104,7 @@ SIGNING_LINK = 255
 class LidarComponent:
     """The lidar on the simulated vehicle: packs its messages and passes its scans to the autopilot.
 
-    The autopilot's router forwards them to every link on which somebody was heard.
+    The autopilot's router forwards them to every link on which a client was heard.
     """
 
     def __init__(self, lidar: Lidar, sensing: RangeSensing, vehicle: Vehicle) -> None:

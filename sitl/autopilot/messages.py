@@ -55,9 +55,9 @@ def _heartbeat(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     if message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"]):
         vehicle.clocks.ground_station_s = vehicle.time_s
     if message.type == mavlink.MAV_TYPE_ONBOARD_CONTROLLER:
-        who, known = (message.get_srcSystem(), message.get_srcComponent()), vehicle.onboard_controller
-        if known is None or known[:2] == who:
-            vehicle.onboard_controller = (*who, channel.number)
+        sender, known = (message.get_srcSystem(), message.get_srcComponent()), vehicle.onboard_controller
+        if known is None or known[:2] == sender:
+            vehicle.onboard_controller = (*sender, channel.number)
 
 
 def _override(vehicle: Vehicle, channel: Channel, message: Any) -> None:

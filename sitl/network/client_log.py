@@ -1,4 +1,4 @@
-"""Log lines of the lidar's client link: who is at its other end, and how much was sent."""
+"""Log lines of the lidar's client link: its peer, and how much was sent."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class State(Enum):
     """State of a link."""
 
     BEGUN = auto()
-    NOBODY = auto()
+    NO_PEER = auto()
     CONNECTED = auto()
     ANSWERED = auto()
     SILENT = auto()
@@ -71,7 +71,7 @@ class LoggedLink:
     def _state(self, now_s: float) -> State:
         if not self._link.peer:
             self._heard_s = -math.inf
-            return State.NOBODY
+            return State.NO_PEER
         if self._heard_s == -math.inf or self._system() is None:
             return State.CONNECTED
         return State.ANSWERED if now_s - self._heard_s <= SILENT_S else State.SILENT
@@ -79,9 +79,9 @@ class LoggedLink:
     def _line(self, state: State, system: int | None) -> str:
         peer = self._link.peer
         match state:
-            case State.NOBODY if self._known[0] is State.BEGUN:
+            case State.NO_PEER if self._known[0] is State.BEGUN:
                 return f"waiting for {self._url}"
-            case State.NOBODY if self._known[0] is not State.NOBODY:
+            case State.NO_PEER if self._known[0] is not State.NO_PEER:
                 return f"{self._peer}: link lost; waiting for {self._url}"
             case State.CONNECTED:
                 return f"scans go to {peer}, where no autopilot has been heard yet ({self._url})"

@@ -26,27 +26,27 @@ class EventLog:
         self._collisions = 0
         self._collisions_reported_s = -math.inf
 
-    def connected(self, who: str, url: str) -> None:
+    def connected(self, client: str, url: str) -> None:
         """A client has connected."""
-        self._tell(f"{who} has connected ({url})")
+        self._tell(f"{client} has connected ({url})")
 
-    def disconnected(self, who: str, url: str, *, dropped: bool) -> None:
+    def disconnected(self, client: str, url: str, *, dropped: bool) -> None:
         """A client has disconnected, or was ``dropped`` by the vehicle."""
-        self._tell(f"{who} has {'been dropped: the autopilot restarts' if dropped else 'disconnected'} ({url})")
+        self._tell(f"{client} has {'been dropped: the autopilot restarts' if dropped else 'disconnected'} ({url})")
 
-    def heard(self, who: str, url: str) -> None:
+    def heard(self, client: str, url: str) -> None:
         """A client has sent something over a protocol without connections."""
-        if (who, url) not in self._heard_s:
-            self.connected(who, url)
-        self._heard_s[who, url] = self._now_s()
+        if (client, url) not in self._heard_s:
+            self.connected(client, url)
+        self._heard_s[client, url] = self._now_s()
 
     def look(self, simulator: Simulator) -> None:
         """Report clients that have fallen silent, and collisions since the last look."""
         now_s = self._now_s()
-        for (who, url), last_s in list(self._heard_s.items()):
+        for (client, url), last_s in list(self._heard_s.items()):
             if now_s - last_s > SILENT_S:
-                del self._heard_s[who, url]
-                self._tell(f"{who} has been silent for {SILENT_S:g} s ({url})")
+                del self._heard_s[client, url]
+                self._tell(f"{client} has been silent for {SILENT_S:g} s ({url})")
         collisions = simulator.collisions
         if len(collisions) > self._collisions and now_s - self._collisions_reported_s >= COLLISIONS_EVERY_S:
             self._collisions, self._collisions_reported_s = len(collisions), now_s

@@ -52,8 +52,8 @@ def move_on_circle(control: Any, tuning: Any, estimate: Any) -> None:
     inwards = control.circle_speed**2 / radius
     beside_n = control.shaped_an + inwards * math.cos(control.circle_angle)
     beside_e = control.shaped_ae + inwards * math.sin(control.circle_angle)
-    wish = control.base_speed if control.on_circle else 0.0
-    control.circle_speed += limited(wish - control.circle_speed, control.accel_max * LOOP_S)
+    desired = control.base_speed if control.on_circle else 0.0
+    control.circle_speed += limited(desired - control.circle_speed, control.accel_max * LOOP_S)
     sign = 1.0 if control.circle_radius > 0.0 else -1.0
     turn = control.circle_speed / radius * LOOP_S
     control.circle_angle += sign * turn

@@ -51,11 +51,11 @@ def ramp_m(start: float, end: float, accel: float, jerk: float) -> float:
 
 
 @njit(cache=True, nogil=True)
-def top_speed(length_m: float, start: float, wish: float, accel: float, jerk: float) -> float:
-    """The highest speed up to ``wish`` that still allows to stop at the end of a leg; negative if there is none."""
-    if ramp_m(start, wish, accel, jerk) + ramp_m(wish, 0.0, accel, jerk) <= length_m:
-        return wish
-    low, high = min(start, wish), min(wish, start + math.sqrt(accel * length_m))
+def top_speed(length_m: float, start: float, desired: float, accel: float, jerk: float) -> float:
+    """The highest speed up to ``desired`` that still allows a stop at the end of a leg; negative if there is none."""
+    if ramp_m(start, desired, accel, jerk) + ramp_m(desired, 0.0, accel, jerk) <= length_m:
+        return desired
+    low, high = min(start, desired), min(desired, start + math.sqrt(accel * length_m))
     if ramp_m(start, low, accel, jerk) + ramp_m(low, 0.0, accel, jerk) > length_m:
         return -1.0
     for _ in range(40):

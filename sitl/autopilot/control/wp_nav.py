@@ -62,9 +62,9 @@ def change_leg_speed(control: Any, row: int) -> None:
     """Replan the rest of a leg for a new top speed, unless it already brakes."""
     leg, accel, jerk = control.legs[row], control.accel_max, control.jerk_max
     done_m, speed, _ = along(leg, leg[TIME], accel, jerk)
-    wish = top_speed(leg[LENGTH] - done_m, speed, control.speed_max, accel, jerk)
-    if leg[LENGTH] > 0.0 and leg[TIME] < leg_times(leg, accel, jerk)[0] and wish > 0.0:
-        leg[START_SPEED], leg[SPEED], leg[DONE], leg[TIME] = speed, wish, done_m, 0.0
+    desired = top_speed(leg[LENGTH] - done_m, speed, control.speed_max, accel, jerk)
+    if leg[LENGTH] > 0.0 and leg[TIME] < leg_times(leg, accel, jerk)[0] and desired > 0.0:
+        leg[START_SPEED], leg[SPEED], leg[DONE], leg[TIME] = speed, desired, done_m, 0.0
 
 
 @njit(cache=True, nogil=True)

@@ -59,7 +59,7 @@ def test_fields_cover_a_polygon_and_hardly_more(corners: list[tuple[float, float
     fields, shape = shape_of({"polygon_m": [list(corner) for corner in hull.exterior.coords[:-1]]})
     rows, columns = np.nonzero(fields)
     middles = shapely.points((columns + 0.5) * 0.1, (rows + 0.5) * 0.1)
-    # A mitred sharp corner reaches farther than half a field; at five halves, a limit of shapely, the tip is cut square.
+    # A mitred sharp corner reaches farther than half a field; at five halves, a limit of shapely, the tip is cut.
     assert shapely.distance(shape, middles).max() <= math.hypot(5.0 * 0.05, 0.05) + 1e-6
     missed = shape.difference(
         shapely.union_all(shapely.box(columns * 0.1, rows * 0.1, columns * 0.1 + 0.1, rows * 0.1 + 0.1))
