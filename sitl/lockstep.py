@@ -1,6 +1,8 @@
 """Companion and simulator in one process on one simulated clock, connected by real MAVLink bytes.
 
 When the companion sleeps, the world advances: nothing waits, and the same seed gives the same run.
+
+Nouns: LockstepClock, Drive.
 """
 
 from __future__ import annotations

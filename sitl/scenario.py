@@ -1,4 +1,7 @@
-"""The simulation of a mission: world, start, sensors, steering, parameters, faults."""
+"""The simulation of a mission: world, start, sensors, steering, parameters, faults.
+
+Nouns: Scenario.
+"""
 
 from __future__ import annotations
 

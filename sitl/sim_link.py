@@ -1,4 +1,7 @@
-"""A link to the simulated vehicle: bytes in and out, packet counters, link faults."""
+"""A link to the simulated vehicle: bytes in and out, packet counters, link faults.
+
+Nouns: SimLink.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """The simulator: a rover with its autopilot in a world, advanced in steps; bytes in, time forward, bytes out.
 
 Deterministic: the same world, start, seed and bytes at the same times give the same bytes.
+
+Nouns: Simulator.
 """
 
 from __future__ import annotations

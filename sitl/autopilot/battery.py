@@ -2,6 +2,8 @@
 
 Current and voltage as recorded: 50 A with both motors at full output, 0.014 ohm. With SIM_BATT_CAP_AH above 0 the
 pack also discharges; by default, as in the firmware's own simulation, its voltage at rest stays SIM_BATT_VOLTAGE.
+
+Nouns: AP_BattMonitor.
 """
 
 from __future__ import annotations

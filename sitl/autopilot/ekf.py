@@ -4,6 +4,8 @@ Behaviour of NavEKF3 (aiding, time-outs, innovation gate, glitch flag), of the A
 the GPS) and of Rover's EKF check, ten times a second. Measured: with a silent GPS, HOLD with "EKF failsafe" after 8
 s; the rest is from the firmware's source. The estimate is the truth plus ``offset_m``; this module computes that
 offset.
+
+Nouns: NavEKF3.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The fence: polygons, circles, the circle around home; breaches and actions (AC_Fence, AC_PolyFence_loader)."""
+"""The fence: polygons, circles, the circle around home; breaches and actions (AC_Fence, AC_PolyFence_loader).
+
+Nouns: AC_Fence.
+"""
 
 from __future__ import annotations
 

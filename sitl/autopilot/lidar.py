@@ -1,4 +1,7 @@
-"""The lidar: a MAVLink component (196) on the vehicle's network, or on a link to a real autopilot."""
+"""The lidar: a MAVLink component (196) on the vehicle's network, or on a link to a real autopilot.
+
+Nouns: lidar.
+"""
 
 from __future__ import annotations
 

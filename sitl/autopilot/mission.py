@@ -1,6 +1,8 @@
 """Order of the mission's commands: one navigation command at a time, others alongside, jumps (behaviour of AP_Mission).
 
 What a command does is up to the ``Runner`` (see ``mode_auto``).
+
+Nouns: AP_Mission.
 """
 
 from __future__ import annotations

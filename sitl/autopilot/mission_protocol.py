@@ -2,6 +2,8 @@
 
 One uploader at a time. Mission and rally points are written as they arrive, the fence only when it is complete. A
 cancelling MISSION_ACK is ignored: an abandoned upload ends after eight seconds.
+
+Nouns: MissionItemProtocol.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""AUTO: what each mission command does on a rover, and when it is done (behaviour of ModeAuto)."""
+"""AUTO: what each mission command does on a rover, and when it is done (behaviour of ModeAuto).
+
+Nouns: ModeAuto.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""RTL: return to home or to a rally point (behaviour of ModeRTL, AP_Rally)."""
+"""RTL: return to home or to a rally point (behaviour of ModeRTL, AP_Rally).
+
+Nouns: ModeRTL, AP_Rally.
+"""
 
 from __future__ import annotations
 

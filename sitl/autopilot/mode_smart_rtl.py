@@ -1,4 +1,7 @@
-"""SMART_RTL: record the path driven, simplify it, drive it back (behaviour of ModeSmartRTL, AP_SmartRTL)."""
+"""SMART_RTL: record the path driven, simplify it, drive it back (behaviour of ModeSmartRTL, AP_SmartRTL).
+
+Nouns: ModeSmartRTL, AP_SmartRTL.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""ArduRover's parameters that the simulator knows: names, types, defaults of the simulated skid rover."""
+"""ArduRover's parameters that the simulator knows: names, types, defaults of the simulated skid rover.
+
+Nouns: ArduRover's parameters.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Both can mislead a companion (measured): its own OBSTACLE_DISTANCE comes back as DISTANCE_SENSOR with ids 10 to 17,
 and the rover's simple avoidance creeps to AVOID_MARGIN before an obstacle and stays there without any text.
+
+Nouns: AP_Proximity.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Routing of packets between the vehicle's links (behaviour of MAVLink_routing)."""
+"""Routing of packets between the vehicle's links (behaviour of MAVLink_routing).
+
+Nouns: MAVLink_routing.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""ArduRover's start-up: when each part becomes available, which texts are sent when, and delays without GPS."""
+"""ArduRover's start-up: when each part becomes available, which texts are sent when, and delays without GPS.
+
+Nouns: ArduRover's start-up.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """Link faults: loss, delay, reordering, duplication, damage and outage of packets between a link and the autopilot.
 
 They act on whole packets, in simulated time. Bytes between packets count as a packet of their own.
+
+Nouns: link fault.
 """
 
 from __future__ import annotations

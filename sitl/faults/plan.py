@@ -2,6 +2,8 @@
 
 Times are seconds since the simulator was switched on, or since the rover began to drive; a reboot of the autopilot
 does not reset them.
+
+Nouns: fault plan.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Frames of ArduPilot's JSON interface: servo outputs arrive in a binary frame, the rover's state is returned as text.
 
 Source: ArduPilot, libraries/SITL/SIM_JSON and its description.
+
+Nouns: JSON interface.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Reads parameter files of Mission Planner (NAME,VALUE), MAVProxy (NAME VALUE) and QGroundControl (five columns)."""
+"""Reads parameter files of Mission Planner (NAME,VALUE), MAVProxy (NAME VALUE) and QGroundControl (five columns).
+
+Nouns: parameter file.
+"""
 
 from __future__ import annotations
 

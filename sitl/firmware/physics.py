@@ -3,6 +3,8 @@
 Plant, world and sensors are those of the simulated vehicle; autopilot and estimator are the firmware's. Time passes
 only with answers: the firmware waits for each, and takes its clock from the answer's timestamp. So a run is a
 function of mission, seed and frames.
+
+Nouns: physics.
 """
 
 from __future__ import annotations

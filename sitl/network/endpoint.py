@@ -1,4 +1,7 @@
-"""What all endpoints have in common: the protocol, addresses, datagrams of complete packets."""
+"""What all endpoints have in common: the protocol, addresses, datagrams of complete packets.
+
+Nouns: Endpoint.
+"""
 
 from __future__ import annotations
 

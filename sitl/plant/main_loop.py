@@ -1,4 +1,7 @@
-"""The compiled main loop: estimate, motion control, battery, plant; runs a batch of loops in one call."""
+"""The compiled main loop: estimate, motion control, battery, plant; runs a batch of loops in one call.
+
+Nouns: NoiseSettings.
+"""
 
 from __future__ import annotations
 

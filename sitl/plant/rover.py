@@ -6,6 +6,8 @@ drive, and front wheels with a limited angle and rate, so the rover turns only w
 
 On slippery ground both slide: the friction that changes the velocity is limited to grip times gravity. The rover then
 accelerates and brakes more slowly, and drifts sideways (skid steering) or understeers (steered wheels).
+
+Nouns: plant, SIM_Rover.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Flaws of range sensors: noise, dropouts, false echoes, sunlight, latency; and sensors with their own rate.
 
 Glass and black surfaces are part of the world.
+
+Nouns: Flaws.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 ``lidar-90`` and ``lidar-360`` are MAVLink components (196) that publish OBSTACLE_DISTANCE; ``beams`` are three narrow
 rangefinders wired to the autopilot, which publishes them as DISTANCE_SENSOR.
+
+Nouns: SensorSuite.
 """
 
 from __future__ import annotations

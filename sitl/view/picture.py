@@ -1,4 +1,7 @@
-"""Picture file of a run: the world, the companion's map, and the driven track."""
+"""Picture file of a run: the world, the companion's map, and the driven track.
+
+Nouns: picture.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Times are the simulator's, in seconds since it was created. They are kept as integer milliseconds, so that rounding
 cannot decide whether a door is open.
+
+Nouns: Door.
 """
 
 from __future__ import annotations

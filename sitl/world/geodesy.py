@@ -3,6 +3,8 @@
 It shares no code with the companion, so that the same error cannot cancel out in both.
 
 Latitude and longitude are integers of 1e-7 degree, as the firmware stores them; offsets are metres north and east.
+
+Nouns: geodesy.
 """
 
 from __future__ import annotations

@@ -2,6 +2,8 @@
 
 Times are the simulator's, in seconds since it was created. Movers react to nothing: they pass through walls, each
 other and the rover.
+
+Nouns: Mover.
 """
 
 from __future__ import annotations

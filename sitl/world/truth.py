@@ -1,4 +1,7 @@
-"""The rover's start, its true state, and its collisions, in the world frame."""
+"""The rover's start, its true state, and its collisions, in the world frame.
+
+Nouns: Collision, Truth.
+"""
 
 from __future__ import annotations
 

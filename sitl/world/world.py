@@ -2,6 +2,8 @@
 
 The world frame is metres north and east; obstacles are the fields of a boolean array indexed ``[y, x]`` (y grows
 north, x grows east) whose outer south-west corner may lie anywhere. Ground outside the array is open and firm.
+
+Nouns: World.
 """
 
 from __future__ import annotations

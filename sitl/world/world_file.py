@@ -3,6 +3,8 @@
 Places are metres north and east of the world's south-west corner. Shapes are drawn into fields that are fine enough
 for rays and contact; an obstacle takes every field whose centre it covers or comes within half a field of, so it is
 never thinner than written.
+
+Nouns: world file.
 """
 
 from __future__ import annotations

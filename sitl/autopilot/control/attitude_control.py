@@ -1,4 +1,7 @@
-"""Speed and turn-rate controllers that set throttle and steering (AR_AttitudeControl, AC_PID; compiled)."""
+"""Speed and turn-rate controllers that set throttle and steering (AR_AttitudeControl, AC_PID; compiled).
+
+Nouns: AR_AttitudeControl, AC_PID.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Driving circles around a place, as LOITER_TURNS does (behaviour of ModeCircle; compiled)."""
+"""Driving circles around a place, as LOITER_TURNS does (behaviour of ModeCircle; compiled).
+
+Nouns: ModeCircle.
+"""
 
 from __future__ import annotations
 

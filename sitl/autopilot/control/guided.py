@@ -3,6 +3,8 @@
 A position target is shaped: an inner target runs ahead of the rover with limited speed, acceleration and jerk, and
 the rover follows it. If the target lies farther to the side than WP_PIVOT_ANGLE, the rover first turns on the spot;
 with steered wheels it drives an arc instead.
+
+Nouns: ModeGuided.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Motor outputs: throttle and steering become the plant's two servo outputs (behaviour of AP_MotorsUGV; compiled)."""
+"""Motor outputs: throttle and steering become the plant's two servo outputs (behaviour of AP_MotorsUGV; compiled).
+
+Nouns: AP_MotorsUGV.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Follows a moving inner target, after a turn on the spot if needed (AR_PosControl, AR_PivotTurn; compiled)."""
+"""Follows a moving inner target, after a turn on the spot if needed (AR_PosControl, AR_PivotTurn; compiled).
+
+Nouns: AR_PosControl, AR_PivotTurn.
+"""
 
 from __future__ import annotations
 

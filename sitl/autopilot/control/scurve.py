@@ -1,6 +1,8 @@
 """Motion along one leg with limited speed, acceleration and jerk (behaviour of SCurve; compiled).
 
 Here the jerk changes in steps; in the firmware it rises and falls smoothly.
+
+Nouns: SCurve.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Servo outputs: their functions (SERVOn_FUNCTION) and the kind of rover they make (behaviour of SRV_Channels)."""
+"""Servo outputs: their functions (SERVOn_FUNCTION) and the kind of rover they make (behaviour of SRV_Channels).
+
+Nouns: SRV_Channels.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 An inner target moves along the leg with limited speed, acceleration and jerk, and no faster than the rover can
 follow. Before a corner without a pivot turn, the next leg begins while this one ends, so that the rover rounds the
 corner without stopping.
+
+Nouns: AR_WPNav, leg.
 """
 
 from __future__ import annotations

@@ -56,12 +56,12 @@ def test_what_becomes_of_a_users_own_parameters_is_told() -> None:
     told = firmware_parameters(own, SUITES["beams"], steered=False)
     assert file.firmware_notes(told) == (
         "x.parm: outside the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); is that intended?",
-        "x.parm: SERVO1_FUNCTION 74 becomes 73, as our rover is built",
-        "x.parm: RNGFND1_TYPE 10 becomes 100, as our rover is built",
-        "x.parm: 1 parameters that are not known here are passed on as they are: FOO",
+        "x.parm: SERVO1_FUNCTION 74 becomes 73, as the simulated rover is built",
+        "x.parm: RNGFND1_TYPE 10 becomes 100, as the simulated rover is built",
+        "x.parm: 1 unknown parameters are passed on unchanged: FOO",
     )
     (note,) = ParameterFile(Path("x.parm"), {"FOO": 3.0}, {}).firmware_notes(None)
-    assert "--write-params FILE writes the rest" in note
+    assert "--write-params FILE writes the other parameters" in note
 
 
 def test_every_parameter_that_is_written_is_in_the_manual() -> None:

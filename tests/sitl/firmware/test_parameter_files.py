@@ -56,14 +56,14 @@ def test_types_are_taken_and_other_components_left_out(tmp_path: Path) -> None:
         ("WP_SPEED nan\n", ":1:", "is not a number"),
         ("WP_SPEED,1e39\n", ":1:", "is not a number"),
         ("WP_SPEED inf\n", ":1:", "write one such as 1.5"),
-        ("MAV_SYSID 300\n", ":1:", "MAV_SYSID: 300: a MAVLink system has a number from 1 to 255; choose one"),
+        ("MAV_SYSID 300\n", ":1:", "MAV_SYSID: 300: a MAVLink system id is 1 to 255; choose one"),
         ("WP_SPEED 1\nMAV_SYSID,0\n", ":2:", "MAV_SYSID: 0: a MAVLink system"),
         ("wp_speed 1\n", ":1:", "'wp_speed' is not a parameter name"),
-        ("A_NAME_THAT_IS_TOO_LONG 1\n", ":1:", "no parameter's name"),
-        ("<html>,1\n", ":1:", "no parameter's name"),
+        ("A_NAME_THAT_IS_TOO_LONG 1\n", ":1:", "not a parameter name"),
+        ("<html>,1\n", ":1:", "not a parameter name"),
         ("# nothing\n", ":", "no parameters"),
         (b"WP_SPEED,\xff\n", ":", "not UTF-8 text"),
-        (b"WP_SPEED,1\n" * 100_000, ":", "too many"),
+        (b"WP_SPEED,1\n" * 100_000, ":", "larger than"),
     ],
 )
 def test_a_bad_line_is_named(tmp_path: Path, text: str | bytes, place: str, reason: str) -> None:
@@ -129,7 +129,7 @@ def test_values_that_are_most_likely_slips_are_told_in_one_line(tmp_path: Path) 
     assert note == (
         f"{tmp_path / 'rover.param'}: outside the range that ArduRover documents: ATC_DECEL_MAX -5 (0 to 10), "
         "CRUISE_SPEED 101 (0 to 100), SCHED_LOOP_RATE 0 (50 to 400), TURN_RADIUS -1 (0 to 10), "
-        "WP_RADIUS 1e+38 (0 to 100), ...; see if they are meant"
+        "WP_RADIUS 1e+38 (0 to 100), ...; is that intended?"
     )
     client = Client(scenario(tmp_path, odd).simulator(0))
     client.run_for(1.0)

@@ -354,7 +354,7 @@ def test_nothing_seen_is_out_of_range_and_nothing_known_is_no_reading() -> None:
 
 
 def test_more_rangefinders_than_six_are_refused() -> None:
-    with pytest.raises(ValueError, match="7 rangefinders: the firmware takes 6 at most"):
+    with pytest.raises(ValueError, match="7 rangefinders: the firmware accepts at most 6"):
         physics(suite=SensorSuite(beams=(Beam(0, 0.2, 6.0),) * 7))
 
 
@@ -445,7 +445,7 @@ def test_without_a_firmware_there_is_nothing_to_sum_up() -> None:
     assert summary(behind) == "stopped; no firmware has asked (1 not frames)"
 
 
-def test_news_are_told_once_and_summed_up() -> None:
+def test_events_are_logged_once_and_summed_up() -> None:
     behind = physics(walled())
     said: list[str] = []
     now_s = 0.0
@@ -464,9 +464,9 @@ def test_news_are_told_once_and_summed_up() -> None:
     log.look()
     assert [line.split(";")[0].split(":")[0] for line in said] == [
         "the firmware has started and is answered",
-        "something that is no frame of ArduPilot's JSON interface came",
+        "a datagram was no frame of ArduPilot's JSON interface",
         "a second firmware asks at the same port",
-        "frames were lost on the way",
+        "frames were lost",
         "collision 1",
     ]
     assert summary(behind) == (

@@ -185,7 +185,7 @@ def test_the_name_of_a_terminal_in_use_is_left_alone(bench: Bench, tmp_path: Pat
     name = tmp_path / "ttyV0"
     bench.open(f"pty:{name}")
     terminal = os.readlink(name)
-    with pytest.raises(ListenError, match=r"ttyV0: cannot be opened: File exists; name a link that is not there yet"):
+    with pytest.raises(ListenError, match=r"ttyV0: cannot be opened: File exists; name a link that does not exist yet"):
         bench.open(f"pty:{name}")
     assert os.readlink(name) == terminal
 
@@ -223,7 +223,7 @@ def run_and_read(bench: Bench, file: int) -> bytes:
 @pytest.mark.parametrize("place", ["/dev/none", "/dev/none:57600", "/dev/null:9600"])
 def test_a_device_that_is_not_there_is_one_line(bench: Bench, place: str) -> None:
     with pytest.raises(
-        ListenError, match=r"^serial:/dev/.* cannot be opened: .*; see that the device is there"
+        ListenError, match=r"^serial:/dev/.* cannot be opened: .*; check that the device exists"
     ) as told:
         bench.open(f"serial:{place}")
     assert "\n" not in str(told.value) and "Errno" not in str(told.value)

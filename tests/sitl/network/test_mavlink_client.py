@@ -107,5 +107,5 @@ def test_a_port_in_use_is_refused() -> None:
 
 @pytest.mark.parametrize("kind", ["tcp", "udpout"])
 def test_a_name_that_is_none_is_refused(kind: str) -> None:
-    with pytest.raises(ListenError, match="is that a computer's name or address"):
+    with pytest.raises(ListenError, match="is that the name or address of a computer"):
         open_link(f"{kind}:no..name:5762")
