@@ -1,6 +1,6 @@
 """The lidar: a MAVLink component (196) on the vehicle's network, or on a link to a real autopilot.
 
-Nouns: lidar.
+Nouns: LidarComponent.
 """
 
 from __future__ import annotations

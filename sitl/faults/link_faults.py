@@ -2,7 +2,7 @@
 
 They act on whole packets, in simulated time. Bytes between packets count as a packet of their own.
 
-Nouns: link fault.
+Nouns: LinkQueue.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ An inner target moves along the leg with limited speed, acceleration and jerk, a
 follow. Before a corner without a pivot turn, the next leg begins while this one ends, so that the rover rounds the
 corner without stopping.
 
-Nouns: AR_WPNav, leg.
+Nouns: AR_WPNav.
 """
 
 from __future__ import annotations
