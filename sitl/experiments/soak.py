@@ -21,7 +21,7 @@ from rich.table import Table
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.autopilot.modes import arm, arming_faults, set_mode
-from sitl.autopilot.vehicle import Mode
+from sitl.autopilot.state import Mode
 from sitl.experiments import soak_faults, soak_worlds
 from sitl.experiments.experiment import Advance, Options, where_measured
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
@@ -94,9 +94,7 @@ class Person:
             return
         self._in_vain += 1
         if self._in_vain == PATIENCE:
-            self.gave_up = (
-                f"The autopilot does not let it be armed: {'; '.join(arming_faults(vehicle)) or 'GUIDED refused'}"
-            )
+            self.gave_up = f"The autopilot does not let it be armed: {'; '.join(fault.text for fault in arming_faults(vehicle)) or 'GUIDED refused'}"
             drive.companion.stop()
 
 

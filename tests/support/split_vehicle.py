@@ -12,8 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from sitl.autopilot.autopilot import Autopilot
-from sitl.autopilot.control import LOOP_HZ
-from sitl.autopilot.loop import run_tasks
+from sitl.autopilot.control.records import LOOP_HZ
+from sitl.autopilot.control.tasks import run_tasks
 from sitl.autopilot.vehicle import Vehicle
 from sitl.firmware.physics import Physics
 from sitl.plant.rover import new_rover

@@ -7,7 +7,7 @@ import pytest
 
 from companion.core.grid import OBSTACLE, inflated
 from companion.mission.check import check_mission
-from sitl.autopilot.vehicle import Mode
+from sitl.autopilot.state import Mode
 from sitl.experiments import soak, soak_faults
 from sitl.experiments.experiment import Options
 from sitl.experiments.soak import Person, Soaked, SoakReport, soaked
