@@ -12,7 +12,7 @@ from companion.control.point_controller import STANDSTILL
 from companion.control.setpoint_check import SetpointCheck
 from companion.core.clock import Clock, stopwatch_s
 from companion.core.frames import GeoPoint
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.executive.auto_mode_legs import AutoModeLegs
 from companion.executive.goal_driver import GoalDriver
 from companion.executive.goal_requests import GoalRequests
