@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.checkpoint.checkpointer import Memory
+from companion.checkpoint.checkpointer import Checkpointer, RunMoment
 from companion.control.point_controller import STANDSTILL
 from companion.control.setpoint_check import SetpointCheck
 from companion.core.clock import Clock, stopwatch_s
@@ -33,7 +33,7 @@ from companion.operator.reporting import Outcome, Reporter, Status
 from companion.operator.telling import Teller
 from companion.perception.moving_obstacles import announced
 from companion.perception.newest_scans import newest_ranges
-from companion.recording.recorder import DecisionLog
+from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
 from companion.safety.watchdogs import Watchdogs
 from companion.settings import Settings
@@ -67,14 +67,14 @@ class Companion:
         mission: Mission,
         settings: Settings,
         runner: StepRunner,
-        log: DecisionLog,
+        log: RunLog,
         *,
         seed: int,
         arm: bool,
-        memory: Memory | None = None,
+        checkpointer: Checkpointer | None = None,
         keep_settings: Callable[[Settings], None] | None = None,
     ) -> None:
-        self.vehicle = VehicleState(in_auto=mission.in_auto, sticks=memory.sticks if memory else Sticks())
+        self.vehicle = VehicleState(in_auto=mission.in_auto, sticks=checkpointer.sticks if checkpointer else Sticks())
         self.outcome = Outcome()
         self._reporter = Reporter(self.outcome.said)
         self._teller = Teller(autopilot, clock, self._reporter)
@@ -88,8 +88,8 @@ class Companion:
         self._runner = NotedRunner(runner, log.mark)
         self._log = log
         self._rng = np.random.default_rng(seed)
-        self._memory = memory
-        self._start_up = StartUp(mission, settings, arm=arm, kept=memory.kept if memory else None)
+        self._checkpointer = checkpointer
+        self._start_up = StartUp(mission, settings, arm=arm, previous=checkpointer.previous if checkpointer else None)
         self._outbox = Outbox(settings.guidance)
         self._speaker = Speaker(autopilot, self._outbox, self._tell)
         self.output_check = SetpointCheck(self._tell)
@@ -303,7 +303,7 @@ class Companion:
         executor = MissionExecutor(
             self._mission, self._settings, layout, scan, self._runner, self._log, self._tell, self._rng
         )
-        if self._memory is not None and self._memory.take_up(executor, self.vehicle, now_s):
+        if self._checkpointer is not None and self._checkpointer.resume(executor, self.vehicle, now_s):
             self._tell(f"Resumed {self._start_up.found}, {executor.reached} targets reached before", INFO)
         return executor
 
@@ -350,12 +350,15 @@ class Companion:
 
     def _remember(self, now_s: float) -> None:
         """What this run would need to go on after a crash."""
-        if self._memory is not None and self._executor is not None:
-            left, doubted = self._handover.ours, self._whereabouts.position_doubted
-            self._memory.note(now_s, self.vehicle, self.watch.control, self._executor, doubted, left, self._done)
+        if self._checkpointer is not None and self._executor is not None:
+            released, doubted = self._handover.ours, self._whereabouts.position_doubted
+            moment = RunMoment(
+                now_s, self.vehicle, self.watch.control, self._executor, doubted, released=released, done=self._done
+            )
+            self._checkpointer.update(moment)
 
     def _tell_of_faults(self, now_s: float) -> None:
         """What a person should know though it stops nothing."""
-        problem = self._log.problem or (self._memory.heed_problem(self._log) if self._memory else "")
+        problem = self._log.problem or (self._checkpointer.problem_text(self._log) if self._checkpointer else "")
         ours, underway = self.watch.control is Control.COMPANION, self._executor is not None
         self._teller.of_faults(now_s, problem, heard=self.vehicle.heartbeat is not None, underway=underway, ours=ours)

@@ -38,7 +38,7 @@ from companion.navigation.step_runner import StepRunner
 from companion.perception.moving_obstacles import Moving, merged
 from companion.perception.object_tracker import ObjectTracker
 from companion.planning.registry import make_planner
-from companion.recording.recorder import DecisionLog
+from companion.recording.recorder import RunLog
 from companion.settings import Settings
 
 INFO, WARNING = 6, 4
@@ -64,7 +64,7 @@ class MissionExecutor:
         layout: MissionLayout,
         scan: RangeScan,
         runner: StepRunner,
-        log: DecisionLog,
+        log: RunLog,
         tell: Tell,
         rng: np.random.Generator,
     ) -> None:

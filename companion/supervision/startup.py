@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from companion.checkpoint.resume import Kept, Ownership, lay_resumed, ownership, same_boot
+from companion.checkpoint.resume import PreviousRun, ResumePermission, resume_permission, resumed_layout, same_boot
 from companion.control.point_controller import STANDSTILL
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import TargetStatus
@@ -85,15 +85,15 @@ def overruled(ack: AckSeen | None, heartbeat: HeartbeatSeen | None) -> bool:
 class StartUp:
     """The way there, tick by tick. ``missing`` says in words what is awaited."""
 
-    def __init__(self, mission: Mission, settings: Settings, *, arm: bool, kept: Kept | None = None) -> None:
-        """``kept``: the run that is to be taken up."""
+    def __init__(self, mission: Mission, settings: Settings, *, arm: bool, previous: PreviousRun | None = None) -> None:
+        """``previous``: the run that is to be taken up."""
         self.missing = ""
         self.found = ""
         """What is to be said of a run that has been taken up."""
         self.held = ""
         """Why a rover that an earlier run has left armed is put into HOLD, in words."""
-        self._kept = kept
-        self._owner: Ownership | None = None
+        self._previous = previous
+        self._owner: ResumePermission | None = None
         self._mission = mission
         self._settings = settings
         self._arm = arm
@@ -150,7 +150,7 @@ class StartUp:
 
         While AUTO is served, GUIDED is a person's.
         """
-        ours = self._kept is not None and self._kept.state.control is Control.COMPANION and not vehicle.in_auto
+        ours = self._previous is not None and self._previous.state.control is Control.COMPANION and not vehicle.in_auto
         heartbeat = vehicle.heartbeat
         return ours and heartbeat is not None and heartbeat.mode == RoverMode.GUIDED and heartbeat.armed
 
@@ -163,12 +163,12 @@ class StartUp:
         if now_s - self._left_since_s < LEFT_S and not vehicle.sticks.moved:
             return STANDSTILL.setpoint
         self.held = "the sticks were moved" if vehicle.sticks.moved else f"waited too long for {self.missing}"
-        self._owner = Ownership(Control.PERSON, may_arm=False)
+        self._owner = ResumePermission(Control.PERSON, may_arm=False)
         return SetMode(RoverMode.HOLD)
 
     def _due(self, command: Command | None, now_s: float) -> Command | None:
         """The command, if it is not too soon; a run that is taken up waits only with one that has just been given."""
-        if self._kept is None:
+        if self._previous is None:
             soon = now_s - self._asked_s <= ASK_AGAIN_S
         else:
             soon = command == self._asked and now_s - self._asked_s <= AGAIN_RESUMED_S
@@ -190,8 +190,8 @@ class StartUp:
 
     def _whose(self, vehicle: VehicleState, control: Control) -> Control:
         """Who drives, where an earlier run had the rover: looked at once, then by the mode as ever."""
-        if self._owner is None and self._kept is not None:
-            self._owner = ownership(self._kept.state, vehicle)
+        if self._owner is None and self._previous is not None:
+            self._owner = resume_permission(self._previous.state, vehicle)
             self._arm = self._arm and (self._owner is None or self._owner.may_arm)
         return self._owner.control if self._owner is not None and control is Control.NOBODY else control
 
@@ -204,7 +204,7 @@ class StartUp:
         if layout is None:
             return
         # One that a fence has closed while nobody listened is no error of whoever starts: it is refused when its turn comes, as on the way.
-        for number, reason in layout.refused.items() if self._kept is None else ():
+        for number, reason in layout.refused.items() if self._previous is None else ():
             if layout.progress.statuses[number] is TargetStatus.PENDING:
                 raise MissionError(f"{self._mission.source or self._mission.name}: {reason}")
         self._checked, self._bounds = ground, layout.bounds
@@ -219,8 +219,10 @@ class StartUp:
         if vehicle.origin is None or vehicle.home is None or pose is None:
             return None
         origin, mapping = vehicle.origin.point, self._settings.mapping
-        if self._kept is None or vehicle.position is None:
+        if self._previous is None or vehicle.position is None:
             return lay(self._mission, mapping, origin, vehicle.home.point, pose, fence)
-        same = same_boot(self._kept.state, vehicle.position)
-        layout, self.found = lay_resumed(self._kept, self._mission, mapping, origin, now_s, same=same, fence=fence)
+        same = same_boot(self._previous.state, vehicle.position)
+        layout, self.found = resumed_layout(
+            self._previous, self._mission, mapping, origin, now_s, same=same, fence=fence
+        )
         return layout
