@@ -1,6 +1,8 @@
-"""Companion and simulator in one process on one simulated clock, real MAVLink bytes between them.
+"""Companion and simulator in one process on one simulated clock, connected by real MAVLink bytes.
 
-The companion's sleep moves the world: nothing waits, and the same seed gives the same run.
+When the companion sleeps, the world advances: nothing waits, and the same seed gives the same run.
+
+Nouns: LockstepClock, Drive.
 """
 
 from __future__ import annotations
@@ -29,7 +31,7 @@ TRACK_PERIOD_S = 0.5
 
 
 class LockstepClock:
-    """The simulator's time; sleeping exchanges the bytes and moves the world."""
+    """The simulator's clock; sleeping exchanges bytes and advances the world."""
 
     def __init__(self, simulator: Simulator, vehicle_end: SimLink, companion_end: MemoryLink) -> None:
         self._simulator = simulator
@@ -37,14 +39,14 @@ class LockstepClock:
         self._companion_end = companion_end
         self._now_s = simulator.time_s
         self.overhear: Callable[[float, bytes], None] | None = None
-        """Told what the companion has written, and until when the world moves on with that."""
+        """Called with the time to which the world advances, and the bytes that the companion has written."""
 
     def now_s(self) -> float:
         """Simulated seconds since the autopilot booted."""
         return self._now_s
 
     def sleep_until_s(self, time_s: float) -> None:
-        """Deliver what was written, let the world move on, and bring back what the vehicle sent."""
+        """Deliver what the companion has written, advance the world, and fetch what the vehicle has sent."""
         if time_s <= self._now_s:
             return
         said = self._companion_end.read()
@@ -54,14 +56,14 @@ class LockstepClock:
         self._simulator.advance_to_s(time_s)
         self._companion_end.write(self._vehicle_end.take())
         if self._vehicle_end.dropped:
-            # The autopilot has rebooted: whoever holds the line opens it again at once.
+            # The autopilot has rebooted: connect again at once.
             self._vehicle_end = self._simulator.connect(name="companion")
         self._now_s = time_s
 
 
 @dataclass(frozen=True, slots=True)
 class TrackPoint:
-    """Where the rover really was (world frame), and which part of the navigator had led it there."""
+    """The rover's true position (world frame), and the navigator's part at that moment."""
 
     time_s: float
     north_m: float
@@ -69,8 +71,8 @@ class TrackPoint:
     part: str
 
 
-class DriveOutcome(StrEnum):
-    """What came of a drive; the values are those of ``--json``."""
+class Outcome(StrEnum):
+    """How a run ended; the values are those of ``--json``."""
 
     REACHED = "reached"
     INCOMPLETE = "incomplete"
@@ -80,10 +82,10 @@ class DriveOutcome(StrEnum):
 
 @dataclass
 class Report:
-    """What a lock-step run came to; ``as_json`` gives the documented keys."""
+    """Result of a lock-step run; ``as_json`` gives the documented keys."""
 
     seed: int
-    outcome: DriveOutcome = DriveOutcome.TIME_LIMIT
+    outcome: Outcome = Outcome.TIME_LIMIT
     targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
     steps: int = 0
     return_steps: int = 0
@@ -92,7 +94,7 @@ class Report:
     distance_m: float = 0.0
     collisions: int = 0
     refused: int = 0
-    """Setpoints that the companion's own last look before sending turned down."""
+    """Setpoints rejected by the companion's own check before sending."""
     sim_time_s: float = 0.0
     driving_time_s: float = 0.0
     wall_time_s: float = 0.0
@@ -107,10 +109,10 @@ class Report:
         """0 all targets reached without a collision, 3 a target missed, 4 a collision."""
         if self.collisions:
             return 4
-        return 0 if self.outcome is DriveOutcome.REACHED else 3
+        return 0 if self.outcome is Outcome.REACHED else 3
 
     def as_json(self) -> dict[str, object]:
-        """For ``--json``: everything but track and texts."""
+        """The figures for ``--json``: everything except track and texts."""
         hidden = {"track", "said", "targets"}
         result: dict[str, object] = {key: value for key, value in vars(self).items() if key not in hidden}
         result["targets"] = [{"name": name, "status": status} for name, status in self.targets]
@@ -119,7 +121,7 @@ class Report:
 
 @dataclass
 class Drive:
-    """One mission in lock-step; after ``run`` the companion's map and the simulator's truth can be looked at."""
+    """One mission in lock-step; after ``run`` the companion and the simulator can be inspected."""
 
     mission: Mission
     scenario: Scenario
@@ -186,6 +188,6 @@ class Drive:
         seconds = sorted(companion.outcome.step_seconds)
         report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0
         if report.collisions:
-            report.outcome = DriveOutcome.COLLISION
+            report.outcome = Outcome.COLLISION
         elif companion.done:
-            report.outcome = DriveOutcome.REACHED if companion.outcome.complete else DriveOutcome.INCOMPLETE
+            report.outcome = Outcome.REACHED if companion.outcome.complete else Outcome.INCOMPLETE

@@ -1,4 +1,7 @@
-"""From a mission file to a simulation: which world, where the rover stands, what it carries."""
+"""The simulation of a mission: world, start, sensors, steering, parameters, faults.
+
+Nouns: Scenario.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
-from sitl.autopilot.params import DEFAULTS, REAL32, steered_wheels
+from sitl.autopilot.parameters import DEFAULTS, REAL32, steered_wheels
 from sitl.faults.plan import FaultPlan, SensorFault
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.physics import Physics
@@ -23,7 +26,7 @@ from sitl.world.world import World
 from sitl.world.world_file import load_world, movers_of
 
 SOMEWHERE = GeoPoint(53.1325, 23.1688)
-"""Where the rover stands on earth when no place in the mission says."""
+"""Latitude and longitude of the start if the mission has none."""
 
 
 class ScenarioError(Exception):
@@ -32,7 +35,7 @@ class ScenarioError(Exception):
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """Everything a simulator is made from, but the seed.
+    """Everything from which a simulator is created, except the seed.
 
     World frame: metres north and east of the outer south-west corner of the world's field (0, 0).
     """
@@ -43,16 +46,16 @@ class Scenario:
     rover_radius_m: float = 0.35
     parameters: dict[str, float] = field(default_factory=dict)
     turning_radius_m: float = 0.0
-    """0: skid steering; else Ackermann."""
+    """0: skid steering; else Ackermann steering."""
     faults: FaultPlan | None = None
     kept: dict[str, int] = field(default_factory=dict)
-    """Types of those parameters that are not simulated, only kept."""
+    """Types of those parameters that have no effect."""
     parameter_file: ParameterFile | None = None
-    """Where some of the parameters come from."""
+    """The file from which some of the parameters come."""
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What people should know about it before the simulated autopilot drives, a line each."""
+        """Remarks about the parameter file, one line each."""
         return () if self.parameter_file is None else self.parameter_file.notes(self.turning_radius_m > 0.0)
 
     def simulator(self, seed: int, noise: bool | NoiseSettings = True) -> Simulator:
@@ -71,7 +74,7 @@ class Scenario:
         )
 
     def physics(self, seed: int, *, scans: bool = False) -> Physics:
-        """The same rover and world for the real firmware. Raises ScenarioError for sensors that it does not take."""
+        """The same rover and world for the real firmware. Raises ScenarioError for unsuitable sensors."""
         suite = suite_named(self.sensors) if isinstance(self.sensors, str) else self.sensors
         try:
             return Physics(self.world, self.start, suite, seed, self.rover_radius_m, self.turning_radius_m, scans=scans)
@@ -80,10 +83,11 @@ class Scenario:
 
 
 def scenario_from_mission(mission: Mission) -> Scenario:
-    """The simulation a mission asks for; without a world file, open ground.
+    """The simulation of a mission; without a world file, open ground.
 
-    A fixed grid (``grid.size``, ``grid.home``) and a world of the same resolution share their fields: the rover stands in
-    the middle of ``sitl.start``, by default ``grid.home``. Raises ScenarioError, and MapError for a bad world file.
+    A fixed grid (``grid.size``, ``grid.home``) and a world of the same resolution share their fields: the rover
+    starts in the centre of ``sitl.start``, by default ``grid.home``. Raises ScenarioError, and MapError for a bad
+    world file.
     """
     spec = mission.sitl or SitlSpec()
     name = str(mission.source or mission.name)
@@ -103,7 +107,7 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     gap_m, touching = world.mover_gap_m(*start_m, 0.0)
     if gap_m < radius_m:
         which = f"sitl.movers {touching + 1 - own}" if touching >= own else f"{spec.world}: mover {touching + 1}"
-        raise ScenarioError(f"{name}: {which}: begins where the rover stands; let it begin farther from home")
+        raise ScenarioError(f"{name}: {which}: starts where the rover stands; let it start farther from home")
     start = SimStart(*start_m, math.radians(spec.heading_deg), _home(mission, spec))
     parameters = {"WP_SPEED": mission.rover.cruise_speed_m_s, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
     turning_radius_m = _turning_radius_m(mission, spec, name)
@@ -122,7 +126,7 @@ def scenario_from_mission(mission: Mission) -> Scenario:
 
 
 def _steered(scenario: Scenario, turning_radius_m: float) -> Scenario:
-    """With steered wheels, or unchanged for radius 0."""
+    """The scenario with steered wheels; unchanged for radius 0."""
     if turning_radius_m <= 0.0:
         return scenario
     parameters = scenario.parameters | steered_wheels(turning_radius_m)
@@ -130,35 +134,35 @@ def _steered(scenario: Scenario, turning_radius_m: float) -> Scenario:
 
 
 def _fitting_radius_m(radius_m: float, spec: SitlSpec, file: ParameterFile) -> float:
-    """The plant's turning radius, where the parameter file says what kind of rover it is for. Raises ScenarioError."""
+    """The plant's turning radius, if the parameter file determines the kind of steering. Raises ScenarioError."""
     if file.is_skid:
         if spec.steering == "ackermann":
             raise ScenarioError(
-                f"{file.path}: SERVOn_FUNCTION are of a rover with skid steering, the mission says steering "
-                "ackermann; take that out, or another file"
+                f"{file.path}: SERVOn_FUNCTION are those of a rover with skid steering, the mission says steering "
+                "ackermann; remove that, or use another file"
             )
         return 0.0
     if file.is_steered and radius_m <= 0.0:
         if spec.steering == "skid":
             raise ScenarioError(
-                f"{file.path}: SERVOn_FUNCTION are of a rover with steered wheels, the mission says steering "
-                "skid; take that out, or another file"
+                f"{file.path}: SERVOn_FUNCTION are those of a rover with steered wheels, the mission says steering "
+                "skid; remove that, or use another file"
             )
         turning_m = file.values.get("TURN_RADIUS", DEFAULTS["TURN_RADIUS"][0])
         if turning_m <= 0.0:
             raise ScenarioError(
-                f"{file.path}: TURN_RADIUS {turning_m:g}: a rover with steered wheels needs the radius of its tightest turn, in metres"
+                f"{file.path}: TURN_RADIUS {turning_m:g}: steered wheels need the radius of the tightest turn"
             )
         return turning_m
     return radius_m
 
 
 def _turning_radius_m(mission: Mission, spec: SitlSpec, name: str) -> float:
-    """The plant's, by default the rover's own; 0 for skid steering."""
+    """The plant's turning radius, by default that of the mission's rover; 0 for skid steering."""
     radius_m = mission.rover.turning_radius_m
     if spec.steering == "ackermann" and radius_m <= 0.0:
         raise ScenarioError(
-            f"{name}: sitl.steering: ackermann needs [rover] turning_radius_m, the tightest turn it can drive"
+            f"{name}: sitl.steering: ackermann needs [rover] turning_radius_m, the radius of its tightest turn"
         )
     return 0.0 if spec.steering == "skid" else radius_m
 
@@ -170,7 +174,7 @@ def _ground(mission: Mission, spec: SitlSpec, name: str) -> tuple[World, tuple[f
         return World.open(), _middle(cell, mission.grid.resolution_m) if cell else (0.0, 0.0)
     world = load_world(spec.world, spec.resolution_m or mission.grid.resolution_m)
     if cell is None:
-        raise ScenarioError(f"{name}: sitl.start: missing; say in which field of {spec.world} the rover stands")
+        raise ScenarioError(f"{name}: sitl.start: missing; give the field of {spec.world} in which the rover starts")
     shapes = spec.world.suffix.lower() == ".toml"
     own_m = (spec.resolution_m or mission.grid.resolution_m) if shapes else world.resolution_m
     start_m = _middle(cell, own_m if spec.start else mission.grid.resolution_m)
@@ -186,7 +190,7 @@ def _middle(cell: Cell, resolution_m: float) -> tuple[float, float]:
 
 
 def _home(mission: Mission, spec: SitlSpec) -> GeoPoint:
-    """Where on earth the rover starts: as said for the simulator, as planned, or at the first target."""
+    """Latitude and longitude of the start: ``sitl.home``, the planned home, or the first target."""
     if spec.home is not None:
         return spec.home
     if mission.planned_home is not None:
@@ -196,7 +200,7 @@ def _home(mission: Mission, spec: SitlSpec) -> GeoPoint:
 
 
 def with_faults(scenario: Scenario, plan: FaultPlan | None) -> Scenario:
-    """The same scenario with what goes wrong. Raises ScenarioError for a fault of something that it does not have."""
+    """The scenario with faults. Raises ScenarioError for a fault of a sensor that it does not have."""
     described = isinstance(scenario.sensors, SensorSuite)
     beams = len((scenario.sensors if isinstance(scenario.sensors, SensorSuite) else suite_of(scenario.sensors)).beams)
     name = "of the mission" if described else scenario.sensors
@@ -211,7 +215,7 @@ def with_faults(scenario: Scenario, plan: FaultPlan | None) -> Scenario:
 
 
 def with_sensors(mission: Mission, sensors: str) -> Mission:
-    """The same mission with other sensors: the name of a suite, or a TOML file. Raises ScenarioError."""
+    """The mission with other sensors: the name of a suite, or a TOML file. Raises ScenarioError."""
     try:
         given = sensors_from(sensors_given(sensors), Path(), ScenarioError)
     except ValueError as error:
@@ -220,5 +224,5 @@ def with_sensors(mission: Mission, sensors: str) -> Mission:
 
 
 def with_parameter_file(mission: Mission, path: Path) -> Mission:
-    """The same mission with the parameters of a file."""
+    """The mission with the parameters of a file."""
     return replace(mission, sitl=replace(mission.sitl or SitlSpec(), parameters=path))

@@ -1,16 +1,19 @@
-"""One connection to the simulated vehicle: bytes in, bytes out, and what a fault plan does to them on the way."""
+"""A link to the simulated vehicle: bytes in and out, packet counters, link faults.
+
+Nouns: SimLink.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from sitl.autopilot.link import Channel
-from sitl.faults.link_faults import Way
+from sitl.autopilot.channel import Channel
+from sitl.faults.link_faults import LinkQueue
 from sitl.faults.player import FaultPlayer
 
 MAGIC_1, MAGIC_2, SIGNED = 0xFE, 0xFD, 1
 HEAD_BYTES = 3
-"""Magic, payload's length, and MAVLink 2's flags: enough to know how long a packet is."""
+"""Magic, length of the payload, and flags of MAVLink 2: enough to know the length of a packet."""
 
 
 def packet_bytes(data: bytes | bytearray, at: int) -> int:
@@ -22,14 +25,14 @@ def packet_bytes(data: bytes | bytearray, at: int) -> int:
 
 @dataclass
 class PacketCounter:
-    """How many packets have begun so far. Bytes between packets are passed over; pieces may be cut anywhere."""
+    """Counts packets in a stream that is given in pieces; bytes between packets are skipped."""
 
     packets: int = 0
     _skip: int = 0
     _rest: bytes = b""
 
     def feed(self, data: bytes) -> None:
-        """The next bytes of the stream."""
+        """Take in the next bytes of the stream."""
         if self._rest:
             data, self._rest = self._rest + data, b""
         at, end = self._skip, len(data)
@@ -46,29 +49,29 @@ class PacketCounter:
 
 
 class SimLink:
-    """One connection to the vehicle and to the components on its network."""
+    """A link to the vehicle and to the components on its network."""
 
     def __init__(self, channel: Channel, number: int, name: str = "") -> None:
-        """Use ``Simulator.connect``."""
+        """Created by ``Simulator.connect``."""
         self.channel = channel
         self.number = number
         self.name = name
         self.inbox = bytearray()
         self.dropped = False
-        self.ways: tuple[Way, Way] | None = None
-        """Where packets are under way to the vehicle and from it, on links with faults."""
+        self.queues: tuple[LinkQueue, LinkQueue] | None = None
+        """Packets under way to and from the vehicle, on links with faults."""
         self.heard = PacketCounter()
         self.sent = PacketCounter()
         self._arrived = bytearray()
 
     def receive(self, data: bytes) -> None:
-        """Bytes on their way to the vehicle; it handles them with its next main loop."""
+        """Send bytes to the vehicle, which handles them in its next main loop."""
         self.inbox += data
         self.heard.feed(data)
 
     def take(self) -> bytes:
-        """What was sent to this link since the last call."""
-        if self.ways is None:
+        """The bytes that the vehicle has sent since the last call."""
+        if self.queues is None:
             data = self.channel.take()
         else:
             data = bytes(self._arrived)
@@ -77,16 +80,16 @@ class SimLink:
         return data
 
     def pass_in(self, player: FaultPlayer, now_s: float) -> bytes:
-        """What reaches the vehicle now."""
+        """The bytes that reach the vehicle now."""
         data = bytes(self.inbox)
         self.inbox.clear()
-        if self.ways is None:
+        if self.queues is None:
             return data
-        player.pass_on(self.ways[0], data, now_s)
-        return self.ways[0].arrived(now_s)
+        player.pass_on(self.queues[0], data, now_s)
+        return self.queues[0].arrived(now_s)
 
     def pass_out(self, player: FaultPlayer, now_s: float) -> None:
-        """What the vehicle has sent goes on its way, what was under way arrives."""
-        if self.ways is not None:
-            player.pass_on(self.ways[1], self.channel.take(), now_s)
-            self._arrived += self.ways[1].arrived(now_s)
+        """Queue what the vehicle has sent, and take in what has arrived by now."""
+        if self.queues is not None:
+            player.pass_on(self.queues[1], self.channel.take(), now_s)
+            self._arrived += self.queues[1].arrived(now_s)

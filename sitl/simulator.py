@@ -1,6 +1,8 @@
-"""A rover with its autopilot in a world, moved in lock-step: bytes in, time forward, bytes out.
+"""The simulator: a rover with its autopilot in a world, advanced in steps; bytes in, time forward, bytes out.
 
-Deterministic: the same world, start, seed and bytes at the same times give the same bytes back.
+Deterministic: the same world, start, seed and bytes at the same times give the same bytes.
+
+Nouns: Simulator.
 """
 
 from __future__ import annotations
@@ -12,14 +14,14 @@ from dataclasses import replace
 import numpy as np
 
 from sitl.autopilot.autopilot import Autopilot
-from sitl.autopilot.control import LOOP_HZ
+from sitl.autopilot.control.records import LOOP_HZ
+from sitl.autopilot.control.tasks import compile_begins
 from sitl.autopilot.lidar import LidarComponent
-from sitl.autopilot.plan import Storage
 from sitl.autopilot.signing import SECURE_PORT, StoredKey
+from sitl.autopilot.state import Storage
 from sitl.autopilot.traffic import Traffic
 from sitl.autopilot.vehicle import Vehicle
-from sitl.autopilot.warmup import begin_every_drive
-from sitl.faults.link_faults import Way
+from sitl.faults.link_faults import LinkQueue
 from sitl.faults.plan import FaultPlan
 from sitl.faults.player import FaultPlayer
 from sitl.plant.main_loop import NOISE_COLUMNS, NoiseSettings, run_loops
@@ -32,7 +34,7 @@ from sitl.world.world import World
 
 NOISE_ROWS = 500
 REHEARSAL_S = 4.0
-"""By then every range sensor has measured."""
+"""After this time every range sensor has measured."""
 
 
 class Simulator:
@@ -52,14 +54,11 @@ class Simulator:
         faults: FaultPlan | None = None,
         kept: Mapping[str, int] | None = None,
     ) -> None:
-        """``sensors`` is a suite or its name; ``parameters`` are ArduRover's, other than the defaults.
+        """``sensors``: a suite or its name; ``parameters``: ArduRover's, where they differ from the defaults.
 
-        ``kept``: those among them that are not simulated, and their types: they can be read and set.
-
-        ``turning_radius_m``: 0 for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
-        (``autopilot.params.steered_wheels``), as on a real rover.
-
-        ``faults``: what goes wrong, and when.
+        ``kept``: types of those parameters that have no effect here, but can be read and set. ``turning_radius_m``: 0
+        for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
+        (``autopilot.parameters.steered_wheels``), as on a real rover.
 
         Raises ValueError for an unknown suite, KeyError for an unknown parameter.
         """
@@ -78,14 +77,14 @@ class Simulator:
         self._sensing = RangeSensing(suite, world, settings.range_m, np.random.default_rng(range_seed))
         self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m)
         self._geo_start = (geodesy.to_units(start.home.lat_deg), geodesy.to_units(start.home.lon_deg))
-        # Noise is drawn in fixed blocks, so that it does not depend on how the loops are batched.
+        # Noise is drawn in blocks of fixed size, so that it does not depend on the batches of loops.
         self._draws = np.empty((NOISE_ROWS, NOISE_COLUMNS))
         self._row = NOISE_ROWS
         self._tick = 0
         self._links: list[SimLink] = []
         self._signing_key = StoredKey()
         self._collisions: list[Collision] = []
-        self._solid, self._doors_move_s = world.layers(0.0).solid, world.next_change_s(0.0)
+        self._surroundings, self._doors_move_s = world.surroundings(0.0), world.next_change_s(0.0)
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
         self._player = FaultPlayer(faults or FaultPlan(), seed)
         self._has_faults = faults is not None and bool(faults.faults)
@@ -107,12 +106,12 @@ class Simulator:
 
     @property
     def time_s(self) -> float:
-        """Simulated seconds since the simulator was made."""
+        """Simulated seconds since the simulator was created."""
         return self._tick / LOOP_HZ
 
     @property
     def truth(self) -> Truth:
-        """Where the rover really is."""
+        """The rover's true state."""
         rover = self._rover[0]
         return Truth(
             self.time_s,
@@ -131,17 +130,17 @@ class Simulator:
 
     @property
     def collisions(self) -> tuple[Collision, ...]:
-        """Every contact with an obstacle so far; one that lasts counts once."""
+        """All contacts with obstacles so far; a lasting one counts once."""
         return tuple(self._collisions)
 
     @property
     def driven_m(self) -> float:
-        """Metres driven, backwards too."""
+        """Metres driven, in either direction."""
         return float(self._rover[0]["driven_m"])
 
     @property
     def clearance_m(self) -> float:
-        """Room between the rover's circle and the nearest obstacle, moving or not, at most 5 m; negative never."""
+        """Metres between the rover's circle and the nearest obstacle, moving or not; 0 to 5."""
         rover = self._rover[0]
         reach_m = 5.0 + float(rover["radius_m"])
         here = (float(rover["north_m"]), float(rover["east_m"]))
@@ -151,7 +150,7 @@ class Simulator:
 
     @property
     def vehicle(self) -> Vehicle:
-        """The autopilot's own state, to be looked at."""
+        """The autopilot's state, for inspection."""
         return self._vehicle
 
     @property
@@ -165,40 +164,40 @@ class Simulator:
         return tuple(self._links)
 
     def rehearse(self) -> None:
-        """Run four seconds and begin every kind of drive, so that all is compiled that may be called later.
+        """Run four seconds and begin every kind of task, so that everything is compiled.
 
-        For a simulator that is thrown away afterwards: its time has passed and its noise is drawn.
+        Use a simulator that is discarded afterwards: its time has advanced and its noise is drawn.
         """
-        self.connect()  # some sensors measure only for somebody
+        self.connect()  # some sensors measure only for a client
         self.advance_to_s(REHEARSAL_S)
-        begin_every_drive(self._vehicle)
+        compile_begins(self._vehicle.records)
 
     def connect(self, port: int = SECURE_PORT, name: str = "") -> SimLink:
         """A new link to the vehicle, through its serial port ``port`` (SERIALn); several may be open at once.
 
-        It gets the lowest number, from 1, that no other has; ``name`` is for people.
+        It gets the lowest free number, from 1; ``name`` is for display.
         """
         taken = {one.number for one in self._links}
         number = next(n for n in range(1, len(taken) + 2) if n not in taken)
         link = SimLink(self._autopilot.open_channel(port), number, name)
         if self._player.touches_links:
-            link.ways = (Way(link.number, "to_vehicle"), Way(link.number, "from_vehicle"))
+            link.queues = (LinkQueue(link.number, "to_vehicle"), LinkQueue(link.number, "from_vehicle"))
         self._links.append(link)
         return link
 
     def disconnect(self, link: SimLink) -> None:
-        """The other side has gone; nothing is queued for this link any more."""
+        """Close a link whose client has gone."""
         link.dropped = True
         if link in self._links:
             self._links.remove(link)
             self._autopilot.close_channel(link.channel)
 
     def advance_to_s(self, time_s: float) -> None:
-        """Run the vehicle up to a time (in whole main loops of 20 ms); times in the past do nothing."""
+        """Run the vehicle up to a time, in whole main loops of 20 ms; a time in the past has no effect."""
         goal = math.floor(time_s * LOOP_HZ + 1e-6)
         while self._tick < goal:
             if self._has_faults:
-                self._meet_faults()
+                self._apply_faults()
             self._receive()
             if self.world.doors:
                 self._move_doors()
@@ -207,11 +206,11 @@ class Simulator:
 
     @property
     def is_off(self) -> bool:
-        """Whether the autopilot has no power at this moment."""
+        """Whether the autopilot is without power."""
         return self._off_until_s > 0.0
 
-    def _meet_faults(self) -> None:
-        """Begin and end what the plan says; a failure of the autopilot's power, and its return."""
+    def _apply_faults(self) -> None:
+        """Begin and end faults; handle loss and return of the autopilot's power."""
         if self.is_off and self.time_s >= self._off_until_s - 1e-6:
             self._off_until_s = 0.0
             self._reboot()
@@ -223,7 +222,7 @@ class Simulator:
 
     def _receive(self) -> None:
         for link in self._links:
-            data = link.pass_in(self._player, self.time_s) if link.inbox or link.ways else b""
+            data = link.pass_in(self._player, self.time_s) if link.inbox or link.queues else b""
             if data and not self.is_off:
                 self._autopilot.receive(link.channel, data)
                 link.pass_out(self._player, self.time_s)
@@ -244,10 +243,8 @@ class Simulator:
     def _move_doors(self) -> None:
         """A door moves with the first main loop that begins at its time or after it."""
         if self.time_s >= self._doors_move_s:
-            self._solid, self._doors_move_s = (
-                self.world.layers(self.time_s).solid,
-                self.world.next_change_s(self.time_s),
-            )
+            self._surroundings = self.world.surroundings(self.time_s)
+            self._doors_move_s = self.world.next_change_s(self.time_s)
 
     def _loops_until_due(self) -> int:
         due_us = self._autopilot.next_due_us()
@@ -258,47 +255,46 @@ class Simulator:
         if self._sensing.samples:
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._sensing.next_due_s() - self.time_s))
         if self._traffic.talks:
-            # What moves goes by the simulator's clock, which a reboot of the autopilot does not set back.
+            # Movers follow the simulator's clock, which a reboot of the autopilot does not reset.
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._traffic.next_due_s() - self.time_s))
         if self._has_faults:
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._fault_due_s() - self.time_s))
         return max(1, math.ceil((due_us - self._vehicle.time_us) * 1e-6 * LOOP_HZ - 1e-6))
 
     def _fault_due_s(self) -> float:
-        """When a fault begins or ends, power returns, or a packet that is late comes through."""
+        """When a fault begins or ends, power returns, or a delayed packet arrives."""
         due_s = min(self._player.due_s, self._off_until_s) if self.is_off else self._player.due_s
         for link in self._links:
-            if link.ways is not None:
-                due_s = min(due_s, link.ways[0].next_due_s(), link.ways[1].next_due_s())
+            if link.queues is not None:
+                due_s = min(due_s, link.queues[0].next_due_s(), link.queues[1].next_due_s())
         return due_s
 
     def _run(self, loops: int) -> None:
-        """Run main loops until they are done or something happened that must be told at once."""
-        world, vehicle, rover = self.world, self._vehicle, self._rover[0]
+        """Run main loops until they are done, or something happens that must be reported at once."""
+        vehicle, rover = self._vehicle, self._rover[0]
         contacts = int(rover["contacts"])
         if self._row == NOISE_ROWS:
             self._draws = self._rng.standard_normal((NOISE_ROWS, NOISE_COLUMNS))
             self._row = 0
         done = run_loops(
-            self._rover, vehicle.estimate, vehicle.control, vehicle.tuning, vehicle.origin_m, self._noise,
-            self._draws[self._row : self._row + loops],
-            self._solid, world.south_m, world.west_m, world.resolution_m, world.ground, *world.fleet, self.time_s,
+            self._rover, vehicle.records, vehicle.origin_m, self._noise, self._draws[self._row : self._row + loops],
+            self._surroundings, self.time_s,
         )  # fmt: skip
         self._row += done
         self._tick += done
         self._sensing.time_s = self.time_s
         if int(rover["contacts"]) > contacts:
-            self._collisions.append(collision_of(rover, world.movers, self.time_s))
+            self._collisions.append(collision_of(rover, self.world.movers, self.time_s))
 
     def _send(self) -> None:
         if not self.is_off:
-            self._speak()
+            self._send_due()
         if self._player.touches_links:
             for link in self._links:
                 link.pass_out(self._player, self.time_s)
 
-    def _speak(self) -> None:
-        """Everything that is due now is measured and put into the channels."""
+    def _send_due(self) -> None:
+        """Measure and send everything that is due now."""
         rover = self._rover[0]
         if self._sensing.samples:
             self._sensing.sample(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
@@ -312,5 +308,5 @@ class Simulator:
         )
         if data:
             for link in self._links:
-                if link.channel.spoken:  # the router knows no other way to anybody
+                if link.channel.spoken:  # scans are only routed to where a client was heard
                     link.channel.outbox += data

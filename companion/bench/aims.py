@@ -1,4 +1,4 @@
-"""What was aimed at, and whether the figures measured reach it: ratios within one run, and every miss named."""
+"""The aims of the benchmarks, and whether measured ratios reach them: within one run, with every miss named."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from companion.bench.contestants import Contestant
 from companion.bench.measure import Entry
 
 PEER_FACTOR = 3.0
-"""So many times as fast as the fastest complete peer ``astar`` should be, on every map at every size."""
+"""How many times as fast as the fastest complete peer ``astar`` should be, on every map at every size."""
 GENETIC_FACTORS = {1: 1.0, 40: 50.0}
-"""So many times as fast as ``astar`` the genetic algorithm should be on the map with one obstacle, by size."""
+"""How many times as fast as ``astar`` the genetic algorithm should be on the map with one obstacle, by size."""
 EASY_MAP = "one-obstacle"
 
 
 def fastest_peer(entries: list[Entry], contestants: list[Contestant], case: str, scale: int) -> Entry | None:
-    """Of the peers that always find a path (those that draw random numbers promise none), faults or not; None: none took part."""
+    """The fastest peer without random numbers (only these always find a path), faults or not; None: none took part."""
     complete = {contestant.name for contestant in contestants if not contestant.ours and not contestant.random}
     own = [entry for entry in entries if (entry.case, entry.scale) == (case, scale) and entry.contestant in complete]
     return min((entry for entry in own if entry.found), key=lambda entry: entry.median_ms, default=None)
 
 
 def peer_ratios(entries: list[Entry], contestants: list[Contestant]) -> list[tuple[str, int, str, float]]:
-    """Map, size, the fastest complete peer and how many times as long as ``astar`` it takes."""
+    """For each map and size: the fastest complete peer and its time over that of ``astar``."""
     found = []
     for entry in entries:
         if entry.contestant == "astar":
@@ -31,7 +31,7 @@ def peer_ratios(entries: list[Entry], contestants: list[Contestant]) -> list[tup
 
 
 def genetic_ratios(entries: list[Entry]) -> list[tuple[str, int, float, float]]:
-    """Map, size, how many times as long as ``bspline-ga`` ``astar`` takes, and the share of searches that find a path."""
+    """For each map and size: the time of ``astar`` over that of ``bspline-ga``, and how often that finds a path."""
     times = {(entry.contestant, entry.case, entry.scale): entry for entry in entries}
     found = []
     for entry in entries:

@@ -1,4 +1,4 @@
-"""Who takes part: our planners, and what others have installed."""
+"""Our planners as contestants of a benchmark."""
 
 from __future__ import annotations
 
@@ -15,16 +15,18 @@ from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
 
 Found = Callable[[], CellArray] | None
-"""How to get the fields of the path found, outside the time that is measured; None: nothing found."""
+"""Returns the fields of the path found, outside the measured time; None: no path was found."""
 
 
 @dataclass(frozen=True, slots=True)
 class Contestant:
-    """One way to search. ``solve(weights, start, target, rng)`` is what is timed, all preparations for a new map included (but not the
-    generator's: a vehicle has one).
+    """One way to search.
 
-    ``random``: the seed matters. ``most_fields``: larger maps are not tried, as they would take hours or all memory. ``note``: what a
-    reader must know to compare it fairly.
+    ``solve(weights, start, target, rng)`` is timed, with all preparations for a new map (but not for the generator,
+    which a vehicle has already).
+
+    ``random``: the seed matters. ``most_fields``: larger maps are not tried, as they would take hours or all memory.
+    ``note``: what a reader needs for a fair comparison.
     """
 
     name: str
@@ -36,7 +38,7 @@ class Contestant:
 
 
 def our_planner(name: str, settings: PlannerSettings, budget: Budget) -> Contestant:
-    """A planner of the registry, made anew for every search (some remember). Raises UnknownPlannerError."""
+    """A registered planner, made anew for every search (some have a memory). Raises UnknownPlannerError."""
     capabilities = make_planner(name, settings).capabilities
 
     def solve(weights: Weights, start: Cell, target: Cell, rng: Generator) -> Found:

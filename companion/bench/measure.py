@@ -1,4 +1,4 @@
-"""Measuring: every contestant on every case, in one process, one after the other."""
+"""Time, cost, faults and memory of every contestant on every case, measured in one process, one after the other."""
 
 from __future__ import annotations
 
@@ -20,12 +20,14 @@ from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
 
 DETERMINISTIC_RUNS = 20
-"""Searches whose result never varies are repeated for the sake of their times only."""
+"""Searches whose result never varies are repeated only to measure their time."""
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """How much to measure. ``seeds``: of random planners. ``cell_s``: time for one contestant on one case, after which no new
+    """How much to measure. ``seeds``: of random planners.
+
+    ``cell_s``: time for one contestant on one case, after which no new
     search is begun; a contestant whose next larger map would take longer than this for one search is not sent there.
     """
 
@@ -36,7 +38,10 @@ class Limits:
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One contestant on one case. ``ratios``: cost of each path over the best possible; ``faults``: what is wrong with its paths."""
+    """One contestant on one case.
+
+    ``ratios``: cost of each path over the best possible; ``faults``: what is wrong with its paths.
+    """
 
     contestant: str
     case: str
@@ -69,7 +74,7 @@ Advance = Callable[[str, int, int], None]
 
 
 def measure(contestants: list[Contestant], cases: list[Case], limits: Limits, advance: Advance) -> list[Entry]:
-    """All entries; those that would take too long or too much memory are left out."""
+    """All entries, without those that would take too long or too much memory."""
     entries: list[Entry] = []
     for number, case in enumerate(cases):
         optima = [_optimum(case, at) for at in range(len(case.ends))]
@@ -86,7 +91,7 @@ def measure(contestants: list[Contestant], cases: list[Case], limits: Limits, ad
 
 
 def _expected_s(entries: list[Entry], contestant: Contestant, case: Case) -> float:
-    """Time grows at least with the number of fields for most; guessed from the next smaller size of the same map."""
+    """An estimate from the next smaller size of the same map: most times grow at least with the number of fields."""
     before = [e for e in entries if (e.contestant, e.case) == (contestant.name, case.name) and e.scale < case.scale]
     return before[-1].median_ms / 1e3 * (case.scale / before[-1].scale) ** 2 if before else 0.0
 
@@ -138,7 +143,7 @@ def _entry(contestant: Contestant, case: Case, optima: list[float], limits: Limi
 
 
 def spread_order(count: int) -> list[int]:
-    """All of so many problems, hard ones soon after easy ones: who is stopped early has met both, like everybody else."""
+    """An order of the problems that mixes easy and hard ones, so that a run that is stopped early has met both."""
     step = next(n for n in range(max(round(0.618 * count), 1), count + 2) if math.gcd(n, count) == 1)
     return [at * step % count for at in range(count)]
 

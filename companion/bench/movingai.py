@@ -17,7 +17,9 @@ class ScenarioFileError(ValueError):
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """One problem. ``start`` and ``target`` are fields with y upward; ``optimum_fields`` is the shortest length as the file gives it.
+    """One problem.
+
+    ``start`` and ``target`` are fields with y upward; ``optimum_fields`` is the shortest length as the file gives it.
 
     Lengths count sqrt 2 for a diagonal step and forbid cutting corners (Sturtevant 2012).
     """
@@ -47,7 +49,8 @@ def _scenario(file: Path, number: int, line: str) -> Scenario:
         optimum_fields = float(parts[8])
     except (ValueError, IndexError):
         raise ScenarioFileError(
-            f"{file}: line {number}: nine columns are needed: bucket, map, width, height, start x and y, target x and y, length"
+            f"{file}: line {number}: nine columns are needed: "
+            "bucket, map, width, height, start x and y, target x and y, length"
         ) from None
     return Scenario(Cell(start_x, height - 1 - start_y), Cell(target_x, height - 1 - target_y), optimum_fields)
 

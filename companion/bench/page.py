@@ -34,15 +34,16 @@ def _page(command: str, entries: list[Entry], contestants: list[Contestant], cas
     parts = [
         f"""# Benchmarks of the planners
 
-Written by `{command}`. All rows were measured in one process, one after the other, so they can be compared with each other;
-on another machine all are faster or slower.
+Written by `{command}`. All rows were measured in one process, one after the other, so they can be compared with each
+other; on another machine all are faster or slower.
 
-{where()}. At most {limits.cell_s:g} s for one planner on one map, and a planner whose next larger map would take longer than that for a
-single search is not sent there (`-`). Times are medians of whole searches as a user calls them, in milliseconds, with the 99th percentile in
-brackets: a new map each time, so building a graph or a queue counts. *cost / best* is the median cost of the paths over the least possible
-(Dijkstra's); *MB* is by how much the process grew during one search. Where several figures stand in one cell they
-belong to the sizes in order. Remarks on faults are by our own rules: no path may touch an obstacle or cut its corner; paths of
-any-angle planners are rounded to fields for this, and may touch a corner by the rounding.
+{where()}. At most {limits.cell_s:g} s for one planner on one map, and a planner whose next larger map would take longer
+than that for a single search is not sent there (`-`). Times are medians of whole searches as a user calls them, in
+milliseconds, with the 99th percentile in brackets: a new map each time, so building a graph or a queue counts. *cost /
+best* is the median cost of the paths over the least possible (Dijkstra's); *MB* is by how much the process grew during
+one search. Where several figures stand in one cell they belong to the sizes in order. Remarks on faults are by our own
+rules: no path may touch an obstacle or cut its corner; paths of any-angle planners are rounded to fields for this, and
+may touch a corner by the rounding.
 
 {chr(10).join(runs_explained(limits))}
 

@@ -43,16 +43,17 @@ def _version(package: str) -> str:
 
 
 def runs_explained(limits: Limits) -> list[str]:
-    """How many searches a row is made of, and what those that found nothing came to; lines, column names between asterisks."""
+    """How many searches a row consists of, and what a search without a path means; lines, column names in asterisks."""
     last = limits.first_seed + limits.seeds - 1
     return [
         "*found* counts the searches that gave a path, of all that were made:",
-        f"{limits.seeds} with seeds {limits.first_seed} to {last} of planners that draw random numbers, {DETERMINISTIC_RUNS} of others, whose path "
-        "is always the same, and one a problem where a map has more problems than that;",
+        f"{limits.seeds} with seeds {limits.first_seed} to {last} of planners that draw random numbers, "
+        f"{DETERMINISTIC_RUNS} of others, whose path is always the same, and one a problem where a map has more "
+        "problems than that;",
         f"fewer where {limits.cell_s:g} s were over. Times are of all searches, costs of those that gave a path.",
-        "A random planner but `hybrid` that finds none has spent its budget (`plan` says so), which proves nothing: `bspline-ga` after its epochs,",
-        "`prm` when the samples of all its rounds do not join start and target. Our graph searches and `hybrid` end with a path or with the proof",
-        "that there is none.",
+        "A random planner but `hybrid` that finds none has spent its budget (`plan` says so), which proves nothing:",
+        "`bspline-ga` after its epochs, `prm` when the samples of all its rounds do not join start and target. Our",
+        "graph searches and `hybrid` end with a path or with the proof that there is none.",
     ]
 
 

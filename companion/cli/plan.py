@@ -17,7 +17,7 @@ from companion.core.clock import stopwatch_s
 from companion.core.grid import Cell, Grid
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
-from companion.planning.problem import Motion, PlanningProblem, PlanStatus
+from companion.planning.problem import PlanningProblem, PlanStatus, VehicleMotion
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
 from companion.settings import Settings, SettingsError
 
@@ -85,19 +85,19 @@ def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, 
     return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, problem.motion, settings)
 
 
-def motion_of(name: str, settings: Settings, radius_m: float, heading_deg: float | None, grid: Grid) -> Motion:
+def motion_of(name: str, settings: Settings, radius_m: float, heading_deg: float | None, grid: Grid) -> VehicleMotion:
     """How the rover turns, for a planner that heeds it. Raises TurningError for one that does not, and UnknownPlannerError."""
     if radius_m == 0.0:
         if heading_deg is not None:
             raise TurningError(f"--heading-deg {heading_deg:g}: counts only with --turning-radius-m")
-        return Motion()
+        return VehicleMotion()
     if not (math.isfinite(radius_m) and math.isfinite(heading_deg or 0.0)):
         raise TurningError("--turning-radius-m, --heading-deg: finite numbers are needed")
     if not make_planner(name, settings.planner).capabilities.turning_radius:
         able = (each for each in PLANNERS if make_planner(each, settings.planner).capabilities.turning_radius)
         raise TurningError(f"--turning-radius-m: {name} does not heed it; {' and '.join(able)} do")
     heading_rad = None if heading_deg is None else math.remainder(math.radians(90.0 - heading_deg), 2.0 * math.pi)
-    return Motion(heading_rad, radius_m / grid.resolution_m)
+    return VehicleMotion(heading_rad, radius_m / grid.resolution_m)
 
 
 def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:

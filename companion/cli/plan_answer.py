@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from companion.core.grid import Cell, Grid
-from companion.planning.problem import Motion, Path, PlanResult, PlanStatus
+from companion.planning.problem import Path, PlanResult, PlanStatus, VehicleMotion
 from companion.settings import Settings
 from companion.settings.versions import made_with
 
@@ -45,7 +45,7 @@ class Answer:
     seed: int
     top_left: bool
     grid: Grid
-    motion: Motion
+    motion: VehicleMotion
     settings: Settings
 
     def place(self, cell: Cell) -> tuple[int, int]:

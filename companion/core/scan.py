@@ -16,9 +16,9 @@ NARROW_RAD = np.radians(30.0)
 class RangeScan:
     """Ranges in the rover's own frame.
 
-    ``bearing_rad``: shape (n,), clockwise from straight ahead. ``range_m``: shape (n,), metres; ``inf`` = nothing
-    seen up to ``max_range_m``; ``nan`` = unknown, says nothing. ``beam_width_rad`` is the width that each reading speaks for.
-    ``time_s`` is the companion's clock when the scan arrived.
+    ``bearing_rad``: shape (n,), clockwise from straight ahead. ``range_m``: shape (n,), metres; ``inf`` = nothing seen
+    up to ``max_range_m``; ``nan`` = unknown, says nothing. ``beam_width_rad`` is the width that each reading speaks
+    for. ``time_s`` is the companion's clock when the scan arrived.
     """
 
     time_s: float

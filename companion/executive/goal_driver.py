@@ -22,12 +22,12 @@ from companion.navigation.field_step import (
     Part,
     SearchKind,
     abandon_path,
-    begin,
+    initial_state,
     is_clear,
     retrace,
     step,
 )
-from companion.navigation.search_budget import Searcher, motion_of
+from companion.navigation.search_budget import PathSearcher, motion_of
 from companion.navigation.step_runner import StepRunner
 from companion.navigation.turning_cost import with_turning_cost
 from companion.perception.moving_obstacles import Moving, motion_changed, planners_movers
@@ -58,7 +58,7 @@ class GoalDriver:
         evidence: EvidenceMap,
         rover: RoverLimits,
         settings: Settings,
-        searcher: Searcher,
+        searcher: PathSearcher,
         runner: StepRunner,
         seed: int | None = None,
     ) -> None:
@@ -96,7 +96,7 @@ class GoalDriver:
         self._epoch += 1
         cell = self.evidence.base.cell_at(pose.point)
         seed = (self.seed + self._epoch) % 2**63
-        self._state = begin(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
+        self._state = initial_state(cell, goal.cell, seed, self._settings.navigator.better_every_fields)
         if way:
             self._state = retrace(self._state, way)
         self.route = None
@@ -255,14 +255,14 @@ class GoalDriver:
     def _plans_among_movers(self) -> bool:
         return self.searcher.planner.capabilities.moving_obstacles
 
-    def _movers(self, pose: Pose) -> tuple[problem.Mover, ...]:
+    def _movers(self, pose: Pose) -> tuple[problem.ObstacleTrajectory, ...]:
         """What moves, for a planner that asks."""
         if not self._plans_among_movers:
             return ()
         radius_m, traffic = self._rover.radius_m, self._settings.traffic
         return planners_movers(self._moving, self.evidence.grid, radius_m, pose.time_s, traffic)
 
-    def _motion(self, pose: Pose) -> problem.Motion:
+    def _motion(self, pose: Pose) -> problem.VehicleMotion:
         """How the rover can move, for the planner."""
         return motion_of(pose, self._rover, self._fastest_m_s, self._settings, self.evidence.base.resolution_m)
 

@@ -42,12 +42,12 @@ from companion.mission.fence import AutopilotFence
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
-from companion.navigation.search_budget import Searcher
+from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import StepRunner
 from companion.perception.moving_obstacles import announced, merged
 from companion.perception.object_tracker import ObjectTracker
 from companion.planning.registry import make_planner
-from companion.recording.recorder import DecisionLog
+from companion.recording.recorder import RunLog
 from companion.safety.reasons import RunPhase
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.state import VehicleState
@@ -84,7 +84,7 @@ class MissionExecutor:
         progress: MissionProgress,
         scan: RangeScan,
         runner: StepRunner,
-        log: DecisionLog,
+        log: RunLog,
         notifier: TextSink,
         rng: np.random.Generator,
     ) -> None:
@@ -117,7 +117,7 @@ class MissionExecutor:
             text = "Single beams see too little for a rover that turns in arcs: give it a lidar"
             notifier.tell(text, Severity.WARNING)
         planner = make_planner(given.navigator.planner, given.planner)
-        searcher = Searcher(planner, given.navigator, rng)
+        searcher = PathSearcher(planner, given.navigator, rng)
         self.driver = GoalDriver(layout.evidence, self._limits, given, searcher, runner)
         self._tracker = ObjectTracker(layout.evidence, given.traffic)
 

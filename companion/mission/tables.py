@@ -39,12 +39,12 @@ class Table(BaseModel):
 def read_table(path: Path, kind: type[M], error: type[Exception], remedy: str = "") -> M:
     """A whole TOML file as one table. Raises ``error``: one line with file, place and reason, and where it says what may stand there."""
     try:
-        return kind.model_validate(read_toml(path, error))
+        return kind.model_validate(read_toml(path, error, remedy))
     except ValidationError as fault:
         raise error(f"{path}: {_counted(describe_first(fault, kind))}{remedy and f'; {remedy}'}") from fault
 
 
-def read_toml(path: Path, error: type[Exception]) -> dict[str, object]:
+def read_toml(path: Path, error: type[Exception], remedy: str = "") -> dict[str, object]:
     """What a TOML file says, whatever it is about. Raises ``error``: one line with file, place and reason."""
     try:
         with open_file(path) as file:
@@ -57,11 +57,11 @@ def read_toml(path: Path, error: type[Exception]) -> dict[str, object]:
     except UnicodeDecodeError as fault:
         raise error(f"{path}: not UTF-8 text (byte {fault.start}); save it as UTF-8") from fault
     except tomllib.TOMLDecodeError as fault:
-        raise error(f"{path}: not valid TOML: {fault}") from fault
+        raise error(f"{path}: not valid TOML: {fault}{remedy and f'; {remedy}'}") from fault
     except RecursionError as fault:
-        raise error(f"{path}: not valid TOML: nested too deeply") from fault
+        raise error(f"{path}: not valid TOML: nested too deeply{remedy and f'; {remedy}'}") from fault
     except ValueError as fault:  # a number of thousands of digits
-        raise error(f"{path}: not valid TOML: {str(fault)[:80]}") from fault
+        raise error(f"{path}: not valid TOML: {str(fault)[:80]}{remedy and f'; {remedy}'}") from fault
 
 
 def named(path: Path, kind: str, number: int, make: Callable[[], T], error: type[Exception]) -> T:

@@ -1,11 +1,12 @@
-"""The obstacle avoidance of Kwasniewski & Gosiewski 2018, section 4: one pure ``step`` per field entered.
+"""The navigator's decision in each field entered: follow, replan or go back (Kwasniewski & Gosiewski 2018, section 4).
 
-Part A goes back along the past path and searches every second or third field, part B follows the current path and looks for a
-better one every few fields, part C searches thoroughly when the current path is blocked or missing (figures 10 to 14).
+``step`` is a pure function. Part A goes back along the past path and searches every second or third field. Part B
+follows the current path and searches for a better one every few fields. Part C searches thoroughly when the current
+path is blocked or missing (figures 10 to 14).
 
-Where the paper is silent: the retraced tail of the past path is dropped while returning, so it is always a walk from the
-start to here; "better" compares with what remains of the current path; a blocked past path is mended with a search for
-the nearest past field that can still be reached; at the start a last thorough search comes before "unreachable".
+Where the paper leaves a choice: the retraced end of the past path is dropped while returning, so it is always a walk
+from the start to here. "Better" compares with the rest of the current path. A blocked past path is repaired by a search
+for the nearest past field that can still be reached. At the start a last thorough search precedes "unreachable".
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ class Part(StrEnum):
 
 
 class SearchKind(StrEnum):
-    """How a part wants the planner to search: quickly (A, B) or for quality (C)."""
+    """How the planner is to search: quickly (parts A and B) or thoroughly (part C)."""
 
     RETURN = "return"
     BETTER = "better"
@@ -55,10 +56,12 @@ Search = Callable[[SearchKind, Cell, Cell], PlanResult]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class NavState:
-    """The navigator's memory on the way to one target.
+    """The navigator's state on the way to one target.
 
-    ``past``: the walk from the start to the field last entered. ``current`` with ``index``: the path followed, and how far.
-    ``until_search``: fields until the next search in return mode. ``draws`` seeds its random choice of two or three.
+    ``past``: the walk from the start to the last field entered. ``current``: the path that is followed; ``index``: the
+    rover's place on it. ``returning``: part A. ``until_search``: fields until its next search. ``since_better``: fields
+    since the last search for a better path, ``better_every``: after how many it is due. ``draws``: state of the random
+    choice of two or three.
     """
 
     target: Cell
@@ -74,7 +77,7 @@ class NavState:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Decision:
-    """What to do and why. ``path`` leads from the field entered (or one beside it) onward; empty when there is nowhere to go."""
+    """What to do and why. ``path`` begins at the field entered or a neighbour; empty when there is nowhere to go."""
 
     action: Action
     part: Part
@@ -83,16 +86,16 @@ class Decision:
     reason: str
     searches: tuple[SearchKind, ...] = ()
     proved: bool = False
-    """True when the last search proved that no path exists on the map as known."""
+    """True if the last search proved that the map as known has no path."""
 
 
-def begin(start: Cell, target: Cell, seed: int = 0, better_every: int = 5) -> NavState:
+def initial_state(start: Cell, target: Cell, seed: int = 0, better_every: int = 5) -> NavState:
     """The state before the first step towards a target."""
     return NavState(target=target, past=(start,), draws=seed, better_every=better_every)
 
 
 def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavState, Decision]:
-    """The step function (figure 11), to be called on entering a field, or in the same field when the path ahead gets blocked."""
+    """The step function (figure 11). Call it when a field is entered and when the path ahead gets blocked."""
     entered = cell != state.past[-1]
     state = _arrive(state, cell)
     if cell == state.target:
@@ -105,12 +108,12 @@ def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavSt
 
 
 def retrace(state: NavState, way: tuple[Cell, ...]) -> NavState:
-    """Follow fields that lead from here to the target and were driven before, as long as they stay clear; no better path is looked for."""
+    """Follow fields from here to the target that were driven before, while they stay clear, without better paths."""
     return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER)
 
 
 def abandon_path(state: NavState) -> NavState:
-    """Forget the current path (the rover could not follow it), so that the next step searches anew."""
+    """Drop the current path (the rover could not follow it), so that the next step searches anew."""
     return replace(state, current=None)
 
 
@@ -150,7 +153,7 @@ def _return(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tu
         searches = (kind,)
         proved = result.status is PlanStatus.NO_PATH
         if result.path is not None:
-            return _take(state, result.path, Part.RETURN, searches, "path found on the way back")
+            return _follow_new(state, result.path, Part.RETURN, searches, "path found on the way back")
         draws, due = _two_or_three(state.draws)
         state = replace(state, draws=draws)
     state = replace(state, until_search=due)
@@ -158,7 +161,7 @@ def _return(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tu
         reason = "back at the start, and no path is known to be left"
         return state, Decision(Action.UNREACHABLE, Part.RETURN, (), None, reason, searches, proved)
     if not is_clear(grid, state.past[:-3:-1]):
-        return _mend_past(state, grid, search, searches)
+        return _repair_past(state, grid, search, searches)
     return state, Decision(
         Action.BACKTRACK, Part.RETURN, state.past[::-1], None, "going back along the past path", searches, proved
     )
@@ -175,17 +178,17 @@ def _explore(state: NavState, grid: Grid, search: Search, *, entered: bool) -> t
     result = search(SearchKind.BETTER, state.past[-1], state.target)
     searches = (SearchKind.BETTER,)
     if result.path is not None and result.path.cost < cells_cost(plain(grid.weights), ahead) - 1e-9:
-        return _take(state, result.path, Part.EXPLORE, searches, "a better path")
+        return _follow_new(state, result.path, Part.EXPLORE, searches, "a better path")
     return state, _follow(state, "no better path", searches)
 
 
 def _search(state: NavState, grid: Grid, search: Search) -> tuple[NavState, Decision]:
-    """Part C (figure 14): search thoroughly; in vain: simplify the past path and go on with part A in this same step."""
+    """Part C (figure 14): search thoroughly. Without success: simplify the past path and continue with part A."""
     had_path = state.current is not None
     result = search(SearchKind.THOROUGH, state.past[-1], state.target)
     if result.path is not None:
         reason = "current path blocked: new path" if had_path else "new path"
-        return _take(state, result.path, Part.SEARCH, (SearchKind.THOROUGH,), reason)
+        return _follow_new(state, result.path, Part.SEARCH, (SearchKind.THOROUGH,), reason)
     draws, due = _two_or_three(state.draws)
     state = replace(state, current=None, past=simplified(state.past), returning=True, draws=draws, until_search=due)
     state, decision = _return(state, grid, search, entered=False)
@@ -196,10 +199,10 @@ def _search(state: NavState, grid: Grid, search: Search) -> tuple[NavState, Deci
     )
 
 
-def _mend_past(
+def _repair_past(
     state: NavState, grid: Grid, search: Search, searches: tuple[SearchKind, ...]
 ) -> tuple[NavState, Decision]:
-    """The way back is blocked: search for the nearest past field that can be reached, and go back through there."""
+    """The past path is blocked: search for the nearest past field that can be reached, and go back through it."""
     here = state.past[-1]
     free = [i for i in range(len(state.past) - 2, -1, -1) if not grid.is_obstacle(state.past[i])]
     tries = free[:2] + free[2 :: max(1, len(free) // BACKTRACK_TRIES)] + free[-1:]
@@ -215,7 +218,7 @@ def _mend_past(
     return state, Decision(Action.UNREACHABLE, Part.RETURN, (), None, "shut in: no way back either", searches)
 
 
-def _take(
+def _follow_new(
     state: NavState, path: Path, part: Part, searches: tuple[SearchKind, ...], reason: str
 ) -> tuple[NavState, Decision]:
     state = replace(state, current=path, index=0, returning=False, since_better=0, until_search=0)
@@ -228,7 +231,7 @@ def _follow(state: NavState, reason: str, searches: tuple[SearchKind, ...]) -> D
 
 
 def _arrive(state: NavState, cell: Cell) -> NavState:
-    """Book the field entered: on the past path (its retraced tail is dropped in return mode) and on the current one."""
+    """Record the field entered on the past path (its retraced end is dropped in return mode) and the current path."""
     if cell == state.past[-1]:
         return state
     if state.returning:
@@ -241,7 +244,7 @@ def _arrive(state: NavState, cell: Cell) -> NavState:
 
 
 def _retraced(past: tuple[Cell, ...], cell: Cell) -> tuple[Cell, ...]:
-    """The past path up to the field nearest to where the rover is now, and from there to here."""
+    """The past path up to its field nearest to the rover, and from there to the rover."""
     gaps = [max(abs(p.x - cell.x), abs(p.y - cell.y)) for p in past[:-1]]
     nearest = min(range(len(gaps)), key=lambda i: (gaps[i], -i), default=0)
     if not gaps:
@@ -252,7 +255,7 @@ def _retraced(past: tuple[Cell, ...], cell: Cell) -> tuple[Cell, ...]:
 
 
 def _place_on(cells: CellArray, index: int, cell: Cell) -> int:
-    """Where on the path the field is: itself, else the first neighbour at or after ``index``; -1 when the path is lost."""
+    """The index on the path of the field, else of its first neighbour, from ``index`` on; -1 if the path is lost."""
     gaps = np.abs(cells[index:] - cell).max(axis=1, initial=0)
     for reach in (0, 1):
         near = np.flatnonzero(gaps <= reach)

@@ -1,4 +1,4 @@
-"""The navigator's searches: which budget each kind gets, what the planner is told of the rover, and what they have cost."""
+"""Calls of the planner by the navigator: the budget for each kind of search, the rover's motion, the time they took."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from numpy.random import Generator
 
 from companion.core.clock import stopwatch_s
 from companion.core.frames import Pose, wrap_pi_rad
-from companion.core.grid import Cell, Weights
+from companion.core.grid import OBSTACLE, Cell, Weights
 from companion.core.rover_limits import RoverLimits
 from companion.navigation.field_step import SearchKind
 from companion.planning.planner import Planner
-from companion.planning.problem import Budget, Motion, Mover, PlanningProblem, PlanResult
+from companion.planning.problem import Budget, ObstacleTrajectory, PlanningProblem, PlanResult, VehicleMotion
 from companion.settings import NavigatorSettings, SearchSettings, Settings
+
+START_WEIGHT = 0.9
+"""The weight of the start if the map has an obstacle there."""
 
 
 def budget_of(settings: SearchSettings) -> Budget:
@@ -23,11 +26,13 @@ def budget_of(settings: SearchSettings) -> Budget:
     return Budget(settings.min_epochs, settings.max_epochs, settings.control_points, settings.population)
 
 
-def motion_of(pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, resolution_m: float) -> Motion:
-    """As a planner is told it: where the rover points, how tightly it can turn and how fast it may be planned to go."""
+def motion_of(
+    pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, resolution_m: float
+) -> VehicleMotion:
+    """The rover's motion for a planner: its heading, its turning radius and the range of speeds, in fields."""
     fastest_m_s = min(fastest_m_s, settings.guidance.max_speed_m_s)
     slowest_m_s = min(settings.guidance.min_speed_m_s, fastest_m_s)
-    return Motion(
+    return VehicleMotion(
         heading_rad=wrap_pi_rad(0.5 * math.pi - pose.heading_rad),
         turning_radius_fields=rover.turning_radius_m * settings.steering.planned_radius / resolution_m,
         speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m),
@@ -35,8 +40,8 @@ def motion_of(pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Sett
 
 
 @dataclass
-class Searcher:
-    """Asks the planner, and keeps count. ``seconds`` has one entry per search."""
+class PathSearcher:
+    """Calls the planner with the budget for each kind of search. ``seconds``: how long each search took."""
 
     planner: Planner
     settings: NavigatorSettings
@@ -49,22 +54,23 @@ class Searcher:
         kind: SearchKind,
         start: Cell,
         target: Cell,
-        movers: tuple[Mover, ...] = (),
-        motion: Motion = Motion(),  # noqa: B008 - frozen
+        moving_obstacles: tuple[ObstacleTrajectory, ...] = (),
+        motion: VehicleMotion = VehicleMotion(),  # noqa: B008 - frozen
         settings: NavigatorSettings | None = None,
     ) -> PlanResult:
-        """One search over ``weights`` (not changed). The field the rover stands in is free, whatever the map says.
+        """One search over ``weights``, which are not changed.
 
-        ``settings``: as they were when the step began, which may run in a thread.
+        The start is treated as free even if the map has an obstacle there, because the rover is in it. ``settings``:
+        those at the beginning of the step, which may run in a thread; None: the present ones.
         """
         began_s = stopwatch_s()
-        if weights[start.y, start.x] >= 1.0:
+        if weights[start.y, start.x] >= OBSTACLE:
             weights = np.array(weights)
-            weights[start.y, start.x] = 0.9
+            weights[start.y, start.x] = START_WEIGHT
         settings = settings or self.settings
         budget = budget_of(settings.thorough if kind is SearchKind.THOROUGH else settings.quick)
         result = self.planner.plan(
-            PlanningProblem(weights, start, target, movers=movers, motion=motion), budget, self.rng
+            PlanningProblem(weights, start, target, moving_obstacles=moving_obstacles, motion=motion), budget, self.rng
         )
         self.seconds.append(stopwatch_s() - began_s)
         return result

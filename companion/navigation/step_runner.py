@@ -1,6 +1,6 @@
-"""Where the navigator's step is computed: at once (lock-step), or in a thread of its own (real time).
+"""Runs the navigator's step: at once (lock-step) or in a thread of its own (real time).
 
-A search on a large map may take long; heartbeat, watchdogs and stop commands must not wait for it.
+A search on a large map may take long. Heartbeats, watchdogs and stop commands must not wait for it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Protocol
 
-from companion.core.rounds import Mark
+from companion.core.round_marks import Mark
 from companion.navigation.field_step import Decision, NavState
 
 StepCall = Callable[[], tuple[NavState, Decision]]
@@ -21,7 +21,7 @@ class StepRunner(Protocol):
 
     @property
     def busy(self) -> bool:
-        """Whether a step has been started and its result not been taken."""
+        """Whether a step has been started and its result has not been taken."""
         ...
 
     @property
@@ -34,7 +34,7 @@ class StepRunner(Protocol):
         ...
 
     def take(self) -> tuple[NavState, Decision] | None:
-        """The result, once; None while it is not there."""
+        """The result, once; None before it is ready."""
         ...
 
     def close(self) -> None:
@@ -43,14 +43,14 @@ class StepRunner(Protocol):
 
 
 class InlineRunner:
-    """Computes at once: the same inputs give the same run."""
+    """Computes each step at once, so the same inputs give the same run."""
 
     def __init__(self) -> None:
         self._result: tuple[NavState, Decision] | None = None
 
     @property
     def busy(self) -> bool:
-        """Whether a result waits to be taken."""
+        """Whether there is a result to be taken."""
         return self._result is not None
 
     @property
@@ -72,7 +72,7 @@ class InlineRunner:
 
 
 class NotedRunner:
-    """Another runner, of which is noted what cannot be foretold of a thread: that it works, and when its answers are taken."""
+    """A runner that notes what a thread makes unpredictable: that it works, and when its results are taken."""
 
     def __init__(self, runner: StepRunner, note: Callable[[Mark], None]) -> None:
         self._runner = runner
@@ -96,7 +96,7 @@ class NotedRunner:
         self._runner.start(call)
 
     def take(self) -> tuple[NavState, Decision] | None:
-        """See ``StepRunner``; an error is an answer too."""
+        """See ``StepRunner``. An error is noted like a result."""
         try:
             result = self._runner.take()
         except Exception:
@@ -112,7 +112,10 @@ class NotedRunner:
 
 
 class ThreadRunner:
-    """Computes beside the loop; the compiled kernels release the interpreter lock. The thread never keeps the program from ending."""
+    """Computes in a thread beside the loop. The compiled kernels release the interpreter lock.
+
+    The thread is a daemon: it never prevents the program from ending.
+    """
 
     def __init__(self) -> None:
         self._calls: SimpleQueue[StepCall | None] = SimpleQueue()
@@ -122,12 +125,12 @@ class ThreadRunner:
 
     @property
     def busy(self) -> bool:
-        """Whether a step runs or its result waits."""
+        """Whether a step is running or its result has not been taken."""
         return self._busy
 
     @property
     def working(self) -> bool:
-        """Whether the thread has not finished yet."""
+        """Whether the thread has not finished the step."""
         return self._busy and self._results.empty()
 
     def start(self, call: StepCall) -> None:
@@ -136,7 +139,7 @@ class ThreadRunner:
         self._calls.put(call)
 
     def take(self) -> tuple[NavState, Decision] | None:
-        """The result if the thread has it; raises what the step raised."""
+        """The result if it is ready. Raises what the step raised."""
         if self._results.empty():
             return None
         result = self._results.get()
@@ -146,7 +149,7 @@ class ThreadRunner:
         return result
 
     def close(self) -> None:
-        """Do not wait for a step that nobody will take."""
+        """End the thread after its present step, without waiting for it."""
         self._calls.put(None)
 
     def _work(self) -> None:

@@ -1,8 +1,8 @@
-"""What turning costs, told to the planner in its own coin: the fields behind the rover are dearer.
+"""The cost of turning as weights in the planner's map: fields behind the rover cost more.
 
-A rover stops and pivots for a place behind it, which takes as long as several fields of straight driving; without this, two ways
-round an obstacle of equal length make it turn to and fro with every new piece of wall it sees. Who cannot turn on the spot has
-farther to drive until he comes round.
+To go to a place behind it a rover stops and turns, which takes as long as driving several fields straight on. Without
+this cost, two equally long paths round an obstacle make it turn back and forth with every new piece of wall that it
+sees. A rover that cannot turn on the spot must drive even farther to turn round.
 """
 
 from __future__ import annotations
@@ -14,13 +14,13 @@ from companion.core.grid import OBSTACLE, Grid
 from companion.settings import GuidanceSettings
 
 MAX_WEIGHT = 0.97
-"""Dear, but never an obstacle."""
+"""Costly, but never an obstacle."""
 REACH_RADII = 3.0
-"""For a rover that cannot turn on the spot the dear fields reach at least so many turning radii back."""
+"""For a rover that cannot turn on the spot the costly fields extend at least so many turning radii."""
 
 
 def with_turning_cost(grid: Grid, pose: Pose, settings: GuidanceSettings, turning_radius_m: float = 0.0) -> Grid:
-    """A copy of the grid in which free fields behind the rover, up to ``turn_reach_m``, cost up to ``turn_cost`` more."""
+    """A copy of the grid where free fields behind the rover, up to ``turn_reach_m``, cost up to ``turn_cost`` more."""
     weights = grid.weights.copy()
     cell = grid.cell_at(pose.point)
     reach = round(max(settings.turn_reach_m, REACH_RADII * turning_radius_m) / grid.resolution_m)

@@ -13,7 +13,7 @@ import numpy as np
 
 from companion.core.frames import LocalFrame, NedPoint, Pose
 from companion.core.grid import Grid
-from companion.planning.problem import Mover
+from companion.planning.problem import ObstacleTrajectory
 from companion.settings import TrafficSettings
 from companion.vehicle.events.vehicle import OtherSeen
 from companion.vehicle.state import VehicleState
@@ -87,10 +87,10 @@ def motion_changed(planned: tuple[Moving, ...], now: tuple[Moving, ...], setting
 
 def planners_movers(
     moving: tuple[Moving, ...], grid: Grid, rover_radius_m: float, now_s: float, settings: TrafficSettings
-) -> tuple[Mover, ...]:
+) -> tuple[ObstacleTrajectory, ...]:
     """The same for a planner: time from now, places in fields of the grid, the rover's radius added."""
     return tuple(
-        Mover(
+        ObstacleTrajectory(
             (one.radius_m + rover_radius_m) / grid.resolution_m,
             np.array([_row(one.at(now_s + ahead_s), grid, ahead_s) for ahead_s in (0.0, settings.horizon_s)]),
         )

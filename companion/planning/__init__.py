@@ -1,1 +1,1 @@
-"""Planners: each turns a problem (grid, start, target) into a path."""
+"""Path planners: each finds a path for a problem (grid, start, target)."""

@@ -1,4 +1,4 @@
-"""The navigator's default: the genetic algorithm's smooth curve where it is worth it, graph search behind it."""
+"""The default planner: a genetic algorithm's smooth curve where it is good enough, else a graph search."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.random import Generator
 
+from companion.core.grid import BASE_WEIGHT
 from companion.planning.bspline_ga.planner import BsplineGa
 from companion.planning.graph_search.astar import Astar
 from companion.planning.planner import Capabilities, Planner
@@ -18,13 +19,15 @@ from companion.settings import PlannerSettings
 
 
 class Hybrid:
-    """Fast and smooth where the way is easy, complete where it is not: NO_PATH is a proof.
+    """Fast and smooth for easy problems, complete for others: NO_PATH is a proof.
 
-    A genetic path is taken when driving along its curve costs at most ``hybrid_tolerance`` times what the graph's path costs, pulled taut and
-    rounded. A dearer one leads a rover another way round, which in unknown ground costs more than a smooth curve saves.
+    The genetic path is used if driving along its curve costs at most ``hybrid_tolerance`` times as much as the graph's
+    path after smoothing. A costlier one goes round obstacles on another side, which in unknown ground costs more than a
+    smooth curve saves.
 
-    For who cannot turn on the spot the genetic path is the one that can be driven, and it may cost as much more as coming round to
-    the target does. Otherwise it is the graph's path, and guidance finds the manoeuvres that it takes.
+    A vehicle that cannot turn on the spot can drive the genetic path, so it may cost as much more as turning towards
+    the target does. If it costs more than that, the graph's path is used, and the controller finds the manoeuvres that
+    it needs.
     """
 
     name = "hybrid"
@@ -36,8 +39,8 @@ class Hybrid:
         self._tolerance = settings.hybrid_tolerance
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
-        """See ``Planner.plan``. FOUND or NO_PATH. Raises ValueError for a budget without sense."""
-        # A look of a few epochs finds the easy paths, and often they cannot be better: then the graph is not searched.
+        """See ``Planner.plan``. FOUND or NO_PATH. Raises ValueError for a budget that allows no genetic search."""
+        # A few epochs find the easy paths. Often no path can be better, and then the graph is not searched.
         look = replace(budget, control_points=budget.control_points[:1], max_epochs=budget.min_epochs)
         genetic = self.genetic.plan(problem, look, rng)
         turning = _turning_cost(problem)
@@ -59,7 +62,7 @@ class Hybrid:
     def _with_whole_budget(
         self, problem: PlanningProblem, budget: Budget, rng: Generator, spent: PlanResult, good_cost: float
     ) -> PlanResult:
-        """To a vehicle that cannot turn on the spot a path that it can drive is worth more trouble."""
+        """A longer genetic search for a vehicle that cannot turn on the spot: it can drive only such a path."""
         genetic = self.genetic.plan(problem, budget, rng)
         evaluations, epochs = spent.evaluations + genetic.evaluations, spent.epochs + genetic.epochs
         if _driving_cost(problem, genetic.path) > good_cost:
@@ -68,23 +71,23 @@ class Hybrid:
 
 
 def _turning_cost(problem: PlanningProblem) -> float:
-    """What coming round to the target costs who cannot turn on the spot: the arc, and as much again to be back on the way."""
-    motion, ordinary = problem.motion, 0.5
+    """The cost of an arc towards the target, and as much again to return to the line; 0 if it turns on the spot."""
+    motion = problem.motion
     if motion.turning_radius_fields <= 0.0 or motion.heading_rad is None:
         return 0.0
     bearing_rad = math.atan2(problem.target[1] - problem.start[1], problem.target[0] - problem.start[0])
     turn_rad = abs(math.remainder(bearing_rad - motion.heading_rad, 2.0 * math.pi))
-    return 2.0 * turn_rad * motion.turning_radius_fields * ordinary
+    return 2.0 * turn_rad * motion.turning_radius_fields * BASE_WEIGHT
 
 
 def _least_cost(problem: PlanningProblem) -> float:
-    """What driving there cannot cost less than: the straight line over the cheapest ground there is."""
+    """A lower bound for the cost of driving there: the straight line over the cheapest ground."""
     (x, y), (to_x, to_y) = problem.start, problem.target
     return math.hypot(to_x - x, to_y - y) * max(float(problem.weights.min()), MIN_WEIGHT)
 
 
 def _driving_cost(problem: PlanningProblem, path: Path | None) -> float:
-    """What driving along a path's curve costs (its fields, if it has none); inf without a path."""
+    """The cost of driving along a path's curve (or its fields, if it has no curve); inf without a path."""
     if path is None:
         return math.inf
     curve = path.cell_array.astype(np.float64) if path.curve is None else path.curve
@@ -92,7 +95,7 @@ def _driving_cost(problem: PlanningProblem, path: Path | None) -> float:
 
 
 def _smoothed(problem: PlanningProblem, path: Path) -> Path:
-    """A curve along the path, and the fields under it; where corners may be cut the paper's rules hold: nothing is smoothed."""
+    """A curve along the path and the fields under it. If corners may be cut (the paper's rule) nothing is smoothed."""
     if problem.corner_cutting:
         return path
     weights = plain(problem.weights)

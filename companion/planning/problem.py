@@ -1,4 +1,4 @@
-"""What a planner is asked and what it answers."""
+"""A planning problem (grid, start, target, vehicle, moving obstacles), a budget, and a planner's result."""
 
 from __future__ import annotations
 
@@ -11,19 +11,20 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.core.grid import Cell, Weights, as_array, as_cells
+from companion.core.grid import OBSTACLE, Cell, Weights, as_array, as_cells
 
 MIN_WEIGHT = 0.01
-"""The least that a field costs: on ground of weight 0 a detour must still cost something."""
+"""The least that a field costs: even on ground of weight 0 a longer path must cost more."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Mover:
-    """A moving obstacle: a disc whose centre goes along straight segments.
+class ObstacleTrajectory:
+    """Where a moving obstacle is expected to be: a disc whose centre moves along straight segments.
 
-    ``track`` has shape (n, 3): columns time in seconds from the moment of planning, rising, then x and y in fields (field
-    centres at whole numbers). Between the rows it moves evenly; before the first and after the last it stands there.
-    ``radius_fields`` has the rover's own radius in it, as the map has.
+    ``track`` has shape (n, 3), one row for each end of a segment: time in seconds from the moment of planning (rising),
+    then x and y in fields (field centres at whole numbers). Between two rows the speed is constant; before the first
+    row and after the last the obstacle stands still. ``radius_fields`` includes the rover's own radius, as the map
+    does.
     """
 
     radius_fields: float
@@ -31,11 +32,12 @@ class Mover:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Motion:
-    """How the vehicle moves, for planners that ask.
+class VehicleMotion:
+    """How the vehicle can move, for planners that consider it.
 
-    ``heading_rad``: at the start, 0 along +x, growing towards +y; None: any. ``turning_radius_fields``: the tightest arc it can
-    drive; 0: it turns on the spot. ``speeds_fields_s``: the slowest and the fastest it may be told to go.
+    ``heading_rad``: at the start, 0 along +x, growing towards +y; None: any. ``turning_radius_fields``: the tightest
+    arc it can drive; 0: it turns on the spot. ``speeds_fields_s``: the lowest and the highest speed it may be
+    commanded.
     """
 
     heading_rad: float | None = None
@@ -47,24 +49,33 @@ class Motion:
 class PlanningProblem:
     """Find a path over ``weights`` (shape (height, width), 1 = obstacle) from ``start`` to ``target``.
 
-    ``corner_cutting`` allows a diagonal step past the corner of an obstacle, as the papers do; off, both orthogonal
-    neighbours of a diagonal step must be free. Planners never write to ``weights``. ``movers`` and ``motion`` count only
-    for planners whose capabilities say so.
+    ``corner_cutting`` allows a diagonal step past the corner of an obstacle, as the papers do. Without it both straight
+    neighbours of a diagonal step must be free. Planners never write to ``weights``. Only planners whose capabilities
+    say so consider ``moving_obstacles`` and ``motion``.
     """
 
     weights: Weights
     start: Cell
     target: Cell
     corner_cutting: bool = False
-    movers: tuple[Mover, ...] = ()
-    motion: Motion = Motion()
+    moving_obstacles: tuple[ObstacleTrajectory, ...] = ()
+    motion: VehicleMotion = VehicleMotion()
+
+    @property
+    def ends_are_free(self) -> bool:
+        """Whether start and target are inside the map and free. If not, there is no path."""
+        height, width = self.weights.shape
+        for x, y in (self.start, self.target):
+            if not (0 <= x < width and 0 <= y < height and self.weights[y, x] < OBSTACLE):
+                return False
+        return True
 
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """How hard to try, in epochs (never seconds); planners that are complete ignore it.
+    """How long to search, in epochs (never seconds). Complete planners ignore it.
 
-    ``control_points`` are tried one after the other, ``max_epochs`` each, until one gives a path.
+    Each number of ``control_points`` is tried in turn, for ``max_epochs``, until one gives a path.
     """
 
     min_epochs: int = 1
@@ -85,10 +96,10 @@ class PlanStatus(StrEnum):
 class Path:
     """The fields from start to target, each 8-adjacent to the one before.
 
-    ``cell_array`` has their places, shape (n, 2), columns x and y; ``cells`` are the same as tuples. ``cost``: see
-    ``path_cost``. ``curve``, if the planner has one, is the smooth line the fields came from: shape (n, 2),
-    columns x and y in fields, field centres at whole numbers. ``speeds_fields_s``, if the planner chooses them, has
-    shape (n - 1,): the speed from each point of the curve to the next. Nobody writes to these arrays.
+    ``cell_array``: their coordinates, shape (n, 2), columns x and y; ``cells``: the same as tuples. ``cost``: see
+    ``path_cost``. ``curve``: the smooth line that the fields were made from, if the planner has one, shape (n, 2),
+    columns x and y in fields, field centres at whole numbers. ``speeds_fields_s``: the speed from each point of the
+    curve to the next, if the planner chooses speeds, shape (n - 1,). The arrays must not be written to.
     """
 
     cell_array: NDArray[np.int64]
@@ -113,7 +124,7 @@ class Path:
 
     @property
     def cells(self) -> tuple[Cell, ...]:
-        """The fields one by one. Made when first asked for: on a large map that takes as long as finding the path."""
+        """The fields as tuples, made at the first use: on a large map that takes as long as finding the path."""
         if self._cells is None:
             object.__setattr__(self, "_cells", as_cells(self.cell_array))
         assert self._cells is not None
@@ -127,7 +138,7 @@ class Path:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class PlanResult:
-    """A planner's answer. ``path`` is there exactly when the status is FOUND."""
+    """A planner's result. ``path`` is not None exactly when the status is FOUND."""
 
     status: PlanStatus
     path: Path | None

@@ -1,7 +1,7 @@
-"""Fields under straight lines, and what makes a row of fields a path. Compiled.
+"""Rasterised lines, and tests and costs of paths of fields. Compiled.
 
-Lines are drawn with the DDA (digital differential analyser): one field per unit of the longer side, so a line is
-8-connected and no wall is thin enough to be jumped. Arrays of fields have shape ``(n, 2)``, columns x and y.
+Lines are drawn with the DDA (digital differential analyser): one field per unit of the longer side. So a line is
+8-connected and cannot skip a thin wall. Arrays of fields have shape ``(n, 2)``, columns x and y.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from companion.planning.problem import MIN_WEIGHT
 CellArray = NDArray[np.int64]
 
 ONE = 1 << 32
-"""Fixed point: a coordinate is a whole number of these fractions, exact to 1e-6 fields over 4000 fields."""
+"""1 in fixed point: coordinates are whole multiples of 1 / ONE, exact to 1e-6 fields over 4000 fields."""
 HALF = 1 << 31
 SHIFT = 32
 SQRT2 = math.sqrt(2.0)
@@ -29,7 +29,7 @@ ROUND = (5, 8, 7, 6, 3, 0, 1, 2)
 
 @njit(cache=True, nogil=True)
 def fine_steps(delta_x: int, delta_y: int) -> tuple[int, int, int]:
-    """Steps of a line, and how far one goes along x and y in fixed point."""
+    """The number of steps of a line, and what one adds to x and y in fixed point."""
     steps = max(abs(delta_x), abs(delta_y))
     share = ONE / max(steps, 1)
     return steps, int(delta_x * share), int(delta_y * share)
@@ -37,7 +37,7 @@ def fine_steps(delta_x: int, delta_y: int) -> tuple[int, int, int]:
 
 @njit(cache=True, nogil=True)
 def line_into(cells: CellArray, used: int, x0: int, y0: int, x1: int, y1: int) -> int:
-    """Write the fields of a line after ``cells[:used]``, without its first field; how many are used then."""
+    """Write the fields of a line after ``cells[:used]``, without its first field. Returns how many are used then."""
     steps, step_x, step_y = fine_steps(x1 - x0, y1 - y0)
     fine_x, fine_y = x0 * ONE + HALF, y0 * ONE + HALF
     for i in range(steps):
@@ -50,7 +50,7 @@ def line_into(cells: CellArray, used: int, x0: int, y0: int, x1: int, y1: int) -
 
 @njit(cache=True, nogil=True)
 def polyline(points: CellArray) -> CellArray:
-    """The fields under straight lines from point to point, 8-connected, joints once. ``points`` has at least one row."""
+    """The fields under straight lines from point to point, 8-connected, each joint once. Needs at least one point."""
     total = 1
     for i in range(1, len(points)):
         total += max(abs(points[i, 0] - points[i - 1, 0]), abs(points[i, 1] - points[i - 1, 1]))
@@ -65,7 +65,7 @@ def polyline(points: CellArray) -> CellArray:
 
 @njit(cache=True, nogil=True)
 def _slot(table: NDArray[np.int64], cells: CellArray, x: int, y: int) -> int:
-    """Where a field is, or belongs, in an open-addressed table of indices into ``cells`` (-1 = empty)."""
+    """The slot of a field in an open-addressed hash table of indices into ``cells`` (-1 = empty)."""
     mask = len(table) - 1
     at = ((x * 73856093) ^ (y * 19349663)) & mask
     while table[at] >= 0 and (cells[table[at], 0] != x or cells[table[at], 1] != y):
@@ -75,7 +75,7 @@ def _slot(table: NDArray[np.int64], cells: CellArray, x: int, y: int) -> int:
 
 @njit(cache=True, nogil=True)
 def _never_turns_back(cells: CellArray) -> bool:
-    """Whether all steps of a walk lie within less than half a turn: then it comes to no field twice."""
+    """Whether all steps of a walk lie within less than half a turn. Then it visits no field twice."""
     taken = 0
     for i in range(1, len(cells)):
         step = 3 * (cells[i, 1] - cells[i - 1, 1]) + cells[i, 0] - cells[i - 1, 0] + 4
@@ -93,10 +93,9 @@ def _never_turns_back(cells: CellArray) -> bool:
 
 @njit(cache=True, nogil=True)
 def without_loops(cells: CellArray) -> CellArray:
-    """The same walk with everything between two visits of one field cut out (paper, section 4.6).
+    """The same walk with everything between two visits of a field cut out (paper, section 4.6).
 
-    Neighbours stay neighbours, the ends stay the ends. Time grows with the number of fields, not its square. Without loops it is the
-    same array.
+    Neighbours stay neighbours and the ends stay the ends. Takes linear time. A walk without loops is returned as it is.
     """
     if _never_turns_back(cells):
         return cells
@@ -129,12 +128,12 @@ def cells_cost(weights: Weights, cells: CellArray) -> float:
 
 
 FAULTS = ("none", "outside the map", "obstacle", "not adjacent", "corner cut")
-"""What ``first_fault`` can find, by its number."""
+"""The faults that ``first_fault`` can find, by number."""
 
 
 @njit(cache=True, nogil=True)
 def first_fault(weights: Weights, cells: CellArray, corner_cutting: bool) -> tuple[int, int]:
-    """The first thing wrong with a row of fields: (index into FAULTS, index of the field); (0, -1) if it is a path."""
+    """The first fault of a row of fields: (index into FAULTS, index of the field); (0, -1) if it is a correct path."""
     height, width = weights.shape
     for i in range(len(cells)):
         x, y = cells[i, 0], cells[i, 1]
@@ -159,7 +158,7 @@ def is_path(weights: Weights, cells: Iterable[Cell], corner_cutting: bool = Fals
 
 
 def plain(weights: Weights) -> Weights:
-    """The weights as the kernels are compiled for: float64, row after row, writeable. Copies only if they are not."""
+    """The weights as the kernels need them: float64, row after row, writeable. Copies them only if they are not."""
     if weights.flags.carray and weights.dtype == np.float64:
         return weights
     return np.array(weights, np.float64, order="C")

@@ -1,4 +1,4 @@
-"""The planners there are, by name."""
+"""The registered planners by name, how to make one, and how to compile their kernels before a drive."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from companion.planning.graph_search.dijkstra import Dijkstra
 from companion.planning.graph_search.dstar_lite import DstarLite
 from companion.planning.graph_search.theta_star import ThetaStar
 from companion.planning.hybrid import Hybrid
-from companion.planning.papers.achour_ga import SegmentGa
+from companion.planning.papers.achour_ga import AchourGa
 from companion.planning.papers.prm import Prm
 from companion.planning.papers.sedighi_ga import geisler, hermanu, sedighi
 from companion.planning.papers.wang_ga import vertex, vertex_plus
@@ -34,13 +34,13 @@ PLANNERS: dict[str, PlannerFactory] = {
     "hermanu": hermanu,
     "vertex": vertex,
     "vertex++": vertex_plus,
-    "achour": SegmentGa,
+    "achour": AchourGa,
     "prm": Prm,
 }
 
 
 class UnknownPlannerError(ValueError):
-    """A planner's name that is not in PLANNERS; the text names the known ones, and one that is spelt nearly so."""
+    """A planner's name that is not in PLANNERS. The text lists the known names and suggests a similar one."""
 
 
 def make_planner(name: str, settings: PlannerSettings) -> Planner:
@@ -54,9 +54,9 @@ def make_planner(name: str, settings: PlannerSettings) -> Planner:
 
 
 def warm_up(names: Iterable[str] = tuple(PLANNERS), settings: PlannerSettings | None = None) -> None:
-    """Compile every kernel of these planners, or load it from the cache, so that no later plan waits for the compiler.
+    """Compile the kernels of these planners, or load them from the cache, so that no later plan waits for the compiler.
 
-    The first time on a machine this takes some ten seconds, later a fraction of one. Raises UnknownPlannerError.
+    The first time on a machine this takes about ten seconds, later less than one. Raises UnknownPlannerError.
     """
     rng = np.random.default_rng(0)
     for name in names:
@@ -64,7 +64,7 @@ def warm_up(names: Iterable[str] = tuple(PLANNERS), settings: PlannerSettings | 
         for problem in (_easy(), _winding()):
             path = planner.plan(problem, Budget(), rng).path
             if path is not None:
-                cells_cost(problem.weights, path.cell_array)  # what is left of a path is weighed by the navigator
+                cells_cost(problem.weights, path.cell_array)  # the navigator calls it for the rest of a path
 
 
 def _easy() -> PlanningProblem:
@@ -75,7 +75,7 @@ def _easy() -> PlanningProblem:
 
 
 def _winding() -> PlanningProblem:
-    """Walls from both sides in turn: too many bends for a few control points, so ``hybrid`` needs its graph search here."""
+    """Walls from alternate sides: too many bends for a few control points, so ``hybrid`` needs its graph search."""
     weights = np.full((9, 25), BASE_WEIGHT)
     weights[:-1, 2::8] = OBSTACLE
     weights[1:, 6::8] = OBSTACLE

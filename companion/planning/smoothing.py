@@ -1,8 +1,8 @@
-"""A path of fields made into the smooth curve that a rover likes to drive. Compiled.
+"""Path smoothing: a path of fields becomes the smooth curve that a rover can drive fast. Compiled.
 
-Every sharp bend costs a rover a stop and a turn on the spot. So the staircase of a graph search is first pulled straight wherever the
-straight line costs no more than the fields it replaces, and what corners are left are rounded by a 2nd-degree B-spline, as wide as the
-ground beside them allows.
+At every sharp bend a rover must stop and turn on the spot. So the staircase of a graph search is first pulled straight
+wherever the straight line costs no more than the fields it replaces. The corners that remain are rounded by a B-spline
+of degree 2, as widely as the ground beside them allows.
 """
 
 from __future__ import annotations
@@ -19,27 +19,28 @@ from companion.planning.problem import MIN_WEIGHT
 from companion.planning.raster import CellArray, cells_cost, first_fault, polyline, without_loops
 
 ROUNDING_FIELDS = (6.0, 4.0, 2.5, 1.5, 0.75)
-"""How far from a corner its rounding begins, tried in turn."""
+"""How far from a corner its rounding begins; tried in turn."""
 SLACK = 1.02
-"""A straight line may cost so many times what it replaces: a stair is a little dearer than the line beside it."""
+"""A straight line may cost so many times what it replaces: a staircase and the line beside it differ a little."""
 SAMPLES_A_CORNER = 8
 CORRIDOR_FIELDS = 8
-"""So far beside a straightened path a shorter one is looked for."""
+"""A shorter path is searched within this distance of the straightened one."""
 EVEN_SHARE = 0.5
 SIDE_WEIGHT = 0.9
-"""Fields beside an obstacle are this dear when a path is made taut, and others a quarter of what they are: a rover goes round corners
-faster, and with less doubt, where there is room beside it."""
+"""When a path is made taut, fields beside an obstacle have this weight and others EVEN_SHARE of their own: with room
+beside it a rover goes round corners faster and more reliably."""
 ROOM_SHARE = 1.15
-"""A path with room beside it may cost so many times the one that it takes the place of."""
+"""A path with room beside it may cost so many times the path that it replaces."""
 TAUT_FIELDS = 400
-"""So long a beginning of a path is made taut."""
+"""Only the beginning of a path is made taut, up to this length."""
 PIECE_FIELDS = 0.5
 GRAZED_WEIGHT = 10.0
-"""What an obstacle counts that a curve touches between the fields under its points: it may be no more than a corner."""
+"""The weight of an obstacle that a curve touches between its points: finite, because it may be only a corner."""
 
 Mask = NDArray[np.bool_]
 Curve = NDArray[np.float64]
 """Shape (n, 2): columns x and y in fields."""
+Direction = tuple[float, float]
 
 
 @njit(cache=True, nogil=True)
@@ -54,7 +55,7 @@ def straightened(weights: Weights, cells: CellArray) -> CellArray:
     used, at = 1, 0
     ends = np.empty((2, 2), np.int64)
     while at < count - 1:
-        # The farthest field in straight reach: doubling steps, then back one by one. Near fields always are.
+        # The farthest field in straight reach: by doubling steps, then back one by one. The next field always is.
         step, far = 1, at + 1
         while at + step < count:
             ends[0], ends[1] = cells[at], cells[at + step]
@@ -82,7 +83,7 @@ def _is_straight(weights: Weights, ends: CellArray, cost: float) -> bool:
 
 @njit(cache=True, nogil=True)
 def rounded(weights: Weights, corners: CellArray) -> NDArray[np.float64]:
-    """The curve through straightened corners, shape (n, 2) in fields. Corners with no room beside them stay sharp."""
+    """The curve through straightened corners, shape (n, 2) in fields. Corners without room beside them stay sharp."""
     count = len(corners)
     points = np.empty((count * (SAMPLES_A_CORNER + 1) + 2, 2))
     points[0, 0], points[0, 1] = corners[0, 0], corners[0, 1]
@@ -90,11 +91,12 @@ def rounded(weights: Weights, corners: CellArray) -> NDArray[np.float64]:
     for i in range(1, count - 1):
         into_x, into_y = float(corners[i, 0] - corners[i - 1, 0]), float(corners[i, 1] - corners[i - 1, 1])
         out_x, out_y = float(corners[i + 1, 0] - corners[i, 0]), float(corners[i + 1, 1] - corners[i, 1])
-        into, out = math.hypot(into_x, into_y), math.hypot(out_x, out_y)
+        before, after = math.hypot(into_x, into_y), math.hypot(out_x, out_y)
+        into, out = (into_x / before, into_y / before), (out_x / after, out_y / after)
         written = 0
         for rounding in ROUNDING_FIELDS:
-            reach = min(rounding, into / 2.0, out / 2.0)
-            written = _arc(points, used, corners[i], into_x / into, into_y / into, out_x / out, out_y / out, reach)
+            reach = min(rounding, before / 2.0, after / 2.0)
+            written = _arc(points, used, corners[i], into, out, reach)
             if _is_free(weights, points, used - 1, written + 1) and _is_cheap(
                 weights, points[used : used + written], corners[i]
             ):
@@ -109,19 +111,15 @@ def rounded(weights: Weights, corners: CellArray) -> NDArray[np.float64]:
 
 
 @njit(cache=True, nogil=True)
-def _arc(
-    points: NDArray[np.float64],
-    used: int,
-    corner: NDArray[np.int64],
-    into_x: float,
-    into_y: float,
-    out_x: float,
-    out_y: float,
-    reach: float,
-) -> int:
-    """One span of the B-spline: from ``reach`` before the corner to as far beyond it. How many points were written."""
-    from_x, from_y = corner[0] - reach * into_x, corner[1] - reach * into_y
-    to_x, to_y = corner[0] + reach * out_x, corner[1] + reach * out_y
+def _arc(points: Curve, used: int, corner: CellArray, into: Direction, out: Direction, reach: float) -> int:
+    """One span of the B-spline, from ``reach`` before the corner to as far beyond it.
+
+    Returns how many points were written.
+
+    ``into`` and ``out``: unit vectors along the path before and after the corner.
+    """
+    from_x, from_y = corner[0] - reach * into[0], corner[1] - reach * into[1]
+    to_x, to_y = corner[0] + reach * out[0], corner[1] + reach * out[1]
     for k in range(SAMPLES_A_CORNER + 1):
         t = k / SAMPLES_A_CORNER
         a, b, c = (1.0 - t) * (1.0 - t), 2.0 * t * (1.0 - t), t * t
@@ -132,7 +130,7 @@ def _arc(
 
 @njit(cache=True, nogil=True)
 def _is_free(weights: Weights, points: NDArray[np.float64], used: int, written: int) -> bool:
-    """Whether nothing is wrong with the fields under these points, joined by lines."""
+    """Whether the fields under the lines between these points are a correct path."""
     cells = np.empty((written, 2), np.int64)
     for k in range(written):
         cells[k, 0] = math.floor(points[used + k, 0] + 0.5)
@@ -142,7 +140,7 @@ def _is_free(weights: Weights, points: NDArray[np.float64], used: int, written: 
 
 @njit(cache=True, nogil=True)
 def _is_cheap(weights: Weights, arc: NDArray[np.float64], corner: NDArray[np.int64]) -> bool:
-    """Whether an arc does not lead over dearer ground than the way through the corner: beside obstacles ground is dear."""
+    """Whether an arc costs no more than the path through the corner: ground beside obstacles may be costly."""
     around = np.empty((3, 2), np.int64)
     for axis in range(2):
         around[0, axis] = math.floor(arc[0, axis] + 0.5)
@@ -175,7 +173,7 @@ def _fill_corridor(corridor: Mask, width: int, corners: CellArray) -> None:
 
 @njit(cache=True, nogil=True)
 def _mark_sides(around: Weights, before: Weights) -> None:
-    """Obstacles as they were, and free fields beside one as dear as can be; all others have been made cheap."""
+    """Set obstacles as in ``before``, and free fields beside one to SIDE_WEIGHT. All others are cheap already."""
     height, width = around.shape
     for y in range(height):
         for x in range(width):
@@ -188,10 +186,11 @@ def _mark_sides(around: Weights, before: Weights) -> None:
 
 
 def taut(weights: Weights, corners: CellArray) -> CellArray:
-    """Corners of a shorter path beside one that has been pulled straight: ends included, each in clear sight of the next.
+    """Corners of a shorter path near a straightened one: ends included, each in clear sight of the next.
 
-    A graph search counts a way in steps, and of many ways with as many steps takes any; the difference in metres is up to a twelfth.
-    Of a very long path only the beginning is made taut: a rover plans anew long before it comes to the rest.
+    A graph search measures a path in steps, and takes any of the paths with equally many; their lengths in metres
+    differ by up to a twelfth. Only the beginning of a very long path is made taut: a rover replans long before it
+    reaches the rest.
     """
     reached = np.abs(np.diff(corners, axis=0)).max(axis=1, initial=0).cumsum()
     count = 1 + int(np.searchsorted(reached, TAUT_FIELDS, "right"))
@@ -206,7 +205,7 @@ def taut(weights: Weights, corners: CellArray) -> CellArray:
     _mark_sides(around, around.copy())
     start, end = (Cell(*place.tolist()) for place in (head[0] - low, head[-1] - low))
     shorter = any_angle(around, start, end, False, corridor) + low
-    # Beside obstacles all fields have been made alike: where they are not, room could be bought too dearly.
+    # The search took all fields beside obstacles as alike. Where they are not, room could cost too much.
     if curve_cost(weights, shorter.astype(np.float64)) > ROOM_SHARE * curve_cost(weights, head.astype(np.float64)):
         return corners
     return np.concatenate((shorter, corners[count:]))
@@ -218,13 +217,14 @@ def smooth(weights: Weights, cells: CellArray) -> Curve:
         return cells.astype(np.float64)
     corners = taut(weights, straightened(weights, cells))
     curve = rounded(weights, corners)
-    # Arcs begin and end between fields, so a line from one to the next may clip what the line between the corners does not.
+    # Arcs begin and end between fields, so a line from one to the next may touch what the line between corners does
+    # not.
     return curve if _is_free(weights, curve, 0, len(curve)) else corners.astype(np.float64)
 
 
 @njit(cache=True, nogil=True)
 def curve_cost(weights: Weights, curve: Curve) -> float:
-    """The length of a curve, in fields, times the weight of the fields under it: what driving along it costs."""
+    """The cost of driving along a curve: its length in fields times the weight of the fields under it."""
     total = 0.0
     for i in range(1, len(curve)):
         along_x, along_y = curve[i, 0] - curve[i - 1, 0], curve[i, 1] - curve[i - 1, 1]

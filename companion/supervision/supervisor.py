@@ -6,13 +6,13 @@ Nouns: supervisor.
 from __future__ import annotations
 
 from companion.core.clock import Clock
-from companion.core.rounds import Mark
+from companion.core.round_marks import Mark
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_executor import Task
 from companion.executive.mission_run import MissionRun, Order
 from companion.navigation.step_runner import StepRunner
 from companion.operator.notifications import Outcome
-from companion.recording.recorder import DecisionLog
+from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Reaction, Verdict
 from companion.safety.reasons import EndReason, Reason
 from companion.safety.watchdogs import LoopMonitor
@@ -54,7 +54,7 @@ class Supervisor:
         loop: LoopWatch,
         localization: LocalizationMonitor,
         keeper: Keeper,
-        log: DecisionLog,
+        log: RunLog,
         notifier: TextSink,
         outcome: Outcome,
     ) -> None:
@@ -133,7 +133,7 @@ class Supervisor:
         text = f"Companion: {self._run.mission.name}, {len(cleared.progress.targets)} targets"
         self._notifier.tell(text, Severity.INFO)
         executor = self._run.begin(cleared.layout, cleared.progress)
-        if self._keeper.take_up(executor, now_s):
+        if self._keeper.resume(executor, now_s):
             text = f"Resumed {cleared.found}, {executor.reached} targets reached before"
             self._notifier.tell(text, Severity.INFO)
 

@@ -1,82 +1,69 @@
-"""ArduRover's face: takes in packets, keeps to its start-up timetable, sends what is due."""
+"""ArduRover in Python: the main loop that handles packets, runs the modes and sends what is due."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
-
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.boot import HOME_S, ORIGIN_S, POSITION_S
-from sitl.autopilot.commands import answer
-from sitl.autopilot.control import LOOP_HZ
-from sitl.autopilot.files import answer_file_request
-from sitl.autopilot.link import Channel
-from sitl.autopilot.modes import apply_sticks, run_failsafes, set_mode
-from sitl.autopilot.network import close_channel, open_channel, pass_on, set_up_signing
-from sitl.autopilot.params import REAL32
-from sitl.autopilot.progress import plan_due_us, run_plan, set_mission_current
-from sitl.autopilot.proximity import forget_stale, take_in
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.fence import run_fence
+from sitl.autopilot.links import close_channel, forward, open_channel
+from sitl.autopilot.messages import HANDLERS
+from sitl.autopilot.mission_protocol import keep_home, run_uploads
+from sitl.autopilot.mode_auto import run_auto
+from sitl.autopilot.mode_rtl import run_return
+from sitl.autopilot.mode_smart_rtl import SAVE_EVERY_US, remember_path, run_smart_rtl
+from sitl.autopilot.modes import disarm, run_failsafes, set_mode
+from sitl.autopilot.proximity import forget_stale
 from sitl.autopilot.signing import SECURE_PORT
-from sitl.autopilot.streams import send_due, set_group
-from sitl.autopilot.targets import attitude_target, global_target, local_target
+from sitl.autopilot.start_up import HOME_S, ORIGIN_S, POSITION_S, TIMETABLE
+from sitl.autopilot.state import Mode
+from sitl.autopilot.streams import send_due
 from sitl.autopilot.telemetry import heartbeat
-from sitl.autopilot.transfer import TRANSFERS, keep_home
-from sitl.autopilot.vehicle import ALTITUDE_M, INFO, WARNING, Sticks, Vehicle, parameter_message
+from sitl.autopilot.vehicle import INFO, WARNING, Vehicle, parameter_message
 
 PARAMETERS_PER_LOOP = 5
 TIMESYNC_S = 10.0
-UNCHANGED, RELEASED = 65535, 32767
+TICK_US = 100_000
+"""Interval at which the modes are run; an arrival is noticed at once."""
 
-TIMETABLE: tuple[tuple[float, tuple[str, ...]], ...] = (
-    (0.0, ("Calibrating barometer", "Barometer 1 calibration complete", "Barometer 2 calibration complete")),
-    (1.0, ("Beginning INS calibration. Do not move vehicle", "ArduPilot Ready", "AHRS: DCM active")),
-    (4.0, ("EKF3 IMU0 initialised", "EKF3 IMU1 initialised")),
-    (5.0, ("EKF3 IMU0 tilt alignment complete", "EKF3 IMU1 tilt alignment complete")),
-    (6.0, ("EKF3 IMU0 MAG0 initial yaw alignment complete", "EKF3 IMU1 MAG0 initial yaw alignment complete")),
-    (9.0, ("GPS 1: probing for u-blox at 230400 baud", "GPS 1: detected u-blox")),
-    (HOME_S, ()),
-    (ORIGIN_S, ("EKF3 IMU0 origin set", "EKF3 IMU1 origin set", f"Field Elevation Set: {ALTITUDE_M:.0f}m")),
-    (POSITION_S, ("EKF3 IMU0 is using GPS", "EKF3 IMU1 is using GPS", "AHRS: EKF3 active")),
-)
-"""What is said when, seconds since boot (measured)."""
+BUSY_MODES = {Mode.AUTO, Mode.RTL, Mode.SMART_RTL}
 
 
 class Autopilot:
-    """Packets in, packets out, one main loop at a time; motion itself is in the vehicle's compiled records."""
+    """Handles packets and sends what is due; the motion itself is computed by compiled code in ``control``."""
 
     def __init__(self, vehicle: Vehicle) -> None:
-        """An autopilot that has just been booted."""
+        """An autopilot that has just booted."""
         self.vehicle = vehicle
         self._opened = 0
         self._next_event = 0
         self._next_second_us = 0
 
     def open_channel(self, port: int = SECURE_PORT) -> Channel:
-        """A new connection through a serial port; it is streamed to at once."""
+        """Open a channel through a serial port; streams start at once."""
         self._opened += 1
         return open_channel(self.vehicle, self._opened - 1, port)
 
     def close_channel(self, channel: Channel) -> None:
-        """Forget a connection and who was heard there."""
+        """Close a channel and forget its routes."""
         close_channel(self.vehicle, channel)
-        if self.vehicle.plan.helper is not None and self.vehicle.plan.helper[2] == channel.number:
-            self.vehicle.plan.helper = None
+        if self.vehicle.onboard_controller is not None and self.vehicle.onboard_controller[2] == channel.number:
+            self.vehicle.onboard_controller = None
 
     def receive(self, channel: Channel, data: bytes) -> None:
-        """Handle what arrived on a channel."""
+        """Handle bytes that arrived on a channel."""
         for message in channel.parse(data):
             handler = HANDLERS.get(message.get_type())
-            if pass_on(self.vehicle, channel, message) and handler is not None:
+            if forward(self.vehicle, channel, message) and handler is not None:
                 handler(self.vehicle, channel, message)
         self.vehicle.flush_texts()
 
     def next_due_us(self) -> float:
-        """When something must be sent or said next."""
+        """Time of the next message or text that is due."""
         due_us = float(self._next_second_us)
         if self._next_event < len(TIMETABLE):
             due_us = min(due_us, self._event_s() * 1e6)
-        due_us = min(due_us, plan_due_us(self.vehicle))
+        due_us = min(due_us, modes_due_us(self.vehicle))
         for channel in self.vehicle.channels.values():
             if channel.requested or channel.parameter_queue:
                 return 0.0
@@ -85,11 +72,11 @@ class Autopilot:
         return due_us
 
     def run_due(self) -> None:
-        """Say and send what is due, tell of targets reached and of time-outs."""
+        """Run the modes, report arrivals and time-outs, send what is due."""
         vehicle = self.vehicle
         self._report_motion()
         self._follow_timetable()
-        run_plan(vehicle)
+        run_modes(vehicle)
         if vehicle.time_us >= self._next_second_us:
             self._next_second_us += 1_000_000
             run_failsafes(vehicle)
@@ -119,7 +106,7 @@ class Autopilot:
             vehicle.say(WARNING, f"target not received last {vehicle.parameters['GUID_TIMEOUT']:.0f}secs, stopping")
 
     def _event_s(self) -> float:
-        """When the next event of the timetable is, which for some is later when the GPS is."""
+        """Time of the next event of the start-up; some are delayed without GPS."""
         moment_s, late = TIMETABLE[self._next_event][0], self.vehicle.gps_late
         return moment_s + {HOME_S: late.home_s, ORIGIN_S: late.origin_s, POSITION_S: late.position_s}.get(moment_s, 0.0)
 
@@ -136,120 +123,27 @@ class Autopilot:
                     channel.requested.append(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
 
 
-def _text_of(name: Any) -> str:
-    return name if isinstance(name, str) else bytes(name).split(b"\0")[0].decode("ascii", "replace")
+def run_modes(vehicle: Vehicle) -> None:
+    """Run uploads, fence and the present mode for this moment."""
+    now_us = vehicle.time_us
+    if vehicle.uploads:
+        run_uploads(vehicle)
+    if vehicle.fence.enabled or vehicle.parameters["FENCE_ENABLE"] != vehicle.fence.seen_setting:
+        run_fence(vehicle, set_mode, disarm)
+    if now_us >= vehicle.smart_rtl.due_us:
+        vehicle.smart_rtl.due_us = (now_us // SAVE_EVERY_US + 1) * SAVE_EVERY_US
+        remember_path(vehicle)
+    if vehicle.mode == Mode.AUTO:
+        run_auto(vehicle)
+    elif vehicle.mode == Mode.RTL:
+        run_return(vehicle)
+    elif vehicle.mode == Mode.SMART_RTL:
+        run_smart_rtl(vehicle)
 
 
-def _read_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    name = _text_of(message.param_id) if message.param_index < 0 else vehicle.parameters.name_of(message.param_index)
-    if name is not None and name in vehicle.parameters:
-        channel.send(parameter_message(vehicle.parameters, name, in_list=message.param_index >= 0))
-
-
-def _list_parameters(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    channel.parameter_queue[:] = list(vehicle.parameters)
-
-
-def _set_parameter(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    name = _text_of(message.param_id)
-    if not vehicle.parameters.set(name, message.param_value):
-        return  # without a word: no such name, or no number
-    vehicle.retune()
-    for listener in vehicle.channels.values():
-        listener.send(parameter_message(vehicle.parameters, name))
-
-
-def _old_set_mode(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    if message.base_mode & mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED:
-        set_mode(vehicle, message.custom_mode)
-
-
-def _heartbeat(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    if message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"]):
-        vehicle.clocks.ground_station_s = vehicle.time_s
-    if message.type == mavlink.MAV_TYPE_ONBOARD_CONTROLLER:
-        who, known = (message.get_srcSystem(), message.get_srcComponent()), vehicle.plan.helper
-        if known is None or known[:2] == who:
-            vehicle.plan.helper = (*who, channel.number)
-
-
-def _override(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """RC_CHANNELS_OVERRIDE of the ground station: steering and throttle; 0 lets go, 65535 leaves as it is."""
-    sticks = vehicle.sticks
-    steering, throttle = (
-        before if raw_us == UNCHANGED else None if raw_us == 0 else (raw_us - 1500) / 500.0
-        for raw_us, before in ((message.chan1_raw, sticks.steering), (message.chan3_raw, sticks.throttle))
-    )
-    _take_sticks(vehicle, message, steering, throttle)
-
-
-def _manual_control(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """MANUAL_CONTROL, a joystick: y steers, z is the throttle, in thousandths; the largest number lets go."""
-    if message.target == vehicle.system:
-        axes = (None if axis == RELEASED else axis / 1000.0 for axis in (message.y, message.z))
-        _take_sticks(vehicle, message, *axes)
-
-
-def _take_sticks(vehicle: Vehicle, message: Any, steering: float | None, throttle: float | None) -> None:
-    """The ground station's sticks, -1 to 1, None where it lets go. They are a sign of life as well."""
-    is_station = message.get_srcSystem() == int(vehicle.parameters["MAV_GCS_SYSID"])
-    if not is_station:
-        return
-    vehicle.clocks.ground_station_s = vehicle.time_s
-    if vehicle.parameters["RC_OVERRIDE_TIME"] == 0.0:
-        return
-    held, pushed = (0.0 if axis is None else min(max(axis, -1.0), 1.0) for axis in (steering, throttle))
-    vehicle.sticks = Sticks(held, pushed, None if steering is None and throttle is None else vehicle.time_s)
-    apply_sticks(vehicle)
-
-
-def _data_stream(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    rate_hz = message.req_message_rate if message.start_stop else 0
-    set_group(channel, message.req_stream_id, rate_hz, vehicle.time_us)
-
-
-def _timesync(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    if message.tc1 == 0:
-        channel.send(mavlink.MAVLink_timesync_message(vehicle.time_us * 1000, message.ts1))
-
-
-def _local(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    local_target(vehicle, message)
-
-
-def _global(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    global_target(vehicle, message)
-
-
-def _obstacles(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    take_in(vehicle, message)
-
-
-def _attitude(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    attitude_target(vehicle, message)
-
-
-HANDLERS: dict[str, Callable[[Vehicle, Channel, Any], None]] = {
-    "COMMAND_LONG": answer,
-    "COMMAND_INT": answer,
-    "FILE_TRANSFER_PROTOCOL": answer_file_request,
-    "HEARTBEAT": _heartbeat,
-    "MANUAL_CONTROL": _manual_control,
-    "MISSION_SET_CURRENT": set_mission_current,
-    "OBSTACLE_DISTANCE": _obstacles,
-    "PARAM_REQUEST_LIST": _list_parameters,
-    "PARAM_REQUEST_READ": _read_parameter,
-    "PARAM_SET": _set_parameter,
-    "RC_CHANNELS_OVERRIDE": _override,
-    "REQUEST_DATA_STREAM": _data_stream,
-    "SET_ATTITUDE_TARGET": _attitude,
-    "SET_MODE": _old_set_mode,
-    "SET_POSITION_TARGET_GLOBAL_INT": _global,
-    "SET_POSITION_TARGET_LOCAL_NED": _local,
-    "SETUP_SIGNING": set_up_signing,
-    "TIMESYNC": _timesync,
-    **TRANSFERS,
-}
-"""Everything else is taken in and ignored."""
-
-__all__ = ["LOOP_HZ", "REAL32", "Autopilot"]
+def modes_due_us(vehicle: Vehicle) -> float:
+    """When ``run_modes`` is to be called next."""
+    if vehicle.uploads or vehicle.fence.enabled or vehicle.mode in BUSY_MODES:
+        # In step with the streams, so that both are done together.
+        return min(vehicle.smart_rtl.due_us, (vehicle.time_us // TICK_US + 1) * TICK_US)
+    return vehicle.smart_rtl.due_us

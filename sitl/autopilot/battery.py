@@ -1,34 +1,31 @@
-"""The battery and its monitor: current by what the motors are given, voltage, and Rover's battery failsafe.
+"""The battery and its monitor: voltage, charge used, and the battery failsafe (behaviour of AP_BattMonitor).
 
-Current and voltage as in the recordings: 50 A with both motors at full output, 0.014 ohm. With SIM_BATT_CAP_AH above 0 the pack also runs
-down; by default, as in the firmware's own simulation, its voltage at rest stays SIM_BATT_VOLTAGE.
+Current and voltage as recorded: 50 A with both motors at full output, 0.014 ohm. With SIM_BATT_CAP_AH above 0 the
+pack also discharges; by default, as in the firmware's own simulation, its voltage at rest stays SIM_BATT_VOLTAGE.
+
+Nouns: AP_BattMonitor.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 FULL_A = 50.0
+
 RESISTANCE_OHM = 0.014
+
 CHARGE: Sequence[float] = (0.0, 0.1, 0.5, 1.0)
+
 SHARE_OF_VOLTS: Sequence[float] = (0.76, 0.86, 0.92, 1.0)
-"""Voltage at rest by charge, as a share of that of a full pack: about that of lithium polymer cells. Our assumption."""
+"""Voltage at rest by charge, as a share of a full pack's: roughly that of lithium polymer cells. Our assumption."""
 
 OK, LOW, CRITICAL = 0, 1, 2
+
 NAMES = ("", "low", "critical")
 
 
-class Table(Protocol):
-    """Parameters by name."""
-
-    def __getitem__(self, name: str) -> float:
-        """The value of a known parameter."""
-        ...
-
-
-def rest_volts(parameters: Table, drawn_ah: float) -> float:
+def rest_volts(parameters: Mapping[str, float], drawn_ah: float) -> float:
     """Voltage without current."""
     full_v, capacity_ah = parameters["SIM_BATT_VOLTAGE"], parameters["SIM_BATT_CAP_AH"]
     if capacity_ah <= 0.0:
@@ -42,23 +39,23 @@ def rest_volts(parameters: Table, drawn_ah: float) -> float:
 
 @dataclass
 class Battery:
-    """What the monitor remembers since boot. ``worst``: how far its failsafe has gone; it never goes back."""
+    """State of the monitor since boot. ``worst``: the most severe failsafe so far; it never goes back."""
 
     fault_v: float | None = None
-    """A voltage at rest that a fault has brought."""
+    """Voltage at rest that a fault imposes."""
     worst: int = OK
     low_since_s: float | None = None
     critical_since_s: float | None = None
 
-    def volts(self, parameters: Table, drawn_ah: float, amps: float) -> float:
+    def volts(self, parameters: Mapping[str, float], drawn_ah: float, amps: float) -> float:
         """Voltage under this current."""
         rest_v = rest_volts(parameters, drawn_ah)
         if self.fault_v is not None:
             rest_v = min(rest_v, self.fault_v)
         return max(rest_v - RESISTANCE_OHM * amps, 0.0)
 
-    def check(self, parameters: Table, volts: float, used_mah: float, now_s: float) -> int:
-        """LOW or CRITICAL when the failsafe has got that far just now, else OK."""
+    def check(self, parameters: Mapping[str, float], volts: float, used_mah: float, now_s: float) -> int:
+        """LOW or CRITICAL when the failsafe has just reached that level, else OK."""
         low, critical = below(parameters, volts, used_mah, "LOW"), below(parameters, volts, used_mah, "CRT")
         self.low_since_s = _since(low[0], self.low_since_s, now_s)
         self.critical_since_s = _since(critical[0], self.critical_since_s, now_s)
@@ -74,8 +71,8 @@ class Battery:
         return state
 
 
-def below(parameters: Table, volts: float, used_mah: float, level: str) -> tuple[bool, bool]:
-    """Whether voltage and capacity are below BATT_LOW_... or BATT_CRT_...; 0 there switches the check off."""
+def below(parameters: Mapping[str, float], volts: float, used_mah: float, level: str) -> tuple[bool, bool]:
+    """Whether voltage and capacity are below BATT_LOW_... or BATT_CRT_...; a limit of 0 switches the check off."""
     limit_v, limit_mah = parameters[f"BATT_{level}_VOLT"], parameters[f"BATT_{level}_MAH"]
     left_mah = parameters["BATT_CAPACITY"] - used_mah
     return limit_v > 0.0 and 0.0 < volts < limit_v, limit_mah > 0.0 and left_mah < limit_mah
@@ -89,8 +86,8 @@ def _is_over(since_s: float | None, now_s: float, patience_s: float) -> bool:
     return since_s is not None and patience_s > 0.0 and now_s - since_s > patience_s
 
 
-def arming_complaint(parameters: Table, volts: float, used_mah: float) -> str:
-    """What the arming checks say of the battery; empty when it is all right."""
+def arming_complaint(parameters: Mapping[str, float], volts: float, used_mah: float) -> str:
+    """What the arming checks report about the battery; empty if nothing."""
     if 0.0 < volts < parameters["BATT_ARM_VOLT"]:
         return "Battery 1 below minimum arming voltage"
     for level, word in (("LOW", "low"), ("CRT", "critical")):

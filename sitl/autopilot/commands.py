@@ -1,4 +1,4 @@
-"""Commands (COMMAND_LONG, COMMAND_INT) and their answers (measured)."""
+"""MAVLink commands (COMMAND_LONG, COMMAND_INT) and their acknowledgements (measured)."""
 
 from __future__ import annotations
 
@@ -8,17 +8,20 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.auto import AutoRunner
-from sitl.autopilot.control import LOOP_HZ
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.control.records import LOOP_HZ
+from sitl.autopilot.destination import change_speed, go_to, valid_place
 from sitl.autopilot.fence import enable_fence
-from sitl.autopilot.link import Channel
+from sitl.autopilot.mode_auto import AutoRunner
+from sitl.autopilot.mode_guided import GLOBAL_FRAMES
 from sitl.autopilot.modes import FORCE, arm, arming_faults, disarm, set_mode
+from sitl.autopilot.state import Mode
 from sitl.autopilot.streams import DEFAULT_INTERVAL_US, set_interval
-from sitl.autopilot.targets import GLOBAL_FRAMES, change_speed, go_to, valid_place
 from sitl.autopilot.telemetry import MESSAGES, streamable
-from sitl.autopilot.vehicle import CRITICAL, INFO, Mode, Vehicle
+from sitl.autopilot.vehicle import CRITICAL, INFO, Vehicle
 
 ACCEPTED, TRY_LATER, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
+
 LONGEST_US = 60_000_000
 
 Handler = Callable[[Vehicle, Channel, Any], int]
@@ -32,7 +35,7 @@ def answer(vehicle: Vehicle, channel: Channel, message: Any) -> None:
         handler = HANDLERS.get(message.command)
         try:
             result = UNSUPPORTED if handler is None else handler(vehicle, channel, message)
-        except (ValueError, OverflowError):  # a number that is none, or fits nowhere
+        except (ValueError, OverflowError):  # NaN, infinity or out of range
             result = DENIED
     channel.send(
         mavlink.MAVLink_command_ack_message(
@@ -133,10 +136,10 @@ def _mission_start(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 def _set_mission_current(vehicle: Vehicle, channel: Channel, message: Any) -> int:
     seq = int(message.param1)
-    if seq < 0 or not vehicle.plan.mission.set_current(seq, AutoRunner(vehicle)):
+    if seq < 0 or not vehicle.mission.set_current(seq, AutoRunner(vehicle)):
         return FAILED
     if message.param2 == 1.0:
-        vehicle.plan.mission.jumps.clear()
+        vehicle.mission.jumps.clear()
     for listener in vehicle.channels.values():
         listener.requested.append(mavlink.MAVLINK_MSG_ID_MISSION_CURRENT)
     return ACCEPTED
@@ -151,7 +154,7 @@ def _return(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 
 def _place_of(message: Any) -> tuple[int, tuple[int, int]]:
-    """Frame, latitude and longitude in 1e-7 degree; COMMAND_LONG has degrees, in the frame GLOBAL."""
+    """Frame, and latitude and longitude in 1e-7 degree; COMMAND_LONG has degrees, in the frame GLOBAL."""
     if message.get_type() == "COMMAND_INT":
         return message.frame, (message.x, message.y)
     degrees = (0.0 if math.isnan(value) else value for value in (message.param5, message.param6))
@@ -160,7 +163,7 @@ def _place_of(message: Any) -> tuple[int, tuple[int, int]]:
 
 
 def _set_home(vehicle: Vehicle, channel: Channel, message: Any) -> int:
-    """DO_SET_HOME: here (param1 is 1, or no place given), or at a place."""
+    """DO_SET_HOME: here (param1 = 1, or no place given) or at a place."""
     if math.isnan(message.param1):
         return DENIED
     frame, place = _place_of(message)
@@ -184,11 +187,11 @@ def _get_home(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 
 
 def _check_arming(vehicle: Vehicle, channel: Channel, message: Any) -> int:
-    """RUN_PREARM_CHECKS: accepted whatever comes out; the complaints follow as texts."""
+    """RUN_PREARM_CHECKS: accepted whatever the result; complaints follow as texts."""
     if vehicle.armed:
         return TRY_LATER
-    for reason in arming_faults(vehicle):
-        vehicle.say(CRITICAL, f"PreArm: {reason}")
+    for fault in arming_faults(vehicle):
+        vehicle.say(CRITICAL, f"PreArm: {fault.text}")
     return ACCEPTED
 
 

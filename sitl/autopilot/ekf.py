@@ -1,8 +1,11 @@
-"""What the EKF makes of a GPS that falls silent or lies, and when the rover stops trusting it.
+"""The EKF with a silent or wrong GPS: its position error, aiding, glitches, the fall-back to DCM, and the EKF failsafe.
 
-Behaviour of NavEKF3 (aiding, time-outs, innovation gate, glitch flag), of the AHRS (its fall-back to DCM, which believes the GPS)
-and of Rover's check of the EKF, ten times a second. Measured: GPS silent, 8 s later HOLD with "EKF failsafe"; the rest is from the source.
-The estimate itself is the truth plus ``offset``; this module says what the offset is.
+Behaviour of NavEKF3 (aiding, time-outs, innovation gate, glitch flag), of the AHRS (fall-back to DCM, which trusts
+the GPS) and of Rover's EKF check, ten times a second. Measured: with a silent GPS, HOLD with "EKF failsafe" after 8
+s; the rest is from the firmware's source. The estimate is the truth plus ``offset_m``; this module computes that
+offset.
+
+Nouns: NavEKF3.
 """
 
 from __future__ import annotations
@@ -14,33 +17,43 @@ from enum import Enum
 import numpy as np
 
 STEP_S = 0.1
+
 GPS_SILENT_S = 4.0
-"""The receiver's driver gives up after so long; the EKF then no longer counts as using GPS."""
+"""After this silence the receiver's driver gives up, and the EKF no longer counts as using GPS."""
+
 ALONE_S, ALONE_WITH_SPEED_S = 7.0, 10.0
-"""A position that has not been confirmed for so long is given up: without GPS speed, and with it."""
+"""A position that GPS has not confirmed for this long is given up: without GPS speed, and with it."""
+
 AIDING_ENDS_S = 15.0
+
 GATE_M = 2.7
 """EK3_POS_I_GATE of 5 standard deviations, each EK3_POSNE_M_NSE of 0.5 m and a little of the estimate's own."""
+
 FOLLOWS_S = 1.0
-"""How fast the estimate follows a GPS that it believes. Our assumption: the gain depends on the EKF's state."""
+"""Time constant with which the estimate follows an accepted GPS. Our assumption: the gain depends on the EKF's state.
+"""
+
 DRIFT_M_S2 = 0.03
-"""Acceleration error (standard deviation) while only inertial sensors are left. Our assumption, of a small MEMS sensor."""
+"""Acceleration error (standard deviation) with inertial sensors alone. Our assumption, for a small MEMS sensor."""
+
 GLITCH_SEEN_S, GLITCH_OVER_S = 1.0, 10.0
+
 FAILED_CHECKS = 10
 
 GOOD, NO_POSITION, CONSTANT_POSITION, GLITCH = 831, 37, 167, 32768
-"""EKF_STATUS_REPORT flags: everything; attitude, vertical speed and height alone; a constant position; the bit for glitches."""
+"""EKF_STATUS_REPORT flags: everything; attitude, vertical speed and height alone; a constant position; the bit for
+glitches."""
 
 
 class Source(Enum):
-    """Whose position the autopilot uses."""
+    """The estimator whose position the autopilot uses."""
 
     EKF = "EKF3"
     DCM = "DCM"
 
 
 class Change(Enum):
-    """What the step brought that must be said or done."""
+    """A change in a step that must be reported or acted on; values are texts of the firmware, where it has one."""
 
     STOPPED_AIDING = "EKF3 IMU0 stopped aiding"
     USING_GPS = "EKF3 IMU0 is using GPS"
@@ -52,7 +65,7 @@ class Change(Enum):
 
 @dataclass
 class Gps:
-    """The receiver: whether it talks, and how wrong it is, metres north and east."""
+    """The GPS receiver: whether it sends, and its error in metres north and east."""
 
     talks: bool = True
     error_m: tuple[float, float] = (0.0, 0.0)
@@ -69,10 +82,10 @@ class Ekf:
     aiding: bool = True
     source: Source = Source.EKF
     test_ratio: float = 0.0
-    """Position innovation in gates; from 1 on it is refused."""
+    """Position innovation relative to the gate; from 1 on the GPS is rejected."""
     failsafe: bool = False
     late_s: float = 0.0
-    """How much later than without faults the GPS's part of the start-up comes."""
+    """How many seconds the GPS part of the start-up is delayed."""
     _passed_s: float = 0.0
     _consistent_s: float = 0.0
     _inconsistent_s: float = -math.inf
@@ -82,19 +95,19 @@ class Ekf:
 
     @property
     def has_position(self) -> bool:
-        """Whether the autopilot would navigate with it."""
+        """Whether the autopilot navigates with the EKF."""
         return self.source is Source.EKF and self.aiding and not self._timed_out
 
     @property
     def shown_m(self) -> tuple[float, float] | None:
-        """The error of the position that is told, None when there is none: then what was told last is told again."""
+        """The error of the reported position; None when there is none, and the last position is reported again."""
         if self.source is Source.EKF:
             return self.offset_m
         return self.gps.error_m if self.gps_has_fix else None
 
     @property
     def gps_has_fix(self) -> bool:
-        """As the receiver's driver has it: for some seconds the last fix counts."""
+        """As the receiver's driver sees it: the last fix counts for some seconds."""
         return self.gps.talks or self._silence_s < GPS_SILENT_S
 
     @property
@@ -108,16 +121,16 @@ class Ekf:
     _silence_s: float = 0.0
 
     def step(self, now_s: float, armed: bool, rng: np.random.Generator) -> list[Change]:
-        """One step of ``STEP_S``: fuse or go on alone, and judge the result."""
+        """One step of ``STEP_S``: fuse the GPS, or continue by dead reckoning, then run the checks."""
         self._silence_s = 0.0 if self.gps.talks else now_s - self.gps.heard_s
-        changes = self._fuse(now_s) if self.gps.talks else self._go_on_alone(now_s, rng)
+        changes = self._fuse(now_s) if self.gps.talks else self._dead_reckon(now_s, rng)
         limit_s = ALONE_WITH_SPEED_S if self._silence_s < ALONE_S else ALONE_S
         self._timed_out = now_s - self._passed_s > limit_s + 1e-6
         changes += self._choose_source(now_s, armed)
         return changes + self._check(armed)
 
     def begin(self, now_s: float) -> None:
-        """The start-up is over: there is a position."""
+        """End of the start-up: the EKF has a position."""
         self._passed_s = self._consistent_s = self.gps.heard_s = now_s
         self.offset_m = self.gps.error_m
 
@@ -131,23 +144,23 @@ class Ekf:
         if not self.aiding:
             self.aiding = True
             changes.append(Change.USING_GPS)
-            self._believe(now_s)
+            self._reset_to_gps(now_s)
         elif self._timed_out or now_s - self._passed_s > ALONE_WITH_SPEED_S:
-            self._believe(now_s)
+            self._reset_to_gps(now_s)
         elif self.test_ratio < 1.0:
             share = 1.0 - math.exp(-STEP_S / FOLLOWS_S)
             self.offset_m = self.offset_m[0] + share * gap_n, self.offset_m[1] + share * gap_e
             self._passed_s = now_s
-        self._look_for_glitch(now_s)
+        self._check_glitch(now_s)
         return changes
 
-    def _believe(self, now_s: float) -> None:
-        """The estimate is put where the GPS says."""
+    def _reset_to_gps(self, now_s: float) -> None:
+        """Reset the estimate to the GPS position."""
         self.offset_m = self.gps.error_m
         self._passed_s = now_s
         self.test_ratio = 0.0
 
-    def _look_for_glitch(self, now_s: float) -> None:
+    def _check_glitch(self, now_s: float) -> None:
         if self.test_ratio < 1.0:
             self._consistent_s = now_s
         else:
@@ -157,8 +170,8 @@ class Ekf:
         elif now_s - self._inconsistent_s > GLITCH_OVER_S:
             self._glitch = False
 
-    def _go_on_alone(self, now_s: float, rng: np.random.Generator) -> list[Change]:
-        """Dead reckoning with inertial sensors: the speed's error grows."""
+    def _dead_reckon(self, now_s: float, rng: np.random.Generator) -> list[Change]:
+        """Dead reckoning with inertial sensors: the velocity error grows."""
         if self._drift_m_s2 == (0.0, 0.0):
             north, east = rng.normal(0.0, DRIFT_M_S2, size=2)
             self._drift_m_s2 = float(north), float(east)
@@ -175,7 +188,7 @@ class Ekf:
         return [Change.STOPPED_AIDING]
 
     def _choose_source(self, now_s: float, armed: bool) -> list[Change]:
-        """Rover's AHRS leaves an EKF that does not use a GPS which has a fix, and one without a position."""
+        """Rover's AHRS switches to DCM when the EKF rejects a GPS with a fix, or has no position."""
         uses_gps = self.aiding and now_s - self._passed_s < GPS_SILENT_S
         refuses_gps = armed and self.gps_has_fix and not uses_gps
         lost = self._timed_out or not self.aiding
@@ -186,7 +199,7 @@ class Ekf:
         return [Change.TO_DCM if source is Source.DCM else Change.TO_EKF]
 
     def _check(self, armed: bool) -> list[Change]:
-        """Rover's EKF check: a second without a position is a failure, a second with one clears it."""
+        """Rover's EKF check: one second without a position is a failure, one second with a position clears it."""
         if not armed:
             self._failed_checks = 0
         elif not self.has_position:

@@ -1,7 +1,7 @@
-"""From a stream of bytes to whole MAVLink packets, by the rules of the firmware's own parser.
+"""Splits a stream of bytes into MAVLink packets, by the rules of the firmware's own parser.
 
-A beginning that is damaged takes as many bytes with it as its header claims, and every byte is looked at once, so a flood of
-anything costs time in proportion to its size. Nothing of the contents is believed here but the length.
+A damaged header consumes as many bytes as it claims, and each byte is inspected once, so the cost of a flood is
+proportional to its size. Only the length in the header is used here; checksums are verified elsewhere.
 """
 
 from __future__ import annotations
@@ -9,15 +9,17 @@ from __future__ import annotations
 import re
 
 MAGIC_1, MAGIC_2 = 0xFE, 0xFD
+
 SIGNED = 0x01
+
 HEADER_1, HEADER_2, CHECKSUM, SIGNATURE = 6, 10, 2, 13
 
 BEGINNING = re.compile(b"[\xfd\xfe]")
-"""A byte that a packet may begin with."""
+"""A byte with which a packet may begin."""
 
 
 def packet_size(data: bytes | bytearray, at: int) -> int | None:
-    """Bytes of the packet that begins at ``at``, as its header says; None while the header is not there yet."""
+    """Length in bytes of the packet that begins at ``at``, from its header; None while the header is incomplete."""
     if data[at] == MAGIC_1:
         return HEADER_1 + data[at + 1] + CHECKSUM if at + 1 < len(data) else None
     if at + 2 >= len(data):
@@ -26,14 +28,14 @@ def packet_size(data: bytes | bytearray, at: int) -> int | None:
 
 
 class Framer:
-    """Takes bytes in any pieces, gives what looks like whole packets; their checksums are not checked yet."""
+    """Takes bytes in pieces of any size and returns complete packets, whose checksums are not verified yet."""
 
     def __init__(self) -> None:
         """Nothing received yet."""
         self._rest = b""
 
     def feed(self, data: bytes) -> list[bytes]:
-        """The packets completed by these bytes; noise between them is dropped."""
+        """The packets completed by these bytes; bytes between packets are dropped."""
         buffer = self._rest + data
         packets: list[bytes] = []
         at = 0
@@ -43,7 +45,7 @@ class Framer:
             if size is None:
                 break
             if buffer[at] == MAGIC_2 and buffer[at + 2] & ~SIGNED:
-                at += 3  # a flag that nobody knows makes the packet unreadable
+                at += 3  # an unknown flag makes the packet unreadable
                 continue
             if at + size > len(buffer):
                 break

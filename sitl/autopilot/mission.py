@@ -1,6 +1,8 @@
-"""The mission under way, item by item (behaviour of AP_Mission): one navigation command at a time, others beside it, jumps.
+"""Order of the mission's commands: one navigation command at a time, others alongside, jumps (behaviour of AP_Mission).
 
-What a command does is told by whoever runs the mission; here is only which comes when.
+What a command does is up to the ``Runner`` (see ``mode_auto``).
+
+Nouns: AP_Mission.
 """
 
 from __future__ import annotations
@@ -10,18 +12,21 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Protocol
 
-from sitl.autopilot.items import JUMP, JUMP_TAG, JUMP_TO_TAG, Item
+from sitl.autopilot.mission_items import JUMP, JUMP_TAG, JUMP_TO_TAG, Item
 
 FOREVER = -1
+
 MOST_SEARCHED = 255
-"""Items looked at between two navigation commands, so that jumps cannot go round for ever."""
+"""Items visited at most between two navigation commands, so that jumps cannot loop endlessly."""
+
 MOST_JUMPS = 64
+
 MOST_COUNTED_JUMPS = 100
-"""So many jumps can be counted; further ones are not taken."""
+"""Number of jumps that can be counted; further ones are not taken."""
 
 
 class State(IntEnum):
-    """Of the mission as a whole; the values are those of MISSION_STATE."""
+    """State of the whole mission; the values are those of MISSION_STATE."""
 
     STOPPED = 2
     RUNNING = 3
@@ -29,18 +34,18 @@ class State(IntEnum):
 
 
 class Runner(Protocol):
-    """What begins commands and sees whether they are done."""
+    """Begins commands and checks whether they are done."""
 
     def start(self, index: int, item: Item) -> bool:
-        """Begin a command; False if this vehicle has no such command."""
+        """Begin a command; False if the vehicle does not know it."""
         ...
 
     def verify(self, index: int, item: Item) -> bool:
-        """Whether a command that was begun is done."""
+        """Whether a command that has begun is done."""
         ...
 
     def completed(self) -> None:
-        """The mission has come to its end."""
+        """The mission has ended."""
         ...
 
     def jumped(self, index: int, times: int, of: int) -> None:
@@ -50,7 +55,7 @@ class Runner(Protocol):
 
 @dataclass
 class Mission:
-    """The items (0 is home) and where in them the vehicle is."""
+    """The items (0 is home) and the vehicle's place in them."""
 
     items: list[Item] = field(default_factory=list)
     state: State = State.STOPPED
@@ -63,38 +68,38 @@ class Mission:
     do_done: bool = False
     jumps: dict[int, int] = field(default_factory=dict)
     changes: int = 0
-    """Counts every item that was written."""
+    """Number of items written so far."""
 
     @property
     def present(self) -> bool:
-        """Whether there is anything beside home."""
+        """Whether there is any item besides home."""
         return len(self.items) > 1
 
     @property
     def current(self) -> int:
-        """The navigation command under way, 0 if none."""
+        """Index of the present navigation command; 0 if none."""
         return self.nav_index or 0
 
     def reset(self) -> None:
-        """Forget where in the mission the vehicle is."""
+        """Forget the place in the mission."""
         self.nav_running = self.do_running = self.do_done = False
         self.nav_index = self.do_index = None
         self.jumps.clear()
 
     def start(self, runner: Runner) -> None:
-        """From the first command."""
+        """Start from the first command."""
         self.state = State.RUNNING
         self.reset()
         if not self._advance(runner):
             self._complete(runner)
 
     def stop(self) -> None:
-        """Stay where it is until it is resumed."""
+        """Pause until ``resume``."""
         if self.state == State.RUNNING:
             self.state = State.STOPPED
 
     def resume(self, runner: Runner) -> None:
-        """Go on with the command that was under way; from the beginning if there is none any more."""
+        """Continue with the interrupted command; start over if there is none."""
         if self.state == State.COMPLETE or self.nav_index is None or self.nav_index >= len(self.items):
             self.start(runner)
             return
@@ -106,7 +111,7 @@ class Mission:
             self.set_current(self.nav_index, runner)
 
     def clear(self) -> bool:
-        """Remove everything; not while it is running."""
+        """Remove all items; False while the mission is running."""
         if self.state == State.RUNNING:
             return False
         self.items.clear()
@@ -116,7 +121,7 @@ class Mission:
         return True
 
     def write(self, index: int, item: Item) -> None:
-        """Replace an item, or add one at the end."""
+        """Replace an item, or append one."""
         if index < len(self.items):
             self.items[index] = item
         else:
@@ -124,7 +129,7 @@ class Mission:
         self.changes += 1
 
     def update(self, runner: Runner) -> None:
-        """To be called often: see what is done, begin what comes next."""
+        """Check what is done and begin what comes next; to be called often."""
         if self.state != State.RUNNING or not self.items:
             return
         done = False
@@ -141,7 +146,7 @@ class Mission:
             self.do_running = False
 
     def set_current(self, index: int, runner: Runner) -> bool:
-        """Go to a command; while stopped, only remember it. False if there is no such command."""
+        """Continue at a command; while stopped, only remember it. False if there is no such command."""
         if index >= len(self.items) or len(self.items) == 1:
             return False
         self.do_index, self.do_running, self.do_done = None, False, False
@@ -172,7 +177,7 @@ class Mission:
         return True
 
     def restart_current(self, runner: Runner) -> bool:
-        """Begin the navigation command under way once more, as it is now."""
+        """Begin the present navigation command again, with its present content."""
         if self.nav_index is None or self.nav_index >= len(self.items):
             return False
         self.nav_item = self.items[self.nav_index]
@@ -183,7 +188,7 @@ class Mission:
         runner.completed()
 
     def _advance(self, runner: Runner, start_at: int | None = None) -> bool:
-        """Begin the next navigation command, and the first other one on the way there; False at the end."""
+        """Begin the next navigation command and the first other command before it; False at the end."""
         self.do_index, self.do_running, self.do_done = None, False, False
         if start_at is None:
             start_at = 1 if self.nav_index is None else self.nav_index + 1
@@ -206,7 +211,7 @@ class Mission:
         return False
 
     def _advance_do(self, runner: Runner) -> None:
-        """Begin the next command beside the navigation command, up to the next of that kind."""
+        """Begin the next command that runs alongside the present navigation command."""
         if self.do_done:
             return
         found = self.next_item(1 if self.do_index is None else self.do_index + 1, dict(self.jumps))
@@ -217,7 +222,7 @@ class Mission:
         runner.start(found, self.items[found])
 
     def next_item(self, index: int, jumps: dict[int, int], runner: Runner | None = None) -> int | None:
-        """The first item from ``index`` on that is no jump, following jumps and counting them in ``jumps``."""
+        """Index of the first item from ``index`` on that is not a jump; jumps are followed and counted in ``jumps``."""
         for _ in range(len(self.items) + MOST_JUMPS):
             if index >= len(self.items):
                 return None
@@ -242,14 +247,14 @@ class Mission:
         return None
 
     def _jump_target(self, item: Item) -> int:
-        """Where a jump goes; a tag is looked for from the beginning, and 0 is nowhere."""
+        """Index to which a jump leads, or 0; tags are searched from the beginning."""
         if item.command == JUMP:
             return int(item.params[0])
         tagged = (n for n, one in enumerate(self.items) if one.command == JUMP_TAG and one.params[0] == item.params[0])
         return next(tagged, 0)
 
     def next_nav(self, index: int) -> int | None:
-        """The next navigation command from ``index`` on, without counting jumps."""
+        """Index of the next navigation command from ``index`` on; jumps are not counted."""
         jumps = dict(self.jumps)
         for _ in range(len(self.items)):
             found = self.next_item(index, jumps)
@@ -259,7 +264,7 @@ class Mission:
         return None
 
     def ahead(self) -> Sequence[Item]:
-        """The command under way and the next two: what a change of the mission is noticed by."""
+        """The present command and the next two, by which a change of the mission is detected."""
         found: list[Item] = []
         index = self.nav_index
         while index is not None and index < len(self.items) and len(found) < 3:

@@ -1,39 +1,50 @@
-"""Flight modes, arming and failsafes: what ArduRover accepts, refuses and says (measured)."""
+"""Flight modes, arming and failsafes: what ArduRover accepts and refuses, and its texts (measured)."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.battery import LOW, NAMES, OK, arming_complaint
-from sitl.autopilot.boot import ARMABLE_S, PREARM_S
-from sitl.autopilot.control import COAST, STOP, outputs_fault
+from sitl.autopilot.control.records import COAST, STOP
+from sitl.autopilot.control.servo_outputs import outputs_fault
+from sitl.autopilot.destination import begin_driving
 from sitl.autopilot.ekf import Change
 from sitl.autopilot.fence import arming_fault
-from sitl.autopilot.plan import GuidedTask, Submode
-from sitl.autopilot.vehicle import AUTOPILOT_MODES, CRITICAL, INFO, NOTICE, WARNING, Mode, Vehicle
-from sitl.autopilot.ways import begin_driving, begin_return, begin_way_back, remember_start
+from sitl.autopilot.mode_rtl import begin_return
+from sitl.autopilot.mode_smart_rtl import begin_smart_rtl, remember_start
+from sitl.autopilot.start_up import ARMABLE_S, PREARM_S
+from sitl.autopilot.state import AUTOPILOT_MODES, GuidedTask, Mode, Submode
+from sitl.autopilot.vehicle import CRITICAL, INFO, NOTICE, WARNING, Vehicle
 
 NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.INITIALISING}
+
 FORCE = {2989, 21196}
-"""Magic numbers that arm or disarm against the checks."""
+"""Magic numbers that arm or disarm regardless of the checks."""
 
 GCS_SILENCE_S = 5.7
+
 PREARM_TEXT_EVERY_S = 30.0
+
 VARIANCE_TEXT_EVERY_S = 30.0
+
 NO_EKF_ACTION, REPORT_ONLY = 0, 2
-"""FS_EKF_ACTION; anything else is HOLD."""
+"""FS_EKF_ACTION; all other values mean HOLD."""
+
 DISARM_ACTION = 5
+
 BATTERY_MODES = {
     1: (Mode.RTL, Mode.HOLD),
     2: (Mode.HOLD,),
     3: (Mode.SMART_RTL, Mode.RTL, Mode.HOLD),
     4: (Mode.SMART_RTL, Mode.HOLD),
 }
-"""BATT_FS_LOW_ACT and BATT_FS_CRT_ACT: the modes tried one after the other."""
+"""BATT_FS_LOW_ACT and BATT_FS_CRT_ACT: the modes to try in turn."""
 
 
 def set_mode(vehicle: Vehicle, number: int) -> bool:
-    """Change the flight mode; a refused change leaves a text."""
+    """Change the flight mode; False, with a text, if that is refused."""
     try:
         mode = Mode(number)
     except ValueError:
@@ -45,19 +56,19 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
         vehicle.say(WARNING, "Flight mode change failed")
         return False
     if vehicle.mode == Mode.AUTO:
-        vehicle.plan.mission.stop()
+        vehicle.mission.stop()
     vehicle.mode = mode
     _enter(vehicle)
-    if vehicle.plan.fence.breached:
-        # Whoever changes the mode now is taken to be driving back by hand.
-        vehicle.plan.fence.recovering_since_s = vehicle.time_s
+    if vehicle.fence.breached:
+        # A change of mode during a breach counts as the pilot driving back by hand.
+        vehicle.fence.recovering_since_s = vehicle.time_s
     for channel in vehicle.channels.values():
         channel.requested.append(mavlink.MAVLINK_MSG_ID_HEARTBEAT)
     return True
 
 
 def _may_enter(vehicle: Vehicle, mode: Mode) -> bool:
-    if mode == Mode.AUTO and not vehicle.plan.mission.present:
+    if mode == Mode.AUTO and not vehicle.mission.present:
         vehicle.say(NOTICE, "No Mission. Can't set AUTO.")
         return False
     if mode == Mode.DOCK:
@@ -67,7 +78,7 @@ def _may_enter(vehicle: Vehicle, mode: Mode) -> bool:
         return False
     if mode in (Mode.RTL, Mode.SMART_RTL, Mode.LOITER) and not vehicle.has_position:
         return False
-    if mode == Mode.SMART_RTL and not vehicle.plan.way_back.active:
+    if mode == Mode.SMART_RTL and not vehicle.smart_rtl.active:
         return False
     return not (vehicle.armed and mode in AUTOPILOT_MODES and not vehicle.has_position)
 
@@ -78,38 +89,37 @@ def _enter(vehicle: Vehicle) -> None:
     control["task"] = STOP
     apply_sticks(vehicle)
     vehicle.destination = vehicle.place()
-    # HOLD takes the throttle away at once, it does not brake by a controller.
+    # HOLD cuts the throttle at once; it does not brake with a controller.
     if vehicle.mode in (Mode.MANUAL, Mode.ACRO, Mode.STEERING, Mode.SIMPLE, Mode.HOLD):
         control["task"] = COAST
     elif vehicle.mode == Mode.RTL:
         begin_return(vehicle)
     elif vehicle.mode == Mode.SMART_RTL:
-        begin_way_back(vehicle)
+        begin_smart_rtl(vehicle)
     elif vehicle.mode == Mode.AUTO:
-        vehicle.plan.auto.waiting = True
-        vehicle.plan.auto.submode = Submode.STOP
-        vehicle.plan.auto.guided = GuidedTask()
+        vehicle.auto.waiting = True
+        vehicle.auto.submode = Submode.STOP
+        vehicle.auto.guided = GuidedTask()
 
 
 def apply_sticks(vehicle: Vehicle) -> None:
-    """In MANUAL the pilot's sticks go straight to the motors."""
+    """In MANUAL, pass the pilot's sticks directly to the motors."""
     manual = vehicle.mode == Mode.MANUAL
     vehicle.control["stick_steering"] = vehicle.sticks.steering if manual else 0.0
     vehicle.control["stick_throttle"] = vehicle.sticks.throttle if manual else 0.0
 
 
 def arm(vehicle: Vehicle, force: bool = False) -> bool:
-    """Arm, or say why not."""
+    """Arm; False, with texts that say why, if that is refused."""
     if vehicle.armed:
         return True
     vehicle.clocks.logging_s = vehicle.time_s
-    reasons = [] if force else arming_faults(vehicle)
+    faults = [] if force else arming_faults(vehicle)
     if vehicle.mode in NOT_ARMABLE and not force:
-        reasons = ["Mode not armable"]
-    for reason in reasons:
-        # The check of the outputs always speaks as a check before arming.
-        vehicle.say(CRITICAL, f"PreArm: {reason}" if reason == outputs_fault(vehicle.parameters) else f"Arm: {reason}")
-    if reasons:
+        faults = [ArmingFault("Mode not armable")]
+    for fault in faults:
+        vehicle.say(CRITICAL, f"{'PreArm' if fault.always_prearm else 'Arm'}: {fault.text}")
+    if faults:
         return False
     vehicle.armed = True
     vehicle.clocks.armed_s = vehicle.time_s
@@ -119,19 +129,28 @@ def arm(vehicle: Vehicle, force: bool = False) -> bool:
     return True
 
 
-def arming_faults(vehicle: Vehicle) -> list[str]:
-    """What the arming checks complain of in this mode at this time."""
+class ArmingFault(NamedTuple):
+    """A complaint of the arming checks, in the firmware's words; some say "PreArm" even when arming was tried."""
+
+    text: str
+    always_prearm: bool = False
+
+
+def arming_faults(vehicle: Vehicle) -> list[ArmingFault]:
+    """What the arming checks complain about in this mode at this time."""
     if not vehicle.has_home:
-        return ["Accels inconsistent", "AHRS: waiting for home"]
+        return [ArmingFault("Accels inconsistent"), ArmingFault("AHRS: waiting for home")]
     battery = arming_complaint(vehicle.parameters, vehicle.volts(), vehicle.used_mah())
-    faults = [fault for fault in (battery, outputs_fault(vehicle.parameters)) if fault]
+    outputs = outputs_fault(vehicle.parameters)
+    faults = [ArmingFault(battery)] if battery else []
+    faults += [ArmingFault(outputs, always_prearm=True)] if outputs else []
     located = vehicle.has_position and vehicle.time_s >= ARMABLE_S + vehicle.gps_late.position_s
     if vehicle.mode in AUTOPILOT_MODES and not located:
-        return [*faults, "AHRS: not using configured AHRS type"]
+        return [*faults, ArmingFault("AHRS: not using configured AHRS type")]
     if vehicle.time_s < PREARM_S:
-        return [*faults, "Accels inconsistent"]
+        return [*faults, ArmingFault("Accels inconsistent")]
     fence = arming_fault(vehicle)
-    return faults if fence is None else [*faults, fence]
+    return faults if fence is None else [*faults, ArmingFault(fence)]
 
 
 def disarm(vehicle: Vehicle) -> None:
@@ -141,12 +160,12 @@ def disarm(vehicle: Vehicle) -> None:
         vehicle.clocks.logging_s = vehicle.time_s
         vehicle.control["armed"] = 0
         if vehicle.mode != Mode.AUTO:
-            vehicle.plan.mission.reset()
+            vehicle.mission.reset()
         vehicle.say(INFO, "Throttle disarmed")
 
 
 def run_failsafes(vehicle: Vehicle) -> None:
-    """Once a second: the ground station's silence, the battery, and the pre-arm complaint every half minute."""
+    """Once a second: ground station failsafe, battery failsafe, and the pre-arm complaint every half minute."""
     _watch_battery(vehicle)
     _forget_override(vehicle)
     seen_s = vehicle.clocks.ground_station_s
@@ -158,12 +177,12 @@ def run_failsafes(vehicle: Vehicle) -> None:
     due = vehicle.time_s - vehicle.clocks.prearm_text_s >= PREARM_TEXT_EVERY_S
     if not vehicle.armed and due:
         vehicle.clocks.prearm_text_s = vehicle.time_s
-        for reason in arming_faults(vehicle)[:1]:
-            vehicle.say(CRITICAL, f"PreArm: {reason}")
+        for fault in arming_faults(vehicle)[:1]:
+            vehicle.say(CRITICAL, f"PreArm: {fault.text}")
 
 
 def _watch_battery(vehicle: Vehicle) -> None:
-    """Rover's battery failsafe: a text, and what BATT_FS_LOW_ACT or BATT_FS_CRT_ACT says."""
+    """Rover's battery failsafe: a text, and the action of BATT_FS_LOW_ACT or BATT_FS_CRT_ACT."""
     vehicle.drain()
     if not vehicle.armed or int(vehicle.parameters["BATT_MONITOR"]) == 0:
         return
@@ -176,7 +195,7 @@ def _watch_battery(vehicle: Vehicle) -> None:
 
 
 def _battery_action(vehicle: Vehicle, action: int) -> None:
-    """0 nothing, 1 RTL, 2 HOLD, 3 SMART_RTL, 4 SMART_RTL or HOLD, 5 disarm; what cannot be done falls back to the next."""
+    """0 nothing, 1 RTL, 2 HOLD, 3 SMART_RTL, 4 SMART_RTL or HOLD, 5 disarm; a refused mode falls back to the next."""
     if action == DISARM_ACTION:
         disarm(vehicle)
         return
@@ -193,8 +212,8 @@ def _forget_override(vehicle: Vehicle) -> None:
         apply_sticks(vehicle)
 
 
-def tell_of_ekf(vehicle: Vehicle, changes: list[Change]) -> None:
-    """Say what has changed about the EKF, and carry out Rover's EKF failsafe."""
+def report_ekf(vehicle: Vehicle, changes: list[Change]) -> None:
+    """Report changes of the EKF, and take the action of Rover's EKF failsafe."""
     for change in changes:
         if change is Change.FAILED:
             _ekf_failsafe(vehicle)

@@ -1,7 +1,9 @@
-"""What the autopilot itself does with obstacle distances when PRX1_TYPE is 2: it echoes them, and it slows down.
+"""Proximity sensing with PRX1_TYPE 2: the autopilot echoes obstacle distances and slows down for them (AP_Proximity).
 
-Both are traps for a companion (measured): its own OBSTACLE_DISTANCE comes back as DISTANCE_SENSOR with ids 10 to 17, and
-the rover's simple avoidance lets it creep to AVOID_MARGIN before an obstacle and stay there without a word.
+Both can mislead a companion (measured): its own OBSTACLE_DISTANCE comes back as DISTANCE_SENSOR with ids 10 to 17,
+and the rover's simple avoidance creeps to AVOID_MARGIN before an obstacle and stays there without any text.
+
+Nouns: AP_Proximity.
 """
 
 from __future__ import annotations
@@ -14,16 +16,22 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sitl.autopilot.vehicle import Vehicle
 
 MAVLINK_SOURCE = 2
+
 FIRST_ID = 10
+
 OCTANTS = 8
+
 AHEAD_DEG = 22.5
+
 STALE_S = 0.5
+
 UNKNOWN = 65535
+
 BODY_FRAME = 12
 
 
 def take_in(vehicle: Vehicle, message: Any) -> None:
-    """OBSTACLE_DISTANCE: keep the nearest range of each eighth of a turn, in centimetres."""
+    """Take in OBSTACLE_DISTANCE: keep the nearest range of each eighth of a turn, in centimetres."""
     increment_deg = message.increment_f or float(message.increment)
     usable = message.frame == BODY_FRAME and 0.0 < increment_deg <= 360.0 and math.isfinite(message.angle_offset)
     if int(vehicle.parameters["PRX1_TYPE"]) != MAVLINK_SOURCE or not usable:
@@ -41,14 +49,14 @@ def take_in(vehicle: Vehicle, message: Any) -> None:
 
 
 def forget_stale(vehicle: Vehicle) -> None:
-    """Ranges that have gone silent count as nothing there: the rover drives on at full speed (measured)."""
+    """Forget ranges that are not updated any more: the rover then drives on at full speed (measured)."""
     if vehicle.time_s - vehicle.proximity.heard_s > STALE_S:
         vehicle.proximity.octants_cm = []
         vehicle.control["room_m"] = math.inf
 
 
 def echoes(vehicle: Vehicle) -> list[Any]:
-    """DISTANCE_SENSOR for each eighth; ``current == max`` where nothing is."""
+    """DISTANCE_SENSOR for each eighth of a turn; ``current == max`` means no obstacle."""
     near_cm, far_cm = vehicle.proximity.limits_cm
     now_ms = vehicle.time_us // 1000
     return [

@@ -1,4 +1,7 @@
-"""Which packet goes where when the vehicle has several links, as ArduPilot's own router decides it."""
+"""Routing of packets between the vehicle's links (behaviour of MAVLink_routing).
+
+Nouns: MAVLink_routing.
+"""
 
 from __future__ import annotations
 
@@ -6,12 +9,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 AUTOPILOT = 1
+
 MOST_ROUTES = 20
 
 
 @dataclass(frozen=True, slots=True)
 class Route:
-    """A component was heard on a channel."""
+    """A component, and a channel on which it was heard."""
 
     system: int
     component: int
@@ -19,10 +23,10 @@ class Route:
 
 
 class Router:
-    """Who was heard where; a component may be heard on several channels."""
+    """The routes learned so far; a component may be heard on several channels."""
 
     def __init__(self) -> None:
-        """Nobody heard yet."""
+        """No routes yet."""
         self._routes: list[Route] = []
 
     def learn(self, system: int, component: int, channel: int) -> None:
@@ -32,18 +36,19 @@ class Router:
             self._routes.append(route)
 
     def forget(self, channel: int) -> None:
-        """A channel was closed."""
+        """Forget the routes of a closed channel."""
         self._routes = [route for route in self._routes if route.channel != channel]
 
     def heartbeat_to(self, system: int, component: int, source: int, active: Iterable[int]) -> set[int]:
-        """Where a heartbeat is passed on: to every active channel but those on which its sender was heard."""
+        """Channels to which a heartbeat is forwarded: all active ones except those on which its sender was heard."""
         heard = {route.channel for route in self._routes if (route.system, route.component) == (system, component)}
         return set(active) - heard - {source}
 
     def forward_to(self, system: int, target_system: int, target_component: int, source: int) -> set[int]:
-        """Channels that get a copy of a packet from channel ``source``; target 0 is everybody, or no target at all.
+        """Channels that get a copy of a packet from channel ``source``; target 0 is a broadcast, or no target at all.
 
-        ``system`` is the autopilot's own. A packet for another system goes wherever any part of that system was heard.
+        ``system`` is the autopilot's own. A packet for another system goes to every channel on which that system was
+        heard.
         """
         if target_system == system and target_component == AUTOPILOT:
             return set()
@@ -57,7 +62,7 @@ class Router:
 
     @staticmethod
     def is_for_autopilot(system: int, target_system: int, target_component: int, forwarded: bool) -> bool:
-        """Whether the autopilot acts on a packet: its own, everybody's, and what could be passed on to nobody."""
+        """Whether the autopilot handles a packet: addressed to it, a broadcast, or one that could not be forwarded."""
         if target_system not in (0, system):
             return False
         return target_component in (0, AUTOPILOT) or not forwarded

@@ -1,8 +1,8 @@
-"""Signed packets (MAVLink 2, "Message Signing") as ArduPilot handles them.
+"""Signed packets (MAVLink 2 message signing) as ArduPilot handles them.
 
-A key that was set with SETUP_SIGNING is kept over reboots. From then on everything sent in MAVLink 2 is signed, and what
-arrives unsigned, wrongly signed or for the second time is refused; except on the first serial port, which counts as a cable
-that only the owner has in hand, and except what radios say of themselves.
+A key set with SETUP_SIGNING survives reboots. From then on everything sent in MAVLink 2 is signed, and packets that
+are unsigned, wrongly signed or replayed are refused. Exceptions: the first serial port, which counts as a cable that
+only the owner can reach, and the status messages of radios.
 """
 
 from __future__ import annotations
@@ -14,31 +14,38 @@ from typing import Any
 from sitl.autopilot.framing import SIGNATURE
 
 KEY_BYTES = 32
+
 MINUTE = 60 * 100_000
 """Signing timestamps count 10 microseconds since 2015."""
+
 TIMESTAMPS = 1 << 48
+
 SAVED_EVERY_S = 30.0
+
 MOST_STREAMS = 16
+
 SECURE_PORT = 0
+
 RADIO, RADIO_STATUS = 166, 109
+
 ACCEPTED_UNSIGNED = {RADIO, RADIO_STATUS}
 
 
 @dataclass(frozen=True, slots=True)
 class StoredKey:
-    """What outlives a reboot: the key and the newest timestamp that was saved with it."""
+    """What survives a reboot: the key and the newest timestamp saved with it."""
 
     secret: bytes = bytes(KEY_BYTES)
     timestamp: int = 0
 
     @property
     def in_use(self) -> bool:
-        """A key of zeros with the timestamp 0 means: no signing."""
+        """A key of zeros with timestamp 0 means: no signing."""
         return self.timestamp != 0 or any(self.secret)
 
 
 class Signing:
-    """The vehicle's key, and who has signed with it so far. A link's own state is in its codec (``codec.signing``)."""
+    """The vehicle's key and the signatures seen so far; a link's own state is in its codec (``codec.signing``)."""
 
     def __init__(self) -> None:
         """No key."""
@@ -47,13 +54,14 @@ class Signing:
         self._saved_s = 0.0
 
     def restore(self, stored: StoredKey) -> None:
-        """The key as it was before a reboot."""
+        """Take over the key from before a reboot."""
         self.stored = stored
 
     def prepare(self, codec: Any, link: int) -> None:
-        """Let a link sign with the stored key, or stop signing.
+        """Make a link sign with the stored key, or stop signing.
 
-        It starts one minute after the saved timestamp: as that is saved every half minute, no old packet fits any more.
+        Its timestamps start one minute after the saved one: that is saved every half minute, so no old packet is
+        accepted.
         """
         signing = codec.signing
         signing.link_id = link & 0xFF
@@ -62,12 +70,12 @@ class Signing:
         signing.secret_key = self.stored.secret if self.stored.in_use else None
 
     def follow(self, codec: Any, link: int) -> None:
-        """Another component of the vehicle that has the same key, and takes over a new one."""
+        """Give a further component of the vehicle the present key."""
         if (codec.signing.secret_key or bytes(KEY_BYTES)) != self.stored.secret:
             self.prepare(codec, link)
 
     def accepts(self, codec: Any, packet: bytes, identity: tuple[int, int, int], signed: bool, secure: bool) -> bool:
-        """Whether a link takes in a whole packet; ``identity``: its system, component and message id."""
+        """Whether a link accepts a packet; ``identity``: its system, component and message id."""
         if codec.signing.secret_key is None:
             return True
         if signed and self._signed_rightly(codec.signing, packet, identity):
@@ -75,7 +83,7 @@ class Signing:
         return secure or identity[2] in ACCEPTED_UNSIGNED
 
     def _signed_rightly(self, link: Any, packet: bytes, identity: tuple[int, int, int]) -> bool:
-        """The signature fits, and it is newer than everything this sender has signed before."""
+        """Whether the signature is correct, and newer than any other of this sender."""
         wanted = hashlib.sha256(link.secret_key + packet[:-6]).digest()[:6]
         if wanted != packet[-6:]:
             return False
@@ -92,7 +100,7 @@ class Signing:
         return True
 
     def save(self, codecs: list[Any], time_s: float) -> None:
-        """Every half minute: keep the newest timestamp that a link has used or heard."""
+        """Every half minute, store the newest timestamp that a link has used or received."""
         if time_s - self._saved_s < SAVED_EVERY_S or not self.stored.in_use:
             return
         self._saved_s = time_s

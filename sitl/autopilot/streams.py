@@ -1,9 +1,9 @@
-"""Which message is due when, on each channel: the firmware's own rates, and those that are asked for."""
+"""Stream rates of each channel: the firmware's defaults and what was requested; sends what is due."""
 
 from __future__ import annotations
 
-from sitl.autopilot.boot import STREAMS_S
-from sitl.autopilot.link import Channel
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.start_up import STREAMS_S
 from sitl.autopilot.telemetry import MESSAGES, requested_messages
 from sitl.autopilot.vehicle import Vehicle
 
@@ -23,7 +23,7 @@ GROUPS: dict[int, tuple[int, ...]] = {
 
 
 def start_streams(channel: Channel, now_us: int) -> None:
-    """All default streams, beginning with the next whole second (not before the streams begin)."""
+    """Start all default streams at the next whole second, but not before ``STREAMS_S``."""
     first_us = max(int(STREAMS_S * 1e6), (now_us // 1_000_000 + 1) * 1_000_000)
     for number in MESSAGES:
         channel.interval_us[number] = DEFAULT_INTERVAL_US
@@ -31,7 +31,7 @@ def start_streams(channel: Channel, now_us: int) -> None:
 
 
 def set_interval(channel: Channel, number: int, interval_us: int, now_us: int) -> None:
-    """Stream a message at an interval from now on; -1 stops it."""
+    """Set the interval of a streamed message; -1 stops it."""
     channel.interval_us[number] = interval_us
     channel.due_us.pop(number, None)
     if interval_us > 0:
@@ -39,14 +39,14 @@ def set_interval(channel: Channel, number: int, interval_us: int, now_us: int) -
 
 
 def set_group(channel: Channel, group: int, rate_hz: int, now_us: int) -> None:
-    """REQUEST_DATA_STREAM: a whole group's rate, at most what the loop allows; 0 stops it."""
+    """REQUEST_DATA_STREAM: set the rate of a group, limited by the main loop; 0 stops it."""
     interval_us = -1 if rate_hz <= 0 else max(1_000_000 // rate_hz, 25_000)
     for number in GROUPS.get(group, tuple(MESSAGES) if group == 0 else ()):
         set_interval(channel, number, interval_us, now_us)
 
 
 def send_due(vehicle: Vehicle, channel: Channel) -> None:
-    """Send every streamed message whose time has come, and what was asked for once."""
+    """Send every streamed message that is due, and single messages that were requested."""
     for number in channel.requested:
         for message in requested_messages(vehicle, number):
             channel.send(message)

@@ -1,31 +1,104 @@
-"""Telemetry: how each message is made of the vehicle's state."""
+"""Telemetry: each message that the autopilot streams or sends on request, built from the vehicle's state."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.boot import EKF_SEEN_S, LOCAL_POSITION_S
-from sitl.autopilot.control import LEG
+from sitl.autopilot.control.records import LEG
 from sitl.autopilot.fence import fence_status
-from sitl.autopilot.modes import base_mode
+from sitl.autopilot.modes import NOT_ARMABLE, arming_faults, base_mode
 from sitl.autopilot.proximity import echoes
-from sitl.autopilot.status import battery_readings, sys_status
-from sitl.autopilot.vehicle import ALTITUDE_M, AUTOPILOT_MODES, Mode, Vehicle
+from sitl.autopilot.start_up import ARMABLE_S, EKF_SEEN_S, LOCAL_POSITION_S
+from sitl.autopilot.state import AUTOPILOT_MODES, Mode
+from sitl.autopilot.vehicle import Vehicle
 from sitl.sensors.range_sensors import Reading
 from sitl.world import geodesy
+from sitl.world.geodesy import ALTITUDE_M
+
+GYRO_ACCEL_MAG_BARO, GPS, LASER = 0b1111, 1 << 5, 1 << 8
+
+STABILISED, NAVIGATING = 1 << 10 | 1 << 11, 1 << 12 | 1 << 14
+
+MOTORS_AND_RC, GEOFENCE, AHRS, LOGGING, BATTERY, PREARM = 1 << 15 | 1 << 16, 1 << 20, 1 << 21, 1 << 24, 1 << 25, 1 << 28
+
+ALWAYS = GYRO_ACCEL_MAG_BARO | MOTORS_AND_RC | BATTERY
+
+AHRS_USED_S = 22.0
+"""From here on the estimate counts as in use (measured)."""
+
+LOGGING_S = 15.0
+"""The log continues for this long after disarming or a refused arming."""
+
+
+def sys_status(vehicle: Vehicle) -> list[Any]:
+    """SYS_STATUS: which parts are present, in use and healthy, as measured over a boot and in each mode."""
+    gps = GPS if vehicle.has_home and vehicle.ekf.gps_has_fix else 0
+    laser = LASER if vehicle.sensing.suite.beams else 0
+    control = 0 if vehicle.mode in (Mode.MANUAL, Mode.HOLD, Mode.INITIALISING) else STABILISED
+    control |= NAVIGATING if vehicle.mode in AUTOPILOT_MODES else 0
+    present = ALWAYS | gps | laser | STABILISED | NAVIGATING | GEOFENCE | AHRS | LOGGING | PREARM
+    enabled = ALWAYS | gps | laser | control | PREARM
+    enabled |= AHRS if vehicle.time_s >= AHRS_USED_S else 0
+    logging = vehicle.armed or vehicle.time_s - vehicle.clocks.logging_s < LOGGING_S
+    enabled |= LOGGING if logging else 0
+    health = ALWAYS | gps | LASER | control | GEOFENCE | LOGGING
+    health |= AHRS if vehicle.time_s >= ARMABLE_S else 0
+    health |= 0 if arming_faults(vehicle) or vehicle.mode in NOT_ARMABLE else PREARM
+    enabled |= GEOFENCE if vehicle.fence.enabled and vehicle.parameters["FENCE_ACTION"] > 0.0 else 0
+    health &= ~GEOFENCE if vehicle.fence.breached else ~0
+    health &= ~BATTERY if vehicle.battery.worst else ~0
+    battery = battery_readings(vehicle)
+    return [
+        mavlink.MAVLink_sys_status_message(
+            present, enabled, health, 0, battery.volts_mv, battery.amps_ca, battery.percent, 0, 0, 0, 0, 0, 0
+        )
+    ]
+
+
+class BatteryReadings(NamedTuple):
+    """Readings of the battery monitor, each limited to the range of its field in a message."""
+
+    volts_mv: int
+    amps_ca: int
+    used_mah: int
+    used_hj: int
+    """Hundreds of joules since boot."""
+    percent: int
+
+
+def battery_readings(vehicle: Vehicle) -> BatteryReadings:
+    """The readings of this moment."""
+    used_hj = 36.0 * float(vehicle.control[0]["used_wh"])
+    return BatteryReadings(
+        _within(1000.0 * vehicle.volts() + 0.5, 0, 65534),
+        _within(100.0 * vehicle.amps(), -32768, 32767),
+        _within(vehicle.used_mah(), -(2**31), 2**31 - 1),
+        _within(used_hj, -(2**31), 2**31 - 1),
+        vehicle.battery_percent(),
+    )
+
+
+def _within(value: float, low: int, high: int) -> int:
+    """The value as an integer between two limits; NaN becomes the lower one."""
+    return int(min(max(value, low), high)) if value > low else low
+
 
 NAN = float("nan")
+
 GROUND_ROVER, SURFACE_BOAT = 10, 11
 """MAV_TYPE."""
+
 BOAT = 2
 """FRAME_CLASS."""
+
 STANDBY, ACTIVE, CALIBRATING = 3, 4, 2
+
 CAPABILITIES = 61935
-"""The firmware's (measured). That of files is among them; what is asked about files is answered (`files`)."""
+"""The firmware's capabilities (measured). File transfer is among them, see ``ftp``."""
 
 Builder = Callable[[Vehicle], list[Any]]
 
@@ -81,7 +154,7 @@ def _ekf_status(vehicle: Vehicle) -> list[Any]:
 
 def _gps_raw(vehicle: Vehicle) -> list[Any]:
     if vehicle.has_home and vehicle.ekf.gps_has_fix and not vehicle.ekf.gps.talks:
-        return []  # while a receiver counts as there, only what is new is sent
+        return []  # while the receiver counts as present, only new fixes are sent
     if not vehicle.has_home or not vehicle.ekf.gps_has_fix:
         return [mavlink.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, 65535, 65535, 0, 0, 0)]
     lat, lon = vehicle.gps_place()
@@ -96,8 +169,8 @@ def _gps_raw(vehicle: Vehicle) -> list[Any]:
     ]  # fmt: skip
 
 
-def _beside_leg_m(vehicle: Vehicle) -> float:
-    """Metres left (positive) or right of the leg that is driven; 0 where there is none."""
+def _cross_track_m(vehicle: Vehicle) -> float:
+    """Metres left (positive) or right of the present leg; 0 without one."""
     control, (north_m, east_m) = vehicle.control[0], vehicle.position_m()
     leg_n, leg_e = float(control["dest_n"] - control["from_n"]), float(control["dest_e"] - control["from_e"])
     length_m = math.hypot(leg_n, leg_e)
@@ -110,15 +183,15 @@ def _navigation(vehicle: Vehicle) -> list[Any]:
     if vehicle.mode not in AUTOPILOT_MODES:
         return []
     bearing = distance = 0
-    beside_m = 0.0
+    cross_track_m = 0.0
     if vehicle.has_target:
         north, east = geodesy.offset_m(vehicle.place(), vehicle.destination)
         bearing = round(math.degrees(math.atan2(east, north))) % 360
         distance = int(math.hypot(north, east))
-        beside_m = _beside_leg_m(vehicle)
+        cross_track_m = _cross_track_m(vehicle)
     return [
         mavlink.MAVLink_nav_controller_output_message(
-            0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, beside_m
+            0.0, 0.0, bearing, bearing, min(distance, 65535), 0.0, 0.0, cross_track_m
         )
     ]
 
@@ -161,14 +234,14 @@ def _rangefinder(vehicle: Vehicle) -> list[Any]:
 
 
 def read_beams(vehicle: Vehicle) -> list[Reading]:
-    """What the rangefinders say at this moment."""
+    """The readings of the rangefinders at this moment."""
     rover = vehicle.rover[0]
     return vehicle.sensing.wired(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
 
 
 def mission_current(vehicle: Vehicle, seq: int) -> Any:
     """MISSION_CURRENT with a given item; the total does not count home."""
-    mission = vehicle.plan.mission
+    mission = vehicle.mission
     state = int(mission.state) if mission.present else mavlink.MISSION_STATE_NO_MISSION
     return mavlink.MAVLink_mission_current_message(
         seq, max(len(mission.items) - 1, 0), state, int(vehicle.mode == Mode.AUTO)
@@ -237,7 +310,7 @@ def _rc_channels(vehicle: Vehicle) -> list[Any]:
 
 
 def stick_us(share: float) -> int:
-    """A stick's place, -1 to 1, as the length of its pulse in microseconds."""
+    """A stick's position, -1 to 1, as a pulse length in microseconds."""
     return 1500 + round(500.0 * share)
 
 
@@ -260,7 +333,7 @@ MESSAGES: dict[int, Builder] = {
     125: lambda _: [mavlink.MAVLink_power_status_message(5000, 0, 0)],
     152: lambda _: [mavlink.MAVLink_meminfo_message(0, 65535, 524288)],
     62: _navigation,
-    42: lambda v: [mission_current(v, v.plan.mission.current)],
+    42: lambda v: [mission_current(v, v.mission.current)],
     36: _servos,
     65: _rc_channels,
     27: _raw_imu,
@@ -283,7 +356,7 @@ MESSAGES: dict[int, Builder] = {
     173: _rangefinder,
     162: fence_status,
 }
-"""Streamed at 1 Hz unless asked otherwise; a builder gives nothing while there is nothing to tell."""
+"""Streamed at 1 Hz unless requested otherwise; a builder returns nothing while there is nothing to send."""
 
 ON_REQUEST: dict[int, Builder] = {0: heartbeat, 49: _gps_origin, 148: _version, 242: _home}
 
@@ -294,6 +367,6 @@ def streamable(number: int) -> bool:
 
 
 def requested_messages(vehicle: Vehicle, number: int) -> list[Any]:
-    """One message made now; empty if there is nothing to tell."""
+    """The message with this id, built now; empty if there is nothing to send."""
     builder = MESSAGES.get(number) or ON_REQUEST[number]
     return builder(vehicle)

@@ -1,7 +1,7 @@
-"""Moving obstacles that tell of themselves, as a rover hears them on its autopilot's links.
+"""Moving obstacles that announce themselves over MAVLink: as vehicles, by ADS-B or by AIS.
 
-A ``vehicle`` is a MAVLink system of its own on the same network: HEARTBEAT and GLOBAL_POSITION_INT. What ``adsb`` and ``ais``
-send on the air reaches the autopilot's receivers, and the autopilot passes it on as ADSB_VEHICLE and AIS_VESSEL.
+A vehicle is a MAVLink system of its own on the same network: HEARTBEAT and GLOBAL_POSITION_INT. ADS-B and AIS reach the
+autopilot's receivers by radio, and the autopilot sends them on as ADSB_VEHICLE and AIS_VESSEL.
 """
 
 from __future__ import annotations
@@ -12,29 +12,36 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.link import Channel, new_codec, packed
+from sitl.autopilot.channel import Channel, new_codec, packed
 from sitl.autopilot.routing import AUTOPILOT
-from sitl.autopilot.vehicle import ALTITUDE_M
 from sitl.world import geodesy
+from sitl.world.geodesy import ALTITUDE_M
+from sitl.world.movers import Announcement
 from sitl.world.world import World
 
 FIRST_SYSTEM = 101
 """System id of the first mover that announces itself as a vehicle; the others count on."""
-INTERVALS_S = {"vehicle": 0.25, "adsb": 1.0, "ais": 1.0}
+
+INTERVALS_S = {Announcement.VEHICLE: 0.25, Announcement.ADSB: 1.0, Announcement.AIS: 1.0}
+
 HEARTBEAT_S = 1.0
+
 GENERIC, GROUND_ROVER, ACTIVE = 0, 10, 4
+
 SURFACE_SERVICE = 18
+
 ADSB_FLAGS = (
     mavlink.ADSB_FLAGS_VALID_COORDS
     | mavlink.ADSB_FLAGS_VALID_ALTITUDE
     | mavlink.ADSB_FLAGS_VALID_HEADING
     | mavlink.ADSB_FLAGS_VALID_VELOCITY
 )
+
 AIS_FLAGS = mavlink.AIS_FLAGS_VALID_COG | mavlink.AIS_FLAGS_VALID_VELOCITY | mavlink.AIS_FLAGS_VALID_DIMENSIONS
 
 
 class Traffic:
-    """Sends what every announced mover tells; vehicles have sequence numbers of their own."""
+    """Sends the messages of every mover that announces itself; vehicles have sequence numbers of their own."""
 
     def __init__(self, world: World, origin: tuple[int, int], origin_m: tuple[float, float]) -> None:
         """``origin``: a place on earth, 1e-7 degree; ``origin_m``: the same place in the world frame."""
@@ -42,7 +49,7 @@ class Traffic:
         self._origin = origin
         self._origin_m = origin_m
         self._talkers = [number for number, mover in enumerate(world.movers) if mover.announce]
-        vehicles = [number for number in self._talkers if world.movers[number].announce == "vehicle"]
+        vehicles = [number for number in self._talkers if world.movers[number].announce is Announcement.VEHICLE]
         self._codecs = {n: new_codec(AUTOPILOT, min(FIRST_SYSTEM + i, 250)) for i, n in enumerate(vehicles)}
         self._due_s = {number: 0.05 * i for i, number in enumerate(self._talkers)}
         self._heartbeat_s = dict.fromkeys(vehicles, 0.0)
@@ -53,7 +60,7 @@ class Traffic:
         return bool(self._talkers)
 
     def next_due_s(self) -> float:
-        """Time of the next packet; inf when nobody talks."""
+        """Time of the next packet; inf without announced movers."""
         return min(self._due_s.values(), default=math.inf)
 
     def send_due(self, time_s: float, channels: Iterable[Channel]) -> None:
@@ -62,7 +69,9 @@ class Traffic:
         for number in self._talkers:
             if time_s < self._due_s[number] - 1e-9:
                 continue
-            self._due_s[number] += INTERVALS_S[self._world.movers[number].announce]
+            announcement = self._world.movers[number].announce
+            assert announcement is not None
+            self._due_s[number] += INTERVALS_S[announcement]
             for message in self._messages(number, time_s):
                 data = packed(message, self._codecs[number]) if number in self._codecs else b""
                 for channel in channels:
@@ -77,9 +86,9 @@ class Traffic:
         place = geodesy.moved(self._origin, north_m - self._origin_m[0], east_m - self._origin_m[1])
         course_cdeg = round(math.degrees(math.atan2(east_m_s, north_m_s)) * 100.0) % 36000
         speed_cm_s = round(100.0 * math.hypot(north_m_s, east_m_s))
-        if mover.announce == "adsb":
+        if mover.announce is Announcement.ADSB:
             return [_adsb(number, place, course_cdeg, speed_cm_s, mover.name)]
-        if mover.announce == "ais":
+        if mover.announce is Announcement.AIS:
             return [_ais(number, place, course_cdeg, speed_cm_s, mover.radius_m, mover.name)]
         messages: list[Any] = []
         if time_s >= self._heartbeat_s[number] - 1e-9:

@@ -1,97 +1,57 @@
-"""The vehicle's state that all parts of the autopilot share: records of the compiled loop, mode, position, who listens."""
+"""The state of the simulated ArduRover that all parts of the autopilot share: records, mode, position, channels."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from enum import IntEnum
 from typing import Any
 
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.battery import Battery, rest_volts
-from sitl.autopilot.boot import ATTITUDE_S, HOME_S, ORIGIN_S, POSITION_S, GpsLate
-from sitl.autopilot.control import CIRCLE, LEG, LOOP_HZ, WAYPOINT, Record, new_control, new_estimate, new_tuning
+from sitl.autopilot.channel import Channel
+from sitl.autopilot.control.records import (
+    CIRCLE,
+    LEG,
+    LOOP_HZ,
+    WAYPOINT,
+    MotionRecords,
+    Record,
+    new_control,
+    new_estimate,
+    new_tuning,
+)
 from sitl.autopilot.ekf import Ekf
-from sitl.autopilot.link import Channel
-from sitl.autopilot.params import Parameters
-from sitl.autopilot.plan import Plan, Storage, Submode, new_plan
+from sitl.autopilot.mission import Mission
+from sitl.autopilot.parameters import Parameters
 from sitl.autopilot.routing import Router
 from sitl.autopilot.signing import Signing
+from sitl.autopilot.start_up import ATTITUDE_S, HOME_S, ORIGIN_S, POSITION_S, GpsLate
+from sitl.autopilot.state import (
+    DRIVEN_MODES,
+    AutoState,
+    Clocks,
+    FenceState,
+    Mode,
+    Proximity,
+    SmartRtl,
+    Sticks,
+    Storage,
+    Submode,
+    Upload,
+)
 from sitl.sensors.range_sensors import RangeSensing
 from sitl.world import geodesy
 
-ALTITUDE_M = 120.0
-"""Height of the ground everywhere, above sea level."""
-
 MOST_TEXTS = 30
-"""Texts that wait to be sent; more push the oldest ones out, as in the firmware's queue."""
+"""Length of the queue of texts; when it is full the oldest are dropped, as in the firmware."""
 
 EKF_UNINITIALISED, EKF_CONSTANT_POSITION = 1024, 167
-"""EKF_STATUS_REPORT flags of the start-up: nothing yet; attitude and velocity but a constant position."""
-
+"""EKF_STATUS_REPORT flags during the start-up: not initialised; attitude and velocity with a constant position."""
 
 CRITICAL, ERROR, WARNING, NOTICE, INFO = 2, 3, 4, 5, 6
-"""MAV_SEVERITY of what is said."""
-
-
-class Mode(IntEnum):
-    """ArduRover's flight modes."""
-
-    MANUAL = 0
-    ACRO = 1
-    STEERING = 3
-    HOLD = 4
-    LOITER = 5
-    FOLLOW = 6
-    SIMPLE = 7
-    DOCK = 8
-    CIRCLE = 9
-    AUTO = 10
-    RTL = 11
-    SMART_RTL = 12
-    GUIDED = 15
-    INITIALISING = 16
-
-
-AUTOPILOT_MODES = {Mode.LOITER, Mode.CIRCLE, Mode.AUTO, Mode.RTL, Mode.SMART_RTL, Mode.GUIDED}
-"""Modes that drive by themselves and need a position."""
-
-DRIVEN_MODES = {Mode.GUIDED, Mode.AUTO, Mode.RTL, Mode.SMART_RTL}
-"""Modes that may have a place to drive to."""
-
-
-@dataclass
-class Clocks:
-    """Times the autopilot remembers, seconds since boot."""
-
-    ground_station_s: float | None = None
-    prearm_text_s: float = 0.0
-    armed_s: float | None = None
-    variance_text_s: float = 0.0
-    logging_s: float = -math.inf
-    """When arming was last tried or ended; the log is written for a while after that."""
-
-
-@dataclass
-class Proximity:
-    """Obstacle distances the autopilot has taken in: nearest of each eighth of a turn, clockwise from ahead."""
-
-    octants_cm: list[int] = field(default_factory=list)
-    limits_cm: tuple[int, int] = (0, 0)
-    heard_s: float = -1.0
-
-
-@dataclass
-class Sticks:
-    """What the pilot gives, -1 to 1, by the transmitter or by a ground station's RC_CHANNELS_OVERRIDE."""
-
-    steering: float = 0.0
-    throttle: float = 0.0
-    overridden_s: float | None = None
-    """When an override was heard last; when none comes any more, the transmitter counts again."""
+"""MAV_SEVERITY."""
 
 
 class Vehicle:
@@ -109,7 +69,8 @@ class Vehicle:
     ) -> None:
         """``origin``: where it boots, 1e-7 degree; ``origin_m``: the same place in the world frame.
 
-        ``storage``: missions and fences kept over a reboot; ``kept``: parameters without effect, and their types.
+        ``storage``: mission, fence and rally points from before a reboot; ``kept``: types of parameters without
+        effect.
         """
         self.rover = rover
         self.sensing = sensing
@@ -117,6 +78,7 @@ class Vehicle:
         self.estimate: Record = new_estimate()
         self.control: Record = new_control()
         self.tuning: Record = new_tuning(self.parameters.as_dict())
+        self.records = MotionRecords(self.estimate, self.control, self.tuning)
         self.origin = origin
         self.origin_m = np.array(origin_m)
         self.home = origin
@@ -137,9 +99,20 @@ class Vehicle:
         self.sticks = self.transmitter
         self.gps_late = GpsLate()
         self.stale_m: tuple[float, float] | None = None
-        """The last position that was known, while none is; it is told again and again."""
+        """The last known position while there is none; it is reported repeatedly."""
         self.control["rest_v"] = self.parameters["SIM_BATT_VOLTAGE"]
-        self.plan: Plan = new_plan(storage or Storage())
+        self.storage = storage or Storage()
+        self.mission = Mission(self.storage.mission)
+        self.uploads: dict[int, Upload] = {}
+        """Transfers under way, by MAV_MISSION_TYPE."""
+        self.auto = AutoState()
+        self.fence = FenceState()
+        self.smart_rtl = SmartRtl()
+        self.rtl_arrival_said = False
+        self.complaints: set[tuple[int, str]] = set()
+        """Complaints about a transfer that were made already: type of list, text."""
+        self.onboard_controller: tuple[int, int, int] | None = None
+        """The first onboard controller that was heard: system, component, channel."""
 
     @property
     def time_us(self) -> int:
@@ -153,22 +126,22 @@ class Vehicle:
 
     @property
     def has_home(self) -> bool:
-        """GPS fix and home are there."""
+        """Whether there is a GPS fix and home is set."""
         return self.time_s >= HOME_S + self.gps_late.home_s
 
     @property
     def has_origin(self) -> bool:
-        """The EKF has an origin."""
+        """Whether the EKF has an origin."""
         return self.time_s >= ORIGIN_S + self.gps_late.origin_s
 
     @property
     def is_started(self) -> bool:
-        """The start-up is over: the EKF has had an absolute position."""
+        """Whether the start-up is over: the EKF has had an absolute position."""
         return self.time_s >= POSITION_S + self.gps_late.position_s
 
     @property
     def has_position(self) -> bool:
-        """The EKF has an absolute position."""
+        """Whether the EKF has an absolute position now."""
         return self.is_started and self.ekf.has_position
 
     @property
@@ -182,18 +155,18 @@ class Vehicle:
 
     @property
     def in_guided(self) -> bool:
-        """Guided targets are obeyed: in GUIDED, and in AUTO while a mission item hands over."""
-        return self.mode == Mode.GUIDED or (self.mode == Mode.AUTO and self.plan.auto.submode == Submode.GUIDED)
+        """Whether guided targets are accepted: in GUIDED, and in AUTO during NAV_GUIDED_ENABLE."""
+        return self.mode == Mode.GUIDED or (self.mode == Mode.AUTO and self.auto.submode == Submode.GUIDED)
 
     @property
     def has_target(self) -> bool:
-        """A place is being driven to, or was reached."""
+        """Whether there is a destination, reached or not."""
         if self.mode in (Mode.RTL, Mode.SMART_RTL, Mode.LOITER):
             return True
         return self.mode in DRIVEN_MODES and int(self.control[0]["task"]) in (WAYPOINT, CIRCLE, LEG)
 
     def position_m(self) -> tuple[float, float]:
-        """Estimated metres north and east of the EKF origin; zeros before there is a position, later the last one known."""
+        """Estimated metres north and east of the EKF origin; zeros in the start-up, the last known when lost."""
         if not self.is_started:
             return 0.0, 0.0
         if self.stale_m is not None:
@@ -202,7 +175,7 @@ class Vehicle:
         return float(believed["north_m"]), float(believed["east_m"])
 
     def velocity_m_s(self) -> tuple[float, float]:
-        """Estimated speed north and east; zeros without a position."""
+        """Estimated velocity north and east; zeros without a position."""
         if not self.is_started or self.stale_m is not None:
             return 0.0, 0.0
         believed = self.estimate[0]
@@ -215,7 +188,7 @@ class Vehicle:
         return geodesy.moved(self.origin, *self.position_m())
 
     def gps_place(self) -> tuple[int, int]:
-        """Latitude and longitude as the GPS receiver has it, 1e-7 degree; zeros without a fix."""
+        """The GPS receiver's latitude and longitude, 1e-7 degree; zeros without a fix."""
         error_n, error_e = self.ekf.gps.error_m
         believed = self.estimate[0]
         believed_n, believed_e = float(believed["offset_n"]), float(believed["offset_e"])
@@ -227,26 +200,26 @@ class Vehicle:
         return geodesy.moved(self.origin, north_m + error_n - believed_n, east_m + error_e - believed_e)
 
     def amps(self) -> float:
-        """What the motors take from the battery."""
+        """Current of the motors."""
         return float(self.control[0]["amps"])
 
     def volts(self) -> float:
-        """The battery's voltage."""
+        """Voltage of the battery."""
         return self.battery.volts(self.parameters, float(self.rover[0]["drawn_ah"]), self.amps())
 
     def used_mah(self) -> float:
-        """What the battery monitor has counted since boot."""
+        """Charge used since boot, as the battery monitor counts it."""
         return float(self.control[0]["used_mah"])
 
     def battery_percent(self) -> int:
-        """What the battery monitor believes is left, by the capacity it was told."""
+        """Charge left according to the battery monitor and BATT_CAPACITY."""
         capacity_mah = self.parameters["BATT_CAPACITY"]
         if capacity_mah <= 10.0:
             return 0
         return min(max(int(100.0 * (capacity_mah - self.used_mah()) / capacity_mah), 0), 100)
 
     def drain(self) -> None:
-        """Keep the voltage at rest that the compiled loop counts energy with."""
+        """Update the voltage at rest, from which the compiled loop computes the energy used."""
         self.control["rest_v"] = rest_volts(self.parameters, float(self.rover[0]["drawn_ah"]))
 
     def heading_rad(self) -> float:
@@ -258,7 +231,7 @@ class Vehicle:
         return round(math.degrees(self.heading_rad()) * 100.0) % 36000
 
     def say(self, severity: int, text: str) -> None:
-        """Queue a STATUSTEXT for every channel; it goes out after the answers of this moment."""
+        """Queue a STATUSTEXT for every channel; it is sent after the answers of this moment."""
         self.texts.append((severity, text))
         del self.texts[:-MOST_TEXTS]
 
@@ -271,24 +244,24 @@ class Vehicle:
         self.texts.clear()
 
     def move_home(self, place: tuple[int, int]) -> None:
-        """Home is elsewhere from now on, 1e-7 degree; every channel is told."""
+        """Set home, in 1e-7 degree, and send it on every channel."""
         self.home = place
         for channel in self.channels.values():
             channel.requested.append(mavlink.MAVLINK_MSG_ID_HOME_POSITION)
 
-    def tell_parameter(self, name: str) -> None:
-        """Tell every channel a parameter's value."""
+    def send_parameter(self, name: str) -> None:
+        """Send a parameter's value on every channel."""
         for channel in self.channels.values():
             channel.send(parameter_message(self.parameters, name))
 
     def retune(self) -> None:
-        """Take changed parameters over into the compiled controllers."""
+        """Copy changed parameters into the tuning record of the compiled controllers."""
         fresh = new_tuning(self.parameters.as_dict())
         self.tuning[:] = fresh
 
 
 def parameter_message(table: Parameters, name: str, in_list: bool = False) -> Any:
-    """PARAM_VALUE of a known parameter; the index is only told in a list."""
+    """PARAM_VALUE of a known parameter; the index is only given in a list."""
     index = table.index_of(name) if in_list else 65535
     return mavlink.MAVLink_param_value_message(name.encode(), table[name], table.type_of(name), len(table), index)
 

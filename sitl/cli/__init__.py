@@ -1,1 +1,1 @@
-"""The command line: ``rover-sitl``, one file a command."""
+"""The command line: ``rover-sitl``, one file per command."""

@@ -15,10 +15,11 @@ from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
 from companion.mapping.map_files import MapError
 from companion.mission.mission import MissionError
-from companion.recording.recorder import NullRecorder, Recorder, RecordError
+from companion.recording.record_format import RecordError
+from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import SettingsError
 from sitl.cli import drive_options as options
-from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_untold
+from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_turning_on_the_spot
 from sitl.cli.drive_outputs import outputs, print_summary
 from sitl.cli.drive_progress import Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
@@ -34,7 +35,7 @@ BAD_INPUT = (
     SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
 )  # fmt: skip
 RECORD_START_US = 1_577_836_800_000_000
-"""2020-01-01: simulated time begins at no date, and the same run shall give the same record."""
+"""2020-01-01: simulated time has no date, and the same run must give the same record."""
 
 
 def drive(
@@ -61,7 +62,7 @@ def drive(
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
-    4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person for a minute of its time is ended: nobody is there.
+    4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person ends after a minute.
     """
     console, wanted = Console(), outputs(image, map_stem, json_file)
     recorder: Recorder | NullRecorder = NullRecorder()
@@ -75,7 +76,7 @@ def drive(
         mission = equipped(mission, sensors, params)
         refuse_blind(mission)
         scenario = simulated(mission, faults)
-        refuse_untold(mission, scenario)
+        refuse_turning_on_the_spot(mission, scenario)
         for note in scenario.notes:
             typer.echo(note, err=True)
         if record is not None:
@@ -113,7 +114,7 @@ def _file(sensors: str | None) -> Path | None:
 
 
 def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
-    """What an interrupt has ended, and where the record of it lies."""
+    """What was interrupted, and where its record is."""
     if run is None:
         what = "before the first metre"
     else:
@@ -125,7 +126,7 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
 
 
 def _paced(run: Drive, pace: Pace) -> Callable[[float], None]:
-    unattended = Unattended(run, lambda _: None)  # the view shows what is waited for
+    unattended = Unattended(run, lambda _: None)  # the view shows what the companion waits for
 
     def wait(time_s: float) -> None:
         unattended.look(run.companion.status())

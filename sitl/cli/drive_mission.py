@@ -1,4 +1,4 @@
-"""Which mission ``drive`` drives, and where: from a file, on any map, or both; and those that it refuses."""
+"""The mission that ``drive`` drives: from a file, on any map, or both; and missions that it refuses."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from pathlib import Path
 
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
+from sitl.map_mission import field_at, mission_in_world, mission_on_map
 from sitl.scenario import Scenario
-from sitl.world.any_map import field_at, mission_in_world, mission_on_map
 from sitl.world.world_file import ground_grid
 
 
 @dataclass(frozen=True, slots=True)
 class OnWorld:
-    """``--world`` and what goes with it."""
+    """``--world`` and the options that go with it."""
 
     world: Path | None
     start: str | None
@@ -34,7 +34,7 @@ def mission_to_drive(mission_file: Path | None, on: OnWorld) -> Mission:
             raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
         return _driven_here(load_mission(mission_file))
     if on.prior and world.suffix.lower() == ".toml":
-        raise MissionError(f"drive: --prior: {world} is drawn in shapes; the companion can be given a map only")
+        raise MissionError(f"drive: --prior: {world} consists of shapes; the companion can read maps only")
     ground = ground_grid(world, on.resolution_m)
     begin = field_at(ground, on.start, "--start", top_left=on.top_left) if on.start else None
     if mission_file is not None:
@@ -48,27 +48,28 @@ def mission_to_drive(mission_file: Path | None, on: OnWorld) -> Mission:
 
 
 def _driven_here(mission: Mission) -> Mission:
-    """The mission, unless it is the autopilot's to drive."""
+    """The mission, unless the autopilot drives it in AUTO. Raises MissionError."""
     if mission.in_auto:
         raise MissionError(
-            f"{mission.source}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE); use rover-sitl serve, upload the mission, "
-            "and rover-companion run"
+            f"{mission.source}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE); "
+            "use rover-sitl serve, upload the mission, and rover-companion run"
         )
     return mission
 
 
 def refuse_blind(mission: Mission) -> None:
-    """The companion must see something. Raises MissionError."""
+    """Refuse a mission without range sensors. Raises MissionError."""
     if mission.sitl is not None and str(mission.sitl.sensors) == "none":
         raise MissionError(
             "sensors none: the companion does not drive without range data; none is for rover-sitl serve"
         )
 
 
-def refuse_untold(mission: Mission, scenario: Scenario) -> None:
-    """The companion must know that it cannot turn on the spot. Raises MissionError."""
+def refuse_turning_on_the_spot(mission: Mission, scenario: Scenario) -> None:
+    """Refuse steered wheels that the companion does not know of. Raises MissionError."""
     if scenario.turning_radius_m > 0.0 and mission.rover.turning_radius_m <= 0.0:
         raise MissionError(
-            f"{mission.source or mission.name}: the parameters are of a rover with steered wheels: give the mission "
-            f"[rover] turning_radius_m = {scenario.turning_radius_m:g}, or the companion would turn it on the spot"
+            f"{mission.source or mission.name}: the parameters are those of a rover with steered wheels: "
+            f"give the mission [rover] turning_radius_m = {scenario.turning_radius_m:g}, "
+            "or the companion would turn it on the spot"
         )

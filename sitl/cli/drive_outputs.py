@@ -1,4 +1,4 @@
-"""What ``drive`` leaves behind: a table on the terminal, and the files that were asked for."""
+"""Results of ``drive``: a table on the terminal, and the files that were requested."""
 
 from __future__ import annotations
 
@@ -20,32 +20,32 @@ from sitl.view.picture import save_picture
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """The files that are wanted; ``map_stem`` is the name of two, without their suffixes."""
+    """The files to write; ``map_stem``: name of two files, without their suffixes."""
 
     image: Path | None = None
     map_stem: Path | None = None
     json_file: Path | None = None
 
     def check(self) -> None:
-        """Try all of them before anything is driven. Raises OutputError."""
+        """Check before the drive that all can be written. Raises OutputError."""
         picture(self.image)
         writable(self.json_file)
         writable(self.map_stem, ".yaml")
 
     def write(self, run: Drive, recorder: Recorder | NullRecorder, console: Console) -> None:
-        """Write them, end the record with its map, and say where it all is.
+        """Write the files, complete the record with its map, and print where they are.
 
-        One that fails does not keep the others from being written; then raises OutputError.
+        All are written even if one fails; then raises OutputError.
         """
         problems = []
         for write in (partial(_end_record, recorder), self._write_image, self._write_map, self._write_figures):
             try:
-                told = write(run)
+                line = write(run)
             except (OutputError, MapError) as error:
                 problems.append(str(error))
             else:
-                if told:
-                    console.print(told, soft_wrap=True, markup=False, highlight=False)
+                if line:
+                    console.print(line, soft_wrap=True, markup=False, highlight=False)
         if problems:
             raise OutputError("\n".join(problems))
 
@@ -76,19 +76,19 @@ def _end_record(recorder: Recorder | NullRecorder, run: Drive) -> str:
     if not isinstance(recorder, Recorder):
         return ""
     if recorder.problem:
-        return recorder.problem  # a record that ends early does not spoil the run's own result
+        return recorder.problem  # a record that ends early does not change the result of the run
     run.companion.save_map(recorder.directory / "map")
     return f"record:  {recorder.directory}"
 
 
 def outputs(image: Path | None, map_stem: Path | None, json_file: Path | None) -> Outputs:
-    """As the options say; a map may be named with one of its two suffixes."""
+    """The files of the options; a map may be named with one of its two suffixes."""
     bare = map_stem and map_stem.suffix in (".yaml", ".pgm")
     return Outputs(image, map_stem.with_suffix("") if map_stem and bare else map_stem, json_file)
 
 
 def print_summary(report: Report, console: Console) -> None:
-    """What the run came to."""
+    """Print the results of a run."""
     table = Table(title=f"outcome: {report.outcome}", show_header=False)
     for name, status in report.targets:
         table.add_row(f"target {name}", status)
@@ -98,7 +98,8 @@ def print_summary(report: Report, console: Console) -> None:
         "driven": f"{report.distance_m:.1f} m in {report.driving_time_s:.0f} s ({speed:.2f} m/s)",
         "steps": f"{report.steps} fields, {report.return_steps} of them going back, {report.searches} searches",
         "stuck": "never" if report.stuck == 0 else f"{report.stuck} x",
-        "planning": f"{1e3 * report.planning_time_s:.1f} ms in all; 99 % of rounds (20 a second) within {report.tick_p99_ms:.2f} ms",
+        "planning": f"{1e3 * report.planning_time_s:.1f} ms in total; "
+        f"99 % of rounds (20 a second) within {report.tick_p99_ms:.2f} ms",
         "time": f"{report.sim_time_s:.0f} s simulated in {report.wall_time_s:.1f} s "
         f"({report.sim_time_s / max(report.wall_time_s, 1e-9):.0f} times real time)",
         "compilation": f"{report.compile_time_s:.1f} s (kept for the next run)",

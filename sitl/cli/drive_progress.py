@@ -1,4 +1,4 @@
-"""What ``drive`` shows without a view: where the run is, and every text of the companion as it is said."""
+"""Progress of ``drive`` without a view: the state of the run, and every text of the companion."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Telling:
 
 
 def run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:
-    """Drive to the end. One line changes; where there is no terminal (a log file, CI) a new one comes now and then instead."""
+    """Drive to the end, with one changing line; without a terminal (a log file, CI) with lines now and then."""
     if not console.is_terminal:
         return _run_with_lines(run, console, pace)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())

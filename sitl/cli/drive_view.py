@@ -1,4 +1,4 @@
-"""What ``drive --view`` shows beyond the vehicle: what the companion has seen, wants, and says."""
+"""``drive --view``: adds the companion's map, targets, decisions and texts to the view of the simulator."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from companion.navigation.field_step import Decision, Part
 from sitl.cli.said import Said
 from sitl.cli.viewer import Viewer
 from sitl.lockstep import Drive, Report
-from sitl.view.sketch import Kind, Layer, Place, Scene
+from sitl.view.sketch import Kind, Layer, Place, PlaceState, Scene
 from sitl.view.view import Fact, Section, View
 from sitl.view.watching import Watching, world_layers
 
 STATES = {
-    TargetStatus.PENDING: "pending",
-    TargetStatus.REACHED: "reached",
-    TargetStatus.UNREACHABLE: "lost",
-    TargetStatus.SKIPPED: "lost",
+    TargetStatus.PENDING: PlaceState.PENDING,
+    TargetStatus.REACHED: PlaceState.REACHED,
+    TargetStatus.UNREACHABLE: PlaceState.LOST,
+    TargetStatus.SKIPPED: PlaceState.LOST,
 }
-PARTS = {"A": "returning", "B": "exploring", "C": "new path"}
+PARTS = {Part.RETURN: "returning", Part.EXPLORE: "exploring", Part.SEARCH: "new path"}
 
 
 def run_with_view(run: Drive, console: Console, pace: Callable[[float], None]) -> tuple[Report, Viewer]:
-    """Drive to the end while a picture of it is shown; ``pace`` waits until a simulated time may come."""
+    """Drive to the end while the view is shown; ``pace`` waits until a simulated time may be passed."""
     with Viewer(console) as viewer:
         shown = DriveView(run, viewer)
 
@@ -44,7 +44,7 @@ def run_with_view(run: Drive, console: Console, pace: Callable[[float], None]) -
 
 
 class DriveView:
-    """Shows a run in lock-step; real time is read only to know when a picture is due."""
+    """Shows a lock-step run; real time is read only to decide when to draw."""
 
     def __init__(self, run: Drive, viewer: Viewer) -> None:
         self._run = run
@@ -54,7 +54,7 @@ class DriveView:
         self._said = Said(run)
 
     def observe(self, status: Status) -> None:
-        """A new moment of the run; drawn if the last picture is old enough."""
+        """Take in a new moment of the run, and draw it if that is due."""
         self._take_in(status)
         now_s = stopwatch_s()
         if self._viewer.is_due(now_s):
@@ -68,12 +68,12 @@ class DriveView:
             self._watching.tell(f"{status.time_s:.0f} s: {text}")
         decision = status.decision
         if decision is not None and decision is not self._decided and decision.part is not Part.EXPLORE:
-            # Going on along the path is no news: the panel says it all the time.
+            # Following the path is not an event: the panel always shows it.
             self._watching.tell(f"{status.time_s:.0f} s: {decision.reason}")
         self._decided = decision
 
     def finish(self) -> None:
-        """The last moment, which is always drawn."""
+        """Draw the last moment."""
         status = self._run.companion.status()
         self._take_in(status)
         self._viewer.show(self._view(status, stopwatch_s()))
@@ -81,16 +81,16 @@ class DriveView:
     def _view(self, status: Status, now_s: float) -> View:
         watching = self._watching
         sections = (watching.vehicle_section(now_s), mission_section(status, self._run), watching.links_section())
-        return View(watching.title, self._scene(), sections, tuple(watching.news))
+        return View(watching.title, self._scene(), sections, tuple(watching.events))
 
     def _scene(self) -> Scene:
-        """The truth faintly, and over it what the companion knows."""
+        """The true world, dimmed, overlaid with the companion's map and targets."""
         scene, simulator, companion = self._watching.scene(), self._run.simulator, self._run.companion
         evidence, progress = companion.evidence, companion.progress
         layers = world_layers(simulator.world, simulator.time_s, Kind.HIDDEN)
-        places = [place for place in scene.places if place.state == "start"]
+        places = [place for place in scene.places if place.state is PlaceState.START]
         if evidence is not None and progress is not None and companion.origin is not None:
-            # An autopilot that has rebooted counts from where it did so, and with it the companion.
+            # After a reboot the autopilot's origin is where it rebooted, and so is the companion's.
             north_m, east_m = self._run.scenario.start.place_of(companion.origin)
             layers += seen_layers(evidence, north_m, east_m)
             for target, state in zip(progress.targets, progress.statuses, strict=True):
@@ -100,7 +100,7 @@ class DriveView:
 
 
 def seen_layers(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[Layer, ...]:
-    """The companion's map, whose frame begins at this place of the world."""
+    """Layers of the companion's map; the origin of its frame is at this place in the world."""
     base = evidence.base
     corner = (base.resolution_m, base.south_west.north_m + north_m, base.south_west.east_m + east_m)
     closed = base.weights >= OBSTACLE
@@ -111,14 +111,14 @@ def seen_layers(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[L
 
 
 def mission_section(status: Status, run: Drive) -> Section:
-    """What the companion is doing, where it is going, and why."""
+    """State, target and last decision of the companion."""
     companion = run.companion
     decision = status.decision
     goal = companion.progress.goal if companion.progress else None
     left = ""
     if goal is not None and status.pose is not None and status.target:
         left = f", {status.pose.point.distance_m(goal.point):.0f} m"
-    part = f"{decision.part.value}, {PARTS[decision.part.value]}" if decision else "-"
+    part = f"{decision.part.value}, {PARTS[decision.part]}" if decision else "-"
     searches = len(companion.driver.searcher.seconds) if companion.driver else 0
     facts = (
         Fact("doing", status.doing),

@@ -1,4 +1,4 @@
-"""Rover and trouble as the options of ``drive``, ``serve`` and ``physics`` ask for them, on top of the mission's own."""
+"""Options common to ``drive``, ``serve`` and ``physics``: sensors, parameters, faults."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_par
 
 
 def equipped(mission: Mission, sensors: str | None, params: Path | None) -> Mission:
-    """The mission with other sensors and the autopilot's parameters from a file. Raises what their readers raise."""
+    """The mission with other sensors, and with autopilot parameters from a file. Raises ScenarioError."""
     mission = mission if sensors is None else with_sensors(mission, sensors)
     return mission if params is None else with_parameter_file(mission, params)
 
 
 def simulated(mission: Mission, faults: Path | None) -> Scenario:
-    """What is simulated for a mission, with what goes wrong. Raises ScenarioError, FaultFileError."""
+    """The simulation of a mission, with faults. Raises ScenarioError, FaultFileError."""
     return with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)

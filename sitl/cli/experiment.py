@@ -1,4 +1,4 @@
-"""``rover-sitl experiment``: makes a paper's experiment again and shows the figures."""
+"""``rover-sitl experiment``: repeats a paper's experiment and shows the figures."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def experiment(
     runs: Annotated[
         int,
         typer.Option(
-            min=1, help="Runs, with seeds that count up, on each map or mission. kwasniewski-table1 makes 3 at least."
+            min=1, help="Runs, with consecutive seeds, on each map or mission. kwasniewski-table1 makes at least 3."
         ),
     ] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones count up.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones are consecutive.")] = 0,
     jobs: Annotated[
-        int, typer.Option(min=1, help="Runs at a time. Results stay the same, but they disturb each other's times.")
+        int, typer.Option(min=1, help="Parallel runs. Results stay the same, but measured times get longer.")
     ] = 1,
     maps: Annotated[
         Path | None, typer.Option(help="Folder with the maps; default: missions/maps. sedighi-table1: more grids.")
@@ -62,25 +62,28 @@ def experiment(
     world: Annotated[
         list[Path] | None,
         typer.Option(
-            help="navigation, driving: another map, with its MovingAI scenario file beside it; several times for several."
+            help="navigation, driving: another map, with its MovingAI scenario file beside it; may be repeated."
         ),
     ] = None,
     planners: Annotated[
-        str, typer.Option(help="navigation, driving: names, commas between them; default: all that make sense there.")
+        str, typer.Option(help="navigation, driving: names, separated by commas; default: all that apply.")
     ] = "",
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
         Path | None,
-        typer.Option(help="Folder whose results.md and images/ are brought up to date; made if there is none."),
+        typer.Option(help="Folder whose results.md and images/ are updated; created if missing."),
     ] = None,
 ) -> None:
-    """Make the experiment NAME and print its tables. Exit code 2: bad input; 3: soak, dead-companion: something touched or failed."""
+    """Run the experiment NAME and print its tables.
+
+    Exit code 2: bad input; 3: soak, dead-companion: a collision or a failure.
+    """
     console = Console()
     try:
         made = EXPERIMENTS.get(name)
         if made is None:
             raise ExperimentError(f"experiment {name}: unknown; known are {', '.join(EXPERIMENTS)}")
-        # A place that cannot be written should show before the work, not after it.
+        # Report a file that cannot be written before the work, not after it.
         writable(json_file)
         writable(docs and docs / "results.md")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
@@ -97,7 +100,7 @@ def experiment(
 
 
 def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: Path | None) -> None:
-    """An option that would not count is said to be none. Raises ExperimentError."""
+    """Refuse options without effect. Raises ExperimentError."""
     if name not in (navigation.NAME, driving.NAME):
         if planners:
             raise ExperimentError(f"--planners: {name} compares its own; the option is for navigation and driving")
@@ -110,7 +113,7 @@ def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: 
 def _with_progress(name: str, made: Experiment, options: Options, console: Console) -> Report:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
-        # Nothing is shown before there is anything to show: a bad folder of maps gets its one line only.
+        # The bar appears with the first progress, so that a bad folder of maps gives one line only.
         task = progress.add_task(name, total=None, visible=False)
 
         def advance(done: int, total: int) -> None:

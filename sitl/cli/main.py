@@ -1,4 +1,4 @@
-"""``rover-sitl``: the script. Nothing heavy is imported before it has begun."""
+"""Entry point of ``rover-sitl``; heavy modules are imported only after the start."""
 
 from __future__ import annotations
 

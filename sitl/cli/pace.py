@@ -1,4 +1,4 @@
-"""Simulated time that passes no faster than so many times real time."""
+"""Limits the speed of simulated time to a multiple of real time."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from companion.core.clock import Clock
 
 
 class Pace:
-    """``speedup`` None: as fast as it goes. It begins with the first call."""
+    """``speedup`` None: as fast as possible. Time counts from the first call."""
 
     def __init__(self, speedup: float | None, clock: Clock) -> None:
         self._speedup = speedup
@@ -14,7 +14,7 @@ class Pace:
         self._began: tuple[float, float] | None = None
 
     def wait(self, time_s: float) -> None:
-        """Until ``time_s``, simulated, may come; at once when it is late already."""
+        """Wait until the simulated ``time_s`` may be passed; return at once if it is late already."""
         if self._speedup is None:
             return
         began_s, first_s = self._began = self._began or (self._clock.now_s(), time_s)

@@ -1,4 +1,4 @@
-"""``rover-sitl physics``: our world and rover behind the real ArduRover firmware."""
+"""``rover-sitl physics``: world and rover for the real ArduRover firmware."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from sitl.cli.serve import BAD_INPUT, say, stop_signals
 from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
 from sitl.firmware.parameter_files import ParameterFileError
 from sitl.firmware.physics import Physics
-from sitl.firmware.physics_news import PhysicsNews, summary
+from sitl.firmware.physics_log import PhysicsLog, summary
 from sitl.firmware.physics_server import open_port, run
 from sitl.network import ListenError
-from sitl.network.client import FORMS, ClientLink, open_link
-from sitl.network.told import ToldLink
+from sitl.network.client_log import LoggedLink
+from sitl.network.mavlink_client import FORMS, ClientLink, open_link
 from sitl.scenario import Scenario, ScenarioError, scenario_from_mission
 
 
@@ -38,11 +38,11 @@ def physics(
     write_params: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Write the parameters that the firmware needs for this rover.")
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="For all noise.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
     sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
 ) -> None:
-    """Answer the ArduRover firmware, started with --model JSON:127.0.0.1, with the rover and world of MISSION; ends with Ctrl-C."""
+    """Simulate rover and world of MISSION for the ArduRover firmware (--model JSON:127.0.0.1); ends with Ctrl-C."""
     clock = WallClock()
     link: ClientLink | None = None
     try:
@@ -50,7 +50,7 @@ def physics(
         behind = scenario.physics(seed, scans=mavlink is not None)
         _write_parameters(scenario, behind, write_params)
         link = open_link(mavlink) if mavlink else None
-        # Compiles what is not compiled yet before the firmware waits for answers.
+        # Compile everything before the firmware waits for answers.
         with Console(stderr=True).status("starting ..."):
             behind.rehearse()
         listening = open_port(host, port)
@@ -61,12 +61,12 @@ def physics(
         raise typer.Exit(BAD_INPUT) from error
     tell = (lambda line: None) if quiet else say
     if link is not None and mavlink is not None:
-        link = ToldLink(link, mavlink, tell, lambda: behind.system)
+        link = LoggedLink(link, mavlink, tell, lambda: behind.system)
     for line in _greeting(behind, host, port, mavlink, write_params):
         tell(line)
     stop = stop_signals()
     try:
-        run(behind, listening, link, clock.now_s, lambda: not stop, PhysicsNews(behind, tell, clock.now_s).look)
+        run(behind, listening, link, clock.now_s, lambda: not stop, PhysicsLog(behind, tell, clock.now_s).look)
     finally:
         listening.close()
         if link is not None:
@@ -75,20 +75,20 @@ def physics(
 
 
 def _write_parameters(scenario: Scenario, behind: Physics, file: Path | None) -> None:
-    """Write what the firmware needs, if it is wanted; what becomes of a person's own parameters is said."""
-    told: dict[str, float] | None = None
+    """Write the parameters for the firmware, if requested; print remarks about the user's own parameters."""
+    parameters: dict[str, float] | None = None
     if file is not None:
         writable(file)
-        told = firmware_parameters(scenario.parameters, behind.suite, steered=scenario.turning_radius_m > 0.0)
+        parameters = firmware_parameters(scenario.parameters, behind.suite, steered=scenario.turning_radius_m > 0.0)
         with written(file):
-            file.write_text(parameter_file(told), encoding="ascii")
+            file.write_text(parameter_file(parameters), encoding="ascii")
     if scenario.parameter_file is not None:
-        for note in scenario.parameter_file.firmware_notes(told):
+        for note in scenario.parameter_file.firmware_notes(parameters):
             typer.echo(note, err=True)
 
 
 def _greeting(behind: Physics, host: str, port: int, mavlink: str | None, parameters: Path | None) -> list[str]:
-    """How to start the firmware, and what it will not get."""
+    """How to start the firmware, and which sensors it does not get."""
     start = behind.start
     heading_deg = math.degrees(start.heading_rad) % 360.0
     home = f"{start.home.lat_deg:.7f},{start.home.lon_deg:.7f},0,{heading_deg:.0f}"
@@ -100,5 +100,5 @@ def _greeting(behind: Physics, host: str, port: int, mavlink: str | None, parame
     if behind.suite.lidar and mavlink is None:
         lines.append("the lidar is not published: give --mavlink URL, for instance tcp:127.0.0.1:5762")
     if behind.suite.proximity:
-        lines.append("the proximity sectors are left out: the firmware makes its own from rangefinders or scans")
+        lines.append("the proximity sectors are left out: the firmware computes its own from rangefinders or scans")
     return lines

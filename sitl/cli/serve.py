@@ -1,4 +1,4 @@
-"""``rover-sitl serve``: the simulated rover on the network, as ArduPilot's own SITL would stand there."""
+"""``rover-sitl serve``: the simulated rover on the network, like ArduPilot's own SITL."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from sitl.cli.equipment import equipped, simulated
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.faults.fault_file import FaultFileError
 from sitl.network import FORMS, Endpoint, ListenError, open_endpoint
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.network.server import serve as run_server
 from sitl.scenario import Scenario, ScenarioError
 from sitl.view.watching import Watching
@@ -39,31 +39,31 @@ def serve(
         ),
     ] = None,
     speedup: Annotated[float, typer.Option(min=0.01, max=200.0, help="Times real time.")] = 1.0,
-    seed: Annotated[int, typer.Option(min=0, help="Of all noise.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="For all noise.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
     sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
     params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
-    faults: Annotated[Path | None, typer.Option(help="TOML plan of what goes wrong when.")] = None,
+    faults: Annotated[Path | None, typer.Option(help="TOML file with a fault plan.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Show map, rover and rates on this terminal.")] = False,
 ) -> None:
     """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C.
 
-    One line tells of each client that comes or goes, and of each collision.
+    One line is printed for each client that connects or disconnects, and for each collision.
     """
     clock = WallClock()
     endpoints: list[Endpoint] = []
     try:
         console = terminal() if view else None
         name, scenario = _scenario(mission_file, sensors, params, faults)
-        # Compiles what is not compiled yet before anybody connects and time begins to count.
+        # Compile everything before clients connect and time starts.
         with Console(stderr=True).status("starting ..."):
             scenario.simulator(seed).rehearse()
         simulator = scenario.simulator(seed)
         watching = Watching(name, simulator)
         tell = watching.tell if view else say
-        news = News() if quiet else News(tell, clock.now_s)
+        log = EventLog() if quiet else EventLog(tell, clock.now_s)
         for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
-            endpoints.append(open_endpoint(url, simulator, news, serial_port))
+            endpoints.append(open_endpoint(url, simulator, log, serial_port))
     except (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ViewError) as error:
         for endpoint in endpoints:
             endpoint.close()
@@ -77,7 +77,7 @@ def serve(
     stop = stop_signals()
     try:
         with _viewed(console, watching, clock) as observe:
-            run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, news, observe)
+            run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, log, observe)
     finally:
         for endpoint in endpoints:
             endpoint.close()
@@ -88,7 +88,7 @@ def serve(
 def _scenario(
     mission_file: Path, sensors: str | None, params: Path | None, faults: Path | None
 ) -> tuple[str, Scenario]:
-    """The mission's name, and what it and the options ask for; what people should know of it is said."""
+    """The mission's name and its simulation with the options; remarks are printed."""
     mission = equipped(load_mission(mission_file), sensors, params)
     scenario = simulated(mission, faults)
     for note in scenario.notes:
@@ -97,7 +97,7 @@ def _scenario(
 
 
 def stop_signals() -> list[int]:
-    """A list that is empty until the process is asked to end."""
+    """A list that stays empty until the process receives a signal to end."""
     stop: list[int] = []
 
     def on_signal(number: int, frame: FrameType | None) -> None:
@@ -110,7 +110,7 @@ def stop_signals() -> list[int]:
 
 @contextlib.contextmanager
 def _viewed(console: Console | None, watching: Watching, clock: WallClock) -> Iterator[Callable[[], None]]:
-    """What the server calls in each round: nothing, or a new picture when one is due."""
+    """The function that the server calls in each round: it draws the view when that is due."""
     if console is None:
         yield lambda: None
         return
@@ -126,6 +126,6 @@ def _viewed(console: Console | None, watching: Watching, clock: WallClock) -> It
 
 
 def say(line: str) -> None:
-    """A line on standard output; the simulator goes on when nobody reads it any more."""
+    """Print a line; a closed standard output does not stop the simulator."""
     with contextlib.suppress(OSError):
         typer.echo(line)

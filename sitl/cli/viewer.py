@@ -1,4 +1,4 @@
-"""``--view``: draws on the terminal in a thread of its own, so that a slow or stopped terminal never holds the vehicle up."""
+"""Draws the view on the terminal in its own thread, so that a slow terminal does not delay the vehicle."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from rich.live import Live
 from sitl.view.view import View, render
 
 FRAMES_HZ = 5.0
-"""Often enough to see it drive, seldom enough for a slow connection."""
+"""Pictures per second: enough to see it drive, few enough for a slow connection."""
 CLOSING_S = 1.0
-"""A terminal that takes nothing any more is left after so long."""
+"""How long to wait for a terminal that accepts nothing any more."""
 
 
 class ViewError(Exception):
-    """No terminal to draw on; the text is one line."""
+    """There is no usable terminal; the text is one line."""
 
 
 def terminal() -> Console:
-    """The terminal on standard output. Raises ViewError if there is none that can be drawn on."""
+    """The terminal on standard output. Raises ViewError if there is none to draw on."""
     console = Console()
     if not console.is_terminal or not console.file.isatty():
-        raise ViewError("--view: standard output is no terminal; leave the option out, or run this in one")
+        raise ViewError("--view: standard output is not a terminal; run this in a terminal, or leave the option out")
     if console.is_dumb_terminal:
         raise ViewError("--view: this terminal cannot move its cursor (TERM=dumb); set TERM, or leave the option out")
     return console
 
 
 class Viewer:
-    """Shows the newest of the states that are handed to it. The terminal is put back as it was on leaving, errors included."""
+    """Shows the newest of the views handed to it, and restores the terminal on leaving, errors included."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
@@ -48,20 +48,20 @@ class Viewer:
         self._thread = threading.Thread(target=self._draw, name="view", daemon=True)
 
     def is_due(self, now_s: float) -> bool:
-        """Whether it is time for a new picture; at most ``FRAMES_HZ`` times a second of real time."""
+        """Whether a new picture is due, at most ``FRAMES_HZ`` times per second of real time."""
         if now_s < self._due_s:
             return False
         self._due_s = now_s + 1.0 / FRAMES_HZ
         return True
 
     def show(self, view: View) -> None:
-        """Draw this next; returns at once."""
+        """Draw this view next; returns at once."""
         with self._wake:
             self._view = view
             self._wake.notify()
 
     def __enter__(self) -> Viewer:
-        """Take the terminal over."""
+        """Take over the terminal."""
         self._live.start(refresh=False)
         self._thread.start()
         self._tstp_before = signal.signal(signal.SIGTSTP, self._suspend)
@@ -70,7 +70,7 @@ class Viewer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give the terminal back."""
+        """Restore the terminal."""
         signal.signal(signal.SIGTSTP, self._tstp_before)
         with self._wake:
             self._ended = True
@@ -81,12 +81,12 @@ class Viewer:
                 self._live.stop()
 
     def _suspend(self, number: int, frame: FrameType | None) -> None:
-        """Ctrl-Z: the terminal is the shell's until this process is continued."""
+        """Ctrl-Z: restore the terminal until this process continues."""
         self._console.set_alt_screen(False)
         self._console.show_cursor(True)
         signal.signal(signal.SIGTSTP, signal.SIG_DFL)
         os.kill(os.getpid(), signal.SIGTSTP)
-        # Continued.
+        # Execution continues here.
         signal.signal(signal.SIGTSTP, self._suspend)
         self._console.set_alt_screen(True)
         self._console.show_cursor(False)
@@ -95,13 +95,13 @@ class Viewer:
             self._wake.notify()
 
     def print_last(self) -> None:
-        """The last state, once more, where it stays."""
+        """Print the last view, so that it stays on the terminal."""
         if self._view is not None:
             rows = self._console.height - 1
             self._console.print(self._rendered(self._view, rows), height=rows)
 
     def _draw(self) -> None:
-        """Draw what is new until the end; a terminal that has gone ends it too."""
+        """Draw new views until the end, or until the terminal is gone."""
         with contextlib.suppress(OSError):
             while True:
                 with self._wake:

@@ -1,7 +1,7 @@
-"""Four environments of growing complexity in the manner of Achour & Chaalal 2011: walls and polygons, the second with narrow regions.
+"""Four environments like those of Achour & Chaalal 2011: walls and polygons, the second with narrow regions.
 
-The paper prints its start (3, 2) and target (18, 19), no sizes, and shows its environments as small pictures; ours are 20 m wide, the
-least that has room for both, and fields are 0.1 m.
+The paper prints its start (3, 2) and target (18, 19), no sizes, and shows its environments as small pictures; ours are
+20 m wide, the least that has room for both, and fields are 0.1 m.
 """
 
 from __future__ import annotations

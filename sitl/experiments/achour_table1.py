@@ -36,7 +36,7 @@ NAME = "achour-table1"
 
 @dataclass(frozen=True, slots=True)
 class Printed:
-    """A cell of the paper's table I: N and T; ``tries``: how often it was tried until it succeeded, where the text says so."""
+    """A cell of the paper's table I: N and T. ``tries``: attempts until success, where the text gives them."""
 
     number: int
     time_s: float
@@ -255,7 +255,7 @@ def _slowest_ms(report: AchourReport, method: str) -> float:
 
 
 def _longer(report: AchourReport, length: str) -> tuple[float, float]:
-    """The median length of the genetic paths over that of the roadmap's: the least and the greatest of the environments."""
+    """The median length of the genetic paths over that of the roadmap: the least and the greatest ratio."""
     ratios = []
     for name in report.problems:
         ours, theirs = (report.of(name, method).figures()[length] for method in (GENETIC, ROADMAP))
@@ -277,28 +277,32 @@ def _section(report: AchourReport) -> str:
 
 `rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
 
-From {START_M} to {TARGET_M} through {side_m} m x {side_m} m, {FIELDS_A_METRE} fields a metre, with M = {SETTINGS.achour.samples} samples and
-B = {SETTINGS.achour.neighbours} neighbours, as the paper has it. "At once" counts the runs that succeeded at the first attempt (`achour`; it may
-make {SETTINGS.achour.attempts}) or without extra samples (`prm`; up to {SETTINGS.prm.rounds} rounds of {SETTINGS.prm.samples}). N is what it is in the paper:
-iterations of the attempt that succeeded for `achour`, samples in the roadmap for `prm`. Then come nodes and length of the path as the
-paper's method finds it, and of the same path pulled straight, where nodes between two that see each other are left out: `achour`
-does this by default, `prm` does not, the paper neither. All figures are medians, time of all runs and the rest of those that found a path.
-Below each row stands the paper's as printed: **milliseconds here, seconds there**.
+From {START_M} to {TARGET_M} through {side_m} m x {side_m} m, {FIELDS_A_METRE} fields a metre, with M =
+{SETTINGS.achour.samples} samples and B = {SETTINGS.achour.neighbours} neighbours, as the paper has it. "At once" counts
+the runs that succeeded at the first attempt (`achour`; it may make {SETTINGS.achour.attempts}) or without extra samples
+(`prm`; up to {SETTINGS.prm.rounds} rounds of {SETTINGS.prm.samples}). N is what it is in the paper: iterations of the
+attempt that succeeded for `achour`, samples in the roadmap for `prm`. Then come nodes and length of the path as the
+paper's method finds it, and of the same path pulled straight, where nodes between two that see each other are left out:
+`achour` does this by default, `prm` does not, the paper neither. All figures are medians, time of all runs and the rest
+of those that found a path. Below each row stands the paper's as printed: **milliseconds here, seconds there**.
 
 {tables}
 
-The paper's times are at least {_least_ratio(report, GENETIC):.0f} times our medians for `achour` and {_least_ratio(report, ROADMAP):.0f} times for
-`prm`; the slowest single search took {_slowest_ms(report, GENETIC):.0f} ms with `achour`, {_slowest_ms(report, ROADMAP):.0f} ms with `prm`. Measured on
-{where_measured()}; the paper: Matlab, on a computer that is not named.
+The paper's times are at least {_least_ratio(report, GENETIC):.0f} times our medians for `achour` and
+{_least_ratio(report, ROADMAP):.0f} times for `prm`; the slowest single search took {_slowest_ms(report, GENETIC):.0f}
+ms with `achour`, {_slowest_ms(report, ROADMAP):.0f} ms with `prm`. Measured on {where_measured()}; the paper: Matlab,
+on a computer that is not named.
 
-The paper gives no success rates. Of its environment 4 it says that the path was found after 5 tests; of the attempts of `achour` in ours
-{100 * attempts:.0f} % succeed. It prints no lengths either, but calls the genetic algorithm's paths the better ones in length. Here, as found, they
-are {as_found[0]:.2f} to {as_found[1]:.2f} times as long as those of `prm`; with both pulled straight, {straight[0]:.2f} to {straight[1]:.2f} times. `theta-star`
-(complete, no samples, default settings) shows about how short a path can be, and what that takes.
+The paper gives no success rates. Of its environment 4 it says that the path was found after 5 tests; of the attempts of
+`achour` in ours {100 * attempts:.0f} % succeed. It prints no lengths either, but calls the genetic algorithm's paths
+the better ones in length. Here, as found, they are {as_found[0]:.2f} to {as_found[1]:.2f} times as long as those of
+`prm`; with both pulled straight, {straight[0]:.2f} to {straight[1]:.2f} times. `theta-star` (complete, no samples,
+default settings) shows about how short a path can be, and what that takes.
 
 ![The four environments](images/{NAME}.png)
 
-What is ours: the environments (`sitl/experiments/achour_environments.py`), since the paper has only small pictures of its own: walls and
-polygons, more of them each time, the second with two doors of 1.2 m. So neither times nor success can be compared one to one. The robot is a
-point, as in the paper's abstract; its third degree of freedom, the heading, has no part in the equations.
+What is ours: the environments (`sitl/experiments/achour_environments.py`), since the paper has only small pictures of
+its own: walls and polygons, more of them each time, the second with two doors of 1.2 m. So neither times nor success
+can be compared one to one. The robot is a point, as in the paper's abstract; its third degree of freedom, the heading,
+has no part in the equations.
 """

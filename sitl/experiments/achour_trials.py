@@ -1,4 +1,4 @@
-"""Single searches for ``achour-table1``: timed as a user makes them, then made again with the same seed to see what they did."""
+"""Single searches for ``achour-table1``: timed as a user calls them, then repeated with the same seed for details."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.core.clock import stopwatch_s
-from companion.planning.line_of_sight import free_samples, shortened
 from companion.planning.papers.achour_ga import walked
+from companion.planning.papers.line_of_sight import free_samples, shortened
 from companion.planning.papers.prm import queried
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.random_numbers import draw_seed, seeded
@@ -32,9 +32,10 @@ SETTINGS = PlannerSettings(achour=AchourSettings(unit_fields=FIELDS_A_METRE))
 class Trial:
     """One search.
 
-    ``at_once``: without a second attempt or extra samples. ``number`` is the paper's N: iterations of the last attempt (``achour``),
-    samples in the roadmap (``prm``). ``attempts``: how often samples were drawn. ``nodes``: of the path as the paper's method finds it, shape
-    (n, 2), columns x and y in fields, no rows if there is none; ``straight``: those that are left where each sees the next.
+    ``at_once``: without a second attempt or extra samples. ``number`` is the paper's N: iterations of the last attempt
+    (``achour``), samples in the roadmap (``prm``). ``attempts``: how often samples were drawn. ``nodes``: of the path
+    as the paper's method finds it, shape (n, 2), columns x and y in fields, no rows if there is none; ``straight``:
+    those that are left where each sees the next.
     """
 
     seed: int

@@ -173,11 +173,12 @@ def _section(report: AdaptiveReport) -> str:
 
 `rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
 
-The B-spline genetic algorithm from {tuple(START)} to {tuple(TARGET)} on the known maps, no corner cutting, population 30, {EPOCHS} epochs in
-all: with 4 control points always; with {", ".join(map(str, NUMBERS))} in turn, {EPOCHS // len(NUMBERS)} epochs each, which is how the paper goes
-on after a failure; and with a number that is part of the chromosome and is bred with it (`planner.adaptive`), in searches of as
-many epochs that begin with these numbers to twice as many. Epochs (median, 90th percentile), number of control points (mean) and cost (median) are those of
-the searches that found a path; ms is the median of all.
+The B-spline genetic algorithm from {tuple(START)} to {tuple(TARGET)} on the known maps, no corner cutting, population
+30, {EPOCHS} epochs in all: with 4 control points always; with {", ".join(map(str, NUMBERS))} in turn,
+{EPOCHS // len(NUMBERS)} epochs each, which is how the paper goes on after a failure; and with a number that is part of
+the chromosome and is bred with it (`planner.adaptive`), in searches of as many epochs that begin with these numbers to
+twice as many. Epochs (median, 90th percentile), number of control points (mean) and cost (median) are those of the
+searches that found a path; ms is the median of all.
 
 {tables}
 

@@ -1,7 +1,7 @@
-"""What happens when the companion falls dead: every shipped mission, cut off at a random moment and watched until the rover stands.
+"""What happens when the companion fails: every shipped mission, cut off at a random moment until the rover stands.
 
-The autopilot follows the last setpoint that it got, a position for ever and a velocity for three seconds. So no setpoint
-may be one that the rover cannot be left alone with.
+The autopilot follows the last setpoint that it got, a position for ever and a velocity for three seconds. So no
+setpoint may be one that the rover cannot be left alone with.
 """
 
 from __future__ import annotations
@@ -164,10 +164,11 @@ class DeadReport:
 
 `{self.options.command(NAME)}`
 
-{len(self.deaths)} runs: each mission driven with each suite of sensors, and the companion silent for ever at {self.options.runs} moments drawn evenly from that
-drive; then watched until the rover had stood for {STANDS_S:g} s. *moving* counts the runs in which it moved when that happened; *touched* the contacts while it
-moved on: **{touched}**; *run into*: it stood already (slower than {STOOD_M_S:g} m/s), and something that moves came along: {run_into}. *m/s*: the fastest it was; *metres*, *s*:
-how far and how long it went on at most.
+{len(self.deaths)} runs: each mission driven with each suite of sensors, and the companion silent for ever at
+{self.options.runs} moments drawn evenly from that drive; then watched until the rover had stood for {STANDS_S:g} s.
+*moving* counts the runs in which it moved when that happened; *touched* the contacts while it moved on: **{touched}**;
+*run into*: it stood already (slower than {STOOD_M_S:g} m/s), and something that moves came along: {run_into}. *m/s*:
+the fastest it was; *metres*, *s*: how far and how long it went on at most.
 
 {tables}
 """
@@ -190,7 +191,10 @@ def _row(name: str, deaths: list[Death]) -> list[str]:
 
 
 def run(options: Options, advance: Advance) -> DeadReport:
-    """Each mission driven once with each suite, and from each drive as many deaths as there are runs. Does not depend on ``jobs``."""
+    """Each mission driven once with each suite, and from each drive as many deaths as there are runs.
+
+    Does not depend on ``jobs``.
+    """
     missions = [with_suite(mission, suite) for mission in shipped(options) for suite in SUITES]
     deaths: list[Death] = []
     calls = (

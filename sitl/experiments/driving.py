@@ -1,4 +1,4 @@
-"""What the rover feels: the shipped missions driven in lock-step, with the rover's own dynamics, by several planners."""
+"""Driving times of several planners: the shipped missions in lock-step, with the rover's own dynamics."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ from sitl.experiments.experiment import (
 )
 from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
-from sitl.lockstep import Drive, DriveOutcome, Report
+from sitl.lockstep import Drive, Outcome, Report
+from sitl.map_mission import mission_on_map
 from sitl.scenario import scenario_from_mission
-from sitl.world.any_map import mission_on_map
 
 NAME = "driving"
 MISSIONS = (
@@ -74,7 +74,7 @@ class Series:
     def missed(self) -> int:
         """Drives in which a target was missed."""
         return sum(
-            report.outcome not in (DriveOutcome.REACHED, DriveOutcome.COLLISION)
+            report.outcome not in (Outcome.REACHED, Outcome.COLLISION)
             or any(status is not TargetStatus.REACHED for _, status in report.targets)
             for report in self.reports
         )
@@ -185,9 +185,10 @@ class DrivingReport:
 
 `{self.options.command(NAME)}`
 
-The shipped missions in lock-step, with the rover's dynamics and sensor noise, with several planners in the navigator; each row is made of
-{self.options.runs} drives, with seeds {self.options.seed} to {self.options.seed + self.options.runs - 1}. *time* is the mean driving time, */ref* the same divided by the faster of `{REFERENCES[0]}` and `{REFERENCES[1]}`; *missed* counts
-drives in which a target was not reached.
+The shipped missions in lock-step, with the rover's dynamics and sensor noise, with several planners in the navigator;
+each row is made of {self.options.runs} drives, with seeds {self.options.seed} to
+{self.options.seed + self.options.runs - 1}. *time* is the mean driving time, */ref* the same divided by the faster of
+`{REFERENCES[0]}` and `{REFERENCES[1]}`; *missed* counts drives in which a target was not reached.
 
 {tables}
 
@@ -219,8 +220,8 @@ def shortfalls(series: tuple[Series, ...]) -> str:
         return ""
     return (
         f"Aimed at with `{OURS}` on every mission: no more time than the faster of the references"
-        f" ({_misses(slower)}); at most {STEPS_FACTOR:g} times the steps of `{STEPS_REFERENCE}` ({_misses(longer)}); no target"
-        f" missed ({f'{missed} missed' if missed else 'reached'})."
+        f" ({_misses(slower)}); at most {STEPS_FACTOR:g} times the steps of `{STEPS_REFERENCE}` ({_misses(longer)});"
+        f" no target missed ({f'{missed} missed' if missed else 'reached'})."
     )
 
 

@@ -30,8 +30,8 @@ class ExperimentError(Exception):
 class Options:
     """How much of an experiment to do. Run i has the seed ``seed + i``; ``maps`` None: those of the source checkout.
 
-    ``worlds``: maps of the user's, with scenario files beside them, and ``planners``, names (none: the experiment's own choice), for
-    experiments that take any.
+    ``worlds``: maps of the user's, with scenario files beside them, and ``planners``, names (none: the experiment's own
+    choice), for experiments that take any.
     """
 
     runs: int = 100
@@ -109,7 +109,10 @@ def load_maps(folder: Path | None, names: tuple[str, ...]) -> dict[str, Grid]:
 
 
 def shipped_missions(maps: Path | None, names: tuple[str, ...]) -> list[Path]:
-    """The files of the missions that ship with the project: they lie beside the folder of maps. Raises ExperimentError."""
+    """The files of the missions that ship with the project: they lie beside the folder of maps.
+
+    Raises ExperimentError.
+    """
     source = Path(__file__).parents[2] / "missions" / "maps"
     folder = source if maps is None else maps
     if maps is not None and not maps.is_dir():

@@ -1,8 +1,8 @@
 """The paper's own simulation (Kwasniewski & Gosiewski 2018, section 5): from field to field, without a vehicle.
 
-The robot sees a triangle of fields in the direction of its last move: layer k holds 2k + 1 fields. Where the paper
-is silent: the triangle has eight directions, on a diagonal it is the quadrant (in layer k the larger offset is k); obstacles hide what
-lies behind them; before a move the robot turns, so it sees the field it is about to enter.
+The robot sees a triangle of fields in the direction of its last move: layer k holds 2k + 1 fields. Where the paper is
+silent: the triangle has eight directions, on a diagonal it is the quadrant (in layer k the larger offset is k);
+obstacles hide what lies behind them; before a move the robot turns, so it sees the field it is about to enter.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from companion.core.clock import stopwatch_s
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Grid, Weights
-from companion.navigation.field_step import Action, Decision, Part, SearchKind, begin, step
-from companion.navigation.search_budget import Searcher
+from companion.navigation.field_step import Action, Decision, Part, SearchKind, initial_state, step
+from companion.navigation.search_budget import PathSearcher
 from companion.planning.problem import PlanResult
 from companion.planning.registry import make_planner
 from companion.settings import Settings
@@ -38,7 +38,8 @@ class Outcome(StrEnum):
 class FieldRun:
     """One run. ``track``: the fields entered, start first; ``parts``: the navigator's part at each move.
 
-    ``steps`` counts moves, ``return_steps`` those of part A; ``step_seconds`` has the time of each call of the step function.
+    ``steps`` counts moves, ``return_steps`` those of part A; ``step_seconds`` has the time of each call of the step
+    function.
     """
 
     seed: int
@@ -56,7 +57,8 @@ class FieldRun:
 class View:
     """The fields of one triangle, apex left out. Shape of offsets (n, 2): x, y.
 
-    ``between`` has shape (n, layers - 1, 2): the fields on the straight line from the apex to each, padded with the apex.
+    ``between`` has shape (n, layers - 1, 2): the fields on the straight line from the apex to each, padded with the
+    apex.
     """
 
     offsets: NDArray[np.int64]
@@ -105,8 +107,8 @@ class FieldRobot:
         self.run = FieldRun(seed, track=[start])
         rng = np.random.default_rng(seed)
         planner = make_planner(settings.navigator.planner, settings.planner)
-        self._searcher = Searcher(planner, settings.navigator, rng)
-        self._state = begin(start, target, int(rng.integers(2**63)), settings.navigator.better_every_fields)
+        self._searcher = PathSearcher(planner, settings.navigator, rng)
+        self._state = initial_state(start, target, int(rng.integers(2**63)), settings.navigator.better_every_fields)
         self._heading = (int(np.sign(target.x - start.x)), int(np.sign(target.y - start.y)))
 
     def drive(self, step_limit: int = STEP_LIMIT) -> FieldRun:

@@ -1,4 +1,4 @@
-"""Kwasniewski & Gosiewski 2018, sections 5 and 6: four unknown maps, many runs on each, times and steps as histograms."""
+"""Kwasniewski & Gosiewski 2018, sections 5 and 6: many runs on four unknown maps, times and steps as histograms."""
 
 from __future__ import annotations
 
@@ -175,7 +175,8 @@ def _made(tasks: list[tuple[tuple[Profile, str], range]], maps: dict[str, Grid],
 def _run_some(truth: Grid, profile: Profile, seeds: range) -> list[FieldRun]:
     _warm_up_once()
     settings = profile_settings(profile)
-    # As ``timeit`` does: a full collection takes longer than all planning of a run, and would fall into some run by chance.
+    # As ``timeit`` does: a full collection takes longer than all planning of a run, and would fall into some run by
+    # chance.
     collecting = gc.isenabled()
     gc.disable()
     try:
@@ -249,7 +250,7 @@ def _legend(figure: Figure) -> None:
 
 
 def _bins(values: NDArray[Any], *, whole: bool) -> NDArray[np.float64]:
-    """Some 25 bars over nearly all of the values; what lies beyond (an interrupted computation) goes into the last one."""
+    """About 25 bars for nearly all values. The last one takes outliers, which come from interrupted computations."""
     low, high = float(values.min()), float(values.max())
     if whole:
         width = max(1, int(np.ceil((high - low + 1.0) / 25.0)))
@@ -266,15 +267,15 @@ def _section(report: MapsReport) -> str:
 
 `rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
 
-Start {tuple(START)}, target {tuple(TARGET)}, 100 x 50 fields, at most {STEP_LIMIT} steps, a view of {LAYERS} layers. Steps, searches and plan (all
-searches of one run together) are medians of the runs, max is the slowest run, back (steps in return mode) is the mean, limit
-counts the runs that reached the limit of steps; 99 % of all calls of the step function, searches included, took no longer than p99. Times
-are in milliseconds, without Python's garbage collection.
+Start {tuple(START)}, target {tuple(TARGET)}, 100 x 50 fields, at most {STEP_LIMIT} steps, a view of {LAYERS} layers.
+Steps, searches and plan (all searches of one run together) are medians of the runs, max is the slowest run, back (steps
+in return mode) is the mean, limit counts the runs that reached the limit of steps; 99 % of all calls of the step
+function, searches included, took no longer than p99. Times are in milliseconds, without Python's garbage collection.
 
 {tables}
 
-The paper gives no table, only histograms of computing times in seconds (Python 3.6; its text names two of 189 s and 232 s on
-map 3) and says that almost all tests reached the target. Measured on {where_measured()}.
+The paper gives no table, only histograms of computing times in seconds (Python 3.6; its text names two of 189 s and 232
+s on map 3) and says that almost all tests reached the target. Measured on {where_measured()}.
 
 ![Example paths](images/{NAME}-paths.png)
 
@@ -286,12 +287,15 @@ Each example is the run with the median number of steps in the profile `paper`.
 
 What is ours:
 
-- **The maps.** The paper's maps are not available as data. Ours (`missions/maps`) are drawn to fit its text: one obstacle; 22
-  simple obstacles placed at random; the rooms of a building; obstacles of different shapes placed at random.
-- **The view.** The paper gives a triangle with its top in the robot's field and 2x + 1 fields in layer x. We take layer 0 as the
-  robot's own field and {LAYERS} layers beyond it, in the direction of the last move (at first: towards the target), which is one of eight; on a
-  diagonal the triangle is the quadrant. The paper does not say whether obstacles hide what lies behind them: here they do.
+- **The maps.** The paper's maps are not available as data. Ours (`missions/maps`) are drawn to fit its text: one
+  obstacle; 22 simple obstacles placed at random; the rooms of a building; obstacles of different shapes placed at
+  random.
+- **The view.** The paper gives a triangle with its top in the robot's field and 2x + 1 fields in layer x. We take layer
+  0 as the robot's own field and {LAYERS} layers beyond it, in the direction of the last move (at first: towards the
+  target), which is one of eight; on a diagonal the triangle is the quadrant. The paper does not say whether obstacles
+  hide what lies behind them: here they do.
 - **Turning.** Before a move the robot turns to the field it is about to enter and so sees it. When that field turns out
-  to be an obstacle, the step function is called once more in the same field. No diagonal step cuts an obstacle's corner.
+  to be an obstacle, the step function is called once more in the same field. No diagonal step cuts an obstacle's
+  corner.
 - **Profiles.** `paper` searches with the genetic algorithm alone; `default` has graph search behind it.
 """

@@ -1,4 +1,4 @@
-"""Kwasniewski & Gosiewski 2018, Table 1: four known maps of growing complexity, Dijkstra and three settings of the GA."""
+"""Kwasniewski & Gosiewski 2018, Table 1: four known maps, Dijkstra and three settings of the genetic algorithm."""
 
 from __future__ import annotations
 
@@ -254,19 +254,21 @@ def _section(report: TableReport) -> str:
 
 `rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
 
-From {tuple(START)} to {tuple(TARGET)} on known maps of 100 x 50 fields. GA 1: population 40, 4 control points; GA 2: population 100, 4
-control points; GA 3: population 100, 5 control points; all with 1 to 500 epochs. {NOT_FOUND} means that the budget was spent without a
-path. Mind the units: **milliseconds here, seconds in the paper**.
+From {tuple(START)} to {tuple(TARGET)} on known maps of 100 x 50 fields. GA 1: population 40, 4 control points; GA 2:
+population 100, 4 control points; GA 3: population 100, 5 control points; all with 1 to 500 epochs. {NOT_FOUND} means
+that the budget was spent without a path. Mind the units: **milliseconds here, seconds in the paper**.
 
 {tables}
 
-Measured on {where_measured()}. Times here and there cannot be compared one to one: the paper's
-programs are Python 3.6 on a computer that is not named, ours are compiled (the row in plain Python shows how much of the paper's 40 s
-belongs to its implementation). What can be compared: on map 1 the paper's Dijkstra takes {theirs:.0f} times as long as its
-GA 1, ours {ours:.1f} times; on map 4 the paper's three settings found a path in 0 of 9 runs, ours in {_found_in_maze(report)}.
+Measured on {where_measured()}. Times here and there cannot be compared one to one: the paper's programs are Python 3.6
+on a computer that is not named, ours are compiled (the row in plain Python shows how much of the paper's 40 s belongs
+to its implementation). What can be compared: on map 1 the paper's Dijkstra takes {theirs:.0f} times as long as its GA
+1, ours {ours:.1f} times; on map 4 the paper's three settings found a path in 0 of 9 runs, ours in
+{_found_in_maze(report)}.
 
 ![The four maps](images/{NAME}.png)
 
-The paper's maps are not available as data; ours (`missions/maps/known-1` to `known-4`) are drawn to fit its text: complexity grows from one
-simple obstacle to a maze. As in the paper, and unlike everywhere else in this project, paths may cut an obstacle's corner here.
+The paper's maps are not available as data; ours (`missions/maps/known-1` to `known-4`) are drawn to fit its text:
+complexity grows from one simple obstacle to a maze. As in the paper, and unlike everywhere else in this project, paths
+may cut an obstacle's corner here.
 """

@@ -1,4 +1,4 @@
-"""Which paths the genotypes of Sedighi et al. 2004 can write down at all: exactly, by trying every vertex after every other."""
+"""Which paths the genotypes of Sedighi et al. 2004 can represent: exactly, by an exhaustive search over vertices."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Places = dict[tuple[int, int, int], int]
 
 
 def fewest_switches(problem: PlanningProblem, kinds: Iterable[int] = (ROWS, COLUMNS)) -> int | None:
-    """With how many switches a square map can be crossed from corner to corner, begun with one of the kinds; None: never.
+    """The fewest switches for a path from corner to corner of a square map that begins with one kind; None: no path.
 
     As many as it takes are counted, though a chromosome has room for two. Switches lie between vertices, one at a time.
     """

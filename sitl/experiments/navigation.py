@@ -1,4 +1,4 @@
-"""Every planner inside the navigator, through unknown ground, field by field: what better or faster planning is worth there."""
+"""Every planner in the navigator, through unknown ground, field by field: what better or faster planning achieves."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Ground:
 
 @dataclass(frozen=True, slots=True)
 class Series:
-    """All runs of one planner on the problems of one map; ``over``: steps of each run that arrived over the best possible."""
+    """All runs of one planner on one map. ``over``: steps of each run that arrived, over the least possible."""
 
     planner: str
     map_name: str
@@ -135,9 +135,10 @@ class NavigationReport:
         """How many runs a row is made of; column names between asterisks."""
         runs, first = self.options.runs, self.options.seed
         made = "1 run, with seed" if runs == 1 else f"{runs} runs, with seeds {first} to"
-        return f"""*reached* counts the runs that arrived, of all that were made: on each problem {made} {first + runs - 1}, of planners that draw random
-numbers, and 1 of others, whose run is always the same. A planner whose searches may end without a path or a proof (prm, achour and
-the genetic algorithms) sends the rover back when its budget is spent, which shows in *back*, and may give up a target that can be reached."""
+        return f"""*reached* counts the runs that arrived, of all that were made: on each problem {made}
+{first + runs - 1}, of planners that draw random numbers, and 1 of others, whose run is always the same. A planner whose
+searches may end without a path or a proof (prm, achour and the genetic algorithms) sends the rover back when its budget
+is spent, which shows in *back*, and may give up a target that can be reached."""
 
     def _names(self) -> list[str]:
         return list(dict.fromkeys(ground.name for ground in self.grounds))
@@ -169,10 +170,10 @@ the genetic algorithms) sends the rover back when its budget is spent, which sho
 
 `{self.options.command(NAME)}`
 
-The four maps of the section on unknown maps, driven field by field as there (at most {STEP_LIMIT} steps), each time with another planner in the
-navigator. *steps/best* is the median (then the mean) of the steps over those of a shortest path for somebody who knows the map;
-*back* the mean number of steps in return mode; *plan* the median of all planning of one run together, *p99* of single calls of the
-navigator's step, searches included, in milliseconds.
+The four maps of the section on unknown maps, driven field by field as there (at most {STEP_LIMIT} steps), each time
+with another planner in the navigator. *steps/best* is the median (then the mean) of the steps over those of a shortest
+path for somebody who knows the map; *back* the mean number of steps in return mode; *plan* the median of all planning
+of one run together, *p99* of single calls of the navigator's step, searches included, in milliseconds.
 {self._runs_explained()}
 
 {tables}

@@ -37,7 +37,10 @@ def write_section(folder: Path, name: str, text: str, file: str = "results.md") 
 
 
 def terminal_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]], texts: Sequence[str] = ()) -> Table:
-    """The same for the terminal, narrow enough for 80 columns. ``texts``: columns of words, which may take several lines."""
+    """The same for the terminal, narrow enough for 80 columns.
+
+    ``texts``: columns of words, which may take several lines.
+    """
     table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     for column, name in enumerate(head):
         text = name in texts

@@ -1,8 +1,8 @@
 """Search spaces in the form of Sedighi et al. 2004: square, from the upper left corner to the lower right one.
 
-The paper shows its own only as small pictures. These eight are ours, drawn to fit what it says of them: 01 can be crossed row by
-row only; 02, 05 and 06 defeat a row-wise planner but not a column-wise one; 03 and 04 can be crossed row by row and column by
-column; 07 and 08 need both in one path.
+The paper shows its own only as small pictures. These eight are ours, drawn to fit what it says of them: 01 can be
+crossed row by row only; 02, 05 and 06 defeat a row-wise planner but not a column-wise one; 03 and 04 can be crossed row
+by row and column by column; 07 and 08 need both in one path.
 """
 
 from __future__ import annotations

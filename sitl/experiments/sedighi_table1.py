@@ -165,7 +165,10 @@ def turns(path: Path) -> int:
 
 
 def run(options: Options, advance: Advance) -> TableReport:
-    """Make all searches, one after the other (they are timed): ``jobs`` does not count. ``maps``: a folder of more grids."""
+    """Make all searches, one after the other (they are timed): ``jobs`` does not count.
+
+    ``maps``: a folder of more grids.
+    """
     spaces = own_spaces() | ({} if options.maps is None else given_spaces(options.maps))
     warm_up()
     entries: list[Entry] = []
@@ -227,12 +230,14 @@ def _section(report: TableReport) -> str:
     runs = len(report.entries[0].trials)
     return f"""## Search spaces (Sedighi et al. 2004, Table 1)
 
-`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed}{" --maps FOLDER" if _given(report) else ""} --docs docs`
+`rover-sitl experiment {NAME} --runs {report.options.runs} --seed
+{report.options.seed}{" --maps FOLDER" if _given(report) else ""} --docs docs`
 
-From the upper left to the lower right corner, every planner with its default settings. Success in per cent: of the first
-{min(runs, PAPER_RUNS)} runs (the paper makes {PAPER_RUNS}), then of all {runs}, in brackets the paper's figure as printed. Switches: the fewest
-with which any chromosome can write down a free path, begun row-wise / begun column-wise, found by trying everything; `geisler` needs
-a 0 on the left, `hermanu` a 0 on either side, `sedighi` has up to 2. - means that no chromosome crosses this space, however many switches it had.
+From the upper left to the lower right corner, every planner with its default settings. Success in per cent: of the
+first {min(runs, PAPER_RUNS)} runs (the paper makes {PAPER_RUNS}), then of all {runs}, in brackets the paper's figure as
+printed. Switches: the fewest with which any chromosome can write down a free path, begun row-wise / begun column-wise,
+found by trying everything; `geisler` needs a 0 on the left, `hermanu` a 0 on either side, `sedighi` has up to 2. -
+means that no chromosome crosses this space, however many switches it had.
 
 {markdown_table(HEAD, report._success(own))}
 
@@ -245,9 +250,10 @@ The paper prints no times. Here no search of `sedighi` took longer than {_slowes
 
 ![The eight search spaces](images/{NAME}.png)
 
-The paper's search spaces are not available as data; these are ours, drawn to fit its text: 01 can be crossed row-wise only, 07 and 08 need both
-kinds of movement. A success rate depends on the space as much as on the method, so the figures beside each other say that the three
-genotypes fail and succeed in the same places, not that one program is better than the other. More than that: 07 and 08 were picked from a
-dozen drawings while the parameters were being chosen, and drawings that `sedighi` seldom crossed were left out. Among those was the first
-08, which needs two switches; none of the eight does now.
+The paper's search spaces are not available as data; these are ours, drawn to fit its text: 01 can be crossed row-wise
+only, 07 and 08 need both kinds of movement. A success rate depends on the space as much as on the method, so the
+figures beside each other say that the three genotypes fail and succeed in the same places, not that one program is
+better than the other. More than that: 07 and 08 were picked from a dozen drawings while the parameters were being
+chosen, and drawings that `sedighi` seldom crossed were left out. Among those was the first 08, which needs two
+switches; none of the eight does now.
 """

@@ -1,7 +1,7 @@
-"""Many missions on random ground with random faults, one after the other in one process: does anything touch, fail, or grow?
+"""Many missions on random ground with random faults, in one process: does the rover touch anything, does memory grow?
 
-A person stands by, as the safety page asks for: where the companion says that it waits for one, the person looks for a while, arms if need
-be, and sets GUIDED again.
+A person stands by, as the safety page asks for: where the companion says that it waits for one, the person looks for a
+while, arms if need be, and sets GUIDED again.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from companion.recording.recorder import NullRecorder
 from companion.safety.reasons import Activity
 from companion.settings import Settings
 from sitl.autopilot.modes import arm, arming_faults, set_mode
-from sitl.autopilot.vehicle import Mode
+from sitl.autopilot.state import Mode
 from sitl.experiments import soak_faults, soak_worlds
 from sitl.experiments.experiment import Advance, Options, where_measured
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
@@ -104,9 +104,7 @@ class Person:
             return
         self._in_vain += 1
         if self._in_vain == PATIENCE:
-            self.gave_up = (
-                f"The autopilot does not let it be armed: {'; '.join(arming_faults(vehicle)) or 'GUIDED refused'}"
-            )
+            self.gave_up = f"The autopilot does not let it be armed: {'; '.join(fault.text for fault in arming_faults(vehicle)) or 'GUIDED refused'}"
             drive.companion.stop()
 
 
@@ -203,8 +201,8 @@ class SoakReport:
 
     @property
     def growth_mb(self) -> float | None:
-        """By how much the memory of the last runs is more than that of the first after the caches have filled; None: too few runs, or
-        more than one process."""
+        """By how much the memory of the last runs is more than that of the first after the caches have filled; None:
+        too few runs, or more than one process."""
         after = [run.memory_mb for run in self.runs[WARM_UP:]]
         if self.options.jobs > 1 or len(after) < 2 * WARM_UP:
             return None
@@ -228,11 +226,14 @@ class SoakReport:
 
 `{self.options.command(NAME)}` (`make soak`)
 
-{len(self.runs)} missions on random ground ({", ".join(sorted({run.ground for run in self.runs}))}; rough and slippery patches), with two or three targets that can be
-reached, in a quarter of them one that cannot, a lidar of 90 or 360 degrees, and none to {soak_faults.MOST} faults each at random times: {_named(met)}. A person stands by
-who sets GUIDED again, and arms, {PERSON_S:g} s after the companion has asked for one. *reached*: every target that can be reached; *policy*:
-targets missed as this page says ({by_policy}); *left*: missed without such a reason, or not at the end after {TIME_LIMIT_S:g} s; *coll.*: contacts; *errors*: exceptions that nobody caught; *person*: how often the person helped.
-A sensor gets stuck only with something in view (of the other case see [what it does not do](#what-it-does-not-do)). The process's {self._memory()}. {where_measured()}.
+{len(self.runs)} missions on random ground ({", ".join(sorted({run.ground for run in self.runs}))}; rough and slippery
+patches), with two or three targets that can be reached, in a quarter of them one that cannot, a lidar of 90 or 360
+degrees, and none to {soak_faults.MOST} faults each at random times: {_named(met)}. A person stands by who sets GUIDED
+again, and arms, {PERSON_S:g} s after the companion has asked for one. *reached*: every target that can be reached;
+*policy*: targets missed as this page says ({by_policy}); *left*: missed without such a reason, or not at the end after
+{TIME_LIMIT_S:g} s; *coll.*: contacts; *errors*: exceptions that nobody caught; *person*: how often the person helped. A
+sensor gets stuck only with something in view (of the other case see [what it does not do](#what-it-does-not-do)). The
+process's {self._memory()}. {where_measured()}.
 
 {markdown_table(HEAD, self._rows())}
 """

@@ -1,12 +1,12 @@
 """Random plans of faults: what a rover may meet on a bad day. Each ends by itself, so that there is a way on.
 
-A sensor that is stuck while it sees nothing cannot be told from one over open ground (docs/safety.md): here it has something in view.
+A sensor that is stuck while it sees nothing cannot be told from one over open ground (docs/safety.md): here it has
+something in view.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Literal
 
 import numpy as np
 
@@ -17,12 +17,14 @@ from sitl.faults.plan import (
     GpsGlitch,
     GpsLoss,
     GpsNoise,
+    LinkEffect,
     LinkFault,
     PilotTakesOver,
     Reboot,
     SensorFault,
     WheelSlip,
 )
+from sitl.sensors.range_sensors import Defect
 
 Make = Callable[[np.random.Generator, float], Fault]
 """Draws a fault that begins then, seconds after the rover has begun to drive."""
@@ -37,25 +39,22 @@ def plan_of(rng: np.random.Generator) -> FaultPlan:
     return FaultPlan(tuple(FAULTS[str(name)](rng, float(rng.uniform(0.0, LATEST_S))) for name in names))
 
 
-LinkWhat = Literal["loss", "delay", "reorder", "duplicate", "corrupt", "outage"]
-
-
-def _link(what: LinkWhat, longest_s: float, *, probability: float = 1.0, delay_s: float = 0.0) -> Make:
+def _link(effect: LinkEffect, longest_s: float, *, probability: float = 1.0, delay_s: float = 0.0) -> Make:
     """``probability``, ``delay_s``: at most; 1 is always."""
 
     def made(rng: np.random.Generator, start_s: float) -> Fault:
         end_s = start_s + rng.uniform(0.5, longest_s)
         share = float(rng.uniform(0.02, probability)) if probability < 1.0 else 1.0
         late_s = float(rng.uniform(0.05, delay_s)) if delay_s else 0.0
-        more_s = late_s / 2.0 if what == "delay" else 0.0
-        return LinkFault(start_s, end_s, "driving", what=what, probability=share, delay_s=late_s, jitter_s=more_s)
+        more_s = late_s / 2.0 if effect is LinkEffect.DELAY else 0.0
+        return LinkFault(start_s, end_s, "driving", effect=effect, probability=share, delay_s=late_s, jitter_s=more_s)
 
     return made
 
 
-def _sensor(what: Literal["stuck in view", "silent"]) -> Make:
+def _sensor(defect: Defect) -> Make:
     def made(rng: np.random.Generator, start_s: float) -> Fault:
-        return SensorFault(start_s, start_s + rng.uniform(0.5, 8.0), "driving", what=what)
+        return SensorFault(start_s, start_s + rng.uniform(0.5, 8.0), "driving", defect=defect)
 
     return made
 
@@ -70,12 +69,12 @@ def _slip(rng: np.random.Generator, start_s: float) -> Fault:
 
 
 FAULTS: dict[str, Make] = {
-    "packets lost": _link("loss", 60.0, probability=0.3),
-    "packets late": _link("delay", 30.0, delay_s=0.8),
-    "packets reordered": _link("reorder", 60.0, probability=0.3, delay_s=0.3),
-    "packets twice": _link("duplicate", 60.0, probability=0.3),
-    "packets damaged": _link("corrupt", 60.0, probability=0.2),
-    "link gone": _link("outage", 12.0),
+    "packets lost": _link(LinkEffect.LOSS, 60.0, probability=0.3),
+    "packets late": _link(LinkEffect.DELAY, 30.0, delay_s=0.8),
+    "packets reordered": _link(LinkEffect.REORDER, 60.0, probability=0.3, delay_s=0.3),
+    "packets twice": _link(LinkEffect.DUPLICATE, 60.0, probability=0.3),
+    "packets damaged": _link(LinkEffect.CORRUPT, 60.0, probability=0.2),
+    "link gone": _link(LinkEffect.OUTAGE, 12.0),
     "GPS gone": lambda rng, start_s: GpsLoss(start_s, start_s + rng.uniform(1.0, 12.0), "driving"),
     "GPS glitch": lambda rng, start_s: GpsGlitch(
         start_s, start_s + rng.uniform(1.0, 10.0), "driving", metres=float(rng.uniform(1.0, 20.0))
@@ -83,8 +82,8 @@ FAULTS: dict[str, Make] = {
     "GPS noise": lambda rng, start_s: GpsNoise(
         start_s, start_s + rng.uniform(5.0, 40.0), "driving", metres=float(rng.uniform(0.1, 1.0))
     ),
-    "sensor stuck": _sensor("stuck in view"),
-    "sensor silent": _sensor("silent"),
+    "sensor stuck": _sensor(Defect.STUCK_IN_VIEW),
+    "sensor silent": _sensor(Defect.SILENT),
     "wheels slip": _slip,
     "pilot takes over": _pilot,
     "autopilot reboots": lambda rng, start_s: Reboot(start_s, start_s + rng.uniform(1.0, 4.0), "driving"),

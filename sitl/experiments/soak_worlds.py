@@ -1,4 +1,4 @@
-"""Random ground to drive on, with walls all round, and places in it that a rover can certainly reach, or certainly cannot."""
+"""Random ground inside walls, with places that a rover can certainly reach and places that it certainly cannot."""
 
 from __future__ import annotations
 

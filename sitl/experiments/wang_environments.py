@@ -1,8 +1,8 @@
-"""Four environments of our own with as many static and moving obstacles as those of Wang, Sillitoe & Mulvaney 2007 (table I).
+"""Four environments with as many static and moving obstacles as those of Wang, Sillitoe & Mulvaney 2007 (table I).
 
-Fields are 1 m wide. The paper shows its environments in pictures only; ours fit its text: obstacles that travel to and fro between two
-places in the first two, along several segments at several speeds in the others. After the change they go elsewhere, at
-the speeds of table III.
+Fields are 1 m wide. The paper shows its environments in pictures only; ours fit its text: obstacles that travel to and
+fro between two places in the first two, along several segments at several speeds in the others. After the change they
+go elsewhere, at the speeds of table III.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import shapely
 from numpy.typing import NDArray
 
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Weights
-from companion.planning.problem import Mover
+from companion.planning.problem import ObstacleTrajectory
 
 Track = NDArray[np.float64]
 Place = tuple[float, float]
@@ -77,14 +77,14 @@ class Environment:
             weights[shapely.contains_xy(shapely.Polygon(corners), x, y)] = OBSTACLE
         return weights
 
-    def movers(self) -> tuple[Mover, ...]:
+    def movers(self) -> tuple[ObstacleTrajectory, ...]:
         """As they move at first."""
-        return tuple(Mover(moving.radius_m, moving.before.track()) for moving in self.moving)
+        return tuple(ObstacleTrajectory(moving.radius_m, moving.before.track()) for moving in self.moving)
 
-    def movers_after(self) -> tuple[Mover, ...]:
+    def movers_after(self) -> tuple[ObstacleTrajectory, ...]:
         """As they move from the change on; its moment is their time 0, where they are then their first place."""
         return tuple(
-            Mover(moving.radius_m, moving.after.track(place_at(moving.before.track(), self.change_s)))
+            ObstacleTrajectory(moving.radius_m, moving.after.track(place_at(moving.before.track(), self.change_s)))
             for moving in self.moving
         )
 

@@ -1,4 +1,4 @@
-"""Wang, Sillitoe & Mulvaney 2007, table IV: planning on the way among static and moving obstacles, for time and for length."""
+"""Wang, Sillitoe & Mulvaney 2007, table IV: replanning among static and moving obstacles, for time and for length."""
 
 from __future__ import annotations
 
@@ -109,7 +109,8 @@ class Entry:
 
 
 COLUMNS = (
-    "offline_length_m", "offline_time_s", "length_m", "time_s", "first_generations", "first_ms", "all_ms", "least_gap_m",
+    "offline_length_m", "offline_time_s", "length_m", "time_s", "first_generations", "first_ms", "all_ms",
+    "least_gap_m",
 )  # fmt: skip
 
 
@@ -262,29 +263,32 @@ def _section(report: WangReport) -> str:
 
 `rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
 
-A robot plans off-line with `vertex++` from {tuple(ENVIRONMENTS[1].start)} to {tuple(ENVIRONMENTS[1].target)}, 1 m a field, speeds of
-{SPEEDS_M_S[0]} to {SPEEDS_M_S[1]} m/s, and follows that plan until the moving obstacles change their ways and speeds (after 400, 380, 300 and 320 s,
-as in the paper). Then it plans on-line, from where it is: the table has that plan, medians of all runs, and the speeds of the run with the
-median cost. "gen." is the generation of the first feasible path, "first" the time until then, "1000" the time for 1000 generations (ours with
-the making of the polygons). Below each row stands the paper's as printed: **milliseconds here, seconds there**.
+A robot plans off-line with `vertex++` from {tuple(ENVIRONMENTS[1].start)} to {tuple(ENVIRONMENTS[1].target)}, 1 m a
+field, speeds of {SPEEDS_M_S[0]} to {SPEEDS_M_S[1]} m/s, and follows that plan until the moving obstacles change their
+ways and speeds (after 400, 380, 300 and 320 s, as in the paper). Then it plans on-line, from where it is: the table has
+that plan, medians of all runs, and the speeds of the run with the median cost. "gen." is the generation of the first
+feasible path, "first" the time until then, "1000" the time for 1000 generations (ours with the making of the polygons).
+Below each row stands the paper's as printed: **milliseconds here, seconds there**.
 
 {tables}
 
-"Off-line" is the first plan, which begins at the same place whatever is sought: the fair comparison of the criteria, since
-where the robot is when the obstacles change depends on how fast it was. "Touched" counts the runs in which the robot came into contact
-with a moving obstacle when both were simulated in steps of 50 ms from the start to the target; the gap is to the obstacle's edge.
+"Off-line" is the first plan, which begins at the same place whatever is sought: the fair comparison of the criteria,
+since where the robot is when the obstacles change depends on how fast it was. "Touched" counts the runs in which the
+robot came into contact with a moving obstacle when both were simulated in steps of 50 ms from the start to the target;
+the gap is to the obstacle's edge.
 
 {details}
 
-Measured on {where_measured()}. The paper: Matlab 7.2 on a Pentium 4 of 2.8 GHz, and no word on failures. The paper's times
-are at least {first:.0f} times ours to the first feasible path, {whole:.0f} times for 1000 generations. Lengths cannot be compared, the
-environments are not the paper's.
+Measured on {where_measured()}. The paper: Matlab 7.2 on a Pentium 4 of 2.8 GHz, and no word on failures. The paper's
+times are at least {first:.0f} times ours to the first feasible path, {whole:.0f} times for 1000 generations. Lengths
+cannot be compared, the environments are not the paper's.
 
 ![The four environments](images/{NAME}.png)
 
-What is ours: the environments (`sitl/experiments/wang_environments.py`), with the paper's numbers of obstacles (table I), its obstacle
-speeds after the change (table III) and its safe distance of {SAFE_M:g} m (table II); moving obstacles are discs. Red is what they do after the change, the
-disc is where they are at that moment; the diamond is where the robot is.
+What is ours: the environments (`sitl/experiments/wang_environments.py`), with the paper's numbers of obstacles (table
+I), its obstacle speeds after the change (table III) and its safe distance of {SAFE_M:g} m (table II); moving obstacles
+are discs. Red is what they do after the change, the disc is where they are at that moment; the diamond is where the
+robot is.
 """
 
 

@@ -1,4 +1,4 @@
-"""One trip through an environment of ``wang_environments``: planned off-line, followed, planned anew when the obstacles change."""
+"""One trip through an environment of ``wang_environments``: plan off-line, follow, replan when the obstacles change."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from companion.core.clock import stopwatch_s
 from companion.core.grid import Cell
 from companion.planning.papers.wang_ga import Plan, planned
-from companion.planning.problem import Motion, Mover, PlanningProblem
+from companion.planning.problem import ObstacleTrajectory, PlanningProblem, VehicleMotion
 from companion.planning.raster import polyline
 from companion.settings.planners import VertexSettings
 from sitl.experiments.wang_environments import Environment
@@ -58,8 +58,8 @@ def time_s(plan: Plan) -> float:
     return float((np.hypot(*np.diff(plan.corners, axis=0).T) / plan.speeds_fields_s).sum())
 
 
-def least_gap_m(plan: Plan, movers: tuple[Mover, ...], until_s: float) -> float:
-    """The least distance from the edges of the moving obstacles, on the way or until then: both simulated in small steps."""
+def least_gap_m(plan: Plan, movers: tuple[ObstacleTrajectory, ...], until_s: float) -> float:
+    """The least distance from the edges of the moving obstacles until then, both simulated in small steps."""
     times_s = np.arange(0.0, min(until_s, time_s(plan)), CHECK_STEP_S)
     x, y = travel(plan.corners.astype(float), plan.speeds_fields_s, times_s)
     gaps = [
@@ -71,17 +71,17 @@ def least_gap_m(plan: Plan, movers: tuple[Mover, ...], until_s: float) -> float:
 
 
 def make_trip(environment: Environment, settings: VertexSettings, seed: int) -> Trip:
-    """Plan, follow the plan until the obstacles change, plan again from there with their new motion (twice, to time it)."""
-    motion = Motion(speeds_fields_s=SPEEDS_M_S)
+    """Plan, follow the plan until the obstacles change, then replan with their new motion (twice, to time it)."""
+    motion = VehicleMotion(speeds_fields_s=SPEEDS_M_S)
     weights, before, after = environment.weights(), environment.movers(), environment.movers_after()
-    problem = PlanningProblem(weights, environment.start, environment.target, movers=before, motion=motion)
+    problem = PlanningProblem(weights, environment.start, environment.target, moving_obstacles=before, motion=motion)
     offline = planned(problem, settings, 2 * seed, timed=True)
     if len(offline.corners) == 0:
         return Trip(offline, None, None, None, None)
     x, y = travel(offline.corners.astype(float), offline.speeds_fields_s, np.array([environment.change_s]))
     fields = polyline(offline.corners)
     here = Cell(*(int(c) for c in fields[np.argmin((fields[:, 0] - x) ** 2 + (fields[:, 1] - y) ** 2)]))
-    rest = PlanningProblem(weights, here, environment.target, movers=after, motion=motion)
+    rest = PlanningProblem(weights, here, environment.target, moving_obstacles=after, motion=motion)
     began_s = stopwatch_s()
     planned(rest, settings, 2 * seed + 1, timed=True, first_only=True)
     first_s = stopwatch_s()

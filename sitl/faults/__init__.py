@@ -1,1 +1,1 @@
-"""What goes wrong on purpose, and when."""
+"""Fault injection: plans of faults, and their effects on links, sensors, GPS, wheels and power."""

@@ -1,14 +1,31 @@
-"""A plan of faults as plain values: what goes wrong when, for how long, how badly.
+"""Fault plans as plain values: which faults occur, when, for how long and how severely.
 
-Times are seconds from when the simulator was switched on, or from when the rover began to drive; a reboot of the autopilot does not
-set them back.
+Times are seconds since the simulator was switched on, or since the rover began to drive; a reboot of the autopilot
+does not reset them.
+
+Nouns: fault plan.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from typing import Literal
+
+from sitl.sensors.range_sensors import Defect
+
+
+class LinkEffect(Enum):
+    """What a link fault does to a packet."""
+
+    LOSS = "loss"
+    DELAY = "delay"
+    REORDER = "reorder"
+    DUPLICATE = "duplicate"
+    CORRUPT = "corrupt"
+    OUTAGE = "outage"
+
 
 Since = Literal["boot", "driving"]
 Direction = Literal["both", "to_vehicle", "from_vehicle"]
@@ -16,9 +33,9 @@ Direction = Literal["both", "to_vehicle", "from_vehicle"]
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """When it is there: from ``start_s`` until ``end_s`` (inf: to the end), both counted ``since``.
+    """A fault that is active from ``start_s`` to ``end_s`` (inf: forever), both counted ``since``.
 
-    With ``repeat_s`` it comes again so long after it began, for ever.
+    With ``repeat_s`` it recurs at that interval, forever.
     """
 
     start_s: float = 0.0
@@ -27,7 +44,7 @@ class Fault:
     repeat_s: float = math.inf
 
     def at(self, elapsed_s: float) -> tuple[bool, float]:
-        """Whether it is there ``elapsed_s`` after its count began, and when that changes next (inf: never)."""
+        """Whether it is active ``elapsed_s`` after its count began, and when that changes next (inf: never)."""
         if elapsed_s < self.start_s - TINY_S:
             return False, self.start_s
         times = math.floor((elapsed_s - self.start_s + TINY_S) / self.repeat_s) if math.isfinite(self.repeat_s) else 0
@@ -38,52 +55,52 @@ class Fault:
 
 
 TINY_S = 1e-6
-"""A moment is reached when only so much is missing: times are sums of main loops."""
+"""Tolerance when times are compared: they are sums of main loops."""
 
 
 @dataclass(frozen=True, slots=True)
 class LinkFault(Fault):
-    """Something that befalls whole packets, each with a probability of its own.
+    """A fault that affects whole packets, each with ``probability``.
 
     ``links``: numbers of links from 1, empty for all.
     """
 
-    what: Literal["loss", "delay", "reorder", "duplicate", "corrupt", "outage"] = "loss"
+    effect: LinkEffect = LinkEffect.LOSS
     probability: float = 1.0
     delay_s: float = 0.0
     jitter_s: float = 0.0
-    """``delay``: up to so much longer, each packet differently; packets keep their order."""
+    """For a delay: random extra delay of each packet; packets keep their order."""
     direction: Direction = "both"
     links: tuple[int, ...] = ()
 
     def concerns(self, link: int, direction: Direction) -> bool:
-        """Whether packets on this link that go this way are meant."""
+        """Whether it affects packets on this link in this direction."""
         return (not self.links or link in self.links) and self.direction in ("both", direction)
 
 
 @dataclass(frozen=True, slots=True)
 class Reboot(Fault):
-    """The autopilot's power fails: it is off until ``end_s``, then it boots. Links are dropped."""
+    """The autopilot loses power: it is off until ``end_s``, then it boots. Links are dropped."""
 
 
 @dataclass(frozen=True, slots=True)
 class PilotTakesOver(Fault):
-    """The pilot turns the mode switch, holds the sticks so, and gives the rover back at ``end_s`` in the mode it was in."""
+    """The pilot switches the mode, holds the sticks, and at ``end_s`` returns to the mode before."""
 
     mode: str = "HOLD"
     steering: float = 0.0
     throttle: float = 0.0
-    """Sticks, -1 to 1; they count in MANUAL."""
+    """Sticks, -1 to 1; they have an effect in MANUAL only."""
 
 
 @dataclass(frozen=True, slots=True)
 class GpsLoss(Fault):
-    """The receiver is silent."""
+    """The GPS receiver is silent."""
 
 
 @dataclass(frozen=True, slots=True)
 class GpsGlitch(Fault):
-    """The receiver is wrong by so much. ``bearing_deg``: which way, clockwise from north; None: any, by the seed."""
+    """The GPS position is wrong by ``metres`` towards ``bearing_deg``, clockwise from north (None: random)."""
 
     metres: float = 10.0
     bearing_deg: float | None = None
@@ -91,7 +108,7 @@ class GpsGlitch(Fault):
 
 @dataclass(frozen=True, slots=True)
 class GpsNoise(Fault):
-    """The receiver's position wanders by so much (standard deviation), as slowly as ``time_s`` says."""
+    """The GPS position wanders by ``metres`` (standard deviation) with a time constant of ``time_s``."""
 
     metres: float = 1.0
     time_s: float = 10.0
@@ -99,19 +116,18 @@ class GpsNoise(Fault):
 
 @dataclass(frozen=True, slots=True)
 class SensorFault(Fault):
-    """Range sensors repeat their last reading (``stuck``) or give none (``silent``); ``stuck in view``: each from the first reading on
-    that shows something.
+    """Range sensors with a defect.
 
-    ``beams``: numbers of the suite's rangefinders from 1; empty for all, and for the lidar.
+    ``beams``: numbers of the suite's rangefinders, from 1; empty for all sensors, the lidar included.
     """
 
-    what: Literal["stuck", "stuck in view", "silent"] = "silent"
+    defect: Defect = Defect.SILENT
     beams: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
 class WheelSlip(Fault):
-    """Wheels spin: ``share`` of what the motors give is lost, on one side or both."""
+    """Wheels slip: ``share`` of the motor output is lost, on one side or both."""
 
     share: float = 0.5
     side: Literal["both", "left", "right"] = "both"
@@ -119,14 +135,14 @@ class WheelSlip(Fault):
 
 @dataclass(frozen=True, slots=True)
 class BatteryLow(Fault):
-    """The battery's voltage at rest is so low."""
+    """The battery's voltage at rest is at most ``volts``."""
 
     volts: float = 10.0
 
 
 @dataclass(frozen=True, slots=True)
 class FaultPlan:
-    """Everything that goes wrong. ``seed`` goes with the run's own into the faults' randomness."""
+    """All faults of a run. ``seed``: combined with the run's own for the random draws of the faults."""
 
     faults: tuple[Fault, ...] = ()
     seed: int = 0

@@ -1,6 +1,6 @@
-"""Plays a plan of faults on the vehicle: which are there now, and what each does to it.
+"""Applies a fault plan to the vehicle: which faults are active now, and their effects.
 
-Everything is a function of plan, seed and simulated time; each fault has a generator of its own.
+Everything is a function of plan, seed and simulated time; each fault has its own random generator.
 """
 
 from __future__ import annotations
@@ -10,12 +10,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from sitl.autopilot.boot import HOME_S, ORIGIN_S, POSITION_S
-from sitl.autopilot.control import Record
+from sitl.autopilot.control.records import Record
 from sitl.autopilot.ekf import STEP_S
-from sitl.autopilot.modes import apply_sticks, set_mode, tell_of_ekf
-from sitl.autopilot.vehicle import Mode, Sticks, Vehicle
-from sitl.faults.link_faults import Active, Way
+from sitl.autopilot.modes import apply_sticks, report_ekf, set_mode
+from sitl.autopilot.start_up import HOME_S, ORIGIN_S, POSITION_S
+from sitl.autopilot.state import Mode, Sticks
+from sitl.autopilot.vehicle import Vehicle
+from sitl.faults.link_faults import Active, LinkQueue
 from sitl.faults.plan import (
     BatteryLow,
     Fault,
@@ -32,15 +33,15 @@ from sitl.faults.plan import (
 from sitl.sensors.range_sensors import Defect, RangeSensing
 
 DRIVING_M = 0.1
-"""A rover that has come so far has begun to drive."""
+"""The rover counts as driving from this distance on."""
 ALIGN_S = 10.0
-"""The EKF wants to have seen a good GPS for so long before it begins to use it."""
+"""Time for which the EKF must have seen a good GPS before it uses it."""
 OWN_STREAM = 0x4641554C
-"""Keeps the faults' randomness apart from everything else that is drawn from the same seed."""
+"""Separates the random draws of the faults from all others with the same seed."""
 
 
 class FaultPlayer:
-    """Which faults are there, and their effects on vehicle, sensors and wheels. Links ask it for theirs."""
+    """The active faults, and their effects on vehicle, sensors and wheels; links ask it for link faults."""
 
     def __init__(self, plan: FaultPlan, seed: int) -> None:
         """``seed``: the simulator's own."""
@@ -61,21 +62,21 @@ class FaultPlayer:
         self._mode_before: dict[int, Mode] = {}
         self._was_started = False
         self.due_s = 0.0
-        """When ``step`` must be called next."""
+        """Time at which ``step`` must be called next."""
         self.reboot_until_s: float | None = None
-        """Set when the autopilot's power fails now: until when it is off. Whoever acts on it sets it back."""
+        """Set when the autopilot loses power now: until when it is off. The simulator resets it."""
 
     # Time ------------------------------------------------------------------------------------------------------------
 
     def is_active(self, fault: Fault, now_s: float) -> bool:
-        """Whether a fault is there."""
+        """Whether a fault is active."""
         return fault.at(self._elapsed_s(fault, now_s))[0]
 
     def _elapsed_s(self, fault: Fault, now_s: float) -> float:
         return now_s if fault.since == "boot" else now_s - self._driving_s
 
     def step(self, now_s: float, vehicle: Vehicle, rover: Record, sensing: RangeSensing) -> None:
-        """Begin and end what is due, and let the EKF take its step."""
+        """Begin and end the faults that are due, and step GPS and EKF."""
         if math.isinf(self._driving_s) and float(rover[0]["driven_m"]) >= DRIVING_M:
             self._driving_s = self._changes_s = now_s
         if now_s >= self._changes_s - 1e-6:
@@ -90,11 +91,11 @@ class FaultPlayer:
         self.due_s = min(self._changes_s, self._steps * STEP_S if steps else math.inf)
 
     def rebooted(self, vehicle: Vehicle, rover: Record, sensing: RangeSensing) -> None:
-        """A fresh autopilot: it meets what goes on."""
+        """Apply the active faults to an autopilot that has just booted."""
         self._was_started = False
         self._mode_before.clear()
-        for number, fault in self._present():
-            if isinstance(fault, PilotTakesOver):  # the switch and the sticks are where they were
+        for number, fault in self._active_faults():
+            if isinstance(fault, PilotTakesOver):  # switch and sticks have not moved
                 self._take_over(number, fault, vehicle)
         self._apply(vehicle, rover, sensing)
 
@@ -133,8 +134,8 @@ class FaultPlayer:
         if not isinstance(fault, PilotTakesOver):
             return
         before = self._mode_before.pop(number, None)
-        others = [(other, one) for other, one in self._present() if isinstance(one, PilotTakesOver)]
-        if others:  # one pilot, one switch: it stays where another fault has it
+        others = [(other, one) for other, one in self._active_faults() if isinstance(one, PilotTakesOver)]
+        if others:  # there is one switch: it stays where another fault has set it
             self._take_over(*others[-1], vehicle)
         else:
             _hold_sticks(vehicle, Sticks())
@@ -145,30 +146,30 @@ class FaultPlayer:
 
     # Effects ---------------------------------------------------------------------------------------------------------
 
-    def _present(self) -> Iterable[tuple[int, Fault]]:
+    def _active_faults(self) -> Iterable[tuple[int, Fault]]:
         return ((number, self._faults[number][0]) for number in sorted(self._active))
 
     def _apply(self, vehicle: Vehicle, rover: Record, sensing: RangeSensing) -> None:
-        """Everything that is simply there or not."""
+        """Set the effects that are either present or not."""
         grips = [1.0, 1.0]
-        lidar: Defect = ""
+        lidar: Defect | None = None
         beams: dict[int, Defect] = {}
         volts = math.inf
-        for _, fault in self._present():
+        for _, fault in self._active_faults():
             match fault:
                 case WheelSlip():
                     for side, name in enumerate(("left", "right")):
                         grips[side] *= 1.0 - fault.share if fault.side in ("both", name) else 1.0
                 case SensorFault():
-                    lidar = lidar if fault.beams else fault.what
+                    lidar = lidar if fault.beams else fault.defect
                     numbers = [number - 1 for number in fault.beams] or sensing.numbers()
-                    beams |= dict.fromkeys(numbers, fault.what)
+                    beams |= dict.fromkeys(numbers, fault.defect)
                 case BatteryLow():
                     volts = min(volts, fault.volts)
                 case _:
                     pass
         if float(rover[0]["turning_radius_m"]) > 0.0:
-            # Steered wheels are driven together: what slips of one side is lost to both.
+            # Steered wheels are driven together: slip on one side affects both.
             grips = [1.0, 0.5 * (grips[0] + grips[1])]
         rover["grip_1"], rover["grip_3"] = grips
         sensing.lidar_fault, sensing.beam_faults = lidar, beams
@@ -177,10 +178,10 @@ class FaultPlayer:
     # GPS -------------------------------------------------------------------------------------------------------------
 
     def _move_gps(self, vehicle: Vehicle) -> None:
-        """How wrong the receiver is now: all glitches and what wanders, added up."""
+        """Set the GPS error of this moment: the sum of all glitches and noise."""
         north_m = east_m = 0.0
         talks = True
-        for number, fault in self._present():
+        for number, fault in self._active_faults():
             match fault:
                 case GpsLoss():
                     talks = False
@@ -205,7 +206,7 @@ class FaultPlayer:
     def _step_ekf(self, vehicle: Vehicle) -> None:
         ekf = vehicle.ekf
         if not vehicle.is_started:
-            self._hold_up_start(vehicle)
+            self._delay_start(vehicle)
             return
         if not self._was_started:
             self._was_started = True
@@ -218,10 +219,10 @@ class FaultPlayer:
         estimate = vehicle.estimate
         estimate["offset_n"], estimate["offset_e"] = place_m
         estimate["offset_vn"], estimate["offset_ve"] = ekf.drift_m_s
-        tell_of_ekf(vehicle, changes)
+        report_ekf(vehicle, changes)
 
-    def _hold_up_start(self, vehicle: Vehicle) -> None:
-        """Without a GPS those parts of the start-up wait that need it."""
+    def _delay_start(self, vehicle: Vehicle) -> None:
+        """Delay the parts of the start-up that need GPS."""
         gps, late, now_s = vehicle.ekf.gps, vehicle.gps_late, vehicle.time_s
         if gps.talks:
             gps.heard_s = now_s
@@ -235,13 +236,13 @@ class FaultPlayer:
 
     # Links -----------------------------------------------------------------------------------------------------------
 
-    def pass_on(self, way: Way, data: bytes, now_s: float) -> None:
-        """Put bytes on their way through a link with its faults."""
-        way.pass_on(data, now_s, lambda fault: self.is_active(fault, now_s), self._links)
+    def pass_on(self, queue: LinkQueue, data: bytes, now_s: float) -> None:
+        """Put bytes on their queue through a link with its faults."""
+        queue.pass_on(data, now_s, lambda fault: self.is_active(fault, now_s), self._links)
 
 
 def _hold_sticks(vehicle: Vehicle, sticks: Sticks) -> None:
-    """The transmitter's sticks; a ground station's override goes before them while it lasts."""
+    """Set the transmitter's sticks; a ground station's override has priority while it lasts."""
     vehicle.transmitter = sticks
     if vehicle.sticks.overridden_s is None:
         vehicle.sticks = sticks

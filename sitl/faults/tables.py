@@ -1,4 +1,4 @@
-"""What a fault plan may say: a table for each kind of fault, and how it becomes a value. The same in words is in docs/faults.md."""
+"""Tables of a fault plan file, one per kind of fault, and their conversion to values; described in docs/faults.md."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from sitl.faults.plan import (
     GpsGlitch,
     GpsLoss,
     GpsNoise,
+    LinkEffect,
     LinkFault,
     PilotTakesOver,
     Reboot,
@@ -22,6 +23,7 @@ from sitl.faults.plan import (
     Since,
     WheelSlip,
 )
+from sitl.sensors.range_sensors import Defect
 
 REBOOT_S = 3.0
 OVERTAKEN_S = 0.2
@@ -37,7 +39,7 @@ Numbers = Annotated[list[Annotated[int, Field(ge=1, le=1000)]], Field(min_length
 
 
 class FaultTable(BaseModel, ABC):
-    """``[[fault]]``: what all kinds have in common."""
+    """``[[fault]]``: keys that all kinds have in common."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
@@ -49,7 +51,7 @@ class FaultTable(BaseModel, ABC):
     repeat_s: Span | None = None
 
     def window(self, duration_s: float = math.inf) -> dict[str, Any]:
-        """The times, with what a fault lasts that does not say. Raises ValueError when they contradict each other."""
+        """The times; ``duration_s``: default duration. Raises ValueError if they contradict each other."""
         if self.duration_s is not None and self.end_s is not None:
             raise ValueError("duration_s and end_s are both given; use one of them")
         if self.end_s is not None and self.end_s <= self.start_s:
@@ -57,26 +59,26 @@ class FaultTable(BaseModel, ABC):
         end_s = self.start_s + (duration_s if self.duration_s is None else self.duration_s)
         end_s = end_s if self.end_s is None else self.end_s
         if self.repeat_s is not None and self.repeat_s <= end_s - self.start_s:
-            raise ValueError("repeat_s must be longer than the fault lasts; give it a duration_s shorter than repeat_s")
+            raise ValueError("repeat_s must be longer than the fault; give it a duration_s shorter than repeat_s")
         repeat_s = math.inf if self.repeat_s is None else self.repeat_s
         return {"start_s": self.start_s, "end_s": end_s, "since": self.since, "repeat_s": repeat_s}
 
     @abstractmethod
     def fault(self) -> Fault:
-        """The fault as a value. Raises ValueError when what was said contradicts itself."""
+        """The fault as a value. Raises ValueError for contradicting keys."""
 
 
 class OnLink(FaultTable):
-    """What befalls packets on links."""
+    """Keys of link faults."""
 
     direction: Direction = "both"
     links: Numbers = [1]
-    """Replaced by all links where a plan names none."""
+    """All links, if a plan does not give this key."""
 
-    def link_fault(self, what: Any, **strength: Any) -> LinkFault:
-        """The fault on the links that are meant."""
+    def link_fault(self, effect: LinkEffect, **strength: Any) -> LinkFault:
+        """The fault on the links it affects."""
         links = tuple(self.links) if "links" in self.model_fields_set else ()
-        return LinkFault(**self.window(), what=what, direction=self.direction, links=links, **strength)
+        return LinkFault(**self.window(), effect=effect, direction=self.direction, links=links, **strength)
 
 
 class Loss(OnLink):
@@ -86,7 +88,7 @@ class Loss(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("loss", probability=self.probability)
+        return self.link_fault(LinkEffect.LOSS, probability=self.probability)
 
 
 class Delay(OnLink):
@@ -98,7 +100,9 @@ class Delay(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("delay", probability=self.probability, delay_s=self.delay_s, jitter_s=self.jitter_s)
+        return self.link_fault(
+            LinkEffect.DELAY, probability=self.probability, delay_s=self.delay_s, jitter_s=self.jitter_s
+        )
 
 
 class Reorder(OnLink):
@@ -109,7 +113,7 @@ class Reorder(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("reorder", probability=self.probability, delay_s=self.delay_s)
+        return self.link_fault(LinkEffect.REORDER, probability=self.probability, delay_s=self.delay_s)
 
 
 class Duplicate(OnLink):
@@ -119,7 +123,7 @@ class Duplicate(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("duplicate", probability=self.probability)
+        return self.link_fault(LinkEffect.DUPLICATE, probability=self.probability)
 
 
 class Corrupt(OnLink):
@@ -129,7 +133,7 @@ class Corrupt(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("corrupt", probability=self.probability)
+        return self.link_fault(LinkEffect.CORRUPT, probability=self.probability)
 
 
 class Outage(OnLink):
@@ -137,7 +141,7 @@ class Outage(OnLink):
 
     def fault(self) -> Fault:
         """As a value."""
-        return self.link_fault("outage")
+        return self.link_fault(LinkEffect.OUTAGE)
 
 
 class RebootTable(FaultTable):
@@ -156,11 +160,13 @@ class PilotTable(FaultTable):
     throttle: Stick = 0.0
 
     def fault(self) -> Fault:
-        """As a value. Raises ValueError for a mode that is not on the switch, and for sticks that would do nothing."""
+        """As a value. Raises ValueError for a mode that is not on the switch, and for sticks without effect."""
         if self.mode not in PILOT_MODES:
             raise ValueError(f"mode: unknown mode {self.mode!r:.40}; modes are {', '.join(PILOT_MODES)}")
         if self.mode != "MANUAL" and (self.steering or self.throttle):
-            raise ValueError(f'steering and throttle do nothing in {self.mode}; use mode = "MANUAL" or leave them out')
+            raise ValueError(
+                f'steering and throttle have no effect in {self.mode}; use mode = "MANUAL" or leave them out'
+            )
         return PilotTakesOver(**self.window(), mode=self.mode, steering=self.steering, throttle=self.throttle)
 
 
@@ -195,15 +201,15 @@ class GpsNoiseTable(FaultTable):
 
 
 class Stuck(FaultTable):
-    """``sensor_stuck``; ``in_view``: only from the first reading on that shows something."""
+    """``sensor_stuck``; ``in_view``: from the first reading that shows something."""
 
     beams: Numbers | None = None
     in_view: bool = False
 
     def fault(self) -> Fault:
         """As a value."""
-        what: Literal["stuck", "stuck in view"] = "stuck in view" if self.in_view else "stuck"
-        return SensorFault(**self.window(), what=what, beams=tuple(self.beams or ()))
+        defect = Defect.STUCK_IN_VIEW if self.in_view else Defect.STUCK
+        return SensorFault(**self.window(), defect=defect, beams=tuple(self.beams or ()))
 
 
 class Silent(FaultTable):
@@ -213,7 +219,7 @@ class Silent(FaultTable):
 
     def fault(self) -> Fault:
         """As a value."""
-        return SensorFault(**self.window(), what="silent", beams=tuple(self.beams or ()))
+        return SensorFault(**self.window(), defect=Defect.SILENT, beams=tuple(self.beams or ()))
 
 
 class SlipTable(FaultTable):

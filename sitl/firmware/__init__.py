@@ -1,1 +1,1 @@
-"""The simulated world behind the real ArduRover firmware."""
+"""World, plant and sensors for the real ArduRover firmware; its parameter files."""

@@ -1,21 +1,21 @@
-"""The parameters with which the real ArduRover drives our rover, as a file that it reads."""
+"""Parameters with which the real ArduRover drives the simulated rover, and the file that it reads."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
-from sitl.autopilot.control import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
+from sitl.autopilot.control.servo_outputs import GROUND_STEERING, THROTTLE, THROTTLE_LEFT, THROTTLE_RIGHT
 from sitl.firmware.physics import MIDDLE_US, SPAN_US
 from sitl.sensors.range_sensors import SensorSuite
 
 SIMULATED_RANGEFINDER = 100
-"""RNGFNDn_TYPE of a rangefinder that the simulation feeds."""
+"""RNGFNDn_TYPE of a rangefinder whose ranges come from the simulation."""
 
 
 def firmware_parameters(parameters: Mapping[str, float], suite: SensorSuite, *, steered: bool) -> dict[str, float]:
-    """By name: the tuning of ArduRover's own simulated skid rover; ``parameters``, which win; outputs and rangefinders as they must be.
+    """The tuning of ArduRover's own simulated skid rover, overridden by ``parameters``; outputs; rangefinders.
 
-    ``steered``: the plant has steered wheels, not two motors. Ranges are in metres, as from version 4.7 on.
+    ``steered``: the plant has steered wheels, not skid steering. Ranges are in metres, as in version 4.7 and later.
     """
     tuning = {"CRUISE_SPEED": 3.0, "CRUISE_THROTTLE": 75.0, "ATC_SPEED_P": 0.1, "ATC_STR_RAT_FF": 0.2, "PRX1_TYPE": 0.0}
     needed: dict[str, float] = {}
@@ -39,5 +39,5 @@ def firmware_parameters(parameters: Mapping[str, float], suite: SensorSuite, *, 
 
 
 def parameter_file(parameters: Mapping[str, float]) -> str:
-    """A name and its value on each line."""
+    """The text of a parameter file: a name and its value on each line."""
     return "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())

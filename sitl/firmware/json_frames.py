@@ -1,6 +1,8 @@
-"""ArduPilot's JSON interface, bytes only: servo outputs come in a small binary frame, the rover's state goes back as text.
+"""Frames of ArduPilot's JSON interface: servo outputs arrive in a binary frame, the rover's state is returned as text.
 
 Source: ArduPilot, libraries/SITL/SIM_JSON and its description.
+
+Nouns: JSON interface.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ from typing import NamedTuple
 RANGES_MOST = 6
 """``rng_1`` to ``rng_6``."""
 COUNTS = 1 << 32
-"""Frame numbers begin anew after so many."""
+"""Frame numbers wrap around at this value."""
 
 _FORMS = {18458: struct.Struct("<HHI16H"), 29569: struct.Struct("<HHI32H")}
 _MAGIC = struct.Struct("<H")
@@ -22,7 +24,7 @@ _MAGIC = struct.Struct("<H")
 
 @dataclass(frozen=True, slots=True)
 class ServoFrame:
-    """What the firmware sends: how many steps a second it wants, the frame's number, pulses in microseconds."""
+    """A frame of the firmware: steps per second that it wants, the frame's number, pulses in microseconds."""
 
     rate_hz: int
     count: int
@@ -30,7 +32,7 @@ class ServoFrame:
 
 
 class BodyState(NamedTuple):
-    """What the firmware wants to know: metres from the start, m/s, radians, m/s^2; world frame NED, body forward and right."""
+    """State for the firmware: metres from the start, m/s, radians, m/s^2; world NED, body forward and right."""
 
     time_s: float
     north_m: float
@@ -44,7 +46,7 @@ class BodyState(NamedTuple):
 
 
 def decode(datagram: bytes) -> ServoFrame | None:
-    """The frame in a datagram, of 16 or of 32 channels; None if it is none."""
+    """The frame in a datagram, with 16 or 32 channels; None if it is not a frame."""
     if len(datagram) < _MAGIC.size:
         return None
     form = _FORMS.get(_MAGIC.unpack_from(datagram)[0])
@@ -55,10 +57,11 @@ def decode(datagram: bytes) -> ServoFrame | None:
 
 
 def encode(state: BodyState, down_m_s2: float, ranges_m: Sequence[float]) -> bytes:
-    """The answer; ``down_m_s2`` is what the accelerometer shows downwards, a range that is NaN means no reading.
+    """The answer to a frame; ``down_m_s2``: reading of the accelerometer downwards; a range of NaN means no reading.
 
-    The firmware looks for the keys as bare text and counts two characters from there to the value, so there is no space anywhere.
-    The heading is said twice, because some versions take ``rng_1`` only beside ``attitude``, ``rng_2`` only beside ``quaternion``.
+    The firmware searches for the keys as plain text and expects the value two characters later, so there are no
+    spaces. The heading is given twice, because some versions accept ``rng_1`` only with ``attitude`` and ``rng_2``
+    only with ``quaternion``.
     """
     time_s, north_m, east_m, vel_n, vel_e, heading_rad, yaw_rate, ahead, right = state
     ranges = "".join(

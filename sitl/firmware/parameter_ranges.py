@@ -1,7 +1,7 @@
-"""The ranges that ArduRover's own documentation gives for the parameters that change what is simulated.
+"""Documented ranges of the ArduRover parameters that have an effect in the simulator.
 
-The firmware takes any number; what lies outside of these is most likely a slip. PSC_POS_P is left out: its default lies outside of its own
-range. Source: the @Range and @Values remarks of ArduRover 4.7.
+The firmware accepts any number; a value outside its range is most likely a mistake. PSC_POS_P is left out, because
+its default is outside its own range. Source: the @Range and @Values remarks of ArduRover 4.7.
 """
 
 from __future__ import annotations
@@ -61,7 +61,7 @@ RANGES: dict[str, tuple[float, float]] = {
 
 
 def outside(values: Mapping[str, float]) -> list[str]:
-    """Each value that lies outside of its range, in words."""
+    """A text for each value outside its range."""
     return [
         f"{name} {values[name]:g} ({low:g} to {high:g})"
         for name, (low, high) in RANGES.items()

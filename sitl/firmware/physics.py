@@ -1,86 +1,96 @@
-"""The world behind the real firmware: servo outputs in, the rover's state out, one time step for each new frame.
+"""Physics for the real firmware: servo outputs in, the rover's state out, one time step for each new frame.
 
-Plant, world and sensors are those of our own simulated vehicle; autopilot and estimator are the firmware's. Time passes only with
-answers: the firmware waits for each, and its clock is the answers' timestamp. So a run is a function of mission, seed and frames.
+Plant, world and sensors are those of the simulated vehicle; autopilot and estimator are the firmware's. Time passes
+only with answers: the firmware waits for each, and takes its clock from the answer's timestamp. So a run is a
+function of mission, seed and frames.
+
+Nouns: physics.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, NamedTuple
+from enum import Enum, auto
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from sitl.autopilot.scanner import Scanner, ScannerPort
+from sitl.autopilot.lidar import Scanner, ScannerPort
 from sitl.firmware.json_frames import COUNTS, RANGES_MOST, BodyState, ServoFrame, decode, encode
 from sitl.plant.main_loop import NoiseSettings
 from sitl.plant.rover import GRAVITY_M_S2, drive, meet_movers, new_rover
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite
-from sitl.world.movers import Floats, Ints
 from sitl.world.truth import Collision, SimStart, collision_of
-from sitl.world.world import Ground, Obstacles, World
+from sitl.world.world import Surroundings, World
 
 PLANT_STEP_S = 0.005
-"""The plant's longest step, as in our own vehicle."""
+"""The plant's longest step, as in the simulated vehicle."""
 LONGEST_STEP_S = 0.09
-"""The firmware takes no step of 0.1 s or more for one; slower frame rates get this one."""
+"""The firmware rejects steps of 0.1 s and more; slower frame rates get this step."""
 RANGE_INTERVAL_S = 0.02
-"""How often rangefinders without a rate of their own measure: with every main loop of ArduRover."""
+"""Interval of rangefinders without their own rate: every main loop of ArduRover."""
 MIDDLE_US, SPAN_US = 1500, 500
 NO_PULSE_US = (800, 2200)
-"""Outside of these a motor controller takes it for no signal and stops; 0 is an output that is off."""
+"""Outside these limits a motor controller sees no signal and stops; 0 is an output that is off."""
 
 
 @njit(cache=True, nogil=True)
 def advance(
-    rovers: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
-    mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats,
-    time_s: float, servo_1: float, servo_3: float, steps: int, step_s: float,
-) -> None:  # fmt: skip
-    """Move the rover by some steps from ``time_s`` on, with servo outputs -1 to 1."""
+    rovers: Any, surroundings: Surroundings, time_s: float, servos: tuple[float, float], steps: int, step_s: float
+) -> None:
+    """Move the rover by some steps from ``time_s`` on; ``servos``: outputs 1 and 3, -1 to 1."""
     rover = rovers[0]
     for step in range(steps):
-        drive(rover, obstacles, south_m, west_m, resolution_m, ground, servo_1, servo_3, step_s)
-        if mover_radii_m.size > 0:
-            now_s = time_s + (step + 1) * step_s
-            meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)
+        drive(rover, surroundings, servos[0], servos[1], step_s)
+        if surroundings.fleet.radii_m.size > 0:
+            meet_movers(rover, surroundings.fleet, time_s + (step + 1) * step_s)
 
 
 def servo_output(pwm_us: int) -> float:
-    """What a pulse asks for, -1 to 1."""
+    """The servo output of a pulse, -1 to 1."""
     if not NO_PULSE_US[0] <= pwm_us <= NO_PULSE_US[1]:
         return 0.0
     return min(max((pwm_us - MIDDLE_US) / SPAN_US, -1.0), 1.0)
 
 
 def frame_step_s(rate_hz: int) -> float:
-    """How far a frame moves the world."""
+    """The time step of a frame."""
     return min(1.0 / rate_hz, LONGEST_STEP_S)
 
 
 @dataclass(slots=True)
 class Tally:
-    """What has come in so far, from all firmware starts."""
+    """Counts of what was received, over all starts of the firmware."""
 
     steps: int = 0
     repeated: int = 0
-    """Frames asked for again, answered as before."""
+    """Repeated frames, answered as before."""
     lost: int = 0
-    """Frames that never came, by their numbers."""
+    """Missing frames, by their numbers."""
     late: int = 0
-    """Copies that came after newer frames; not answered."""
+    """Copies that arrived after newer frames; not answered."""
     bad: int = 0
-    """Datagrams that are no frames; not answered."""
+    """Datagrams that are not frames; not answered."""
     strangers: int = 0
     """Frames from a second firmware; not answered."""
     starts: int = 0
     """Firmware starts."""
 
 
+class FrameKind(Enum):
+    """What a frame is, compared with the last one."""
+
+    START = auto()
+    NEXT = auto()
+    REPEATED = auto()
+    LATE = auto()
+    STRANGER = auto()
+
+
 class Motion(NamedTuple):
-    """Where the rover is and how it moves, world frame."""
+    """Position, heading and velocity of the rover, world frame."""
 
     north_m: float
     east_m: float
@@ -96,12 +106,12 @@ class Physics:
         self, world: World, start: SimStart, suite: SensorSuite, seed: int = 0, rover_radius_m: float = 0.35,
         turning_radius_m: float = 0.0, range_noise_m: float = NoiseSettings().range_m, *, scans: bool = False,
     ) -> None:  # fmt: skip
-        """``scans``: whether the suite's lidar has a line of its own, see ``take``; ``turning_radius_m``: 0 for skid steering.
+        """``scans``: the lidar publishes on a link of its own, see ``take``; ``turning_radius_m``: 0 for skid steering.
 
-        Raises ValueError for more rangefinders than the firmware takes.
+        Raises ValueError for more rangefinders than the firmware accepts.
         """
         if len(suite.beams) > RANGES_MOST:
-            raise ValueError(f"{len(suite.beams)} rangefinders: the firmware takes {RANGES_MOST} at most")
+            raise ValueError(f"{len(suite.beams)} rangefinders: the firmware accepts at most {RANGES_MOST}")
         self.world, self.start, self.suite = world, start, suite
         self.tally = Tally()
         self._make = (seed, rover_radius_m, turning_radius_m, range_noise_m)
@@ -114,7 +124,7 @@ class Physics:
         self._begin()
 
     def _begin(self) -> None:
-        """The rover at its start, at rest, at time 0; the world as it is then."""
+        """Put the rover at its start, at rest, at time 0."""
         seed, rover_radius_m, turning_radius_m, noise_m = self._make
         start, suite = self.start, self.suite
         self.time_s = 0.0
@@ -124,28 +134,28 @@ class Physics:
         rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
         self._sensing = RangeSensing(suite, self.world, noise_m, rng)
         self._scanner = Scanner(suite.lidar, self._sensing) if suite.lidar and self._scans else None
-        self._solid, self._doors_move_s = self.world.layers(0.0).solid, self.world.next_change_s(0.0)
+        self._surroundings, self._doors_move_s = self.world.surroundings(0.0), self.world.next_change_s(0.0)
         self._ranges_m = [math.nan] * len(suite.beams)
         self._measured = 0
 
     def answer(self, datagram: bytes, sender: object = None) -> bytes:
-        """What to send back to ``sender``; nothing (empty) to what is no frame, or not this firmware's next one."""
+        """The answer to ``sender``; empty if there is none."""
         frame = decode(datagram)
         if frame is None:
             self.tally.bad += 1
             return b""
         kind = self._kind(frame, sender)
-        if kind == "stranger":
+        if kind is FrameKind.STRANGER:
             self.tally.strangers += 1
             return b""
-        if kind == "late":
+        if kind is FrameKind.LATE:
             self.tally.late += 1
             return b""
         self._sender = sender
-        if kind == "repeated":
+        if kind is FrameKind.REPEATED:
             self.tally.repeated += 1
             return self._answer
-        if kind == "start":
+        if kind is FrameKind.START:
             self.tally.starts += 1
             self._begin()
         elif self._last is not None:
@@ -154,22 +164,22 @@ class Physics:
         self._answer = self._stepped(frame)
         return self._answer
 
-    def _kind(self, frame: ServoFrame, sender: object) -> Literal["start", "next", "repeated", "late", "stranger"]:
-        """What a frame is after the last one. A firmware counts from 0, and one that goes on where it was may have moved."""
+    def _kind(self, frame: ServoFrame, sender: object) -> FrameKind:
+        """Compare a frame with the last one. The firmware counts from 0; its address may change while it runs."""
         if self._last is None:
-            return "start"
+            return FrameKind.START
         ahead = (frame.count - self._last.count) % COUNTS
         moved = sender != self._sender
         if frame.count == 0 and ahead != 1 and (moved or ahead != 0):
-            return "start"
+            return FrameKind.START
         if ahead == 0:
-            return "repeated"
+            return FrameKind.REPEATED
         if moved and ahead != 1:
-            return "stranger"
-        return "next" if ahead <= COUNTS // 2 else "late"
+            return FrameKind.STRANGER
+        return FrameKind.NEXT if ahead <= COUNTS // 2 else FrameKind.LATE
 
     def rehearse(self) -> None:
-        """Take one step and forget it: compiles what is not compiled yet, before anybody waits for an answer."""
+        """Take one step and start over, so that everything is compiled before the firmware waits for an answer."""
         self._move(0.0, 0.0, PLANT_STEP_S)
         self._measure(self.motion)
         self._outbox.clear()
@@ -178,22 +188,22 @@ class Physics:
 
     @property
     def system(self) -> int | None:
-        """Id of the autopilot that was heard on the lidar's line, if any."""
+        """System id of the autopilot heard on the lidar's link; None if none was."""
         return self._port.system
 
     def hear(self, data: bytes) -> None:
-        """Bytes from the lidar's line."""
+        """Take in bytes from the lidar's link."""
         self._port.hear(data)
 
     def take(self) -> bytes:
-        """What the lidar has sent on its line since the last call: MAVLink, whole packets."""
+        """The packets that the lidar has sent since the last call."""
         data = bytes(self._outbox)
         self._outbox.clear()
         return data
 
     @property
     def motion(self) -> Motion:
-        """The truth."""
+        """The rover's true motion."""
         rover = self._rover[0]
         heading_rad, speed_m_s, slide_m_s = float(rover["heading_rad"]), float(rover["speed_m_s"]), rover["slide_m_s"]
         ahead_n, ahead_e = math.cos(heading_rad), math.sin(heading_rad)
@@ -217,21 +227,19 @@ class Physics:
     def _move(self, servo_1: float, servo_3: float, step_s: float) -> None:
         world = self.world
         if world.doors and self.time_s >= self._doors_move_s:
-            self._solid, self._doors_move_s = world.layers(self.time_s).solid, world.next_change_s(self.time_s)
+            self._surroundings, self._doors_move_s = world.surroundings(self.time_s), world.next_change_s(self.time_s)
         contacts = int(self._rover[0]["contacts"])
         steps = max(1, math.ceil(step_s / PLANT_STEP_S - 1e-6))
-        advance(
-            self._rover, self._solid, world.south_m, world.west_m, world.resolution_m, world.ground, *world.fleet,
-            self.time_s, servo_1, servo_3, steps, step_s / steps,
-        )  # fmt: skip
+        advance(self._rover, self._surroundings, self.time_s, (servo_1, servo_3), steps, step_s / steps)
         self.time_s += step_s
         if int(self._rover[0]["contacts"]) > contacts:
             self.collisions += (collision_of(self._rover[0], world.movers, self.time_s),)
 
     def _body(self, before: Motion, now: Motion, step_s: float) -> BodyState:
-        """Mean turn rate and acceleration of the step: integrated, they give the heading and the velocity that are told.
+        """The reported state, with mean turn rate and acceleration of the step.
 
-        That holds for a collision too, which stops the rover within the step.
+        Integrated, these give the reported heading and velocity. That holds for a collision too, which stops the
+        rover within the step.
         """
         turned_rad = (now.heading_rad - before.heading_rad + math.pi) % (2.0 * math.pi) - math.pi
         accel_n = (now.vel_north_m_s - before.vel_north_m_s) / step_s
@@ -245,7 +253,7 @@ class Physics:
         )  # fmt: skip
 
     def _measure(self, now: Motion) -> None:
-        """Let every sensor whose time has come measure."""
+        """Measure with every sensor that is due."""
         sensing, here = self._sensing, now[:3]
         sensing.time_s = self.time_s
         if sensing.samples and self.time_s >= sensing.next_due_s() - 1e-9:
@@ -254,7 +262,7 @@ class Physics:
             self._measured = math.floor(self.time_s / RANGE_INTERVAL_S + 1e-6) + 1
             self._ranges_m = [math.nan] * len(self.suite.beams)
             for reading in sensing.wired(*here):
-                # What the firmware takes for out of range lies beyond its maximum.
+                # For the firmware a range beyond the maximum means that nothing was seen.
                 seen_cm = reading.range_cm if reading.range_cm < reading.max_cm else reading.max_cm + 1
                 self._ranges_m[reading.number] = seen_cm / 100.0
         time_us = round(self.time_s * 1e6)

@@ -1,4 +1,4 @@
-"""The physics on a UDP port, and its lidar on a MAVLink line. It has no clock of its own: the firmware sets the pace."""
+"""Serves the physics on a UDP port, and its lidar on a MAVLink link; the firmware sets the pace."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from collections.abc import Callable
 
 from sitl.firmware.physics import Physics
 from sitl.network import ListenError
-from sitl.network.client import ClientLink
+from sitl.network.mavlink_client import ClientLink
 
 WAIT_S = 0.2
-"""How often it looks whether it shall end, and after its MAVLink line, when the firmware says nothing."""
+"""Interval at which it checks for the end and serves its MAVLink link while the firmware is silent."""
 READ_BYTES = 2048
 AT_ONCE = 100
-"""So many datagrams are read before the first is answered, in a flood of them."""
+"""Datagrams that are read at most before the first is answered."""
 Sender = tuple[str, int]
 
 
 def open_port(host: str, port: int) -> socket.socket:
-    """The UDP port at which the firmware asks. Raises ListenError."""
+    """Open the UDP port for the firmware. Raises ListenError."""
     opened = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     opened.setblocking(False)
     try:
@@ -31,13 +31,13 @@ def open_port(host: str, port: int) -> socket.socket:
         reason = getattr(error, "strerror", None) or error
         remedy = "is that an address of this computer?"
         if getattr(error, "errno", None) == errno.EADDRINUSE:
-            remedy = "another physics runs already; choose another --port"
+            remedy = "another physics is running already; choose another --port"
         raise ListenError(f"udp {host}:{port}: cannot be opened: {reason}; {remedy}") from error
     return opened
 
 
 def received(port: socket.socket) -> list[tuple[bytes, Sender]]:
-    """Everything that waits at the port. A frame and its copy count once: two answers would make the firmware lag by one."""
+    """The waiting datagrams; a repeated frame counts once: two answers would delay the firmware by one."""
     waiting: list[tuple[bytes, Sender]] = []
     with contextlib.suppress(OSError):
         for _ in range(AT_ONCE):
@@ -55,7 +55,7 @@ def run(
     running: Callable[[], bool],
     look: Callable[[], None],
 ) -> None:
-    """Answer until ``running`` says no; ``look`` is called after every round. ``now_s`` reads real seconds."""
+    """Answer until ``running`` returns False; ``look`` is called in every round. ``now_s`` reads real seconds."""
     next_exchange_s = now_s()
     while running():
         ready, _, _ = select.select([port, *(link.sockets() if link else [])], [], [], WAIT_S)

@@ -1,4 +1,4 @@
-"""Ways from the network, and from serial lines, to the simulated vehicle."""
+"""Endpoints of the simulated vehicle: TCP, UDP and serial lines; the server; log lines."""
 
 from sitl.network.address import FORMS, open_endpoint
 from sitl.network.endpoint import Endpoint, ListenError

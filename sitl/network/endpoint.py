@@ -1,4 +1,7 @@
-"""What every way to the outside has in common."""
+"""What all endpoints have in common: the protocol, addresses, datagrams of complete packets.
+
+Nouns: Endpoint.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from sitl.simulator import Simulator
 READ_BYTES = 65536
 DATAGRAM_BYTES = 1400
 BACKLOG_BYTES = 1_000_000
-"""A TCP client that does not read is dropped when so much is waiting for it."""
+"""A TCP client is dropped when this much waits for it."""
 
 
 class ListenError(Exception):
@@ -18,40 +21,40 @@ class ListenError(Exception):
 
 
 class Endpoint(Protocol):
-    """Something that exchanges bytes with the simulator."""
+    """An open address where clients exchange bytes with the simulator."""
 
     def descriptors(self) -> list[int]:
-        """The open files to wait on for input."""
+        """File descriptors to wait on for input."""
         ...
 
     def exchange(self, simulator: Simulator, now_s: float) -> None:
-        """Take in what arrived and send what is queued; never blocks. ``now_s``: real seconds."""
+        """Receive and send without blocking. ``now_s``: real seconds."""
         ...
 
     def close(self) -> None:
-        """Let go of everything that is open."""
+        """Close everything that is open."""
         ...
 
 
 def place_text(place: tuple[str, int]) -> str:
-    """An address of the other side as people write it."""
+    """An address as HOST:PORT."""
     return f"{place[0]}:{place[1]}"
 
 
 def network_address(url: str, forms: str) -> tuple[str, int]:
-    """Host and port of ``tcp:``, ``udpout:`` or ``udpin:``. Raises ListenError, which names the ``forms`` that are known."""
+    """Host and port of ``tcp:``, ``udpout:`` or ``udpin:``. Raises ListenError that lists the valid ``forms``."""
     kind, _, place = url.partition(":")
     host, _, port = place.rpartition(":")
     known = kind in ("tcp", "udpout", "udpin")
     if not known or not host or not (port.isascii() and port.isdigit()):
         raise ListenError(f"{url}: not an address; write {forms}")
     if len(port) > 9 or not 0 < int(port) < 65536:
-        raise ListenError(f"{url}: {port:.20} is no port; choose one from 1 to 65535")
+        raise ListenError(f"{url}: {port:.20} is not a port; choose one from 1 to 65535")
     return host, int(port)
 
 
 def packets(data: bytes) -> list[bytes]:
-    """What a link has sent, packet by packet."""
+    """The single packets in the bytes of a link."""
     pieces, at = [], 0
     while at < len(data):
         size = packet_size(data, at) or len(data) - at
@@ -61,7 +64,7 @@ def packets(data: bytes) -> list[bytes]:
 
 
 def datagrams(data: bytes) -> list[bytes]:
-    """The same bytes in pieces of whole packets, as many as fit into one datagram."""
+    """The bytes in pieces of complete packets, as many as fit into one datagram."""
     pieces: list[bytes] = []
     for packet in packets(data):
         if pieces and len(pieces[-1]) + len(packet) <= DATAGRAM_BYTES:

@@ -1,4 +1,4 @@
-"""Serial lines: a device that is there, or a pseudo-terminal made here that looks like one to any program."""
+"""Serial lines: an existing device, or a pseudo-terminal that other programs open like one."""
 
 from __future__ import annotations
 
@@ -20,31 +20,31 @@ TERMINALS = "/dev/pts/"
 
 
 class Line(Protocol):
-    """A serial line: bytes in, bytes out, neither waits."""
+    """A serial line, read and written without blocking."""
 
     def descriptor(self) -> int | None:
-        """The open file; None while the device is away."""
+        """The file descriptor; None while the device is missing."""
         ...
 
     def read(self) -> bytes:
-        """What has arrived; raises OSError when the device has gone."""
+        """The bytes that have arrived. Raises OSError when the device is gone."""
         ...
 
     def write(self, data: bytes) -> int:
-        """Bytes that fitted into the line's buffer; raises OSError when the device has gone."""
+        """Write, and return the number of bytes that fitted into the buffer. Raises OSError when the device is gone."""
         ...
 
     def reopen(self, now_s: float) -> None:
-        """A device that has gone may come back: look for it now and then."""
+        """Try to open a missing device again, from time to time."""
         ...
 
     def close(self) -> None:
-        """Let go of it."""
+        """Close the line."""
         ...
 
 
 class Device:
-    """A serial device of the machine, at a speed. It may be pulled out and put in again."""
+    """A serial device, at a baud rate. It may be unplugged and plugged in again."""
 
     def __init__(self, path: str, baud: int) -> None:
         """Raises OSError when it cannot be opened."""
@@ -56,15 +56,15 @@ class Device:
         return serial.Serial(self._path, self._baud, timeout=0, write_timeout=0, exclusive=True)
 
     def descriptor(self) -> int | None:
-        """The open file; None while the device is away."""
+        """The file descriptor; None while the device is missing."""
         return None if self._port is None else int(self._port.fileno())
 
     def read(self) -> bytes:
-        """What has arrived."""
+        """The bytes that have arrived."""
         return b"" if self._port is None else bytes(self._port.read(READ_BYTES))
 
     def write(self, data: bytes) -> int:
-        """Bytes that fitted into the line's buffer."""
+        """Write, and return the number of bytes that fitted into the buffer."""
         if self._port is None:
             return len(data)
         try:
@@ -73,7 +73,7 @@ class Device:
             return 0
 
     def reopen(self, now_s: float) -> None:
-        """Called when reading or writing failed, and then until it is back."""
+        """Close the device and try to open it again; called until it is back."""
         if self._port is not None:
             self._port.close()
             self._port = None
@@ -89,10 +89,10 @@ class Device:
 
 
 class PseudoTerminal:
-    """Both ends of a line: ours, and one that other programs open under the name of a link in the file system."""
+    """A pseudo-terminal; other programs open its far end through a symbolic link."""
 
     def __init__(self, path: str) -> None:
-        """Raises OSError when there is something else of this name, or somebody's terminal that is still there."""
+        """Raises OSError if the name is taken, for instance by a terminal that is still in use."""
         self._path = Path(path)
         self._ours, self._theirs = os.openpty()
         tty.setraw(self._theirs)
@@ -108,28 +108,28 @@ class PseudoTerminal:
             raise
 
     def descriptor(self) -> int:
-        """Our end."""
+        """File descriptor of the near end."""
         return self._ours
 
     def read(self) -> bytes:
-        """What was written to the other end."""
+        """The bytes written to the far end."""
         try:
             return os.read(self._ours, READ_BYTES)
         except BlockingIOError:
             return b""
 
     def write(self, data: bytes) -> int:
-        """Bytes that fitted into the terminal's buffer."""
+        """Write, and return the number of bytes that fitted into the buffer."""
         try:
             return os.write(self._ours, data)
         except BlockingIOError:
             return 0
 
     def reopen(self, now_s: float) -> None:
-        """It does not go away: we keep the other end open as well."""
+        """Nothing to do: the far end is kept open here too, so it never goes away."""
 
     def close(self) -> None:
-        """Close both ends and take the name away, if it is still ours."""
+        """Close both ends and remove the link, if it is still ours."""
         name = os.ttyname(self._theirs)
         if self._path.is_symlink() and os.readlink(self._path) == name:
             self._path.unlink()
@@ -138,7 +138,7 @@ class PseudoTerminal:
 
 
 def _is_left_over(path: Path, own: str) -> bool:
-    """Whether a name is that of a simulator that was killed: its terminal has gone, or has just become ours (``own``)."""
+    """Whether a link was left by a killed simulator: its terminal is gone, or has just become ours (``own``)."""
     if not path.is_symlink():
         return False
     target = os.readlink(path)
@@ -146,23 +146,23 @@ def _is_left_over(path: Path, own: str) -> bool:
 
 
 class SerialEndpoint:
-    """One partner at the other end of a line. Nobody there, or too slow: then packets are lost, as on any line."""
+    """One client at the other end of a line. If it is absent or too slow, packets are lost, as on any serial line."""
 
     def __init__(self, line: Line, simulator: Simulator, serial_port: int) -> None:
-        """The line is open."""
+        """``line`` must be open."""
         self._line = line
         self._serial_port = serial_port
         self._link: SimLink = simulator.connect(serial_port, f"serial line {serial_port}")
         self._begun = b""
 
     def descriptors(self) -> list[int]:
-        """The line, unless its device is away."""
+        """The line, unless its device is missing."""
         descriptor = self._line.descriptor()
         return [] if descriptor is None else [descriptor]
 
     def exchange(self, simulator: Simulator, now_s: float) -> None:
-        """Bytes in, whole packets out."""
-        queued = self._link.take()  # what was said before a restart is still sent: the answer to who asked for it
+        """Receive bytes, send complete packets."""
+        queued = self._link.take()  # packets from before a restart are still sent: they contain the acknowledgement
         if self._link.dropped:
             self._link = simulator.connect(self._serial_port, f"serial line {self._serial_port}")
         try:
@@ -175,7 +175,7 @@ class SerialEndpoint:
             self._line.reopen(now_s)
 
     def _write(self, data: bytes) -> None:
-        """First the rest of a packet that has begun; what does not fit any more is left out."""
+        """Write the rest of a packet that was begun, then whole packets; what does not fit is dropped."""
         if self._begun:
             self._begun = self._begun[self._line.write(self._begun) :]
         for packet in packets(data):

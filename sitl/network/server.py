@@ -1,4 +1,4 @@
-"""The simulator in real time, or so many times as fast, for whoever is at its endpoints."""
+"""Runs the simulator in real time, or a multiple of it, for the clients at its endpoints."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import select
 from collections.abc import Callable
 
 from sitl.network import Endpoint
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.simulator import Simulator
 
 STEP_S = 0.02
 LATE_S = 1.0
-"""When the machine cannot keep up, the clock is moved by what is later than this."""
+"""A delay beyond this is dropped when the machine cannot keep up."""
 
 
 def serve(
@@ -20,14 +20,14 @@ def serve(
     now_s: Callable[[], float],
     speedup: float,
     running: Callable[[], bool],
-    news: News | None = None,
+    log: EventLog | None = None,
     observe: Callable[[], None] = lambda: None,
 ) -> None:
-    """Keep the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` says no.
+    """Run the simulator ``speedup`` times as fast as ``now_s`` (real seconds) until ``running`` returns False.
 
-    ``news`` tells of it; ``observe`` is called in every round, and must not take long.
+    ``log`` reports events; ``observe`` is called in every round, and must not take long.
     """
-    news = news or News()
+    log = log or EventLog()
     began_s = now_s() - simulator.time_s / speedup
     while running():
         _exchange(simulator, endpoints, now_s())
@@ -37,7 +37,7 @@ def serve(
             goal_s = simulator.time_s + STEP_S
         simulator.advance_to_s(goal_s)
         _exchange(simulator, endpoints, now_s())
-        news.look(simulator)
+        log.look(simulator)
         observe()
         wait_s = (simulator.time_s + STEP_S) / speedup + began_s - now_s()
         if wait_s > 0.0:

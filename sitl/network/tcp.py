@@ -1,4 +1,4 @@
-"""TCP: a port that any number of clients may connect to."""
+"""TCP server endpoint: a port to which several clients may connect."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ import socket
 from dataclasses import dataclass, field
 
 from sitl.network.endpoint import BACKLOG_BYTES, READ_BYTES, place_text
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.sim_link import SimLink
 from sitl.simulator import Simulator
 
 MOST_CLIENTS = 32
 MOST_READS = 16
-"""Taken in at once from one client; what comes faster waits, so that a flood does not stop the vehicle."""
+"""Reads per round and client; more must wait, so that a flood does not stop the vehicle."""
 
 
 @dataclass
 class TcpClient:
-    """A connected client, its link and what it has not read yet."""
+    """A connected client, its link, and bytes that it has not read yet."""
 
     socket: socket.socket
     link: SimLink
@@ -27,7 +27,7 @@ class TcpClient:
     gone: bool = False
 
     def exchange(self) -> None:
-        """Read what is there, write what fits."""
+        """Read what has arrived, write what fits."""
         self._read()
         self.waiting += self.link.take()
         try:
@@ -54,12 +54,12 @@ class TcpClient:
 
 
 class TcpServer:
-    """Listens on one port; every client has a link of its own."""
+    """Listens on one port; every client has its own link."""
 
-    def __init__(self, host: str, port: int, news: News, serial_port: int) -> None:
+    def __init__(self, host: str, port: int, log: EventLog, serial_port: int) -> None:
         """Raises OSError when the port is in use."""
         self._url = f"tcp:{host}:{port}"
-        self._news = news
+        self._log = log
         self._serial_port = serial_port
         self._clients: list[TcpClient] = []
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
@@ -78,7 +78,7 @@ class TcpServer:
         return listener + [client.socket.fileno() for client in self._clients]
 
     def exchange(self, simulator: Simulator, now_s: float) -> None:
-        """Let new clients in, serve the others, forget those that left."""
+        """Accept new clients, serve all, remove those that disconnected."""
         with contextlib.suppress(BlockingIOError, ConnectionError):
             while len(self._clients) < MOST_CLIENTS:
                 caller, place = self._socket.accept()
@@ -87,11 +87,11 @@ class TcpServer:
                 name = place_text(place)
                 link = simulator.connect(self._serial_port, f"tcp:{name}")
                 self._clients.append(TcpClient(caller, link, name))
-                self._news.came(self._clients[-1].name, self._url)
+                self._log.connected(self._clients[-1].name, self._url)
         for client in self._clients:
             client.exchange()
             if client.gone or client.link.dropped:
-                self._news.left(client.name, self._url, dropped=not client.gone)
+                self._log.disconnected(client.name, self._url, dropped=not client.gone)
                 simulator.disconnect(client.link)
                 client.socket.close()
         self._clients = [client for client in self._clients if not (client.gone or client.link.dropped)]

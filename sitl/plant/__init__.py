@@ -1,1 +1,1 @@
-"""The rover's motion, and the compiled main loop that drives it."""
+"""The plant: the rover's motion, and the compiled main loop."""

@@ -1,4 +1,7 @@
-"""The compiled main loop: estimate, controllers, plant, a batch of loops in one call."""
+"""The compiled main loop: estimate, motion control, battery, plant; runs a batch of loops in one call.
+
+Nouns: NoiseSettings.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +14,13 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sitl.autopilot.battery import FULL_A, RESISTANCE_OHM
-from sitl.autopilot.control import LOOP_S
-from sitl.autopilot.loop import run_tasks
+from sitl.autopilot.control.records import LOOP_S, MotionRecords
+from sitl.autopilot.control.tasks import run_task
 from sitl.plant.rover import drive, meet_movers
-from sitl.world.movers import Floats, Ints
-from sitl.world.world import Ground, Obstacles
+from sitl.world.world import Surroundings
 
 SUBSTEPS = 4
-"""Steps of the plant in one main loop."""
+"""Steps of the plant per main loop."""
 
 NOISE_COLUMNS = 5
 """Normal variates per loop: velocity error north, east; position jitter north, east; heading error."""
@@ -26,18 +28,18 @@ NOISE_COLUMNS = 5
 
 @dataclass(frozen=True, slots=True)
 class NoiseSettings:
-    """How far the autopilot's estimate and the sensors are from the truth (standard deviations)."""
+    """Errors of the autopilot's estimate and of the range sensors (standard deviations)."""
 
     position_bias_m: float = 0.12
     position_jitter_m: float = 0.01
     heading_bias_deg: float = 0.5
     range_m: float = 0.02
     bias_time_s: float = 20.0
-    """How slowly the position error wanders."""
+    """Time constant with which the position error wanders."""
 
     @classmethod
     def none(cls) -> NoiseSettings:
-        """Estimates and sensors that tell the truth."""
+        """No errors at all."""
         return cls(0.0, 0.0, 0.0, 0.0)
 
     def as_array(self) -> NDArray[np.float64]:
@@ -52,7 +54,7 @@ class NoiseSettings:
 
 @njit(cache=True, nogil=True)
 def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: Any) -> None:
-    """What the autopilot believes after one loop: the truth, a slowly wandering error, a little jitter."""
+    """Update the autopilot's estimate: the truth, a slowly wandering error, some jitter."""
     keep = math.exp(-LOOP_S / noise[1])
     kick = noise[0] * math.sqrt(1.0 - keep * keep)
     estimate.drift_n = keep * estimate.drift_n + kick * draw[0]
@@ -81,7 +83,7 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
 
 @njit(cache=True, nogil=True)
 def draw_current(rover: Any, control: Any) -> None:
-    """Take one loop's current from the battery, and count it: by the motors' mean output, on steered wheels by the throttle."""
+    """Draw one loop's current from the battery and count it: by mean motor output, with steered wheels by throttle."""
     first, third = abs(control.servo_1), abs(control.servo_3)
     control.amps = FULL_A * (third if rover.turning_radius_m > 0.0 else 0.5 * (first + third))
     drawn_ah = control.amps * LOOP_S / 3600.0
@@ -92,27 +94,25 @@ def draw_current(rover: Any, control: Any) -> None:
 
 @njit(cache=True, nogil=True)
 def run_loops(
-    rovers: Any, estimates: Any, controls: Any, tunings: Any, origin: Any, noise: Any, draws: Any,
-    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
-    mover_rows: Floats, mover_begins: Ints, mover_radii_m: Floats, mover_periods_s: Floats, time_s: float,
-) -> int:  # fmt: skip
-    """Run main loops from ``time_s`` on, until the draws are used up or something happened that people must be told at once.
+    rovers: Any, records: MotionRecords, origin: Any, noise: Any, draws: Any, surroundings: Surroundings, time_s: float
+) -> int:
+    """Run main loops from ``time_s`` on until the draws are used up, or something must be reported at once.
 
-    Returns how many loops were run (a target reached, a time-out, a new contact end the batch early).
+    ``noise``: see ``NoiseSettings.as_array``; ``draws``: shape (loops, NOISE_COLUMNS), normal variates. Returns how
+    many loops were run: a target reached, a time-out and a new contact end the batch early.
     """
-    rover, estimate, control, tuning = rovers[0], estimates[0], controls[0], tunings[0]
+    rover, estimate, control, tuning = rovers[0], records.estimates[0], records.controls[0], records.tunings[0]
     contacts = rover.contacts
     for loop in range(draws.shape[0]):
         control.tick += 1
         update_estimate(estimate, rover, origin, noise, draws[loop])
-        run_tasks(control, tuning, estimate)
+        run_task(control, tuning, estimate)
         draw_current(rover, control)
         first, third = control.servo_1 * rover.grip_1, control.servo_3 * rover.grip_3
         for _ in range(SUBSTEPS):
-            drive(rover, obstacles, south_m, west_m, resolution_m, ground, first, third, LOOP_S / SUBSTEPS)
-        if mover_radii_m.size > 0:
-            now_s = time_s + (loop + 1) * LOOP_S
-            meet_movers(rover, mover_rows, mover_begins, mover_radii_m, mover_periods_s, now_s)
+            drive(rover, surroundings, first, third, LOOP_S / SUBSTEPS)
+        if surroundings.fleet.radii_m.size > 0:
+            meet_movers(rover, surroundings.fleet, time_s + (loop + 1) * LOOP_S)
         if control.arrived or control.timed_out or rover.contacts != contacts:
             return loop + 1
     return int(draws.shape[0])

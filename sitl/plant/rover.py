@@ -1,11 +1,13 @@
-"""The plant: a rover's motion in the world frame, and what happens where it touches something.
+"""The plant: the rover's motion in the world frame, and its contacts with obstacles (like SIM_Rover).
 
-Skid steering is that of the firmware's own simulated skid rover: speed follows the mean of both motors with a first-order lag,
-the turn rate follows their difference at once. Ackermann steering is the bicycle model: the same drive, and front wheels that turn
-no faster and no farther than they can, so the rover turns only while it moves.
+Skid steering is that of the firmware's own simulated skid rover: speed follows the mean of both motors with a
+first-order lag, the turn rate follows their difference at once. Ackermann steering is the bicycle model: the same
+drive, and front wheels with a limited angle and rate, so the rover turns only while it moves.
 
-On slippery ground both slide: friction, which is what changes the velocity, ends at grip times gravity. Then the rover
-pulls away and brakes late, and drifts on sideways (skid) or turns less than its wheels ask for (steered wheels).
+On slippery ground both slide: the friction that changes the velocity is limited to grip times gravity. The rover then
+accelerates and brakes more slowly, and drifts sideways (skid steering) or understeers (steered wheels).
+
+Nouns: plant, SIM_Rover.
 """
 
 from __future__ import annotations
@@ -17,24 +19,24 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sitl.world.movers import Floats, Ints, nearest_mover
-from sitl.world.world import TOP_SPEED_M_S, Ground, Obstacles, clearance_m, ground_under
+from sitl.world.movers import Fleet, nearest_mover
+from sitl.world.world import TOP_SPEED_M_S, Surroundings, clearance_m, ground_under
 
 SPEED_LAG_S = 4.0 / 14.0
 TURN_RATE_RAD_S = math.radians(140.0)
-"""Turn rate for one motor's full output of difference between left and right."""
+"""Turn rate when the outputs of left and right motor differ by 1."""
 
 WHEEL_MOST_RAD = math.radians(35.0)
-"""Steering angle at full lock, where the rover drives its turning radius; that of the firmware's simulated rover."""
+"""Steering angle at full lock, where the rover drives its turning radius; as in the firmware's simulated rover."""
 WHEEL_RATE_RAD_S = math.radians(60.0)
 """How fast the steered wheels turn: 0.6 s from straight ahead to full lock."""
 
 GRAVITY_M_S2 = 9.81
 TURN_GRIP_RAD_S2 = 20.0
-"""How fast the turn rate can change with full grip; matters only where there is less."""
+"""Angular acceleration with full grip; used only where there is less."""
 
 RELEASE_M = 0.05
-"""A contact has ended when the rover has come this far away from the obstacle."""
+"""A contact ends when the rover is this far from the obstacle."""
 
 ROVER = np.dtype(
     [
@@ -58,12 +60,12 @@ ROVER = np.dtype(
         ("drawn_ah", "f8"),
     ]
 )
-"""The truth about the rover, world frame, heading clockwise from north; ``contacts`` counts collisions so far.
+"""The rover's true state, world frame, heading clockwise from north; ``contacts`` counts collisions so far.
 
-``struck``: number of the mover it touches, from 1; ``struck_m_s``: the rover's own speed when that began.
-``turning_radius_m``: 0 for skid steering; ``wheel_rad``: where the steered wheels point, clockwise.
-``slide_m_s``: speed sideways, to the right; 0 unless the ground is slippery.
-``grip_1``, ``grip_3``: the share of each servo output that comes to the ground; ``drawn_ah``: taken from the battery so far.
+``struck``: number of the mover that it touches, from 1; ``struck_m_s``: the rover's own speed when that began.
+``turning_radius_m``: 0 for skid steering; ``wheel_rad``: angle of the steered wheels, clockwise.
+``slide_m_s``: sideways speed, to the right; 0 unless the ground is slippery.
+``grip_1``, ``grip_3``: share of each servo output that reaches the ground; ``drawn_ah``: drawn from the battery so far.
 """
 
 RoverState = NDArray[Any]
@@ -72,7 +74,7 @@ RoverState = NDArray[Any]
 def new_rover(
     north_m: float, east_m: float, heading_rad: float, radius_m: float, turning_radius_m: float = 0.0
 ) -> RoverState:
-    """A rover at rest: an array of one ``ROVER`` record. A turning radius makes it one with Ackermann steering."""
+    """A rover at rest: an array of one ``ROVER`` record. With a turning radius it has Ackermann steering."""
     state = np.zeros(1, dtype=ROVER)
     state["turning_radius_m"] = turning_radius_m
     state["grip_1"] = state["grip_3"] = 1.0
@@ -82,14 +84,14 @@ def new_rover(
 
 
 @njit(cache=True, nogil=True)
-def wheel_curvature(wheel_rad: float, turning_radius_m: float) -> float:
-    """Curvature of the way driven, 1/m, clockwise, with the steered wheels at this angle (bicycle model)."""
+def wheel_curvature_per_m(wheel_rad: float, turning_radius_m: float) -> float:
+    """Curvature of the path, clockwise, with the steered wheels at this angle (bicycle model)."""
     return math.tan(wheel_rad) / (turning_radius_m * math.tan(WHEEL_MOST_RAD))
 
 
 @njit(cache=True, nogil=True)
 def turn_wheels(rover: Any, steering: float, step_s: float) -> None:
-    """Turn the steered wheels towards a share of full lock, -1 to 1, as fast as they can."""
+    """Turn the steered wheels towards a share of full lock, -1 to 1, at their limited rate."""
     change_rad = min(max(steering, -1.0), 1.0) * WHEEL_MOST_RAD - rover.wheel_rad
     most_rad = WHEEL_RATE_RAD_S * step_s
     rover.wheel_rad += min(max(change_rad, -most_rad), most_rad)
@@ -97,11 +99,11 @@ def turn_wheels(rover: Any, steering: float, step_s: float) -> None:
 
 @njit(cache=True, nogil=True)
 def slide(rover: Any, grip: float, wanted_m_s: float, wanted_rad_s: float, step_s: float) -> tuple[float, float, float]:
-    """Forward speed, turn rate and speed sideways after a step on slippery ground.
+    """Forward speed, turn rate and sideways speed after a step on slippery ground.
 
-    The wheels want a speed ahead, none sideways, and a turn rate. Friction changes the velocity by no more than grip times
-    gravity, in whatever direction, and the turn rate not at once. Steered wheels turn the rover no faster than friction
-    can bend its way (it understeers); a skid rover turns all the same and drifts on sideways.
+    The wheels demand a forward speed, no sideways speed, and a turn rate. Friction changes the velocity by at most
+    grip times gravity, in any direction, and limits the angular acceleration. With steered wheels friction also
+    limits the turn rate (understeer); with skid steering the rover turns all the same and drifts sideways.
     """
     most_m_s = grip * GRAVITY_M_S2 * step_s
     if rover.turning_radius_m > 0.0:
@@ -120,24 +122,21 @@ def slide(rover: Any, grip: float, wanted_m_s: float, wanted_rad_s: float, step_
 
 
 @njit(cache=True, nogil=True)
-def drive(
-    rover: Any, obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float, ground: Ground,
-    servo_1: float, servo_3: float, step_s: float,
-) -> None:  # fmt: skip
+def drive(rover: Any, surroundings: Surroundings, servo_1: float, servo_3: float, step_s: float) -> None:
     """Move the rover for ``step_s`` (a few milliseconds) with servo outputs -1 to 1.
 
-    As in the firmware they are the left and the right motor of a skid rover, steering and throttle of one with Ackermann steering.
+    As in the firmware these are left and right motor with skid steering, steering and throttle with Ackermann steering.
     """
     ackermann = rover.turning_radius_m > 0.0
-    grip, pace = ground_under(ground, south_m, west_m, resolution_m, rover.north_m, rover.east_m)
+    grip, pace = ground_under(surroundings.ground, surroundings.solid, rover.north_m, rover.east_m)
     goal_m_s = servo_3 * TOP_SPEED_M_S if ackermann else 0.5 * (servo_1 + servo_3) * TOP_SPEED_M_S
     before_m_s, aside_m_s = rover.speed_m_s, 0.0
     speed_m_s = goal_m_s * pace + (before_m_s - goal_m_s * pace) * math.exp(-step_s / SPEED_LAG_S)
     from_rad = rover.heading_rad
     if ackermann:
         turn_wheels(rover, servo_1, step_s)
-        curvature = wheel_curvature(rover.wheel_rad, rover.turning_radius_m)
-        yaw_rate_rad_s = 0.5 * (before_m_s + speed_m_s) * curvature
+        curvature_per_m = wheel_curvature_per_m(rover.wheel_rad, rover.turning_radius_m)
+        yaw_rate_rad_s = 0.5 * (before_m_s + speed_m_s) * curvature_per_m
     else:
         yaw_rate_rad_s = (servo_1 - servo_3) * TURN_RATE_RAD_S * pace
     if grip < 1.0 or rover.slide_m_s != 0.0:
@@ -146,16 +145,16 @@ def drive(
     rover.yaw_rate_rad_s = yaw_rate_rad_s
     heading_rad = rover.heading_rad + rover.yaw_rate_rad_s * step_s
     rover.heading_rad = (heading_rad + math.pi) % (2.0 * math.pi) - math.pi
-    way_m = 0.5 * (before_m_s + speed_m_s) * step_s
-    north_m = rover.north_m + way_m * math.cos(rover.heading_rad)
-    east_m = rover.east_m + way_m * math.sin(rover.heading_rad)
+    step_m = 0.5 * (before_m_s + speed_m_s) * step_s
+    north_m = rover.north_m + step_m * math.cos(rover.heading_rad)
+    east_m = rover.east_m + step_m * math.sin(rover.heading_rad)
     if aside_m_s != 0.0:
         north_m -= aside_m_s * step_s * math.sin(rover.heading_rad)
         east_m += aside_m_s * step_s * math.cos(rover.heading_rad)
     reach_m = rover.radius_m + RELEASE_M
-    room_m = clearance_m(obstacles, south_m, west_m, resolution_m, north_m, east_m, reach_m)
+    room_m = clearance_m(surroundings.solid, north_m, east_m, reach_m)
     if room_m < rover.radius_m:
-        here_m = clearance_m(obstacles, south_m, west_m, resolution_m, rover.north_m, rover.east_m, reach_m)
+        here_m = clearance_m(surroundings.solid, rover.north_m, rover.east_m, reach_m)
         if room_m <= here_m:
             if rover.touching == 0:
                 rover.contacts += 1
@@ -171,15 +170,15 @@ def drive(
         rover.touching = 0
     rover.speed_m_s = speed_m_s
     rover.slide_m_s = aside_m_s
-    rover.driven_m += abs(way_m)
+    rover.driven_m += abs(step_m)
     rover.north_m = north_m
     rover.east_m = east_m
 
 
 @njit(cache=True, nogil=True)
-def meet_movers(rover: Any, rows: Floats, begins: Ints, radii_m: Floats, periods_s: Floats, time_s: float) -> None:
-    """Notice that a mover and the rover touch: it counts once, and stops the rover; the mover goes on."""
-    gap_m, mover = nearest_mover(rows, begins, radii_m, periods_s, time_s, rover.north_m, rover.east_m)
+def meet_movers(rover: Any, fleet: Fleet, time_s: float) -> None:
+    """Note a contact with a mover: it counts once and stops the rover; the mover drives on."""
+    gap_m, mover = nearest_mover(fleet, time_s, rover.north_m, rover.east_m)
     if gap_m >= rover.radius_m + RELEASE_M:
         rover.struck = 0
     elif gap_m < rover.radius_m and rover.struck != mover + 1:

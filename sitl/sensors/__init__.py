@@ -1,1 +1,1 @@
-"""Simulated range sensors and what is wrong with them."""
+"""Simulated range sensors and their flaws."""

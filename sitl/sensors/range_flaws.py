@@ -1,4 +1,9 @@
-"""What is wrong with a range sensor: noise, dropouts, false echoes, sun, age. The world's glass and black surfaces come besides."""
+"""Flaws of range sensors: noise, dropouts, false echoes, sunlight, latency; and sensors with their own rate.
+
+Glass and black surfaces are part of the world.
+
+Nouns: Flaws.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +18,7 @@ from sitl.world.world import Floats, World
 
 @dataclass(frozen=True, slots=True)
 class Sun:
-    """Within half of ``width_rad`` of the sun's bearing a sensor sees only this share of its maximum range."""
+    """Sunlight: within half of ``width_rad`` of its bearing a sensor sees only this share of its maximum range."""
 
     bearing_rad: float
     width_rad: float
@@ -22,10 +27,10 @@ class Sun:
 
 @dataclass(frozen=True, slots=True)
 class Flaws:
-    """Of one sensor. ``noise_m``: standard deviation of a range (None: the simulator's).
+    """Flaws of one sensor. ``noise_m``: standard deviation of a range (None: the simulator's).
 
-    ``dropout``: chance that a range is not known; ``false_echo``: chance of an echo from nowhere, somewhere before the true one.
-    ``latency_s``: how old a range is when it is sent.
+    ``dropout``: probability that a range is unknown; ``false_echo``: probability of an echo in front of the true one.
+    ``latency_s``: age of a range when it is sent.
     """
 
     noise_m: float | None = None
@@ -38,14 +43,14 @@ class Flaws:
 NO_FLAWS = Flaws()
 
 
-def spoiled(
+def with_flaws(
     true_m: Floats, bearings_rad: Floats, limits_m: tuple[float, float], flaws: Flaws, noise_m: float,
     rng: np.random.Generator,
 ) -> Floats:  # fmt: skip
-    """Ranges as the sensor tells them: ``inf`` where it sees nothing, ``nan`` where it does not know.
+    """Ranges as the sensor reports them: ``inf`` where it sees nothing, ``nan`` where the range is unknown.
 
-    ``bearings_rad`` are those of the ranges in the world; ``limits_m`` the sensor's minimum and maximum. Always draws equally often,
-    so that one flaw does not move the dice of another.
+    ``bearings_rad``: of the ranges, in the world frame; ``limits_m``: the sensor's minimum and maximum. The number of
+    random draws does not depend on the flaws, so that one flaw does not change the draws of another.
     """
     least_m, most_m = limits_m
     noise, echo, place, dropout = (rng.standard_normal(true_m.size), *rng.random((3, true_m.size)))
@@ -63,13 +68,13 @@ def spoiled(
 
 
 class Sampler:
-    """A sensor that measures at its own rate, from the first moment on; what it shows is ``latency_s`` old at least."""
+    """A sensor that measures at its own rate, from the start on; its readings are at least ``latency_s`` old."""
 
     def __init__(
         self, bearings_rad: Floats, limits_m: tuple[float, float], rate_hz: float, flaws: Flaws, noise_m: float,
         rng: np.random.Generator, fixed_m: float | None = None,
     ) -> None:  # fmt: skip
-        """``bearings_rad``: shape (sectors, rays), from straight ahead; ``fixed_m``: always this range, whatever is around."""
+        """``bearings_rad``: shape (sectors, rays), from straight ahead; ``fixed_m``: a constant range."""
         self._bearings_rad = bearings_rad
         self._limits_m = limits_m
         self._period_s = 1.0 / rate_hz
@@ -83,11 +88,11 @@ class Sampler:
 
     @property
     def due_s(self) -> float:
-        """When it measures next."""
+        """Time of the next measurement."""
         return self._count * self._period_s
 
     def sample(self, world: World, time_s: float, north_m: float, east_m: float, heading_rad: float) -> None:
-        """Measure, if its time has come."""
+        """Measure, if that is due."""
         if time_s < self.due_s - 1e-9:
             return
         self.newest_m(time_s)
@@ -98,11 +103,11 @@ class Sampler:
             true_m = world.rays_m(north_m, east_m, bearings_rad, max_m, time_s)
         else:
             true_m = np.full(len(bearings_rad), min(self._fixed_m, max_m))
-        seen_m = spoiled(true_m, bearings_rad.mean(axis=1), self._limits_m, self._flaws, self._noise_m, self._rng)
+        seen_m = with_flaws(true_m, bearings_rad.mean(axis=1), self._limits_m, self._flaws, self._noise_m, self._rng)
         self._waiting.append((time_s + self._flaws.latency_s, seen_m))
 
     def newest_m(self, time_s: float) -> Floats | None:
-        """The newest ranges that are old enough to be out; None before the first."""
+        """The newest ranges that are at least ``latency_s`` old; None before the first."""
         while self._waiting and self._waiting[0][0] <= time_s + 1e-9:
             self._newest_m = self._waiting.popleft()[1]
         return self._newest_m

@@ -1,29 +1,32 @@
-"""Range sensors by suite name or description, and what they measure in a world.
+"""Range sensors: lidars, rangefinders, proximity sectors, suites of them, and what they measure in a world.
 
-``lidar-90`` and ``lidar-360`` are scanners of their own (component 196) that publish OBSTACLE_DISTANCE; ``beams`` are three
-narrow rangefinders wired to the autopilot, which publishes them as DISTANCE_SENSOR.
+``lidar-90`` and ``lidar-360`` are MAVLink components (196) that publish OBSTACLE_DISTANCE; ``beams`` are three narrow
+rangefinders wired to the autopilot, which publishes them as DISTANCE_SENSOR.
+
+Nouns: SensorSuite.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal, NamedTuple
+from enum import Enum, auto
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.sensors.range_flaws import NO_FLAWS, Flaws, Sampler, spoiled
+from sitl.sensors.range_flaws import NO_FLAWS, Flaws, Sampler, with_flaws
 from sitl.world.world import World
 
 SECTORS = 72
 UNKNOWN = 65535
 FIRST_SECTOR_ID = 10
-"""DISTANCE_SENSOR ids of the autopilot's proximity sectors begin here."""
+"""First DISTANCE_SENSOR id of the autopilot's proximity sectors."""
 SECTOR_DEG = 45.0
 UP, DOWN = 24, 25
 LASER, NO_TYPE = 0, 4
-"""MAV_DISTANCE_SENSOR: what the firmware says of proximity sectors and of wired sensors."""
+"""MAV_DISTANCE_SENSOR: types that the firmware reports for proximity sectors and for wired sensors."""
 
 
 def spread_rad(middle_deg: NDArray[np.float64], width_deg: float, rays: int) -> NDArray[np.float64]:
@@ -32,13 +35,17 @@ def spread_rad(middle_deg: NDArray[np.float64], width_deg: float, rays: int) -> 
     return np.asarray(np.radians(middle_deg[:, None] + spread[None, :] * width_deg), dtype=np.float64)
 
 
-Defect = Literal["", "stuck", "stuck in view", "silent"]
-"""What is wrong with a sensor: it repeats its last reading, or gives none."""
+class Defect(Enum):
+    """A defective sensor repeats its last reading, or the first that shows something, or gives none."""
+
+    STUCK = auto()
+    STUCK_IN_VIEW = auto()
+    SILENT = auto()
 
 
 @dataclass(frozen=True, slots=True)
 class Lidar:
-    """A scanner of up to 72 sectors; sector ``i`` looks to ``offset_deg + i * increment_deg``, clockwise from ahead."""
+    """A lidar of up to 72 sectors; sector ``i`` looks to ``offset_deg + i * increment_deg``, clockwise from ahead."""
 
     increment_deg: float
     offset_deg: float
@@ -46,7 +53,7 @@ class Lidar:
     max_m: float
     rate_hz: float = 10.0
     rays: int = 1
-    """Rays spread over a sector; the nearest counts."""
+    """Rays spread over a sector; the shortest counts."""
     sectors: int = SECTORS
     flaws: Flaws = NO_FLAWS
 
@@ -58,10 +65,10 @@ class Lidar:
 
 @dataclass(frozen=True, slots=True)
 class Beam:
-    """A rangefinder; ``orientation`` in eighths of a turn clockwise (0 ahead, 1 right-front, 7 left-front), 24 up, 25 down.
+    """A rangefinder; ``orientation``: eighths of a turn clockwise (0 ahead, 7 left-front), or 24 up, 25 down.
 
-    Without ``rate_hz`` it measures whenever the autopilot sends; with one, at that rate, and the autopilot sends the newest.
-    ``height_m`` is how high it sits, which is what it measures downwards.
+    Without ``rate_hz`` it measures whenever the autopilot sends; else at that rate, and the autopilot sends the
+    newest reading. ``height_m``: mounting height, which is what it measures when looking down.
     """
 
     orientation: int
@@ -73,12 +80,12 @@ class Beam:
     height_m: float = 0.3
 
     def bearings_rad(self) -> NDArray[np.float64]:
-        """Shape (1, rays): a ray for each degree of its width, one at least; meaningless for one that looks up or down."""
+        """Shape (1, rays): a ray per degree of its width, at least one; unused for one that looks up or down."""
         return spread_rad(np.array([45.0 * self.orientation]), self.width_deg, max(1, math.ceil(self.width_deg)))
 
     @property
     def fixed_m(self) -> float | None:
-        """What it measures wherever the rover is, if it does not look along the ground."""
+        """The constant range of one that looks up or down; None for others."""
         return {UP: math.inf, DOWN: self.height_m}.get(self.orientation)
 
 
@@ -93,13 +100,13 @@ class ProximitySectors:
     flaws: Flaws = NO_FLAWS
 
     def bearings_rad(self) -> NDArray[np.float64]:
-        """Shape (sectors, rays), a ray for each degree."""
+        """Shape (sectors, rays): a ray per degree."""
         return spread_rad(SECTOR_DEG * np.array(self.sectors, dtype=np.float64), SECTOR_DEG, round(SECTOR_DEG))
 
 
 @dataclass(frozen=True, slots=True)
 class SensorSuite:
-    """What a rover carries."""
+    """The range sensors of a rover."""
 
     lidar: Lidar | None = None
     beams: tuple[Beam, ...] = ()
@@ -107,7 +114,7 @@ class SensorSuite:
 
 
 class Reading(NamedTuple):
-    """One range as the autopilot sends it in DISTANCE_SENSOR; centimetres, at ``max_cm`` nothing was seen."""
+    """One range as sent in DISTANCE_SENSOR; centimetres, ``max_cm`` means nothing was seen."""
 
     number: int
     orientation: int
@@ -126,29 +133,29 @@ SUITES = {
 
 
 def suite_named(name: str) -> SensorSuite:
-    """The suite of this name. Raises ValueError naming the known ones."""
+    """The suite with this name. Raises ValueError that lists the known ones."""
     if name not in SUITES:
         raise ValueError(f"unknown sensors '{name}' (known: {', '.join(SUITES)})")
     return SUITES[name]
 
 
 class RangeSensing:
-    """Measures with one suite: the truth of the world, its flaws, noise, rounding to centimetres."""
+    """Measurements of one suite: true ranges, flaws, noise, rounding to centimetres."""
 
     def __init__(self, suite: SensorSuite, world: World, noise_m: float, rng: np.random.Generator) -> None:
-        """``noise_m`` is the standard deviation of one range, where a sensor has none of its own."""
+        """``noise_m``: standard deviation of a range, for sensors without a value of their own."""
         self.suite = suite
         self.time_s = 0.0
-        """The world's time at which is measured; the simulator keeps it."""
-        self.lidar_fault: Defect = ""
+        """The world's time, set by the simulator."""
+        self.lidar_fault: Defect | None = None
         self.beam_faults: dict[int, Defect] = {}
-        """What is wrong with which rangefinder or proximity sector, by the number it is told with."""
+        """Defects of rangefinders and proximity sectors, by the number with which they are reported."""
         self._last_scan_cm: list[int] = []
         self._last_readings: dict[int, Reading] = {}
         self._world = world
         self._noise_m = noise_m
         self._rng = rng
-        # Children draw from generators of their own, so that sensors without flaws draw what they always drew.
+        # Sensors with flaws have generators of their own, so that the draws of the others do not depend on them.
         *beam_rngs, sector_rng, self._lidar_rng = rng.spawn(len(suite.beams) + 2)
         self._lidar_rad = suite.lidar.bearings_rad() if suite.lidar else np.zeros((0, 1))
         numbered = list(enumerate(suite.beams))
@@ -162,19 +169,19 @@ class RangeSensing:
         self._sectors = _sampler(suite.proximity, noise_m, sector_rng) if suite.proximity else None
         self._samplers = [sampler for _, _, sampler in self._sampled] + ([self._sectors] if self._sectors else [])
         self.samples = bool(self._samplers)
-        """Whether a sensor measures at a rate of its own, and ``sample`` must be called when that is due."""
+        """Whether a sensor measures at its own rate, so that ``sample`` must be called when that is due."""
 
     def next_due_s(self) -> float:
-        """When such a sensor measures next, on the world's clock."""
+        """When a sensor with its own rate measures next, in the world's time."""
         return min(sampler.due_s for sampler in self._samplers)
 
     def sample(self, north_m: float, east_m: float, heading_rad: float) -> None:
-        """Let every sensor whose time has come measure."""
+        """Measure with every sensor that is due."""
         for sampler in self._samplers:
             sampler.sample(self._world, self.time_s, north_m, east_m, heading_rad)
 
     def scan_cm(self, north_m: float, east_m: float, heading_rad: float) -> list[int]:
-        """The scanner's 72 ranges; maximum + 1 where nothing was seen, 65535 where that is not known."""
+        """The lidar's 72 ranges; maximum + 1 where nothing was seen, 65535 where the range is unknown."""
         lidar = self.suite.lidar
         assert lidar is not None
         nothing = round(lidar.max_m * 100) + 1
@@ -184,7 +191,7 @@ class RangeSensing:
         if lidar.flaws != NO_FLAWS:
             middle_rad = self._lidar_rad.mean(axis=1) + heading_rad
             limits_m = (lidar.min_m, lidar.max_m)
-            seen_m = spoiled(true_m, middle_rad, limits_m, lidar.flaws, self._noise_m, self._lidar_rng)
+            seen_m = with_flaws(true_m, middle_rad, limits_m, lidar.flaws, self._noise_m, self._lidar_rng)
             cells = np.clip(np.rint(np.where(np.isfinite(seen_m), seen_m, 0.0) * 100.0), 0, nothing - 1)
             cells[np.isinf(seen_m)] = nothing
             cells[np.isnan(seen_m)] = UNKNOWN
@@ -196,7 +203,7 @@ class RangeSensing:
         return list(self._last_scan_cm)
 
     def beams_cm(self, north_m: float, east_m: float, heading_rad: float) -> list[int]:
-        """Ranges of the rangefinders that measure when asked; their maximum where nothing was seen."""
+        """Ranges of the rangefinders without their own rate; their maximum where nothing was seen."""
         if not self._plain:
             return []
         reach_m = max(beam.max_m for _, beam in self._plain)
@@ -209,7 +216,7 @@ class RangeSensing:
         ]
 
     def wired(self, north_m: float, east_m: float, heading_rad: float) -> list[Reading]:
-        """What the rangefinders say at this moment; one that knows nothing is left out, as the firmware does."""
+        """Readings of the rangefinders at this moment; one without a range is left out, as in the firmware."""
         if not self.suite.beams:
             return []
         ranges_cm = self.beams_cm(north_m, east_m, heading_rad)
@@ -229,20 +236,20 @@ class RangeSensing:
         return [*range(len(self.suite.beams)), *(FIRST_SECTOR_ID + sector for sector in sectors)]
 
     def _with_faults(self, readings: list[Reading]) -> list[Reading]:
-        """Without what silent rangefinders say; a stuck one says again what it said last."""
-        told = []
+        """The readings without those of silent sensors; a stuck one repeats its last reading."""
+        kept = []
         for reading in readings:
-            fault = self.beam_faults.get(reading.number, "")
+            fault = self.beam_faults.get(reading.number)
             last = self._last_readings.get(reading.number, reading)
             if _repeats(fault, last.range_cm < last.max_cm):
-                told.append(last)
-            elif fault != "silent":
+                kept.append(last)
+            elif fault is not Defect.SILENT:
                 self._last_readings[reading.number] = reading
-                told.append(reading)
-        return told
+                kept.append(reading)
+        return kept
 
     def sectors(self) -> list[Reading]:
-        """The proximity sectors; one that knows nothing shows its maximum, as the firmware does."""
+        """Readings of the proximity sectors; one without a range shows its maximum, as in the firmware."""
         near = self.suite.proximity
         if near is None or self._sectors is None:
             return []
@@ -259,9 +266,9 @@ class RangeSensing:
         return self._rng.standard_normal(count) * self._noise_m
 
 
-def _repeats(defect: Defect, in_view: bool) -> bool:
-    """Whether a sensor says its last reading again; ``in_view``: whether that shows something."""
-    return defect == "stuck" or (defect == "stuck in view" and in_view)
+def _repeats(defect: Defect | None, in_view: bool) -> bool:
+    """Whether a sensor repeats its last reading; ``in_view``: whether that reading shows something."""
+    return defect is Defect.STUCK or (defect is Defect.STUCK_IN_VIEW and in_view)
 
 
 def _sampler(

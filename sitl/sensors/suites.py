@@ -1,4 +1,4 @@
-"""From the description of range sensors in a mission, or in a file of its own, to a suite."""
+"""Sensor suites from their descriptions in a mission or a sensors file."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sitl.sensors.range_sensors import Beam, Lidar, ProximitySectors, SensorSuit
 
 
 def suite_of(sensors: Sensors) -> SensorSuite:
-    """The suite of this name or description. Raises ValueError naming the known ones."""
+    """The suite with this name or description. Raises ValueError that lists the known names."""
     if isinstance(sensors, str):
         return suite_named(sensors)
     return SensorSuite(

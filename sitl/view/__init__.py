@@ -1,1 +1,1 @@
-"""What people see of a simulation: on the terminal and as a picture."""
+"""Views of a simulation: on the terminal and as a picture file."""

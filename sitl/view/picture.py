@@ -1,4 +1,7 @@
-"""A picture of a run: the truth, what the companion has seen of it, and the way it took."""
+"""Picture file of a run: the world, the companion's map, and the driven track.
+
+Nouns: picture.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ PART_NAMES = {"B": "exploring (B)", "C": "new path (C)", "A": "returning (A)"}
 
 
 def save_picture(run: Drive, path: Path) -> None:
-    """Write a north-up PNG: obstacles, what was mapped, the driven track coloured by the navigator's part, start and targets."""
+    """Write a north-up picture: obstacles, map, the track coloured by the navigator's part, start and targets."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -57,12 +60,12 @@ def save_picture(run: Drive, path: Path) -> None:
 
 
 def _extent(world: World) -> tuple[float, float, float, float]:
-    """West, east, south and north edge of the world's fields."""
+    """West, east, south and north edges of the world."""
     return (world.west_m, world.west_m + world.width_m, world.south_m, world.south_m + world.height_m)
 
 
 def _draw_world(axes: Axes, run: Drive) -> None:
-    """The truth in light grey."""
+    """Draw the world's obstacles in light grey."""
     world = run.simulator.world
     if not world.obstacles.any():
         return
@@ -76,7 +79,7 @@ def _draw_world(axes: Axes, run: Drive) -> None:
 def _tint(
     axes: Axes, world: World, mask: NDArray[np.bool_], colour: str, strength: NDArray[np.float64] | float
 ) -> None:
-    """Colour some fields of the world, more or less strongly."""
+    """Colour the fields of a mask with a strength."""
     from matplotlib.colors import to_rgb
 
     picture: NDArray[np.float64] = np.zeros((*mask.shape, 4))
@@ -86,7 +89,7 @@ def _tint(
 
 
 def _draw_ground(axes: Axes, world: World) -> None:
-    """Slippery and rough ground, the stronger the worse."""
+    """Draw slippery and rough ground; a stronger colour means worse ground."""
     for (name, colour), layer in zip(GROUND_COLOURS.items(), world.ground, strict=True):
         if layer.size and (layer < 1.0).any():
             _tint(axes, world, layer < 1.0, colour, 0.15 + 0.45 * (1.0 - layer.astype(np.float64)))
@@ -94,7 +97,7 @@ def _draw_ground(axes: Axes, world: World) -> None:
 
 
 def _draw_special(axes: Axes, world: World, ended_s: float) -> None:
-    """Doors as they were at the end, and what rays go through or do not come back from."""
+    """Draw doors as they were at the end, and obstacles that do not reflect rays."""
     labels: set[str] = set()
     for door in world.doors:
         is_open = door.is_open(ended_s)
@@ -107,11 +110,11 @@ def _draw_special(axes: Axes, world: World, ended_s: float) -> None:
     for mask, colour, name in ((world.glass, GLASS_COLOUR, "glass"), (world.black, BLACK_COLOUR, "black")):
         if mask is not None:
             _tint(axes, world, mask, colour, 1.0)
-            axes.plot([], [], "s", color=colour, label=f"{name}, sends no ray back")
+            axes.plot([], [], "s", color=colour, label=f"{name}, reflects no rays")
 
 
 def _draw_map(axes: Axes, run: Drive) -> None:
-    """What the companion has seen: free ground tinted, obstacles dark."""
+    """Draw the companion's map: free ground tinted, obstacles dark."""
     evidence, origin = run.companion.evidence, run.companion.origin
     if evidence is None or origin is None:
         return
@@ -132,7 +135,7 @@ def _draw_map(axes: Axes, run: Drive) -> None:
 
 
 def _draw_movers(axes: Axes, run: Drive) -> None:
-    """Where the moving obstacles went, and where they were at the end of the run."""
+    """Draw the tracks of moving obstacles, and their positions at the end."""
     from matplotlib.patches import Circle
 
     world, ended_s = run.simulator.world, run.report.sim_time_s
@@ -171,7 +174,7 @@ def _draw_places(axes: Axes, run: Drive) -> None:
         place = (target.point.east_m + east_m, target.point.north_m + north_m)
         axes.plot(*place, "*", color="#d32f2f", markersize=14, label="target" if i == 0 else None)
         if len(progress.targets) > 1:
-            # Towards the middle, where there is room for it.
+            # Towards the middle, where there is room.
             left = place[0] > sum(axes.get_xlim()) / 2.0
             aside, towards = ((-8, 8), "right") if left else ((8, 8), "left")
             axes.annotate(target.name, place, textcoords="offset points", xytext=aside, ha=towards, fontsize=9)

@@ -1,4 +1,4 @@
-"""A world as a small picture of square dots, north up, for a terminal: what is where, and which part of it is shown.
+"""The world as square dots for a terminal, north up: what each dot shows, and which part of the world is shown.
 
 World frame: metres north and east, as in ``sitl.world``.
 """
@@ -7,23 +7,23 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum, auto
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 COARSEST_M = 2.5
-"""A dot is never larger: ground for which that is not enough is shown in part, round the rover."""
+"""Largest side of a dot; of larger worlds only the part around the rover is shown."""
 FOLLOWING_M = 1.0
-"""Side of a dot when only a part is shown."""
+"""Side of a dot when only a part of the world is shown."""
 STEP_M = 10.0
-"""Ground without edges is shown in whole steps, so that the picture does not change its scale all the time."""
+"""Open ground is shown in multiples of this, so that the scale does not change all the time."""
 MARGIN_M = 3.0
 
 
 class Kind(IntEnum):
-    """What a dot shows; of several things in one dot the last one of this list wins."""
+    """What a dot shows; of several things in one dot the last in this list counts."""
 
     NOTHING = 0
     SEEN = 1
@@ -45,7 +45,7 @@ Dots = NDArray[np.uint8]
 
 
 class Layer(NamedTuple):
-    """Fields of one kind: ``where[y, x]``, side of a field, and the outer south-west corner."""
+    """Fields of one kind: ``where[y, x]``, the side of a field, and the outer south-west corner."""
 
     kind: Kind
     where: NDArray[np.bool_]
@@ -55,26 +55,35 @@ class Layer(NamedTuple):
 
 
 class Disc(NamedTuple):
-    """Something round."""
+    """A disc: centre and radius."""
 
     north_m: float
     east_m: float
     radius_m: float
 
 
+class PlaceState(Enum):
+    """What a place is, or what has become of a target."""
+
+    PENDING = auto()
+    REACHED = auto()
+    LOST = auto()
+    START = auto()
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A place with a name: a target, the start. ``state``: pending, reached or lost."""
+    """A place with a name: the start or a target."""
 
     name: str
     north_m: float
     east_m: float
-    state: str = "pending"
+    state: PlaceState = PlaceState.PENDING
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Scene:
-    """Everything that is drawn. ``track``: shape (n, 2), where the rover has been; ``bounds_m``: south, west, north, east, or None."""
+    """Everything to draw. ``track``: shape (n, 2), north and east; ``bounds_m``: south, west, north, east."""
 
     layers: tuple[Layer, ...]
     rover: Disc
@@ -87,7 +96,7 @@ class Scene:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """The part of the world that is shown: north-west corner, side of a dot, and how many dots."""
+    """The part of the world that is shown: north-west corner, side of a dot, number of dots."""
 
     north_m: float
     west_m: float
@@ -96,14 +105,14 @@ class Frame:
     columns: int
 
     def dot(self, north_m: float, east_m: float) -> tuple[int, int] | None:
-        """Row and column of a place, None outside."""
+        """Row and column of a place; None outside."""
         row = math.floor((self.north_m - north_m) / self.dot_m)
         column = math.floor((east_m - self.west_m) / self.dot_m)
         return (row, column) if 0 <= row < self.rows and 0 <= column < self.columns else None
 
 
 def frame_for(scene: Scene, rows: int, columns: int) -> Frame:
-    """All of it, if a dot then is no larger than ``COARSEST_M``; otherwise the surroundings of the rover."""
+    """The whole scene if dots of ``COARSEST_M`` are enough for it; otherwise the part around the rover."""
     south_m, west_m, north_m, east_m = scene.bounds_m or _extent_m(scene)
     dot_m = max((north_m - south_m) / rows, (east_m - west_m) / columns)
     if dot_m <= COARSEST_M:
@@ -118,14 +127,14 @@ def frame_for(scene: Scene, rows: int, columns: int) -> Frame:
 
 
 def _kept_inside(middle_m: float, low_m: float, high_m: float, shown_m: float) -> float:
-    """The middle of what is shown, near the rover, but not beyond the world's edges."""
+    """The middle of the part shown: near the rover, but not beyond the world's edges."""
     if high_m - low_m <= shown_m:
         return 0.5 * (low_m + high_m)
     return min(max(middle_m, low_m + shown_m / 2.0), high_m - shown_m / 2.0)
 
 
 def _extent_m(scene: Scene) -> tuple[float, float, float, float]:
-    """South, west, north and east of all that is there, with some room, in whole steps."""
+    """South, west, north and east of everything in the scene, with a margin, in multiples of ``STEP_M``."""
     discs = [(scene.rover.north_m, scene.rover.east_m), *((m.north_m, m.east_m) for m in scene.movers)]
     discs += [(place.north_m, place.east_m) for place in scene.places]
     points = np.concatenate([np.array(discs), scene.track.reshape(-1, 2)])
@@ -136,7 +145,7 @@ def _extent_m(scene: Scene) -> tuple[float, float, float, float]:
 
 
 def paint(scene: Scene, frame: Frame) -> Dots:
-    """Every dot's kind."""
+    """The kind of every dot."""
     dots: Dots = np.zeros((frame.rows, frame.columns), dtype=np.uint8)
     for layer in scene.layers:
         here = _covered(layer, frame)
@@ -148,7 +157,7 @@ def paint(scene: Scene, frame: Frame) -> Dots:
 
 
 def _covered(layer: Layer, frame: Frame) -> NDArray[np.bool_]:
-    """The dots in which any field of the layer lies; where dots are the smaller ones, those whose middle lies in one."""
+    """The dots that contain a field of the layer; if dots are smaller than fields, those whose centre lies in one."""
     south_m = frame.north_m - frame.rows * frame.dot_m
     rows = _runs(south_m - layer.south_m, frame.dot_m, frame.rows, layer.resolution_m, layer.where.shape[0])
     columns = _runs(frame.west_m - layer.west_m, frame.dot_m, frame.columns, layer.resolution_m, layer.where.shape[1])
@@ -162,7 +171,7 @@ def _covered(layer: Layer, frame: Frame) -> NDArray[np.bool_]:
 
 
 class _Runs(NamedTuple):
-    """Along one axis: which dots have fields, the first field of each, and where the last one's fields end."""
+    """Along one axis: the dots that have fields, the first field of each, and the end of the last dot's fields."""
 
     dots: NDArray[np.intp]
     begins: NDArray[np.intp]
@@ -170,11 +179,11 @@ class _Runs(NamedTuple):
 
 
 def _runs(offset_m: float, dot_m: float, dots: int, field_m: float, fields: int) -> _Runs | None:
-    """The fields of each dot; ``offset_m`` is where the first dot begins, counted from the first field."""
+    """The fields of each dot; ``offset_m``: start of the first dot, relative to the first field."""
     if dot_m < field_m:
         begins = np.floor((offset_m + (np.arange(dots) + 0.5) * dot_m) / field_m).astype(np.intp)
         inside = np.flatnonzero((begins >= 0) & (begins < fields))
-        # Several dots share a field: ``reduceat`` then takes just the field where a run begins.
+        # Several dots share a field: ``reduceat`` then takes only the first field of each.
         return _Runs(inside, begins[inside], int(begins[inside][-1]) + 1) if inside.size else None
     edges = np.ceil((offset_m + np.arange(dots + 1) * dot_m) / field_m - 0.5).astype(np.intp).clip(0, fields)
     inside = np.flatnonzero(edges[1:] > edges[:-1])
@@ -182,7 +191,7 @@ def _runs(offset_m: float, dot_m: float, dots: int, field_m: float, fields: int)
 
 
 def _paint_track(track: NDArray[np.float64], frame: Frame, dots: Dots) -> None:
-    """A line through the points, without gaps."""
+    """Draw a line through the points, without gaps."""
     if len(track) == 0:
         return
     steps = np.abs(np.diff(track, axis=0)).max(axis=1, initial=0.0) / frame.dot_m

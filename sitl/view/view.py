@@ -1,7 +1,7 @@
-"""What ``--view`` shows: map, rover and figures, as something that rich can print. A pure function of the state.
+"""The screen of ``--view``: map, rover and figures as a rich renderable; a pure function of the state.
 
-Two dots, one above the other, make one character. With colours that is an upper half block on a ground of its own; without them
-every kind has a sign of its own.
+Two dots, one above the other, make one character: with colours an upper half block on a background, without colours a
+sign per kind.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import groupby
 from operator import itemgetter
+from typing import NamedTuple
 
 from rich.console import Group, RenderableType
 from rich.layout import Layout
@@ -18,26 +19,39 @@ from rich.panel import Panel
 from rich.table import Table
 from rich.text import Text
 
-from sitl.view.sketch import Dots, Frame, Kind, Scene, frame_for, paint
+from sitl.view.sketch import Dots, Frame, Kind, PlaceState, Scene, frame_for, paint
 
 PANEL_COLUMNS = (32, 44)
-"""At least and at most; between them a third of the terminal."""
+"""Smallest and largest width; between them a third of the terminal."""
 NAME_COLUMNS = 11
 SMALLEST = (60, 16)
-"""Columns and rows below which there is no room for a picture."""
+"""Smallest number of columns and rows for a picture."""
 LEGEND_SHARE = 4
-"""Of the map's rows, the legend takes at most one in so many."""
+"""The legend takes at most one of this many rows of the map."""
 
 ARROWS = "↑↗→↘↓↙←↖"
-STATE_SIGNS = {"pending": "◎", "reached": "✓", "lost": "✗", "start": "⌂"}
-STATE_NAMES = {"pending": "target", "reached": "reached", "lost": "given up", "start": "start"}
-STATE_STYLES = {"pending": "bold #ff5f5f", "reached": "bold #5fd75f", "lost": "bold #ffaf00", "start": "bold #5fd75f"}
+
+
+class PlaceLook(NamedTuple):
+    """How a place looks: its sign, its name in the legend, its style."""
+
+    sign: str
+    name: str
+    style: str
+
+
+PLACE_LOOKS = {
+    PlaceState.PENDING: PlaceLook("◎", "target", "bold #ff5f5f"),
+    PlaceState.REACHED: PlaceLook("✓", "reached", "bold #5fd75f"),
+    PlaceState.LOST: PlaceLook("✗", "given up", "bold #ffaf00"),
+    PlaceState.START: PlaceLook("⌂", "start", "bold #5fd75f"),
+}
 ROVER_STYLE = "bold #000000 on #ffd700"
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """How a kind of dot looks: its colour, its sign where there are none, and its name in the legend."""
+    """How a kind of dot looks: its colour, its sign without colours, and its name in the legend."""
 
     colour: str
     sign: str
@@ -63,7 +77,7 @@ LOOKS = {
 
 @dataclass(frozen=True, slots=True)
 class Fact:
-    """One line of the panel; ``alarm``: it should be seen."""
+    """One line of the panel; ``alarm``: highlighted."""
 
     name: str
     value: str
@@ -80,16 +94,16 @@ class Section:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class View:
-    """The state that is shown. ``news``: what was told, the newest last."""
+    """The state that is shown. ``events``: texts, the newest last."""
 
     title: str
     scene: Scene
     sections: tuple[Section, ...]
-    news: tuple[str, ...] = ()
+    events: tuple[str, ...] = ()
 
 
 def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableType:
-    """The whole screen of so many characters."""
+    """The whole screen, with this many columns and rows of characters."""
     if columns < SMALLEST[0] or rows < SMALLEST[1]:
         small = f"{columns} x {rows} characters are too few for a picture (at least {SMALLEST[0]} x {SMALLEST[1]})"
         return Group(Text(small), *(_line(fact, columns) for section in view.sections for fact in section.facts))
@@ -102,7 +116,7 @@ def render(view: View, columns: int, rows: int, *, colour: bool) -> RenderableTy
 
 
 def _map_panel(view: View, columns: int, rows: int, *, colour: bool) -> Panel:
-    """The map with its legend below, so many characters inside the border."""
+    """The map with its legend below, with this many characters inside the border."""
     frame = frame_for(view.scene, 2 * rows, columns)
     dots = paint(view.scene, frame)
     legend = _legend(view.scene, frame, dots, columns, colour=colour)[: max(1, rows // LEGEND_SHARE)]
@@ -115,7 +129,7 @@ def _map_panel(view: View, columns: int, rows: int, *, colour: bool) -> Panel:
 
 
 def _size(scene: Scene) -> str:
-    """The world's, whatever part of it is shown; nothing for open ground."""
+    """The world's size as text; empty for open ground."""
     if scene.bounds_m is None:
         return ""
     south_m, west_m, north_m, east_m = scene.bounds_m
@@ -123,14 +137,14 @@ def _size(scene: Scene) -> str:
 
 
 def map_lines(scene: Scene, frame: Frame, dots: Dots, *, colour: bool) -> list[Text]:
-    """The map, a text for each row of characters; ``frame.rows`` is even."""
+    """The map, one text per row of characters; ``frame.rows`` is even."""
     marks = _marks(scene, frame)
     lines = []
     for row in range(0, frame.rows, 2):
         pairs = zip(dots[row].tolist(), dots[row + 1].tolist(), strict=True)
         characters = [_character(Kind(upper), Kind(lower), colour=colour) for upper, lower in pairs]
         for column, (sign, style) in marks.get(row // 2, {}).items():
-            # A mark lies on the ground that is there, unless it brings its own.
+            # A mark keeps the background of its dot, unless its style has its own.
             ground = "" if " on " in style or not colour else f" on {LOOKS[Kind(int(dots[row, column]))].colour}"
             characters[column] = (sign, style + ground)
         line = Text(no_wrap=True, overflow="crop")
@@ -152,9 +166,9 @@ def _character(upper: Kind, lower: Kind, *, colour: bool) -> tuple[str, str]:
 
 
 def _marks(scene: Scene, frame: Frame) -> dict[int, dict[int, tuple[str, str]]]:
-    """Signs that take a whole character, and their styles, by row and column of characters; the rover is on top."""
+    """Signs of places and rover with their styles, by row and column of characters; the rover is on top."""
     marks: dict[int, dict[int, tuple[str, str]]] = {}
-    signs = [(one.north_m, one.east_m, STATE_SIGNS[one.state], STATE_STYLES[one.state]) for one in scene.places]
+    signs = [(one.north_m, one.east_m, *PLACE_LOOKS[one.state][::2]) for one in scene.places]
     signs.append((scene.rover.north_m, scene.rover.east_m, arrow(scene.heading_rad), ROVER_STYLE))
     for north_m, east_m, sign, style in signs:
         where = frame.dot(north_m, east_m)
@@ -164,13 +178,13 @@ def _marks(scene: Scene, frame: Frame) -> dict[int, dict[int, tuple[str, str]]]:
 
 
 def arrow(heading_rad: float) -> str:
-    """The arrow that is nearest to a heading, clockwise from north."""
+    """The arrow nearest to a heading, clockwise from north."""
     return ARROWS[round(heading_rad / (math.pi / 4.0)) % 8]
 
 
 def _legend(scene: Scene, frame: Frame, dots: Dots, columns: int, *, colour: bool) -> list[Text]:
-    """What the signs and colours mean that the map shows, the most important first, in as many lines as it takes."""
-    entries = [Text(f"{STATE_SIGNS[state]} {name}", no_wrap=True) for state, name in _states_shown(scene, frame)]
+    """Meaning of the signs and colours on the map, the most important first."""
+    entries = [Text(f"{look.sign} {look.name}", no_wrap=True) for look in _places_shown(scene, frame)]
     there = set(dots.ravel().tolist())
     for kind, look in sorted(LOOKS.items(), reverse=True):
         if look.name and kind in there:
@@ -187,14 +201,14 @@ def _legend(scene: Scene, frame: Frame, dots: Dots, columns: int, *, colour: boo
     return lines or [Text()]
 
 
-def _states_shown(scene: Scene, frame: Frame) -> list[tuple[str, str]]:
-    """The states of places in sight, and what they are called."""
+def _places_shown(scene: Scene, frame: Frame) -> list[PlaceLook]:
+    """The looks of the places in sight."""
     there = {one.state for one in scene.places if frame.dot(one.north_m, one.east_m) is not None}
-    return [(state, name) for state, name in STATE_NAMES.items() if state in there]
+    return [look for state, look in PLACE_LOOKS.items() if state in there]
 
 
 def _facts(view: View, columns: int, rows: int) -> Table:
-    """All sections, long facts whole where there is room for more than a line each, then as much of the news as still fits."""
+    """All sections, with long facts on several lines if there is room, then the events that still fit."""
     table = Table.grid()
     table.add_column(width=columns, no_wrap=True, overflow="ellipsis")
     room = rows
@@ -202,25 +216,25 @@ def _facts(view: View, columns: int, rows: int) -> Table:
     for section in view.sections:
         lines = [Text(section.title, "bold")]
         for fact in section.facts:
-            told = _told(fact, columns, max(spare, 0) + 1)
-            spare -= len(told) - 1
-            lines += told
+            lines_of_fact = _fact_lines(fact, columns, max(spare, 0) + 1)
+            spare -= len(lines_of_fact) - 1
+            lines += lines_of_fact
         for line in lines[: max(room, 0)]:
             table.add_row(line)
         room -= len(lines)
-    if room > 1 and view.news:
-        table.add_row(Text("News", "bold"))
-        for text in _newest(view.news, columns, room - 1):
+    if room > 1 and view.events:
+        table.add_row(Text("Events", "bold"))
+        for text in _newest(view.events, columns, room - 1):
             table.add_row(text)
     return table
 
 
 def _line(fact: Fact, columns: int) -> Text:
-    return _told(fact, columns, 1)[0]
+    return _fact_lines(fact, columns, 1)[0]
 
 
-def _told(fact: Fact, columns: int, most: int) -> list[Text]:
-    """A fact in so many lines at most, the later ones under the value; what does not fit ends in dots."""
+def _fact_lines(fact: Fact, columns: int, most: int) -> list[Text]:
+    """A fact in at most ``most`` lines; text that does not fit is cut with an ellipsis."""
     style = "bold not dim #ff5f5f" if fact.alarm else "not dim"
     values = _broken(fact.value, max(columns - NAME_COLUMNS, 1))
     if len(values) > most:
@@ -234,10 +248,10 @@ def _told(fact: Fact, columns: int, most: int) -> list[Text]:
     return lines
 
 
-def _newest(news: Iterable[str], columns: int, rows: int) -> list[Text]:
-    """The last lines that fit, broken where they are too long; a text that does not fit whole is left out."""
+def _newest(events: Iterable[str], columns: int, rows: int) -> list[Text]:
+    """The newest texts that fit, wrapped; a text that does not fit completely is left out."""
     lines: list[Text] = []
-    for text in reversed(tuple(news)):
+    for text in reversed(tuple(events)):
         wrapped = _wrapped(text, columns)
         if len(lines) + len(wrapped) > rows:
             return lines
@@ -246,12 +260,12 @@ def _newest(news: Iterable[str], columns: int, rows: int) -> list[Text]:
 
 
 def _wrapped(text: str, columns: int) -> list[Text]:
-    """Lines of a text, the later ones set in by a space."""
+    """Lines of a text; all but the first are indented by a space."""
     return [Text(line, no_wrap=True) for line in _broken(text, columns, " ")]
 
 
 def _broken(text: str, columns: int, indent: str = "") -> list[str]:
-    """A text in lines of at most so many characters, at least one; words longer than a line are cut through."""
+    """A text in lines of at most ``columns`` characters, at least one; longer words are split."""
     lines = [""]
     for word in text.split():
         if lines[-1].strip() and len(lines[-1]) + 1 + len(word) > columns:

@@ -1,4 +1,4 @@
-"""From a running simulator to what ``--view`` shows of it."""
+"""Collects from a running simulator what ``--view`` shows: scene, track, rates of links, events."""
 
 from __future__ import annotations
 
@@ -11,28 +11,28 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.autopilot.control import LEG, WAYPOINT
+from sitl.autopilot.control.records import LEG, WAYPOINT
 from sitl.autopilot.vehicle import Vehicle
 from sitl.simulator import Simulator
-from sitl.view.sketch import Disc, Kind, Layer, Place, Scene
+from sitl.view.sketch import Disc, Kind, Layer, Place, PlaceState, Scene
 from sitl.view.view import Fact, Section, View
 from sitl.world.world import World
 
 TRACK_STEP_M = 0.2
 TRACK_POINTS = 20_000
-NEWS_KEPT = 50
+EVENTS_KEPT = 50
 RATE_SPAN_S = 2.0
-"""Rates are counted over so many seconds of the rover's time, at least."""
+"""Shortest time over which rates are counted, in the rover's time."""
 
 
 @dataclass
 class Rates:
-    """How many messages a second each link carries, from counts that only grow."""
+    """Messages per second of each link, from counters."""
 
     _seen: deque[tuple[float, dict[str, tuple[int, int]]]] = field(default_factory=deque)
 
     def update(self, now_s: float, counts: dict[str, tuple[int, int]]) -> dict[str, tuple[float, float]]:
-        """Take in the counts of this moment (heard, sent, by link) and tell the rates since about ``RATE_SPAN_S`` ago."""
+        """Take in the counters of this moment (received, sent, by link); the rates over about ``RATE_SPAN_S``."""
         self._seen.append((now_s, counts))
         while len(self._seen) > 2 and now_s - self._seen[1][0] >= RATE_SPAN_S:
             self._seen.popleft()
@@ -45,8 +45,8 @@ class Rates:
         return rates
 
 
-class _Being:
-    """The autopilot at a moment: which of its lives it is in, and what it has said of mode and arming."""
+class _AutopilotState:
+    """The autopilot at a moment: which boot it is, its mode, and whether it is armed."""
 
     def __init__(self, vehicle: Vehicle, is_off: bool) -> None:
         self._vehicle = vehicle
@@ -54,11 +54,11 @@ class _Being:
         self._mode = vehicle.mode.name
         self._armed = "armed" if vehicle.armed else "disarmed"
 
-    def news_since(self, was: _Being) -> Iterator[str]:
-        """What has changed, a line each."""
+    def events_since(self, was: _AutopilotState) -> Iterator[str]:
+        """What has changed, one line each."""
         if self._is_off:
             if not was._is_off:
-                yield "the autopilot's power has failed"
+                yield "the autopilot has lost power"
         elif was._is_off or was._vehicle is not self._vehicle:
             yield f"the autopilot has booted: {self._mode}, {self._armed}"
         else:
@@ -70,31 +70,31 @@ class _Being:
 
 @dataclass
 class Watching:
-    """Keeps what a single look at the simulator cannot show: its track, the rates of its links, what was told."""
+    """Keeps what a single look at the simulator cannot show: the track, rates of links, events."""
 
     title: str
     simulator: Simulator
-    news: deque[str] = field(default_factory=lambda: deque(maxlen=NEWS_KEPT))
+    events: deque[str] = field(default_factory=lambda: deque(maxlen=EVENTS_KEPT))
     _track: array[float] = field(default_factory=lambda: array("d"))
     _rates: Rates = field(default_factory=Rates)
     _began: tuple[float, float] | None = None
-    _was: _Being | None = None
+    _was: _AutopilotState | None = None
 
     def tell(self, line: str) -> None:
-        """A line for the news."""
-        self.news.append(line)
+        """Add an event."""
+        self.events.append(line)
 
     def view(self, now_s: float) -> View:
-        """What there is to see at a moment (real seconds)."""
+        """The view of this moment; ``now_s``: real seconds."""
         sections = (self.vehicle_section(now_s), self.links_section())
-        return View(self.title, self.scene(), sections, tuple(self.news))
+        return View(self.title, self.scene(), sections, tuple(self.events))
 
     def scene(self) -> Scene:
-        """The truth: world, rover and track."""
+        """The true scene: world, rover and track."""
         simulator, truth = self.simulator, self.simulator.truth
         self.note()
         world = simulator.world
-        start = Place("start", simulator.start.north_m, simulator.start.east_m, "start")
+        start = Place("start", simulator.start.north_m, simulator.start.east_m, PlaceState.START)
         return Scene(
             layers=world_layers(world, simulator.time_s),
             rover=Disc(truth.north_m, truth.east_m, simulator.rover_radius_m),
@@ -107,16 +107,16 @@ class Watching:
 
     @property
     def track(self) -> NDArray[np.float64]:
-        """Where the rover has been, shape (n, 2)."""
+        """The rover's track, shape (n, 2), north and east."""
         return np.array(self._track).reshape(-1, 2)
 
     def note(self) -> None:
-        """Remember where the rover is, and tell of its mode and power, whoever has changed them. To be called often."""
+        """Record the track, and changes of mode, arming and power; to be called often."""
         self._note_track()
         simulator = self.simulator
-        was, now = self._was, _Being(simulator.vehicle, simulator.is_off)
+        was, now = self._was, _AutopilotState(simulator.vehicle, simulator.is_off)
         self._was = now
-        for line in now.news_since(was) if was else ():
+        for line in now.events_since(was) if was else ():
             self.tell(f"{simulator.time_s:.0f} s: {line}")
 
     def _note_track(self) -> None:
@@ -127,7 +127,7 @@ class Watching:
             del self._track[: -2 * TRACK_POINTS]
 
     def _destination(self) -> tuple[Place, ...]:
-        """Where the autopilot is driving to, if anywhere."""
+        """The autopilot's destination, if any."""
         vehicle = self.simulator.vehicle
         goal = vehicle.control[0]
         if not vehicle.has_target or int(goal["task"]) not in (WAYPOINT, LEG):
@@ -155,7 +155,7 @@ class Watching:
         return Section("Rover", facts)
 
     def links_section(self) -> Section:
-        """Messages a second to and from each link."""
+        """Messages per second to and from each link."""
         counts = {link.name: (link.heard.packets, link.sent.packets) for link in self.simulator.links}
         rates = self._rates.update(self.simulator.time_s, counts)
         facts = [Fact("nobody is connected", "")] if not rates else []
@@ -166,7 +166,7 @@ class Watching:
 
 
 def _health(simulator: Simulator) -> tuple[Fact, ...]:
-    """GPS, EKF, and the battery where one is monitored."""
+    """GPS, EKF, and the battery if it is monitored."""
     vehicle = simulator.vehicle
     fix = vehicle.has_home and vehicle.ekf.gps_has_fix
     position = "position known" if vehicle.has_position else "no position"
@@ -183,12 +183,12 @@ WORDS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
 
 
 def arrow_word(heading_rad: float) -> str:
-    """The nearest of eight points of the compass."""
+    """The nearest of the eight compass points."""
     return WORDS[round(heading_rad / (math.pi / 4.0)) % 8]
 
 
 def world_layers(world: World, time_s: float, standing: Kind = Kind.WALL) -> tuple[Layer, ...]:
-    """The truth at a moment; ``standing``: how its ordinary obstacles are shown."""
+    """The world at a moment; ``standing``: how ordinary obstacles are shown."""
     layers = []
     for kind, ground in zip((Kind.SLIPPERY, Kind.ROUGH), world.ground, strict=True):
         if ground.size:
@@ -203,7 +203,7 @@ def world_layers(world: World, time_s: float, standing: Kind = Kind.WALL) -> tup
 
 
 def movers_of(world: World, time_s: float) -> tuple[Disc, ...]:
-    """Where everything is that moves."""
+    """The moving obstacles at a moment."""
     places = (world.mover_at(number, time_s) for number in range(len(world.movers)))
     return tuple(
         Disc(north_m, east_m, mover.radius_m)
@@ -212,7 +212,7 @@ def movers_of(world: World, time_s: float) -> tuple[Disc, ...]:
 
 
 def bounds_of(world: World) -> tuple[float, float, float, float] | None:
-    """South, west, north and east edge of a world that has something in it; None for open ground."""
+    """South, west, north and east edges of a world; None for open ground."""
     if not (world.obstacles.any() or world.doors or world.ground.size):
         return None
     return (world.south_m, world.west_m, world.south_m + world.height_m, world.west_m + world.width_m)

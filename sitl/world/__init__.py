@@ -1,1 +1,1 @@
-"""The truth: obstacles, doors, what moves, where the rover is."""
+"""The simulated world: obstacles, doors, moving obstacles, ground; its own geodesy."""

@@ -1,7 +1,9 @@
-"""The truth that opens and closes: doors with a timetable.
+"""Doors: obstacles that open and close by a timetable.
 
-Times are the simulator's, in seconds since it was made, and are kept as whole milliseconds, so that no rounding decides on which
-side of a moment a door is open.
+Times are the simulator's, in seconds since it was created. They are kept as integer milliseconds, so that rounding
+cannot decide whether a door is open.
+
+Nouns: Door.
 """
 
 from __future__ import annotations
@@ -17,10 +19,10 @@ NEVER_S = math.inf
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Door:
-    """Obstacle fields that are there only while it is closed.
+    """Obstacle fields that exist only while the door is closed.
 
-    ``fields``: shape (height, width), which fields of the world it closes. ``open_ms``: spans during which it is open, the first
-    millisecond belongs to the span and the last does not; ``period_ms``: after so long the timetable begins anew, 0: never.
+    ``fields``: shape (height, width), the fields of the world that it closes. ``open_ms``: half-open spans [begin,
+    end) during which it is open; ``period_ms``: after this time the timetable starts over, 0: never.
     """
 
     name: str
@@ -29,12 +31,12 @@ class Door:
     period_ms: int = 0
 
     def is_open(self, time_s: float) -> bool:
-        """Whether one can pass at this moment."""
+        """Whether it is open at a moment."""
         now_ms = self._within_period(whole_ms(time_s))
         return any(begin <= now_ms < end for begin, end in self.open_ms)
 
     def next_change_s(self, time_s: float) -> float:
-        """The first moment after this one at which it opens or closes; infinity when that never comes."""
+        """The next time after ``time_s`` at which it opens or closes; infinity if never."""
         time_ms = whole_ms(time_s)
         now_ms = self._within_period(time_ms)
         moments = sorted({moment for span in self.open_ms for moment in span if moment != FOR_EVER_MS})
@@ -48,14 +50,14 @@ class Door:
 
 
 FOR_EVER_MS = 10**15
-"""End of a span that does not end."""
+"""End of a span without an end."""
 
 
 def whole_ms(time_s: float) -> int:
-    """The millisecond in which a moment lies; what is less than a microsecond before the next one counts as that."""
+    """The millisecond of a moment; a moment less than a microsecond before the next one belongs to that."""
     return math.floor(time_s * 1000.0 + 1e-3)
 
 
 def next_change_s(doors: tuple[Door, ...], time_s: float) -> float:
-    """The first moment after this one at which any of the doors moves; infinity if none ever does."""
+    """The next time after ``time_s`` at which any door opens or closes; infinity if never."""
     return min((door.next_change_s(time_s) for door in doors), default=NEVER_S)

@@ -1,6 +1,10 @@
-"""The simulator's own few lines between latitude/longitude and metres, so that no frame error can cancel itself out.
+"""Geodesy of the simulator: latitude and longitude to metres and back.
+
+It shares no code with the companion, so that the same error cannot cancel out in both.
 
 Latitude and longitude are integers of 1e-7 degree, as the firmware stores them; offsets are metres north and east.
+
+Nouns: geodesy.
 """
 
 from __future__ import annotations
@@ -11,6 +15,10 @@ METRES_PER_UNIT = 0.011131884502145034
 """Metres along a meridian for 1e-7 degree (the firmware's scaling constant)."""
 
 HALF_TURN = 1_800_000_000
+"""180 degrees of longitude."""
+
+ALTITUDE_M = 120.0
+"""Height of the ground above sea level, everywhere."""
 
 
 def to_units(degrees: float) -> int:
@@ -19,7 +27,7 @@ def to_units(degrees: float) -> int:
 
 
 def longitude_scale(lat_a: int, lat_b: int) -> float:
-    """How much shorter a unit of longitude is than one of latitude, half-way between two latitudes."""
+    """Length of a unit of longitude relative to one of latitude, half-way between two latitudes."""
     return max(math.cos(math.radians((lat_a + lat_b) * 0.5e-7)), 0.01)
 
 
@@ -35,9 +43,9 @@ def offset_m(origin: tuple[int, int], place: tuple[int, int]) -> tuple[float, fl
 
 
 def moved(origin: tuple[int, int], north_m: float, east_m: float) -> tuple[int, int]:
-    """The (latitude, longitude) that lies this many metres north and east of ``origin``.
+    """The (latitude, longitude) at this many metres north and east of ``origin``.
 
-    Fractions of a unit are cut off towards the origin, as the firmware does.
+    Fractions of a unit are truncated towards the origin, as in the firmware.
     """
     lat = origin[0] + int(north_m / METRES_PER_UNIT)
     lon = origin[1] + int(east_m / METRES_PER_UNIT / longitude_scale(origin[0], lat))

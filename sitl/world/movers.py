@@ -1,12 +1,16 @@
-"""The truth that moves: discs on timed routes of straight segments, and what rays and the rover meet of them.
+"""Moving obstacles: discs on timed routes of straight segments, and the distance to them along rays and from places.
 
-The time is the simulator's, in seconds since it was made. Movers heed nothing: they go through walls, each other and the rover.
+Times are the simulator's, in seconds since it was created. Movers react to nothing: they pass through walls, each
+other and the rover.
+
+Nouns: Mover.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
@@ -17,24 +21,32 @@ Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
+class Announcement(Enum):
+    """How a moving obstacle announces itself over MAVLink; the values are those of mission and world files."""
+
+    VEHICLE = "vehicle"
+    ADSB = "adsb"
+    AIS = "ais"
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Mover:
     """A disc that moves; world frame.
 
-    ``track`` has shape (n, 3): columns time in seconds, rising, north and east in metres. Before the first row and after the last
-    the disc stands there; with ``repeats`` it goes from the last row's place on with the first one's route again and again.
-    ``announce``: how it tells others of itself over MAVLink: ``vehicle``, ``adsb``, ``ais``, or not at all (empty).
+    ``track`` has shape (n, 3): columns time in seconds (rising), north and east in metres. Before the first row and
+    after the last the disc stands still; with ``repeats`` it starts over at the first row instead.
     """
 
     name: str
     radius_m: float
     track: Floats
     repeats: bool = False
-    announce: str = ""
+    announce: Announcement | None = None
+    """How it announces itself over MAVLink; None: not at all."""
 
 
 class Fleet(NamedTuple):
-    """All movers, for the compiled loops: their tracks one after the other, where each begins, radii, periods (0: goes once)."""
+    """All movers, for compiled code: tracks one after the other, where each begins, radii, periods (0: no repeat)."""
 
     rows: Floats
     begins: Ints
@@ -43,9 +55,9 @@ class Fleet(NamedTuple):
 
 
 def timed_track(places_m: list[tuple[float, float]], speed_m_s: float, start_s: float, *, repeats: bool) -> Floats:
-    """The track of a disc that passes the places at an even speed; one that repeats goes straight back to the first.
+    """The track of a disc that passes the places at a constant speed; one that repeats returns straight to the first.
 
-    Places (north, east) that are the same as the one before are left out. Raises ValueError when all are the same.
+    Places (north, east) that equal the one before are left out. Raises ValueError when all are equal.
     """
     closed = [*places_m, places_m[0]] if repeats else places_m
     path = [place for i, place in enumerate(closed) if i == 0 or place != closed[i - 1]]
@@ -58,7 +70,7 @@ def timed_track(places_m: list[tuple[float, float]], speed_m_s: float, start_s: 
 
 
 def fleet_of(movers: tuple[Mover, ...]) -> Fleet:
-    """The movers as the kernels want them."""
+    """The movers in the form that compiled code takes."""
     begins = np.cumsum([0, *(len(mover.track) for mover in movers)]).astype(np.int64)
     rows = np.concatenate([mover.track for mover in movers]) if movers else np.empty((0, 3))
     periods_s = [float(mover.track[-1, 0] - mover.track[0, 0]) if mover.repeats else 0.0 for mover in movers]
@@ -67,10 +79,9 @@ def fleet_of(movers: tuple[Mover, ...]) -> Fleet:
 
 
 @njit(cache=True, nogil=True)
-def place(
-    rows: Floats, begins: Ints, periods_s: Floats, mover: int, time_s: float
-) -> tuple[float, float, float, float]:
-    """Where a mover is, north and east, and its velocity."""
+def motion_of(fleet: Fleet, mover: int, time_s: float) -> tuple[float, float, float, float]:
+    """Where a mover is, north and east in metres, and its velocity north and east in m/s."""
+    rows, begins, _, periods_s = fleet
     low, high = begins[mover], begins[mover + 1] - 1
     if periods_s[mover] > 0.0 and time_s > rows[low, 0]:
         time_s = rows[low, 0] + (time_s - rows[low, 0]) % periods_s[mover]
@@ -93,16 +104,15 @@ def place(
 
 @njit(cache=True, nogil=True)
 def shorten_rays(
-    rows: Floats, begins: Ints, radii_m: Floats, periods_s: Floats, time_s: float,
-    north_m: float, east_m: float, bearings_rad: Floats, lengths_m: Floats,
-) -> None:  # fmt: skip
-    """Shorten ``lengths_m`` to what the rays of each row of bearings (sectors x rays) meet of the movers at this moment.
+    fleet: Fleet, time_s: float, north_m: float, east_m: float, bearings_rad: Floats, lengths_m: Floats
+) -> None:
+    """Shorten ``lengths_m`` to the nearest mover met by a ray of each row of bearings (sectors x rays).
 
     From inside a disc every ray is 0.
     """
-    for mover in range(radii_m.size):
-        mover_n, mover_e, _, _ = place(rows, begins, periods_s, mover, time_s)
-        to_n, to_e, radius_m = mover_n - north_m, mover_e - east_m, radii_m[mover]
+    for mover in range(fleet.radii_m.size):
+        mover_n, mover_e, _, _ = motion_of(fleet, mover, time_s)
+        to_n, to_e, radius_m = mover_n - north_m, mover_e - east_m, fleet.radii_m[mover]
         gap2 = to_n * to_n + to_e * to_e - radius_m * radius_m
         for sector in range(bearings_rad.shape[0]):
             for ray in range(bearings_rad.shape[1]):
@@ -116,14 +126,12 @@ def shorten_rays(
 
 
 @njit(cache=True, nogil=True)
-def nearest_mover(
-    rows: Floats, begins: Ints, radii_m: Floats, periods_s: Floats, time_s: float, north_m: float, east_m: float
-) -> tuple[float, int]:
-    """Metres from a place to the nearest mover's rim, negative inside it, and which one; inf and -1 without movers."""
+def nearest_mover(fleet: Fleet, time_s: float, north_m: float, east_m: float) -> tuple[float, int]:
+    """Metres from a place to the nearest mover's edge (negative inside) and its number; inf, -1 without movers."""
     nearest_m, which = math.inf, -1
-    for mover in range(radii_m.size):
-        mover_n, mover_e, _, _ = place(rows, begins, periods_s, mover, time_s)
-        gap_m = math.hypot(mover_n - north_m, mover_e - east_m) - radii_m[mover]
+    for mover in range(fleet.radii_m.size):
+        mover_n, mover_e, _, _ = motion_of(fleet, mover, time_s)
+        gap_m = math.hypot(mover_n - north_m, mover_e - east_m) - fleet.radii_m[mover]
         if gap_m < nearest_m:
             nearest_m, which = gap_m, mover
     return nearest_m, which

@@ -1,4 +1,7 @@
-"""Where the rover begins, where it really is, and what it touched: world frame."""
+"""The rover's start, its true state, and its collisions, in the world frame.
+
+Nouns: Collision, Truth.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,7 @@ class GeoPlace(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class SimStart:
-    """Where the rover stands when it is switched on, in the world frame, and where on earth that is.
+    """Where the rover is switched on: in the world frame, and as latitude and longitude.
 
     The EKF origin and home are set here, so LOCAL_POSITION_NED begins at 0, 0.
     """
@@ -37,7 +40,7 @@ class SimStart:
     home: GeoPlace
 
     def place_of(self, place: GeoPlace) -> tuple[float, float]:
-        """North and east in the world frame, metres, of a place on earth."""
+        """World frame coordinates (north, east in metres) of a latitude and longitude."""
         home = (geodesy.to_units(self.home.lat_deg), geodesy.to_units(self.home.lon_deg))
         there = (geodesy.to_units(place.lat_deg), geodesy.to_units(place.lon_deg))
         north_m, east_m = geodesy.offset_m(home, there)
@@ -46,7 +49,7 @@ class SimStart:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """Where the rover really is, world frame."""
+    """The rover's true state, world frame."""
 
     time_s: float
     north_m: float
@@ -55,14 +58,14 @@ class Truth:
     speed_m_s: float
     yaw_rate_rad_s: float
     slide_m_s: float = 0.0
-    """Speed sideways, to the right; only on slippery ground."""
+    """Sideways speed, to the right; not 0 only on slippery ground."""
 
 
 @dataclass(frozen=True, slots=True)
 class Collision:
     """The rover touched an obstacle: when, and where its centre was (world frame).
 
-    ``mover`` is the name of what touched it if that moves, ``speed_m_s`` the rover's own speed then.
+    ``mover``: name of the moving obstacle, if it was one; ``speed_m_s``: the rover's own speed then.
     """
 
     time_s: float
@@ -82,7 +85,7 @@ class Named(Protocol):
 
 
 def collision_of(rover: Any, movers: Sequence[Named], time_s: float) -> Collision:
-    """What the record of the rover's plant says of the contact that it has just had; ``movers``: the world's, in their order."""
+    """The contact that the plant's record has just noted; ``movers``: the world's, in their order."""
     struck, here = int(rover["struck"]), (float(rover["north_m"]), float(rover["east_m"]))
     if struck == 0:
         return Collision(time_s, *here)

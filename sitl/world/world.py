@@ -1,7 +1,9 @@
-"""The truth: where the obstacles are, how far a ray flies, how much room a round rover has, what the ground is like.
+"""The simulated world: obstacles, lengths of rays, free room around a place, and what the ground is like.
 
 The world frame is metres north and east; obstacles are the fields of a boolean array indexed ``[y, x]`` (y grows
 north, x grows east) whose outer south-west corner may lie anywhere. Ground outside the array is open and firm.
+
+Nouns: World.
 """
 
 from __future__ import annotations
@@ -16,41 +18,61 @@ from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Grid
 from sitl.world.doors import Door, next_change_s
-from sitl.world.movers import Fleet, Mover, fleet_of, nearest_mover, place, shorten_rays
+from sitl.world.movers import Fleet, Mover, fleet_of, motion_of, nearest_mover, shorten_rays
 
 Obstacles = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Ground = NDArray[np.float32]
-"""Shape (2, height, width): grip and the share of its speed that the rover keeps on a field, both 0 to 1; size 0: 1 everywhere."""
+"""Shape (2, height, width): grip and the share of its speed that the rover keeps on a field, both 0 to 1; size 0: 1
+everywhere."""
 
 TOP_SPEED_M_S = 4.0
-"""Of the rover, on firm ground: what the pace of a field is a share of."""
+"""The rover's top speed on firm ground; rough fields allow a share of it."""
 
 FIRM: Ground = np.ones((2, 0, 0), dtype=np.float32)
 """Ordinary ground everywhere."""
 
 
-class Layers(NamedTuple):
-    """What stands at a moment, field by field: what the rover touches, what sends rays back, what swallows them (None: nothing)."""
+class FieldGrid(NamedTuple):
+    """Fields of the world, ``fields[y, x]``, with their outer south-west corner and the side of a field."""
 
-    solid: Obstacles
-    echoing: Obstacles
-    dark: Obstacles | None
+    fields: Obstacles
+    south_m: float
+    west_m: float
+    resolution_m: float
+
+
+class Layers(NamedTuple):
+    """The obstacles at a moment: those that the rover touches, that reflect rays, that absorb rays (None: none)."""
+
+    solid: FieldGrid
+    echoing: FieldGrid
+    dark: FieldGrid | None
+
+
+class Surroundings(NamedTuple):
+    """What the rover drives on and may touch, for compiled code."""
+
+    solid: FieldGrid
+    ground: Ground
+    fleet: Fleet
 
 
 @njit(cache=True, nogil=True)
-def ray_length(
-    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
-    north_m: float, east_m: float, bearing_rad: float, max_m: float,
-) -> float:  # fmt: skip
+def in_fields(grid: FieldGrid, north_m: float, east_m: float) -> tuple[float, float]:
+    """A place counted in fields from the south-west corner: x east, y north."""
+    return (east_m - grid.west_m) / grid.resolution_m, (north_m - grid.south_m) / grid.resolution_m
+
+
+@njit(cache=True, nogil=True)
+def ray_length(grid: FieldGrid, north_m: float, east_m: float, bearing_rad: float, max_m: float) -> float:
     """Metres from a place to the first obstacle along a bearing, or ``max_m`` when there is none nearer.
 
-    Walks through every field the ray touches (Amanatides & Woo's traversal), so no thin wall is jumped.
+    Visits every field that the ray touches (Amanatides & Woo's traversal), so that it cannot skip a thin wall.
     A place inside an obstacle gives 0.
     """
-    height, width = obstacles.shape
-    x = (east_m - west_m) / resolution_m
-    y = (north_m - south_m) / resolution_m
+    height, width = grid.fields.shape
+    x, y = in_fields(grid, north_m, east_m)
     dx = math.sin(bearing_rad)
     dy = math.cos(bearing_rad)
     column = math.floor(x)
@@ -65,11 +87,11 @@ def ray_length(
     next_y = math.inf
     if cross_y < math.inf:
         next_y = ((row + 1 - y) if dy > 0.0 else (y - row)) * cross_y
-    reach = max_m / resolution_m
+    reach = max_m / grid.resolution_m
     travelled = 0.0
     while travelled < reach:
-        if 0 <= column < width and 0 <= row < height and obstacles[row, column]:
-            return travelled * resolution_m
+        if 0 <= column < width and 0 <= row < height and grid.fields[row, column]:
+            return travelled * grid.resolution_m
         if next_x < next_y:
             travelled = next_x
             next_x += cross_x
@@ -83,60 +105,51 @@ def ray_length(
 
 @njit(cache=True, nogil=True)
 def ray_lengths(
-    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
-    north_m: float, east_m: float, bearings_rad: Floats, max_m: float, lengths_m: Floats,
-) -> None:  # fmt: skip
+    grid: FieldGrid, north_m: float, east_m: float, bearings_rad: Floats, max_m: float, lengths_m: Floats
+) -> None:
     """Fill ``lengths_m`` with the shortest of the rays of each row of ``bearings_rad`` (shape: sectors x rays)."""
     for sector in range(bearings_rad.shape[0]):
         shortest_m = max_m
         for ray in range(bearings_rad.shape[1]):
-            length_m = ray_length(
-                obstacles, south_m, west_m, resolution_m, north_m, east_m, bearings_rad[sector, ray], shortest_m
-            )
+            length_m = ray_length(grid, north_m, east_m, bearings_rad[sector, ray], shortest_m)
             shortest_m = min(shortest_m, length_m)
         lengths_m[sector] = shortest_m
 
 
 @njit(cache=True, nogil=True)
-def ground_under(
-    ground: Ground, south_m: float, west_m: float, resolution_m: float, north_m: float, east_m: float
-) -> tuple[float, float]:
-    """Grip and the share of its speed that the rover keeps, where its middle is."""
+def ground_under(ground: Ground, grid: FieldGrid, north_m: float, east_m: float) -> tuple[float, float]:
+    """Grip, and the share of its speed that the rover keeps, at a place; ``grid`` locates the ground's fields."""
     if ground.size == 0:
         return 1.0, 1.0
-    column = math.floor((east_m - west_m) / resolution_m)
-    row = math.floor((north_m - south_m) / resolution_m)
+    x, y = in_fields(grid, north_m, east_m)
+    column, row = math.floor(x), math.floor(y)
     if row < 0 or column < 0 or row >= ground.shape[1] or column >= ground.shape[2]:
         return 1.0, 1.0
     return float(ground[0, row, column]), float(ground[1, row, column])
 
 
 @njit(cache=True, nogil=True)
-def clearance_m(
-    obstacles: Obstacles, south_m: float, west_m: float, resolution_m: float,
-    north_m: float, east_m: float, reach_m: float,
-) -> float:  # fmt: skip
+def clearance_m(grid: FieldGrid, north_m: float, east_m: float, reach_m: float) -> float:
     """Metres from a place to the nearest obstacle field's square, or ``reach_m`` when none is that near."""
-    height, width = obstacles.shape
-    x = (east_m - west_m) / resolution_m
-    y = (north_m - south_m) / resolution_m
-    reach = reach_m / resolution_m
+    height, width = grid.fields.shape
+    x, y = in_fields(grid, north_m, east_m)
+    reach = reach_m / grid.resolution_m
     nearest = reach * reach
     for row in range(max(0, math.floor(y - reach)), min(height - 1, math.floor(y + reach)) + 1):
         for column in range(max(0, math.floor(x - reach)), min(width - 1, math.floor(x + reach)) + 1):
-            if obstacles[row, column]:
+            if grid.fields[row, column]:
                 gap_x = max(column - x, 0.0, x - (column + 1))
                 gap_y = max(row - y, 0.0, y - (row + 1))
                 nearest = min(nearest, gap_x * gap_x + gap_y * gap_y)
-    return math.sqrt(nearest) * resolution_m
+    return math.sqrt(nearest) * grid.resolution_m
 
 
 @dataclass(frozen=True, eq=False)
 class World:
-    """Obstacles and where they lie: ``obstacles[y, x]``, the south-west corner of field (0, 0) in metres; and what changes.
+    """Obstacles, ``obstacles[y, x]``, with the south-west corner of field (0, 0); doors, movers, ground.
 
-    ``glass`` and ``black`` are those obstacle fields that rays go through, and those that swallow them. ``doors`` are obstacles
-    besides ``obstacles``, of their own fields; theirs may be glass or black too. All arrays have one shape.
+    ``glass``: obstacle fields that rays pass through; ``black``: those that absorb them. ``doors`` have fields of
+    their own, in addition to ``obstacles``; these may be glass or black too. All arrays have the same shape.
     """
 
     obstacles: Obstacles
@@ -178,7 +191,7 @@ class World:
         return int(self.obstacles.shape[0]) * self.resolution_m
 
     def layers(self, time_s: float = 0.0) -> Layers:
-        """What stands at a moment; the arrays are kept, one set for each state of the doors."""
+        """The obstacles at a moment; the arrays are kept, one set for each state of the doors."""
         if not self.doors:
             return self._without_doors
         state = tuple(door.is_open(time_s) for door in self.doors)
@@ -192,17 +205,23 @@ class World:
             solid = solid if is_open else solid | door.fields
         echoing = solid if self.glass is None else solid & ~self.glass
         dark = None if self.black is None else echoing & self.black
-        return Layers(solid, echoing if dark is None else echoing & ~dark, dark)
+        echoing = echoing if dark is None else echoing & ~dark
+        return Layers(self._grid(solid), self._grid(echoing), None if dark is None else self._grid(dark))
+
+    def _grid(self, fields: Obstacles) -> FieldGrid:
+        return FieldGrid(fields, self.south_m, self.west_m, self.resolution_m)
+
+    def surroundings(self, time_s: float) -> Surroundings:
+        """What the rover may touch at a moment (it stays so until ``next_change_s``), and the ground."""
+        return Surroundings(self.layers(time_s).solid, self.ground, self.fleet)
 
     def next_change_s(self, time_s: float) -> float:
         """When a door next opens or closes, after a moment; infinity if none ever does."""
         return next_change_s(self.doors, time_s)
 
     def ray_m(self, north_m: float, east_m: float, bearing_rad: float, max_m: float, time_s: float = 0.0) -> float:
-        """Metres along a bearing to the first thing that stands and sends a ray back, or ``max_m``."""
-        frame = (self.south_m, self.west_m, self.resolution_m)
-        echoing = self.layers(time_s).echoing
-        return float(ray_length(echoing, *frame, north_m, east_m, bearing_rad, max_m))
+        """Metres along a bearing to the first obstacle that stands still and reflects the ray, or ``max_m``."""
+        return float(ray_length(self.layers(time_s).echoing, north_m, east_m, bearing_rad, max_m))
 
     def rays_m(self, north_m: float, east_m: float, bearings_rad: Floats, max_m: float, time_s: float = 0.0) -> Floats:
         """The shortest ray of each row of bearings (sectors x rays) at a moment, ``max_m`` where nothing was hit."""
@@ -210,23 +229,21 @@ class World:
         if layers.dark is not None:
             return self._rays_in_the_dark_m(layers, north_m, east_m, bearings_rad, max_m, time_s)
         lengths_m = np.empty(bearings_rad.shape[0])
-        frame = (self.south_m, self.west_m, self.resolution_m)
-        ray_lengths(layers.echoing, *frame, north_m, east_m, bearings_rad, max_m, lengths_m)
+        ray_lengths(layers.echoing, north_m, east_m, bearings_rad, max_m, lengths_m)
         self._meet_movers(north_m, east_m, bearings_rad, time_s, lengths_m)
         return lengths_m
 
     def _rays_in_the_dark_m(
         self, layers: Layers, north_m: float, east_m: float, bearings_rad: Floats, max_m: float, time_s: float
     ) -> Floats:
-        """Ray by ray, because one that is swallowed must not see what moves behind that place."""
+        """Ray by ray, because one that is absorbed must not see what moves behind that place."""
         assert layers.dark is not None
         each_rad = np.ascontiguousarray(bearings_rad.reshape(-1, 1))
-        lengths_m, swallowed_m = np.empty(len(each_rad)), np.empty(len(each_rad))
-        frame = (self.south_m, self.west_m, self.resolution_m)
-        ray_lengths(layers.echoing, *frame, north_m, east_m, each_rad, max_m, lengths_m)
-        ray_lengths(layers.dark, *frame, north_m, east_m, each_rad, max_m, swallowed_m)
+        lengths_m, absorbed_m = np.empty(len(each_rad)), np.empty(len(each_rad))
+        ray_lengths(layers.echoing, north_m, east_m, each_rad, max_m, lengths_m)
+        ray_lengths(layers.dark, north_m, east_m, each_rad, max_m, absorbed_m)
         self._meet_movers(north_m, east_m, each_rad, time_s, lengths_m)
-        lengths_m[swallowed_m < lengths_m] = max_m
+        lengths_m[absorbed_m < lengths_m] = max_m
         nearest_m: Floats = lengths_m.reshape(bearings_rad.shape).min(axis=1)
         return nearest_m
 
@@ -234,20 +251,17 @@ class World:
         self, north_m: float, east_m: float, bearings_rad: Floats, time_s: float, lengths_m: Floats
     ) -> None:
         if self.movers:
-            rows, begins, radii_m, periods_s = self.fleet
-            shorten_rays(rows, begins, radii_m, periods_s, time_s, north_m, east_m, bearings_rad, lengths_m)
+            shorten_rays(self.fleet, time_s, north_m, east_m, bearings_rad, lengths_m)
 
     def mover_gap_m(self, north_m: float, east_m: float, time_s: float) -> tuple[float, int]:
-        """Metres from a place to the nearest mover's rim at a moment, negative inside it, and its number; inf and -1 if none."""
-        rows, begins, radii_m, periods_s = self.fleet
-        gap_m, which = nearest_mover(rows, begins, radii_m, periods_s, time_s, north_m, east_m)
+        """Metres from a place to the nearest mover's edge (negative inside) and its number; inf, -1 without movers."""
+        gap_m, which = nearest_mover(self.fleet, time_s, north_m, east_m)
         return float(gap_m), int(which)
 
     def mover_at(self, number: int, time_s: float) -> tuple[float, float, float, float]:
         """Where a mover is at a moment, north and east, and its velocity."""
-        return place(self.fleet.rows, self.fleet.begins, self.fleet.periods_s, number, time_s)
+        return motion_of(self.fleet, number, time_s)
 
     def clearance_m(self, north_m: float, east_m: float, reach_m: float, time_s: float = 0.0) -> float:
         """Metres from a place to the nearest obstacle that stands at a moment, at most ``reach_m``."""
-        solid = self.layers(time_s).solid
-        return float(clearance_m(solid, self.south_m, self.west_m, self.resolution_m, north_m, east_m, reach_m))
+        return float(clearance_m(self.layers(time_s).solid, north_m, east_m, reach_m))

@@ -1,7 +1,10 @@
-"""World files of our own: TOML with obstacles, doors, slippery and rough ground as shapes in metres, on a map or without one.
+"""World files: TOML with obstacles, doors, slippery and rough ground as shapes in metres, with or without a map.
 
-Places are metres north and east of the world's south-west corner. Shapes are drawn into fields fine enough for the rays and for
-contact; an obstacle takes every field whose middle it covers or comes within half a field of, so it is never thinner than written.
+Places are metres north and east of the world's south-west corner. Shapes are drawn into fields that are fine enough
+for rays and contact; an obstacle takes every field whose centre it covers or comes within half a field of, so it is
+never thinner than written.
+
+Nouns: world file.
 """
 
 from __future__ import annotations
@@ -24,7 +27,7 @@ from companion.mission.mission import MoverSpec
 from companion.mission.tables import FileName, Metres, Name, Pair, Positive, Table, named, read_table
 from companion.mission.toml_reader import MoverTable
 from sitl.world.doors import FOR_EVER_MS, Door, whole_ms
-from sitl.world.movers import Mover, timed_track
+from sitl.world.movers import Announcement, Mover, timed_track
 from sitl.world.world import FIRM, TOP_SPEED_M_S, Ground, World
 
 FINE_M = 0.1
@@ -34,7 +37,7 @@ Seconds = Annotated[float, Field(ge=0.0, le=1e6)]
 
 
 class ShapeTable(Table):
-    """A polygon, a broad line or a circle."""
+    """A polygon, a line with a width, or a circle."""
 
     polygon_m: Annotated[list[Pair], Field(min_length=3)] | None = None
     line_m: Annotated[list[Pair], Field(min_length=2)] | None = None
@@ -44,7 +47,7 @@ class ShapeTable(Table):
     radius_m: Positive | None = None
 
     def shape(self) -> BaseGeometry:
-        """In x east, y north. Raises ValueError unless it is exactly one shape."""
+        """The shape, x east, y north. Raises ValueError unless there is exactly one."""
         circle = (self.north_m, self.east_m, self.radius_m)
         if (self.line_m is None) != (self.width_m is None):
             raise ValueError("a line needs line_m and width_m")
@@ -77,7 +80,7 @@ class DoorTable(ObstacleTable):
     period_s: Positive | None = None
 
     def timetable_ms(self) -> tuple[tuple[int, int], ...]:
-        """When it is open. Raises ValueError for spans that end before they begin or after the period."""
+        """When it is open. Raises ValueError for spans that end before they begin or after the period, or overlap."""
         spans = tuple((whole_ms(s[0]), whole_ms(s[1]) if len(s) == 2 else FOR_EVER_MS) for s in self.open_s)
         for begin, end in spans:
             if end <= begin:
@@ -93,14 +96,14 @@ class DoorTable(ObstacleTable):
 
 
 class SlipperyTable(ShapeTable):
-    """``[[slippery]]``: ground with less grip; it falls from 1 at the rim to ``grip`` at ``edge_m`` within."""
+    """``[[slippery]]``: ground with less grip; it falls from 1 at the edge to ``grip`` at ``edge_m`` inside."""
 
     grip: Annotated[float, Field(ge=0.01, le=1.0)]
     edge_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
 
 
 class RoughTable(ShapeTable):
-    """``[[rough]]``: ground that the rover cannot cross faster than so."""
+    """``[[rough]]``: ground with a top speed."""
 
     top_speed_m_s: Annotated[float, Field(gt=0.0, le=TOP_SPEED_M_S)]
 
@@ -120,7 +123,7 @@ class WorldTable(Table):
 
 
 def load_world(path: Path, resolution_m: float | None = None) -> World:
-    """Any world: a map file as ``load_map`` reads it (its south-west corner is 0, 0), or one of our TOML files.
+    """Read a world: a map file as ``load_map`` reads it (its south-west corner becomes 0, 0), or a TOML world file.
 
     ``resolution_m`` is the field size of maps that have none of their own. Raises MapError: one line.
     """
@@ -152,9 +155,9 @@ def load_world(path: Path, resolution_m: float | None = None) -> World:
 
 
 def ground_grid(path: Path, resolution_m: float | None = None) -> Grid:
-    """A world as fields that people count in: a map's own; of a TOML file, fields of ``resolution_m`` (1 m if not given).
+    """A world as fields for ``X,Y`` options: a map's own, or for a TOML file fields of ``resolution_m`` (default 1 m).
 
-    A field of these is an obstacle if its middle lies in one that always stands.
+    A field of a TOML world is an obstacle if its centre lies in one that is always there.
     """
     if path.suffix.lower() != ".toml":
         return load_map(path, resolution_m)
@@ -168,17 +171,19 @@ def ground_grid(path: Path, resolution_m: float | None = None) -> Grid:
 
 
 def movers_of(specs: list[MoverSpec], origin_m: tuple[float, float]) -> tuple[Mover, ...]:
-    """What moves, in the world frame; the places of their routes count from ``origin_m`` (north, east)."""
+    """The movers in the world frame; places of their routes are relative to ``origin_m`` (north, east)."""
     movers = []
     for one in specs:
         places_m = [(origin_m[0] + place.north_m, origin_m[1] + place.east_m) for place in one.route]
         track = timed_track(places_m, one.speed_m_s, one.start_s, repeats=one.repeat)
-        movers.append(Mover(one.name, one.radius_m, track, one.repeat, one.announce or ""))
+        movers.append(
+            Mover(one.name, one.radius_m, track, one.repeat, Announcement(one.announce) if one.announce else None)
+        )
     return tuple(movers)
 
 
 class _Drawing:
-    """Fields to draw shapes into: ``obstacles`` are those of the map underneath."""
+    """Fields into which shapes are drawn; ``obstacles`` are those of the map underneath."""
 
     def __init__(self, path: Path, obstacles: Mask, resolution_m: float) -> None:
         self.path = path
@@ -189,7 +194,7 @@ class _Drawing:
         self.east_m = (np.arange(width) + 0.5) * resolution_m
 
     def covered(self, kind: str, number: int, item: ShapeTable, *, obstacle: bool = True) -> Mask:
-        """The fields of a shape: for an obstacle all that it comes into, for ground those whose middle it covers."""
+        """The fields of a shape: for an obstacle all that it touches, for ground those whose centre it covers."""
         shape = self._shape(kind, number, item)
         if obstacle:
             shape = shape.buffer(0.5 * self.resolution_m - 1e-6, join_style="mitre")
@@ -202,7 +207,7 @@ class _Drawing:
         return mask
 
     def door(self, number: int, item: DoorTable, standing: Mask, layers: dict[str, Mask]) -> Door:
-        """A door of the fields where nothing stands anyway; its material goes into ``layers``."""
+        """A door, in the fields without other obstacles; its material is added to ``layers``."""
         spans_ms = named(self.path, "door", number, item.timetable_ms, MapError)
         fields = self.covered("door", number, item) & ~standing
         if item.material != "solid":
@@ -211,7 +216,7 @@ class _Drawing:
         return Door(item.name or f"door {number}", fields, spans_ms, period_ms)
 
     def ground(self, table: WorldTable) -> Ground:
-        """Grip and the share of its speed that the rover keeps; where areas overlap, the worst counts."""
+        """Grip, and the share of its speed that the rover keeps; where areas overlap, the lower value counts."""
         if not (table.slippery or table.rough):
             return FIRM.copy()
         ground = np.ones((2, *self.obstacles.shape), dtype=np.float32)
@@ -233,8 +238,8 @@ class _Drawing:
         size_m = (width * self.resolution_m, height * self.resolution_m)
         if not shape.intersects(shapely.box(0.0, 0.0, *size_m)):
             raise MapError(
-                f"{self.path}: {kind} {number}: lies outside the world, {size_m[0]:g} m east and {size_m[1]:g} m north; "
-                "move it inside"
+                f"{self.path}: {kind} {number}: lies outside the world, "
+                f"{size_m[0]:g} m east and {size_m[1]:g} m north; move it inside"
             )
         return shape
 
@@ -247,18 +252,18 @@ def _polygon(corners: list[tuple[float, float]]) -> BaseGeometry:
 
 
 def _base(path: Path, table: WorldTable) -> tuple[Mask, float]:
-    """The fields to draw on, with the obstacles of the map underneath, and their size."""
+    """The obstacles of the map underneath, in fields to draw on, and the size of a field."""
     if table.base is None:
         if table.size_m is None or table.base_resolution_m is not None:
             raise MapError(
-                f"{path}: size_m: [east, north] is needed where there is no base, and no base_resolution_m; give it, or a base"
+                f"{path}: size_m: [east, north] is needed without a base, and no base_resolution_m; give it, or a base"
             )
         resolution_m = table.resolution_m or FINE_M
         width, height = (max(1, math.ceil(side_m / resolution_m - 1e-9)) for side_m in table.size_m)
         _check_size(path, width, height)
         return np.zeros((height, width), dtype=np.bool_), resolution_m
     if table.size_m is not None:
-        raise MapError(f"{path}: size_m: the base, {table.base}, says how large the world is; leave size_m out")
+        raise MapError(f"{path}: size_m: the base, {table.base}, already has a size; leave size_m out")
     if Path(table.base).suffix.lower() == ".toml":
         raise MapError(f"{path}: base: {table.base} is a world file; it must be a map (image, ROS yaml, MovingAI .map)")
     try:

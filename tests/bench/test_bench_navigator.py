@@ -14,7 +14,7 @@ from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.mapping.evidence_map import MAX_SOFT_WEIGHT
 from companion.mapping.kernels import soften
 from companion.navigation.field_step import SearchKind
-from companion.navigation.search_budget import Searcher
+from companion.navigation.search_budget import PathSearcher
 from companion.navigation.turning_cost import with_turning_cost
 from companion.planning.problem import PlanStatus
 from companion.planning.registry import make_planner, warm_up
@@ -77,7 +77,7 @@ def test_searches_of_a_known_map_of_eight_million_fields(name):
     free, weights, rng = np.argwhere(case.weights < OBSTACLE), case.weights, np.random.default_rng(0)
     height, width = weights.shape
     soften(weights, 0, 0, width, height, settings.mapping.soft_reach_m, settings.mapping.soft_cost, MAX_SOFT_WEIGHT)
-    searcher = Searcher(make_planner("hybrid", settings.planner), settings.navigator, rng)
+    searcher = PathSearcher(make_planner("hybrid", settings.planner), settings.navigator, rng)
     grid, seconds = Grid(weights), []
     for y, x in free[rng.integers(len(free), size=LARGE_SEARCHES)].tolist():
         pose = Pose(y + 0.5, x + 0.5, rng.uniform(-np.pi, np.pi), 0.0)

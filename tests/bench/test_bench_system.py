@@ -22,7 +22,10 @@ REAL_TIME_FACTOR = 50.0
 TICK_LIMIT_MS = 5.0
 MEMORY_LIMIT_MB, CPU_LIMIT = 250.0, 0.10
 SPEED_SHARE = {"lidar-360": 0.9, "lidar-90": 0.75}
-"""Of the cruise speed. A lidar that sees 4.5 m lets no target lie farther away than 3.9 m, towards which the autopilot drives 1.7 m/s."""
+"""Of the cruise speed.
+
+A lidar that sees 4.5 m lets no target lie farther away than 3.9 m, towards which the autopilot drives 1.7 m/s.
+"""
 MEASURED_S = 40.0
 
 OPEN = """

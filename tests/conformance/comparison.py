@@ -24,7 +24,8 @@ NOT_COMPARED = (
     "yaw",
     "bearing",
 )
-"""Fields of a stream whose values are not compared as numbers: clocks, places and directions, which the motion decides."""
+"""Fields of a stream whose values are not compared as numbers: clocks, places and directions, which the motion
+decides."""
 WINDOW_S = 5.0
 """Rates are compared over windows of this length."""
 BOOTED_S = 3.2
@@ -183,7 +184,7 @@ def ranges_of(heard: tuple[Heard, ...]) -> dict[str, tuple[float, float]]:
 
 
 def values_differ(replay: Replay) -> set[str]:
-    """Streamed numbers that leave the recorded range by more than a tenth of the largest, 0.05 (fractions) or 5 (whole numbers)."""
+    """Streamed numbers that leave the recorded range by over a tenth of the largest, 0.05 or 5 (integers)."""
     real, ours = ranges_of(replay.real), ranges_of(replay.ours)
     wrong = set()
     for name in set(real) & set(ours):

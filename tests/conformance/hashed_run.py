@@ -1,7 +1,8 @@
-"""Drives a mission in lock-step and prints one hash of all bytes in both directions, all decisions and the rover's truth.
+"""Drives a mission in lock-step and prints a hash of all bytes, all decisions and the rover's true state.
 
-``python -m tests.conformance.hashed_run MISSION SEED..``: a line for each seed. ``MISSION+SENSORS+FAULTS..`` adds a file of sensors and
-plans of faults. ``auto:`` before it: the autopilot drives a mission of its own instead, and a ground station listens.
+``python -m tests.conformance.hashed_run MISSION SEED..``: a line for each seed. ``MISSION+SENSORS+FAULTS..`` adds a
+file of sensors and plans of faults. ``auto:`` before it: the autopilot drives a mission of its own instead, and a
+ground station listens.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.core.rounds import Mark
+from companion.core.round_marks import Mark
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Decision

@@ -27,7 +27,7 @@ WORLD_M = 60
 
 @dataclass(frozen=True)
 class Recording:
-    """How a recording came about: the rover's heading, its sensors, and whether all came so much earlier than in the others."""
+    """Conditions of a recording: the rover's heading, its sensors, and how much earlier its start-up was."""
 
     name: str
     heading_deg: float = 0.0

@@ -2,14 +2,15 @@
 
 A line of the table is ``name | state | sent | answers | texts | afterwards``:
 
-- state: time of the first packet, then a mode (set at that time), ``armed``, ``PARAMETER=value``, ``sensors=SUITE``, ``wall``
-  (9 m north), ``post`` (1 m wide, 5.5 m north), ``as=SYSTEM/COMPONENT``, ``facing=DEGREES``.
-- sent, by ``;``: ``LONG n p1..p7``, ``INT n field=value..``, ``LOCAL frame mask field=value..``, ``GLOBAL ...``, ``KIND field=value..``,
-  ``wait s``, ``x10 0.5 ...`` (ten times, every 0.5 s), ``@255/190 ...`` (somebody else, on a link of its own), ``forget``.
-- answers, in order: ACCEPTED, ... for COMMAND_ACK; other kinds by name with their first telling field; ``-`` for none at all.
-- texts, by ``//``: ``severity text`` or ``severity beginning...``; ``-`` for none at all; ``*`` for any that may follow.
-- afterwards, by ``;``: ``+s`` lets time pass; ``still``; ``value=number``, with ``~tolerance``, ``<`` or ``>``. A value is one of VALUES,
-  ``n(KIND)`` (received since the last ``+`` or ``forget``), ``KIND.field`` or ``KIND.field.number`` (of the newest).
+- state: time of the first packet, then a mode (set at that time), ``armed``, ``PARAMETER=value``, ``sensors=SUITE``,
+``wall`` (9 m north), ``post`` (1 m wide, 5.5 m north), ``as=SYSTEM/COMPONENT``, ``facing=DEGREES``. - sent, by ``;``:
+``LONG n p1..p7``, ``INT n field=value..``, ``LOCAL frame mask field=value..``, ``GLOBAL ...``, ``KIND
+field=value..``, ``wait s``, ``x10 0.5 ...`` (ten times, every 0.5 s), ``@255/190 ...`` (somebody else, on a link of
+its own), ``forget``. - answers, in order: ACCEPTED, ... for COMMAND_ACK; other kinds by name with their first telling
+field; ``-`` for none at all. - texts, by ``//``: ``severity text`` or ``severity beginning...``; ``-`` for none at
+all; ``*`` for any that may follow. - afterwards, by ``;``: ``+s`` lets time pass; ``still``; ``value=number``, with
+``~tolerance``, ``<`` or ``>``. A value is one of VALUES, ``n(KIND)`` (received since the last ``+`` or ``forget``),
+``KIND.field`` or ``KIND.field.number`` (of the newest).
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def read_rows(path: Path = SHEET) -> list[Row]:
 
 @dataclass
 class Play:
-    """A row under way: the client, others on links of their own, where the rover stood before, what was heard since then."""
+    """A row under way: the client, further clients, the rover's position before, the messages since then."""
 
     client: Client
     stood: Any

@@ -1,4 +1,4 @@
-"""The simulated rover moves as ArduRover 4.7's own simulated skid rover was measured to: 5 % or 0.05 m/s, 0.2 s, 0.1 m."""
+"""The rover moves as ArduRover 4.7's simulated skid rover, as measured: 5 % or 0.05 m/s, 0.2 s, 0.1 m."""
 
 import math
 from typing import Any

@@ -1,7 +1,8 @@
 """The sent half of every recording, sent again to the simulator: the same answers, texts, rates, states and motion.
 
-Motion: at every moment of the long drive within 0.25 m and, for 95 % of the moments, 0.1 m/s of the recording; the figures of
-single legs to 0.15 s, 0.06 m/s, 0.1 m. The recording with rangefinders was driven by other physics, which turns otherwise: 1 m.
+Motion: at every moment of the long drive within 0.25 m and, for 95 % of the moments, 0.1 m/s of the recording; the
+figures of single legs to 0.15 s, 0.06 m/s, 0.1 m. The recording with rangefinders was driven by other physics, which
+turns otherwise: 1 m.
 """
 
 import math
@@ -90,7 +91,7 @@ LEGS = {
 
 
 def figures(path: NDArray[np.float64], from_s: float, to_s: float, target_m: tuple[float, float] | None) -> list[float]:
-    """Seconds until it moves, until 90 % of the top speed, until it stands; top speed; metres driven; metres past the target."""
+    """Seconds until it moves, reaches 90 % of the top speed, stands; top speed; metres driven, and past the target."""
     leg = path[(path[:, 0] >= from_s) & (path[:, 0] < to_s)]
     times_s, speeds = leg[:, 0] - from_s, leg[:, 3]
     top = speeds.max()
@@ -124,7 +125,7 @@ def test_a_carrot_at_2_hz_is_followed_as_slowly_as_recorded(replays: dict[str, R
 
 
 def test_ranges_are_those_recorded(replays: dict[str, Replay]) -> None:
-    """Standing before the post to a centimetre or two, else as far as the motion differs; nothing seen where nothing was."""
+    """Before the post within a centimetre or two, else as far as the motion differs; nothing where nothing was."""
     one = replays["rangefinders"]
     compared = 0
     for number in (0, 1, 2):

@@ -1,4 +1,4 @@
-"""Every row of the table of measured facts, sent to the simulator as MAVLink packets: results, texts, silences, motion."""
+"""Every row of the table of measured facts, sent to the simulator as packets: results, texts, silences, motion."""
 
 import pytest
 

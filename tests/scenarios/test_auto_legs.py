@@ -57,7 +57,7 @@ def in_auto(folder: Path, rows: list[Row], *, sealed: bool = False) -> Asker:
 
 def item(rig: Asker) -> int:
     """The navigation item under way, as the autopilot knows it."""
-    return int(rig.simulator.vehicle.plan.mission.current)
+    return int(rig.simulator.vehicle.mission.current)
 
 
 def assert_steered_only_in_the_leg(rig: Asker) -> None:

@@ -28,8 +28,9 @@ def test_the_depot_is_driven_without_a_collision(sensors: str, tmp_path: Path) -
     run = driven(MISSIONS / "depot.toml", sensors)
     assert run.report.exit_code == 0, run.report.said
     world = run.simulator.world
-    frame = (world.south_m, world.west_m, world.resolution_m)
-    ground = [ground_under(world.ground, *frame, point.north_m, point.east_m) for point in run.report.track]
+    ground = [
+        ground_under(world.ground, world.layers().solid, point.north_m, point.east_m) for point in run.report.track
+    ]
     assert min(grip for grip, _ in ground) < 0.2, "the way leads over the ice"
     slow = {i for i, (_, pace) in enumerate(ground) if pace < 1.0}
     track = run.report.track

@@ -99,14 +99,14 @@ def test_the_picture_has_the_target_there_too(driven: Driven, tmp_path: Path, mo
 
 
 def test_the_news_tell_what_pilot_and_power_did(driven: Driven) -> None:
-    told = [text.partition(" s: ")[2] for text in driven.views[-1].news]
-    expected = ["mode HOLD, was GUIDED", "mode GUIDED, was HOLD", "the autopilot's power has failed"]
+    told = [text.partition(" s: ")[2] for text in driven.views[-1].events]
+    expected = ["mode HOLD, was GUIDED", "mode GUIDED, was HOLD", "the autopilot has lost power"]
     expected.append("the autopilot has booted: MANUAL, disarmed")
     assert [text for text in told if text in expected] == expected
 
 
 def test_the_news_tell_all_that_the_companion_said(driven: Driven) -> None:
-    told = [text.partition(" s: ")[2] for text in driven.views[-1].news]
+    told = [text.partition(" s: ")[2] for text in driven.views[-1].events]
     said = driven.run.companion.outcome.said
     assert len(said) > 5 and any("mode is not GUIDED" in text for text in said)
     assert [text for text in told if text in said] == said

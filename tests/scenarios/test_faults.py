@@ -24,6 +24,7 @@ from sitl.faults.plan import (
     GpsGlitch,
     GpsLoss,
     GpsNoise,
+    LinkEffect,
     LinkFault,
     PilotTakesOver,
     Reboot,
@@ -31,6 +32,7 @@ from sitl.faults.plan import (
 )
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
+from sitl.sensors.range_sensors import Defect
 from sitl.sim_link import SimLink
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
@@ -80,7 +82,7 @@ class Run:
 
 def on_companion(what: Any, probability: float = 1.0, start_s: float = 45.0, **more: Any) -> LinkFault:
     """A fault of the companion's link alone."""
-    return LinkFault(start_s, what=what, probability=probability, links=(1,), **more)
+    return LinkFault(start_s, effect=LinkEffect(what), probability=probability, links=(1,), **more)
 
 
 # GPS lost for long, sensors, wheels and battery come with the shipped plans below.
@@ -109,7 +111,7 @@ STOPPED: dict[str, tuple[tuple[Fault, ...], int, str]] = {
     "pilot stays": ((PilotTakesOver(60.0, mode="HOLD"),), ARMED, "mode is not GUIDED"),
     "gps gone": ((GpsLoss(60.0),), ARMED, "EKF failsafe"),
     "gps false": ((GpsGlitch(60.0, metres=10.0),), ARMED, "EKF failsafe"),
-    "blind": ((SensorFault(60.0, what="silent"),), ARMED, "HOLD: range data ahead silent for over 1 s"),
+    "blind": ((SensorFault(60.0, defect=Defect.SILENT),), ARMED, "HOLD: range data ahead silent for over 1 s"),
     "power": ((Reboot(60.0, 63.0),), 0, "HOLD: "),
 }
 

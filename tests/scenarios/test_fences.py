@@ -36,7 +36,7 @@ class Watched(Rig):
 
     @property
     def breaches(self) -> int:
-        return self.simulator._vehicle.plan.fence.count
+        return self.simulator._vehicle.fence.count
 
     def nearest_m(self, south_m: float, west_m: float, north_m: float, east_m: float) -> float:
         """How near the rover's middle came to a rectangle."""
@@ -249,7 +249,7 @@ def test_a_breach_that_the_autopilot_acts_on_silences_the_companion(tmp_path: Pa
     rig.until_driven(3.0)
     # No time to hear of it: the fence is put under the rover, and the autopilot acts first.
     vehicle = rig.simulator._vehicle
-    keep, corners = list(vehicle.plan.storage.fence), vehicle.plan.storage.fence
+    keep, corners = list(vehicle.storage.fence), vehicle.storage.fence
     corners[:] = [corner.__class__(KEEP_OUT, *_tail(corner)) for corner in keep]
     rig.until(lambda: rig.mode != GUIDED, 3.0)
     since_s = rig.now_s()

@@ -83,7 +83,7 @@ def test_a_firmware_drives_and_starts_again_and_the_physics_ends_cleanly(tmp_pat
         "the firmware has started and is answered",
         "something that is no frame of ArduPilot's JSON interface came; ignored, like all that follow",
         "the firmware has started again: the rover stands at its start, the time is 0",
-        "stopped; 420 steps, 1 no frames; since the firmware's last start 0 s and 0 collisions",
+        "stopped; 420 steps, 1 not frames; since the firmware's last start 0 s and 0 collisions",
     ]
 
     lines = set(file.read_text(encoding="ascii").splitlines())
@@ -152,7 +152,7 @@ def test_the_lidar_reaches_the_firmware_over_tcp_again_and_again() -> None:
     assert said[0] == f"waiting for {url}"
     assert said.count(f"scans go to {peer} (system 5)") == 2
     assert said.count(f"{peer}: link lost; waiting for {url}") == 2
-    assert re.fullmatch(rf"{url}: \d+ packets of the lidar sent, \d+ lost with nobody there", said[-1])
+    assert re.fullmatch(rf"{url}: \d+ packets of the lidar sent, \d+ lost without a peer", said[-1])
 
 
 def test_the_lidar_reaches_a_ground_network_over_udp() -> None:

@@ -17,7 +17,7 @@ from companion.mission.load import load_mission
 from companion.navigation.step_runner import InlineRunner
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.autopilot.params import steered_wheels
+from sitl.autopilot.parameters import steered_wheels
 from sitl.firmware.physics import Physics
 from sitl.lockstep import LockstepClock
 from sitl.scenario import scenario_from_mission

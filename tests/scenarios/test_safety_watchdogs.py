@@ -11,6 +11,7 @@ import pytest
 
 from companion.navigation.step_runner import InlineRunner
 from companion.settings import parse_settings
+from sitl.sensors.range_sensors import Defect
 from tests.support.rig import HOLD, SET_MODE, Rig, without, yard
 from tests.support.served import finished, mission_path, process, served, wait_until
 
@@ -304,9 +305,9 @@ def test_companion_and_simulator_as_two_processes_a_lidar_stuck_for_a_while(tmp_
         assert run.stderr is not None
         lines = iter(run.stderr.readline, "")
         wait_until(lambda: world.simulator.driven_m > 2.0, 40.0)
-        world.simulator._sensing.lidar_fault = "stuck"
+        world.simulator._sensing.lidar_fault = Defect.STUCK
         assert any("Stopping: obstacle distance repeats itself" in line for line in lines)
-        world.simulator._sensing.lidar_fault = ""
+        world.simulator._sensing.lidar_fault = None
         code, out, _ = finished(run, 60.0)
         assert world.simulator.collisions == ()
     assert (code, out) == (0, "gate: reached\n")

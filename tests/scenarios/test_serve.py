@@ -34,7 +34,7 @@ def test_it_serves_twenty_times_as_fast_and_ends_cleanly(tmp_path: Path, number:
                             times_s.append(message.time_boot_ms / 1000)
             # Loosely, as the machine may be busy: 30 s of the rover's time have passed.
             assert 10.0 < times_s[-1] - times_s[0] < 40.0
-            assert "has come" in child.stdout.readline() and "has left" in child.stdout.readline()
+            assert "has connected" in child.stdout.readline() and "has disconnected" in child.stdout.readline()
             child.send_signal(number)
             assert child.wait(timeout=5.0) == 0
             assert child.stdout.read().startswith("stopped after ")

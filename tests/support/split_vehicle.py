@@ -12,8 +12,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from sitl.autopilot.autopilot import Autopilot
-from sitl.autopilot.control import LOOP_HZ
-from sitl.autopilot.loop import run_tasks
+from sitl.autopilot.control.records import LOOP_HZ
+from sitl.autopilot.control.tasks import run_task
 from sitl.autopilot.vehicle import Vehicle
 from sitl.firmware.physics import Physics
 from sitl.plant.rover import new_rover
@@ -64,7 +64,7 @@ class SplitVehicle:
         vehicle = self.vehicle
         vehicle.control["tick"] += 1
         self._believe()
-        run_tasks(vehicle.control[0], vehicle.tuning[0], vehicle.estimate[0])
+        run_task(vehicle.control[0], vehicle.tuning[0], vehicle.estimate[0])
         pulses = [1500 + round(500.0 * float(vehicle.control[0][name])) for name in ("servo_1", "servo_3")]
         assert self.firmware.update(*pulses), self.firmware.complaints
         self.autopilot.run_due()

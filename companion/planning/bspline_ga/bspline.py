@@ -1,10 +1,14 @@
-"""Second-degree B-splines on clamped, equidistant knots (paper, section 3.1; Piegl & Tiller, A2.1 and A3.1). Compiled.
+"""B-spline curves of degree 2 on clamped, equidistant knots (paper, section 3.1; Piegl & Tiller, A2.1 and A3.1).
 
-``n`` control points make ``n - 2`` knot spans of equal length; the curve begins in the first control point and ends in
-the last. Only three basis functions differ from zero anywhere, so a basis is kept as three values and where they begin.
+Compiled.
+
+``n`` control points make ``n - 2`` knot spans of equal length. The curve begins in the first control point and ends in
+the last. At any place only three basis functions differ from zero, so a basis is stored as three values and an index.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -14,24 +18,34 @@ DEGREE = 2
 Points = NDArray[np.float64]
 
 
+class Basis(NamedTuple):
+    """Basis functions at some places of a curve.
+
+    ``first``: the first control point that counts at each place, shape (samples,). ``values``: the weights of that one
+    and the next two, shape (samples, 3).
+    """
+
+    first: NDArray[np.int64]
+    values: Points
+
+
 @njit(cache=True, nogil=True, inline="always")
 def basis_at(spans: int, u: float) -> tuple[int, float, float, float]:
-    """One row of ``basis``, ``u`` knot spans from the start: the first control point that counts, and three weights."""
+    """The basis ``u`` knot spans from the start: the first control point that counts, and three weights."""
     span = min(int(u), spans - 1)
     rise = u - span
-    # With equidistant knots the recursion comes down to squares: halved where the function's support goes on into
-    # the next span, not halved at the clamped ends. The three always sum to 1.
+    # With equidistant knots the recursion reduces to squares: halved where the function's support extends into
+    # the next span, not halved at the clamped ends. The three weights always sum to 1.
     falling = (1.0 - rise) * (1.0 - rise) * (1.0 if span == 0 else 0.5)
     rising = rise * rise * (1.0 if span == spans - 1 else 0.5)
     return span, falling, 1.0 - falling - rising, rising
 
 
 @njit(cache=True, nogil=True)
-def basis(control_points: int, samples: int) -> tuple[NDArray[np.int64], Points]:
+def basis(control_points: int, samples: int) -> Basis:
     """Basis functions at ``samples`` places equally far apart in u, ends included.
 
-    Returns, for each sample, the first control point that counts (shape (samples,)) and the weights of that
-    one and the next two (shape (samples, 3)). Needs at least 3 control points and 2 samples.
+    Needs at least 3 control points and 2 samples.
     """
     first = np.empty(samples, np.int64)
     values = np.empty((samples, DEGREE + 1))
@@ -39,7 +53,7 @@ def basis(control_points: int, samples: int) -> tuple[NDArray[np.int64], Points]
     share = spans / (samples - 1.0)
     for i in range(samples):
         first[i], values[i, 0], values[i, 1], values[i, 2] = basis_at(spans, i * share)
-    return first, values
+    return Basis(first, values)
 
 
 @njit(cache=True, nogil=True)
@@ -50,7 +64,7 @@ def curve(control: Points, samples: int) -> Points:
     share = spans / max(samples - 1.0, 1.0)
     i = 0
     for span in range(spans):
-        # In one span the curve is a parabola in ``rise``: its value at 0, its slope there, its bend.
+        # In one span the curve is a parabola in ``rise``: here its value at 0, its slope there and its curvature.
         _, a, b, _ = basis_at(spans, float(span))
         opening = 2.0 if span == 0 else 1.0
         closing = 1.0 if span == spans - 1 else 0.5

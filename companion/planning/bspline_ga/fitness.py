@@ -1,19 +1,20 @@
-"""What a chromosome of Kwasniewski & Gosiewski 2018 is worth (section 3.4). Compiled.
+"""Fitness of a B-spline chromosome (Kwasniewski & Gosiewski 2018, section 3.4). Compiled.
 
-A chromosome has shape (control points, 2): columns x and y in whole fields; its ends are start and target.
+A chromosome has shape (control points, 2), columns x and y in whole fields. Its first and last row are start and
+target.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Weights
 from companion.planning.bspline_ga import bspline
+from companion.planning.bspline_ga.bspline import Basis
+from companion.planning.bspline_ga.parameters import Task, Tuning
 from companion.planning.raster import HALF, ONE, SHIFT, CellArray, fine_steps
 
 U = np.uint64
@@ -21,42 +22,7 @@ PER_ONE = 1.0 / ONE
 
 GLANCES = 16
 GLANCE_FIELDS = 64
-"""Before all fields are summed a few are looked at, so many on a line as long as the map, but one in so many fields at least."""
-
-
-class Tuning(NamedTuple):
-    """The settings of the algorithm as the kernel wants them; see ``PlannerSettings``."""
-
-    way_points: int
-    span_way_points: int
-    mixing: float
-    selected_share: float
-    mutation_probability: float
-    mutation_range: float
-    line_probability: float
-    line_range: float
-    neighbourhood: float
-    margin_fields: int
-    obstacle_value: float
-    adaptive: bool = False
-    most_control_points: int = 16
-    number_probability: float = 0.5
-
-
-class Task(NamedTuple):
-    """Start, target, the rule for corners; how tightly the vehicle turns (0: on the spot) and its heading (NaN: any).
-
-    ``by_length``: fields count as much as the line under them is long, not all alike.
-    """
-
-    start_x: int
-    start_y: int
-    target_x: int
-    target_y: int
-    corner_cutting: bool
-    turning_radius: float = 0.0
-    heading: float = math.nan
-    by_length: bool = False
+"""A few fields are checked before all are summed: GLANCES on a line as long as the map, at least 1 in GLANCE_FIELDS."""
 
 
 @njit(cache=True, nogil=True)
@@ -73,33 +39,31 @@ def large_value(control_points: int, width: int, height: int, tuning: Tuning) ->
 
 @njit(cache=True, nogil=True)
 def is_correct(value: float, vln: float) -> bool:
-    """Whether this is the fitness of a path without an obstacle; half a field is left for rounding."""
+    """Whether this is the fitness of a path without an obstacle. Half a field is left for rounding errors."""
     return value < vln - 0.5
 
 
 @njit(cache=True, nogil=True)
-def way_point(genes: CellArray, first: NDArray[np.int64], basis: NDArray[np.float64], i: int) -> tuple[int, int]:
+def way_point(genes: CellArray, basis: Basis, i: int) -> tuple[int, int]:
     """Way point ``i`` of a chromosome, rounded to the nearest field centre (3.4)."""
-    at = first[i]
-    x = basis[i, 0] * genes[at, 0] + basis[i, 1] * genes[at + 1, 0] + basis[i, 2] * genes[at + 2, 0]
-    y = basis[i, 0] * genes[at, 1] + basis[i, 1] * genes[at + 1, 1] + basis[i, 2] * genes[at + 2, 1]
+    at, values = basis.first[i], basis.values
+    x = values[i, 0] * genes[at, 0] + values[i, 1] * genes[at + 1, 0] + values[i, 2] * genes[at + 2, 0]
+    y = values[i, 0] * genes[at, 1] + values[i, 1] * genes[at + 1, 1] + values[i, 2] * genes[at + 2, 1]
     return math.floor(x + 0.5), math.floor(y + 0.5)
 
 
 @njit(cache=True, nogil=True)
-def glance(
-    weights: Weights, genes: CellArray, first: NDArray[np.int64], basis: NDArray[np.float64], enough: float
-) -> float:
-    """Obstacles among a few fields of every long line, up to ``enough``: there are at least so many under the whole path.
+def glance(weights: Weights, genes: CellArray, basis: Basis, enough: float) -> float:
+    """Obstacles among a few fields of every long line, up to ``enough``: a lower bound for those under the whole path.
 
-    Most chromosomes are hopeless, and on a large map every field is a wait for memory.
+    Most chromosomes are hopeless, and on a large map every field costs a memory access.
     """
     height, width = weights.shape
     stride = min(max(width, height) // GLANCES + 1, GLANCE_FIELDS)
     seen = 0.0
     x, y = genes[0, 0], genes[0, 1]
-    for i in range(1, len(first)):
-        to_x, to_y = way_point(genes, first, basis, i)
+    for i in range(1, len(basis.first)):
+        to_x, to_y = way_point(genes, basis, i)
         steps, step_x, step_y = fine_steps(to_x - x, to_y - y)
         at_x, at_y, done = to_x, to_y, 0
         while done < steps:
@@ -114,34 +78,27 @@ def glance(
 
 
 @njit(cache=True, nogil=True)
-def fitness(
-    weights: Weights,
-    genes: CellArray,
-    first: NDArray[np.int64],
-    basis: NDArray[np.float64],
-    corner_cutting: bool,
-    vln: float,
-    limit: float,
-    by_length: bool = False,
-) -> float:
-    """Equation 5: the sum of the fields under the lines from way point to way point, start and target counting 0.
+def fitness(weights: Weights, genes: CellArray, basis: Basis, task: Task, vln: float, limit: float) -> float:
+    """Equation 5: the sum of the fields under the lines from way point to way point; start and target count 0.
 
-    Obstacles and fields outside the map count ``vln`` each, a cut corner adds ``vln``; a line that leaves the map is
-    not looked at for corners. ``by_length``: the fields of a line count by its length, so that of two ways over as many
-    fields the straighter is the fitter (ours). See ``is_correct``. Stops early once it has reached ``limit``. The lines are those of
-    ``raster.line_into``, drawn here once more: a call for each would take longer than the line.
+    Obstacles and fields outside the map count ``vln`` each, and a cut corner adds ``vln``. A line that leaves the map
+    is not checked for corners. With ``task.by_length`` the fields of a line count in proportion to its length, so that
+    of two paths over equally many fields the straighter one is fitter (ours). See ``is_correct``.
+
+    Stops as soon as it has reached ``limit``. The lines are those of ``raster.line_into``, drawn here again because a
+    call for each line would take longer than the line.
     """
     height, width = weights.shape
     total: float = -weights[genes[-1, 1], genes[-1, 0]]
     x, y = genes[0, 0], genes[0, 1]
     inside = True
-    for i in range(1, len(first)):
-        to_x, to_y = way_point(genes, first, basis, i)
+    for i in range(1, len(basis.first)):
+        to_x, to_y = way_point(genes, basis, i)
         steps, step_x, step_y = fine_steps(to_x - x, to_y - y)
         fine_x, fine_y = x * ONE + HALF, y * ONE + HALF
         was_inside, inside = inside, 0 <= to_x < width and 0 <= to_y < height
         safe = was_inside and inside
-        strict = safe and not corner_cutting
+        strict = safe and not task.corner_cutting
         before = total
         for _ in range(steps):
             from_x, from_y = x, y
@@ -150,9 +107,9 @@ def fitness(
             x, y = fine_x >> SHIFT, fine_y >> SHIFT
             value = vln
             if safe or (0 <= x < width and 0 <= y < height):
-                value = weights[U(y), U(x)]  # unsigned: else the compiler looks for negative indices
+                value = weights[U(y), U(x)]  # unsigned: else the compiler adds a test for negative indices
                 worst = value
-                if strict:  # looking beside every field is quicker than a branch that nobody can predict
+                if strict:  # checking both neighbours of every field is faster than a branch that cannot be predicted
                     beside = max(weights[U(from_y), U(x)], weights[U(y), U(from_x)])
                     worst = max(value, beside if (x != from_x) & (y != from_y) else 0.0)
                 if worst >= OBSTACLE:
@@ -160,7 +117,7 @@ def fitness(
                     if total + value >= limit:
                         return total + value
             total += value
-        if by_length and steps > 0:
+        if task.by_length and steps > 0:
             total = before + (total - before) * math.hypot(step_x, step_y) * PER_ONE
         x, y = to_x, to_y
         if total >= limit:

@@ -1,6 +1,6 @@
-"""Several populations, islands, that live on several threads and now and then send their best to the next one (our extension).
+"""Islands: several populations that evolve on several threads and send their best to the next one (our extension).
 
-Between two migrations no island knows of another, and each has random numbers of its own, so what comes out depends on the
+Between two migrations no island depends on another, and each has its own random numbers. So the result depends on the
 seed and the number of islands, never on the number of threads.
 """
 
@@ -9,17 +9,18 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
 from companion.core.grid import Weights
-from companion.planning.bspline_ga.fitness import Task, Tuning, is_correct
+from companion.planning.bspline_ga.fitness import is_correct
+from companion.planning.bspline_ga.parameters import Lifetime, Task, Tuning
 from companion.planning.bspline_ga.population import (
+    Evolution,
     Population,
-    Span,
     advance,
     begin,
     best_of,
@@ -28,7 +29,6 @@ from companion.planning.bspline_ga.population import (
     rank_of,
     vln_of,
 )
-from companion.planning.bspline_ga.tuples import Lives, Places, TuningValues
 from companion.planning.random_numbers import seeded
 from companion.planning.raster import CellArray
 
@@ -36,9 +36,8 @@ Job = Callable[[int], Population]
 Run = Callable[[Job, int], list[Population]]
 
 
-@dataclass(frozen=True, slots=True)
-class Archipelago:
-    """How many islands, after how many epochs they send their best round, and how many threads share the work."""
+class Archipelago(NamedTuple):
+    """How many islands, after how many epochs each sends its best on, and how many threads share the work."""
 
     islands: int
     migrate_every: int
@@ -46,37 +45,17 @@ class Archipelago:
 
 
 @njit(cache=True, nogil=True)
-def settle(
-    weights: Weights, places: Places, settings: TuningValues, control_points: int, lives: Lives, until: int, seed: int
-) -> Population:
-    """A new island's population, alive until an epoch."""
-    task, tuning, span = Task(*places), Tuning(*settings), Span(*lives)
-    vln = vln_of(weights, control_points, tuning)
-    people = empty_population(control_points, span.population, tuning, seeded(seed))
-    begin(weights, people, task, tuning, control_points, span, vln)
-    advance(weights, people, task, tuning, span, vln, until)
-    return people
-
-
-@njit(cache=True, nogil=True)
-def live_on(
-    weights: Weights,
-    places: Places,
-    settings: TuningValues,
-    control_points: int,
-    lives: Lives,
-    until: int,
-    people: Population,
-) -> Population:
-    """The same population, alive until a later epoch."""
-    task, tuning = Task(*places), Tuning(*settings)
-    advance(weights, people, task, tuning, Span(*lives), vln_of(weights, control_points, tuning), until)
+def settle(evolution: Evolution, control_points: int, until: int, seed: int) -> Population:
+    """A new island's population, evolved until an epoch."""
+    people = empty_population(control_points, evolution.lifetime.population, evolution.tuning, seeded(seed))
+    begin(evolution, people, control_points)
+    advance(evolution, people, until)
     return people
 
 
 @njit(cache=True, nogil=True)
 def welcome(people: Population, genes: CellArray, value: float) -> None:
-    """A migrant takes its rank among the selected; one that is no better than the last of them goes under."""
+    """A migrant takes its rank among the selected; one that is no better than the last of them is dropped."""
     if value < people.values[-1]:
         place = rank_of(people.ranks, people.values, value)
         copy_genes(genes, people.selected[place], len(genes))
@@ -84,7 +63,7 @@ def welcome(people: Population, genes: CellArray, value: float) -> None:
 
 
 def migrate(peoples: list[Population]) -> None:
-    """The best of each island goes to the next one, round in a ring, all at once."""
+    """The best of each island goes to the next one in a ring, all at the same time."""
     leaving = [(best_of(people), float(people.values[0])) for people in peoples]
     for i, (genes, value) in enumerate(leaving):
         welcome(peoples[(i + 1) % len(peoples)], genes, value)
@@ -92,25 +71,31 @@ def migrate(peoples: list[Population]) -> None:
 
 def evolve_islands(
     weights: Weights,
-    places: Places,
-    settings: TuningValues,
+    task: Task,
+    tuning: Tuning,
+    lifetime: Lifetime,
     control_points: int,
-    lives: Lives,
     archipelago: Archipelago,
     seeds: NDArray[np.int64],
 ) -> tuple[bool, CellArray, int, int]:
-    """As ``ga_population.evolve``: (found, best chromosome, epochs of the longest lived, evaluations of all)."""
-    _, min_epochs, max_epochs = lives
-    common = (weights, places, settings, control_points, lives)
-    vln = vln_of(weights, control_points, Tuning(*settings))
-    until = min(archipelago.migrate_every, max_epochs)
-    with _workers(archipelago.threads) as run:
-        peoples = run(lambda i: settle(*common, until, int(seeds[i])), archipelago.islands)
+    """As ``population.evolve``: (found, best chromosome, epochs of the longest-lived island, evaluations of all)."""
+    islands, migrate_every, threads = archipelago
+    _, min_epochs, max_epochs = lifetime
+    vln = vln_of(weights, control_points, tuning)
+    evolution = Evolution(weights, task, tuning, lifetime, vln)
+
+    def go_on(people: Population, until: int) -> Population:
+        advance(evolution, people, until)
+        return people
+
+    until = min(migrate_every, max_epochs)
+    with _workers(threads) as run:
+        peoples = run(lambda i: settle(evolution, control_points, until, int(seeds[i])), islands)
         while until < max_epochs and not any(_is_done(people, vln, min_epochs) for people in peoples):
             migrate(peoples)
-            until = min(until + archipelago.migrate_every, max_epochs)
+            until = min(until + migrate_every, max_epochs)
             now, living = until, peoples
-            peoples = run(lambda i: live_on(*common, now, living[i]), archipelago.islands)  # noqa: B023 - run at once
+            peoples = run(lambda i: go_on(living[i], now), islands)  # noqa: B023 - run at once
     best = min(peoples, key=lambda people: float(people.values[0]))
     epochs = max(int(people.spent[0]) for people in peoples)
     return is_correct(best.values[0], vln), best_of(best), epochs, sum(int(people.spent[1]) for people in peoples)
@@ -122,7 +107,7 @@ def _is_done(people: Population, vln: float, min_epochs: int) -> bool:
 
 @contextmanager
 def _workers(threads: int) -> Iterator[Run]:
-    """Runs a job for every island, on so many threads, and waits for all; the kernels hold no interpreter lock."""
+    """Runs a job for every island on so many threads and waits for all. The kernels release the interpreter lock."""
     if threads == 1:
         yield lambda job, islands: [job(i) for i in range(islands)]
         return

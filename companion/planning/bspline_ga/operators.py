@@ -1,4 +1,4 @@
-"""The operators of Kwasniewski & Gosiewski 2018, sections 3.3, 3.6 and 3.7. Compiled."""
+"""Initial population, crossover and mutation (Kwasniewski & Gosiewski 2018, sections 3.3, 3.6 and 3.7). Compiled."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.planning.bspline_ga.fitness import Tuning
+from companion.planning.bspline_ga.parameters import Tuning
 from companion.planning.random_numbers import State, uniform, whole
 from companion.planning.raster import CellArray
 
@@ -17,7 +17,10 @@ Chromosomes = NDArray[np.int64]
 
 @njit(cache=True, nogil=True)
 def scatter(genes: CellArray, part: int, width: int, height: int, tuning: Tuning, state: State) -> None:
-    """Fill in a chromosome of the initial population (3.3): part 0 line, 1 near the start, 2 anywhere. Ends are set."""
+    """Fill in the inner points of a chromosome of the initial population (3.3).
+
+    Part 0: near the straight line, 1: near the start, 2: anywhere. The ends of the chromosome are set already.
+    """
     last = len(genes) - 1
     start_x, start_y, target_x, target_y = genes[0, 0], genes[0, 1], genes[last, 0], genes[last, 1]
     smaller = min(width, height)
@@ -39,16 +42,22 @@ def scatter(genes: CellArray, part: int, width: int, height: int, tuning: Tuning
 
 
 @njit(cache=True, nogil=True)
+def choose_parents(count: int, state: State) -> tuple[int, int]:
+    """Two different ranks below ``count`` at random, the better one first."""
+    a = whole(state, 0, count - 1)
+    b = whole(state, 0, count - 2)
+    if b >= a:
+        b += 1
+    return min(a, b), max(a, b)
+
+
+@njit(cache=True, nogil=True)
 def breed(genes: CellArray, parents: Chromosomes, mutation_fields: int, tuning: Tuning, state: State) -> None:
     """A new chromosome: equation 6 on two different parents, then mutation (3.7). Parents are in order of fitness.
 
     The second case of equation 6 is read as D * CB + (1 - D) * CA: the better parent always gets the larger share.
     """
-    a = whole(state, 0, len(parents) - 1)
-    b = whole(state, 0, len(parents) - 2)
-    if b >= a:
-        b += 1
-    better, other = min(a, b), max(a, b)
+    better, other = choose_parents(len(parents), state)
     for i in range(1, len(genes) - 1):
         for axis in range(2):
             mixed = tuning.mixing * parents[better, i, axis] + (1.0 - tuning.mixing) * parents[other, i, axis]

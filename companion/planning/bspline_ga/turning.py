@@ -1,8 +1,8 @@
-"""Fitness for vehicles that cannot turn on the spot (the extension that Kwasniewski & Gosiewski 2018 close with). Compiled.
+"""Fitness of a B-spline chromosome for a vehicle that cannot turn on the spot. Compiled.
 
-Within one knot span a B-spline of degree 2 is a parabola, so its sharpest curvature is known exactly: the cross product
-of its derivatives is the same all along, and the speed is least where the derivative, which moves on a straight line,
-comes nearest to zero.
+Kwasniewski & Gosiewski 2018 name this extension at their end. Within one knot span a B-spline of degree 2 is a
+parabola, so its greatest curvature is known exactly: the cross product of its derivatives is constant, and the speed is
+least where the derivative, which moves along a straight line, is nearest to zero.
 """
 
 from __future__ import annotations
@@ -15,25 +15,25 @@ from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Weights
 from companion.planning.bspline_ga import bspline
-from companion.planning.bspline_ga.fitness import Task
+from companion.planning.bspline_ga.parameters import Task
 from companion.planning.raster import HALF, ONE, SHIFT, CellArray, fine_steps
 
 SAMPLE_FIELDS = 1.0
-"""The curve is followed by lines about so long: their way off a curve is far less than a field."""
+"""The curve is followed by lines of about this length: they stay within much less than a field of it."""
 MOST_EXCESS = 10.0
-"""A turn that is sharper than this many times what the vehicle can do is no worse than this."""
+"""The excess of a turn is limited to this: so many times the curvature that the vehicle can drive."""
 
 
 @njit(cache=True, nogil=True)
 def control_of(genes: CellArray, task: Task) -> NDArray[np.float64]:
-    """The curve's control points, shape (n, 2): the chromosome, its second point moved onto the ray of the start heading.
+    """The control points, shape (n, 2): the chromosome with its second point moved onto the ray of the start heading.
 
-    A B-spline sets out towards its second control point, so the heading holds exactly. Behind the vehicle is taken
-    as far ahead of it.
+    A B-spline starts towards its second control point, so the curve has the heading exactly. A point behind the vehicle
+    is moved as far ahead of it.
     """
     control = genes.astype(np.float64)
-    if not math.isnan(task.heading):
-        east, north = math.cos(task.heading), math.sin(task.heading)
+    if not math.isnan(task.heading_rad):
+        east, north = math.cos(task.heading_rad), math.sin(task.heading_rad)
         ahead = abs((control[1, 0] - control[0, 0]) * east + (control[1, 1] - control[0, 1]) * north)
         ahead = max(ahead, 1.0)
         control[1, 0], control[1, 1] = control[0, 0] + ahead * east, control[0, 1] + ahead * north
@@ -54,8 +54,8 @@ def derivatives(control: NDArray[np.float64], span: int) -> tuple[float, float, 
 
 
 @njit(cache=True, nogil=True)
-def sharpest(control: NDArray[np.float64], span: int) -> float:
-    """The greatest curvature in a knot span, per field; infinite where the curve stands still."""
+def greatest_curvature_per_field(control: NDArray[np.float64], span: int) -> float:
+    """The greatest curvature in a knot span; infinite where the curve stops."""
     from_x, from_y, to_x, to_y = derivatives(control, span)
     change_x, change_y = to_x - from_x, to_y - from_y
     length2 = change_x * change_x + change_y * change_y
@@ -69,11 +69,11 @@ def sharpest(control: NDArray[np.float64], span: int) -> float:
 
 
 @njit(cache=True, nogil=True)
-def too_sharp(control: NDArray[np.float64], radius: float) -> float:
-    """0 if no turn is tighter than the radius; else how much too sharp, at least 1 a knot span."""
+def curvature_excess(control: NDArray[np.float64], radius_fields: float) -> float:
+    """0 if no turn is tighter than the radius; else the sum over the spans that are, each at least 1."""
     total = 0.0
     for span in range(len(control) - bspline.DEGREE):
-        turn = sharpest(control, span) * radius
+        turn = greatest_curvature_per_field(control, span) * radius_fields
         if turn > 1.0:
             total += min(turn, MOST_EXCESS)
     return total
@@ -81,7 +81,7 @@ def too_sharp(control: NDArray[np.float64], radius: float) -> float:
 
 @njit(cache=True, nogil=True)
 def curve_samples(control: NDArray[np.float64]) -> int:
-    """Samples a knot span so that in the fastest one the lines between them are SAMPLE_FIELDS long."""
+    """Samples in each knot span so that the lines between them are at most SAMPLE_FIELDS long."""
     fastest = 0.0
     for span in range(len(control) - bspline.DEGREE):
         from_x, from_y, to_x, to_y = derivatives(control, span)
@@ -103,12 +103,12 @@ def curve_points(control: NDArray[np.float64]) -> CellArray:
 
 @njit(cache=True, nogil=True)
 def turning_fitness(weights: Weights, genes: CellArray, task: Task, vln: float, limit: float) -> float:
-    """Equation 5 along the curve itself, and ``vln`` for every knot span that turns too tightly, times how much.
+    """Equation 5 along the curve itself, plus ``vln`` times the ``curvature_excess``.
 
-    Stops early once it has reached ``limit``.
+    Stops as soon as it has reached ``limit``.
     """
     control = control_of(genes, task)
-    total: float = vln * too_sharp(control, task.turning_radius)
+    total: float = vln * curvature_excess(control, task.turning_radius_fields)
     if total >= limit:
         return total
     points = curve_points(control)
@@ -122,7 +122,7 @@ def turning_fitness(weights: Weights, genes: CellArray, task: Task, vln: float, 
 
 @njit(cache=True, nogil=True)
 def _line_value(weights: Weights, start: CellArray, end: CellArray, corner_cutting: bool, vln: float) -> float:
-    """What the fields under a line cost, its first one not counted; see ``ga_fitness.fitness``."""
+    """What the fields under a line cost, without its first field; see ``fitness.fitness``."""
     height, width = weights.shape
     x, y = start[0], start[1]
     steps, step_x, step_y = fine_steps(end[0] - x, end[1] - y)

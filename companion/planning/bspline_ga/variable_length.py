@@ -1,8 +1,8 @@
-"""Chromosomes of different lengths: the number of control points as one more gene (our extension). Compiled.
+"""Chromosomes of different lengths: the number of control points is one more gene (our extension). Compiled.
 
-Kwasniewski & Gosiewski 2018 call its choice their important problem, solved in a basic way. Here equation 6 crosses
-the number as it crosses coordinates, and it mutates by knot insertion and removal (Piegl & Tiller, A5.1), which keep
-the curve nearly as it was, so that a new control point starts where it does no harm.
+Kwasniewski & Gosiewski 2018 call the choice of this number an important problem that they solve in a basic way. Here
+equation 6 crosses the number as it crosses coordinates. It mutates by knot insertion and removal (Piegl & Tiller,
+A5.1), which hardly change the curve, so that a new control point begins where it does no harm.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from companion.planning.bspline_ga import bspline
-from companion.planning.bspline_ga.fitness import Tuning
-from companion.planning.bspline_ga.operators import Chromosomes
+from companion.planning.bspline_ga.operators import Chromosomes, choose_parents
+from companion.planning.bspline_ga.parameters import Tuning
 from companion.planning.random_numbers import State, uniform, whole
 from companion.planning.raster import CellArray
 
@@ -24,14 +24,14 @@ LEAST = bspline.DEGREE + 1
 
 @njit(cache=True, nogil=True)
 def abscissa(i: int, control_points: int) -> float:
-    """Where along the curve control point ``i`` acts most (its Greville abscissa), 0 to 1."""
+    """Where along the curve control point ``i`` has most influence (its Greville abscissa), 0 to 1."""
     spans = control_points - bspline.DEGREE
     return min(max(i - 0.5, 0.0), float(spans)) / spans
 
 
 @njit(cache=True, nogil=True)
 def between(genes: CellArray, control_points: int, place: float, axis: int) -> float:
-    """The control polygon's coordinate at a place from 0 to 1, after abscissae."""
+    """The control polygon's coordinate at a place from 0 to 1, interpolated between abscissae."""
     at = place * (control_points - bspline.DEGREE) + 0.5
     i = min(max(int(at), 0), control_points - 2)
     low, high = abscissa(i, control_points), abscissa(i + 1, control_points)
@@ -41,7 +41,10 @@ def between(genes: CellArray, control_points: int, place: float, axis: int) -> f
 
 @njit(cache=True, nogil=True)
 def insert_knot(genes: CellArray, control_points: int, span: int) -> None:
-    """One control point more: a knot in the middle of a span. ``genes`` has room; then knots count as equidistant again."""
+    """One control point more: a knot in the middle of a span. ``genes`` has room for it.
+
+    Afterwards knots count as equidistant again.
+    """
     at = span + 1
     before, after = _shares(span, control_points)
     for i in range(control_points, at + 1, -1):
@@ -54,7 +57,7 @@ def insert_knot(genes: CellArray, control_points: int, span: int) -> None:
 
 @njit(cache=True, nogil=True)
 def remove_knot(genes: CellArray, control_points: int, span: int) -> None:
-    """One control point less: undoes ``insert_knot`` in this span of the shorter curve, as nearly as can be."""
+    """One control point less: reverses ``insert_knot`` in this span of the shorter curve, as far as possible."""
     at = span + 1
     before, after = _shares(span, control_points - 1)
     for axis in range(2):
@@ -67,7 +70,7 @@ def remove_knot(genes: CellArray, control_points: int, span: int) -> None:
 
 @njit(cache=True, nogil=True)
 def _shares(span: int, control_points: int) -> tuple[float, float]:
-    """How much of its neighbours the control point of a span passes on to the two it is split into."""
+    """How much of its two neighbours goes into the two points that the control point of a span is split into."""
     last = control_points - bspline.DEGREE - 1
     return 0.5 if span == 0 else 0.25, 0.5 if span == last else 0.25
 
@@ -81,16 +84,12 @@ def breed_any(
     tuning: Tuning,
     state: State,
 ) -> int:
-    """``ga_operators.breed`` for parents of different lengths; gives the child's number of control points.
+    """``operators.breed`` for parents of different lengths. Returns the child's number of control points.
 
-    Of the inner coordinates as many mutate as in a chromosome of four control points: with more of them, at the same
-    probability each, hardly a child would still resemble its parents.
+    On average as many inner coordinates mutate as in a chromosome of four control points. If each coordinate of a
+    longer one kept the same probability, hardly any child would resemble its parents.
     """
-    a = whole(state, 0, len(parents) - 1)
-    b = whole(state, 0, len(parents) - 2)
-    if b >= a:
-        b += 1
-    better, other = min(a, b), max(a, b)
+    better, other = choose_parents(len(parents), state)
     count: int = math.floor(tuning.mixing * counts[better] + (1.0 - tuning.mixing) * counts[other] + 0.5)
     genes[0, 0], genes[0, 1] = parents[better, 0, 0], parents[better, 0, 1]
     for i in range(1, count):

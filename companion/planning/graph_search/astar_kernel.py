@@ -1,15 +1,17 @@
-"""The compiled part of A*: of many equally cheap ways to a field only few are followed.
+"""The compiled part of A*, which follows only few of the equally cheap paths to a field.
 
-On even ground most fields can be reached by many paths of one cost, which differ only in the order of their steps. Of those only the canonical
-ones are followed (Sturtevant & Rabin 2016; it is the pruning of Harabor & Grastien's jump points, 2011, without the jumps): diagonal steps
-first, straight ones after. So from a field entered by a straight step the search goes straight on, and turns aside only where
-an obstacle, or ground that costs something else, makes that more than another order of the same steps; from a field entered
-by a diagonal step there are three ways on instead of eight. Where several ways to a field are equally cheap each of them goes on, as
-each leaves out others. The rules compare the weights of the three or four fields that they are about, so they hold on any ground.
+On even ground most fields can be reached by many paths of the same cost that differ only in the order of their steps.
+Only the canonical ones are followed (Sturtevant & Rabin 2016; the pruning of jump point search, Harabor & Grastien
+2011, without the jumps): diagonal steps first, straight ones after. From a field entered by a straight step the search
+goes straight on. It turns only where an obstacle, or ground of another cost, makes a turn more than another order of
+the same steps. From a field entered by a diagonal step there are three successors instead of eight. Where several paths
+to a field are equally cheap each of them is continued, because each leaves out others. The rules compare the weights of
+the three or four fields concerned, so they hold on any ground.
 
-Costs are fixed-point numbers, so sums do not depend on their order, and equal ones are equal. One number a field holds all that is known of
-it: 0, not reached; else the cost of reaching it, and in its lowest bits by which steps. So the memory of a search is zeros to begin
-with, and only the part of the map that is searched is ever touched.
+Costs are fixed-point numbers, so sums do not depend on their order and equal costs are equal. One number for each field
+holds all that the search knows of it: 0 if it is not reached, else its cost and, in the lowest bits, the steps by which
+it was entered. So the memory of a search begins as zeros, and only the part of the map that is searched is ever
+touched.
 """
 
 from __future__ import annotations
@@ -21,78 +23,69 @@ from numba import njit
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE
-from companion.planning.graph_search.steps import STEP_X, STEP_Y, least_cost
+from companion.planning.graph_search.steps import STEP_X, STEP_Y, Query, least_cost
 from companion.planning.problem import MIN_WEIGHT
 from companion.planning.raster import SQRT2, CellArray
 
 Floats = NDArray[np.float64]
 Entries = NDArray[np.int32]
 Reached = NDArray[np.int64]
-U = np.uint64  # as an index: else the compiler looks for negative ones
+U = np.uint64  # as an index: else the compiler adds a test for negative ones
 
 UNIT = 1 << 30
-"""Cost 1. A path through all fields of a large map fits beside the bits of the steps."""
+"""Cost 1 in fixed point. The cost of a path through all fields of a large map fits beside the bits of the steps."""
 DIRECTIONS = 8
-"""Bits of a field's number that tell by which steps it was entered."""
+"""Bits of a field's number for the steps by which it was entered."""
 ANY_WAY = 8
-"""From this number on it is no step: the start was not entered by one."""
+"""Numbers from here on are no step: the start was not entered by one."""
 BUCKETS = 1024
-"""A power of two. They hold what one step can add to the sum: at most sqrt 2, and as much again if it leads away."""
+"""A power of two. Enough for what one step can add to the sum: at most sqrt 2, and as much again if it leads away."""
 RUN = 8
-"""So many fields a search goes straight on ahead of its queue. With many more it now and then has much to correct."""
+"""How many fields a search goes straight on ahead of its queue. With many more it sometimes has much to correct."""
 LEAST_SHIFT = 22
-"""So many bits of the sum are left out at least when it is put into a bucket."""
+"""The least number of bits of the sum that are dropped for the bucket's number."""
 NONE, FOUND, CROWDED = range(3)
 NOT_YET = np.iinfo(np.int64).max
 
 
 @njit(cache=True, nogil=True, inline="always")
 def step_costs(weight: float) -> tuple[int, int]:
-    """What a straight and a diagonal step onto such ground cost, as fixed-point numbers."""
+    """The cost of a straight and of a diagonal step onto a field of this weight, in fixed point."""
     cost = max(weight, MIN_WEIGHT) * UNIT
     return int(cost), int(cost * SQRT2)
 
 
 @njit(cache=True, nogil=True, inline="always")
 def ahead(straight: int, diagonal: int, delta_x: int, delta_y: int) -> int:
-    """The cost of the shortest way over ground where steps cost so much."""
+    """The heuristic: the cost of the shortest path over ground where steps cost so much."""
     across, along = abs(delta_x), abs(delta_y)
     return straight * max(across, along) + (diagonal - straight) * min(across, along)
 
 
 @njit(cache=True, nogil=True)
-def shortest(
-    weights: Floats,
-    reached: Reached,
-    room: int,
-    start_x: int,
-    start_y: int,
-    target_x: int,
-    target_y: int,
-    corner_cutting: bool,
-) -> CellArray:
-    """The fields of a cheapest path between two free ones; none if there is no path.
+def shortest(weights: Floats, reached: Reached, room: int, query: Query) -> CellArray:
+    """The fields of a cheapest path between two free ones; no rows if there is no path.
 
-    ``reached``: zeros, one for each field. ``room``: of the queue, to begin with, at least 8; if it turns out too small, all begins
-    again with more.
+    ``reached``: zeros, one for each field. ``room``: entries of the queue to begin with, at least 8. If they are too
+    few, the search begins again with more.
     """
-    least = least_cost(weights.ravel(), weights[target_y, target_x])
-    found = _search(weights, reached, room, least, start_x, start_y, target_x, target_y, corner_cutting)
+    least = least_cost(weights.ravel(), weights[query.target_y, query.target_x])
+    found = _search(weights, reached, room, least, query)
     while found == CROWDED:
         room *= 2
         reached[:] = 0
-        found = _search(weights, reached, room, least, start_x, start_y, target_x, target_y, corner_cutting)
+        found = _search(weights, reached, room, least, query)
     if found == NONE:
         return np.empty((0, 2), np.int64)
-    return _way_back(weights, reached, target_x, target_y, corner_cutting)
+    return _trace_back(weights, reached, query)
 
 
 @njit(cache=True, nogil=True, inline="always")
 def is_pruned(behind: float, beside: float, between: float, here: float) -> bool:
-    """Whether straight on from here makes the steps to one side needless.
+    """Whether the steps to one side can be left out when the search goes straight on from here.
 
-    The fields are those diagonally behind on that side, beside, and diagonally ahead. They are reached as cheaply by a diagonal step
-    from the field before this; or they cannot be entered from here either.
+    The weights are those of the fields diagonally behind on that side, beside, and diagonally ahead. The fields can be
+    reached as cheaply by a diagonal step from the field before this one, or they cannot be entered from here either.
     """
     even = beside == here and (between == here or between >= OBSTACLE)
     return bool(beside >= OBSTACLE or (behind < OBSTACLE and even))
@@ -100,14 +93,16 @@ def is_pruned(behind: float, beside: float, between: float, here: float) -> bool
 
 @njit(cache=True, nogil=True, forceinline=True)
 def straight_on(
-    fields: Floats, reached: Reached, width: int, x: int, y: int, way: int, target_x: int, target_y: int, least: float
+    fields: Floats, reached: Reached, width: int, x: int, y: int, way: int, query: Query, least: float
 ) -> int:
-    """From a field entered by a straight step on as far as nothing but straight on is canonical; how many steps.
+    """Go straight on from a field entered by straight step ``way`` while no other step is canonical; how many steps.
 
-    It ends before the target, the map's edge, an obstacle, ground that costs something else, and a field that was reached as well. As
-    long as the sum of cost and what is ahead stays the same it is what the queue would do next; else it runs ahead of the
-    queue, but not far: the queue's work for single fields takes much longer than a few fields too many.
+    It ends before the target, the map's edge, an obstacle, ground of another cost, and a field that was reached as
+    cheaply. As long as the sum of cost and heuristic stays the same, this is what the queue would do next. Beyond that
+    it runs ahead of the queue, but not far: handling single fields in the queue takes much longer than a few unneeded
+    fields.
     """
+    target_x, target_y = query.target_x, query.target_y
     step_x, step_y, height = STEP_X[way], STEP_Y[way], len(fields) // width
     along = (target_x - x) * step_x + (target_y - y) * step_y
     across = abs((target_x - x) * step_y) + abs((target_y - y) * step_x)
@@ -118,7 +113,7 @@ def straight_on(
         most = along - 1 if across == 0 else most
     if most <= 0:
         return 0
-    # The rows beside it; where the map ends there, the run itself stands in for them.
+    # The rows beside the run; at the edge of the map the run itself is used instead.
     hop, aside = step_y * width + step_x, step_x * width + step_y
     one = aside if 0 <= x + step_y < width and 0 <= y + step_x < height else 0
     other = -aside if 0 <= x - step_y < width and 0 <= y - step_x < height else 0
@@ -146,7 +141,7 @@ def straight_on(
 
 @njit(cache=True, nogil=True, forceinline=True)
 def ways_on(onward: Entries, fields: Floats, width: int, x: int, y: int, way: int) -> int:
-    """Write the steps that may be canonical from a field entered by this step, allowed or not, and how many."""
+    """Write the steps that may be canonical from a field entered by this step, allowed or not. Returns how many."""
     if way >= ANY_WAY:
         for i in range(8):
             onward[i] = i
@@ -156,7 +151,7 @@ def ways_on(onward: Entries, fields: Floats, width: int, x: int, y: int, way: in
     onward[0] = way & 3
     if way >= 4:
         onward[1], onward[2], count = left, way, 3
-        # Round a dear field two diagonal steps may be cheaper than the two straight ones over it.
+        # Round a costly field two diagonal steps may be cheaper than the two straight ones over it.
         if fields[field - hop] > here:
             onward[count], count = 4 + left, count + 1
         if fields[field - STEP_Y[left] * width - STEP_X[left]] > here:
@@ -178,17 +173,10 @@ def ways_on(onward: Entries, fields: Floats, width: int, x: int, y: int, way: in
 
 @njit(cache=True, nogil=True)
 def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every neighbour takes four times as long
-    weights: Floats,
-    reached: Reached,
-    room: int,
-    least: float,
-    start_x: int,
-    start_y: int,
-    target_x: int,
-    target_y: int,
-    corner_cutting: bool,
+    weights: Floats, reached: Reached, room: int, least: float, query: Query
 ) -> int:
-    """Whether there is a way; CROWDED if the queue would need more than its room."""
+    """FOUND or NONE; CROWDED if the queue would need more than its room."""
+    start_x, start_y, target_x, target_y, corner_cutting = query
     height, width = weights.shape
     fields = weights.ravel()
     target = target_y * width + target_x
@@ -199,7 +187,7 @@ def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every 
     reached[start_y * width + start_x] = (1 << DIRECTIONS) - 1
     if start_x == target_x and start_y == target_y:
         return FOUND
-    # Where corners may be cut nothing is left out, and no diagonal step is looked at from the side.
+    # If corners may be cut nothing is left out, and the sides of a diagonal step are not checked.
     loose, slanting = (ANY_WAY, 8) if corner_cutting else (0, 4)
     best, free, unused, waiting = NOT_YET, -1, 0, 0
     bucket = ahead(straight, diagonal, target_x - start_x, target_y - start_y) >> shift
@@ -208,7 +196,7 @@ def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every 
     while True:
         way |= loose
         if way < 4:
-            steps = straight_on(fields, reached, width, x, y, way, target_x, target_y, least)
+            steps = straight_on(fields, reached, width, x, y, way, query, least)
             x, y = x + steps * STEP_X[way], y + steps * STEP_Y[way]
         so_far = reached[y * width + x] >> DIRECTIONS
         inside = 0 < x < width - 1 and 0 < y < height - 1
@@ -268,11 +256,12 @@ def _search(  # noqa: PLR0912, PLR0915 - one loop: a call with arrays for every 
 
 
 @njit(cache=True, nogil=True)
-def _way_back(weights: Floats, reached: Reached, target_x: int, target_y: int, corner_cutting: bool) -> CellArray:
-    """Walk back from the target to the start; fields in the order of the path.
+def _trace_back(weights: Floats, reached: Reached, query: Query) -> CellArray:
+    """Go back from the target to the start; the fields in the order of the path.
 
-    Of equally cheap ways back, canonical or not, the one straight on is taken: fewer bends for the rover.
+    Of equally cheap predecessors, canonical or not, the one straight on is taken: fewer bends for the rover.
     """
+    target_x, target_y, corner_cutting = query.target_x, query.target_y, query.corner_cutting
     height, width = weights.shape
     fields = weights.ravel()
     cells = np.empty((weights.size, 2), np.int64)

@@ -1,30 +1,27 @@
-"""Graph search over the fields: the paper's reference, the complete fallback, and the proof that no path exists. Compiled.
+"""Dijkstra's algorithm over the fields: the paper's reference planner, complete and optimal. Compiled.
 
-Dijkstra's algorithm with a circular bucket queue (Dial 1969). A bucket is as wide as the cheapest step, so that fields
-in one bucket cannot improve each other and their order within it does not matter: only the queue is quantised, the
-costs stay exact. Inside, the map has a border of obstacles and its fields are numbered row after row.
+The open list is a circular bucket queue (Dial 1969). A bucket is as wide as the cheapest step, so fields in one bucket
+cannot improve each other and their order in it does not matter. Only the queue is quantised; the costs stay exact.
+Internally the map has a border of obstacles and its fields are numbered row after row.
 """
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
-from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Weights
-from companion.planning.ends import ends_free
-from companion.planning.planner import Capabilities
-from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.raster import SQRT2, CellArray, cells_cost, plain
-from companion.settings import PlannerSettings
+from companion.planning.planner import Capabilities, CompletePlanner
+from companion.planning.problem import MIN_WEIGHT, Path, PlanningProblem
+from companion.planning.raster import SQRT2, CellArray, cells_cost
 
 Floats = NDArray[np.float64]
 
 
 @njit(cache=True, nogil=True)
 def step_costs(weights: Weights) -> tuple[Floats, float, float]:
-    """What it costs to enter each field of the bordered map (inf: never), the least and the largest of the free ones."""
+    """The cost of entering each field of the bordered map (inf: an obstacle), the least and the largest finite cost."""
     height, width = weights.shape
     costs = np.full((height + 2) * (width + 2), np.inf)
     least, largest = np.inf, MIN_WEIGHT
@@ -41,7 +38,7 @@ def step_costs(weights: Weights) -> tuple[Floats, float, float]:
 
 @njit(cache=True, nogil=True)
 def moves(stride: int) -> NDArray[np.int64]:
-    """The eight steps, straight ones first: columns step, and for a diagonal the two straight steps beside it."""
+    """The eight steps, straight ones first: columns step and, for a diagonal one, the two straight steps beside it."""
     table = np.zeros((8, 3), np.int64)
     table[0, 0], table[1, 0], table[2, 0], table[3, 0] = 1, -1, stride, -stride
     for i in range(4):
@@ -52,7 +49,7 @@ def moves(stride: int) -> NDArray[np.int64]:
 
 @njit(cache=True, nogil=True)
 def buckets_needed(least: float, largest: float) -> int:
-    """The power of two of buckets that holds every step."""
+    """How many buckets hold every step, a power of two."""
     buckets = 4
     while buckets < largest * SQRT2 / least + 3.0:
         buckets *= 2
@@ -63,12 +60,12 @@ def buckets_needed(least: float, largest: float) -> int:
 def spread(
     costs: Floats, stride: int, start: int, target: int, least: float, largest: float, corner_cutting: bool
 ) -> Floats:
-    """Distances from the start, at least of those fields that are nearer than the target; inf: none."""
+    """Distances from the start for all fields nearer than the target, and for some others; inf: not reached."""
     table = moves(stride)
     mask = buckets_needed(least, largest) - 1
-    # A little narrower than the cheapest step, so that rounding never puts a step's end into its own bucket: then a
-    # field is settled once, each step is taken once, and 8 entries a field are enough. Memory that is never written
-    # costs nothing.
+    # A little narrower than the cheapest step, so that rounding never puts a step's end into its own bucket. So a
+    # field is settled once, each step is taken once, and 8 entries for each field are enough. Memory that is never
+    # written costs nothing.
     per_cost = (1.0 + 1e-6) / least
     heads = np.full(mask + 1, -1, np.int64)
     entry_field = np.empty(8 * len(costs) + 1, np.int32)
@@ -111,9 +108,9 @@ def spread(
 
 @njit(cache=True, nogil=True)
 def trace(costs: Floats, distances: Floats, stride: int, target: int, corner_cutting: bool) -> CellArray:
-    """Walk back from the target to where the distance is 0; fields of the map in the order of the path.
+    """Go back from the target to where the distance is 0; fields of the map in the order of the path.
 
-    Of equally short ways back the one straight on is taken: fewer bends for the rover.
+    Of equally near predecessors the one straight on is taken: fewer bends for the rover.
     """
     table = moves(stride)
     fields = np.empty(len(distances), np.int32)
@@ -154,21 +151,12 @@ def shortest(
     return cells, cells_cost(weights, cells)
 
 
-class Dijkstra:
+class Dijkstra(CompletePlanner):
     """The cheapest path, or the proof that there is none."""
 
     name = "dijkstra"
     capabilities = Capabilities(proves_no_path=True, optimal=True)
 
-    def __init__(self, settings: PlannerSettings) -> None:
-        del settings  # nothing to set
-
-    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
-        """See ``Planner.plan``. FOUND or NO_PATH; budget and generator are left alone."""
-        del budget, rng
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        cells, cost = shortest(plain(problem.weights), *problem.start, *problem.target, problem.corner_cutting)
-        if len(cells) == 0:
-            return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        return PlanResult(PlanStatus.FOUND, Path(cells, cost), self.name)
+    def _path(self, problem: PlanningProblem, weights: Weights) -> Path | None:
+        cells, cost = shortest(weights, *problem.start, *problem.target, problem.corner_cutting)
+        return Path(cells, cost) if len(cells) else None

@@ -1,11 +1,8 @@
-"""A priority queue of fields whose priority may change: a binary heap that knows where each field is. Compiled.
-
-``heap[:size]`` has the waiting fields' numbers, ``place`` has for each field of the map where it is in the heap, plus 1 (0: not waiting), and
-``keys`` has two numbers for each field: the smaller first number comes first, and of equal ones the smaller second. Every function
-returns the new size. All arrays may begin as zeros, and each has room for every field, so none ever grows.
-"""
+"""A priority queue whose priorities may change: a binary heap that knows where each of its fields is. Compiled."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -15,6 +12,25 @@ Fields = NDArray[np.int32]
 Keys = NDArray[np.float64]
 
 
+class Queue(NamedTuple):
+    """Waiting fields in the order of their keys.
+
+    ``heap``: how many fields wait, then their numbers; ``heap[1]`` is the first to come out. ``place``: for each field
+    its index in the heap, 0 when it does not wait. ``keys``: two numbers for each field; the smaller first number comes
+    out first, of equal ones the smaller second. The arrays begin as zeros and have room for every field, so they never
+    grow.
+    """
+
+    heap: Fields
+    place: Fields
+    keys: Keys
+
+
+def empty_queue(fields: int) -> Queue:
+    """A queue with room for so many fields. numpy's zeros come from the system only when they are used."""
+    return Queue(np.zeros(fields + 1, np.int32), np.zeros(fields, np.int32), np.zeros((fields, 2)))
+
+
 @njit(cache=True, nogil=True)
 def before(keys: Keys, a: int, b: int) -> bool:
     """Whether field a comes out before field b."""
@@ -22,49 +38,49 @@ def before(keys: Keys, a: int, b: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def _settle(heap: Fields, place: Fields, keys: Keys, size: int, at: int) -> None:
-    """Move the field at this place of the heap up or down to where its keys belong."""
-    field = heap[at]
-    while at > 0 and before(keys, field, heap[(at - 1) >> 1]):
-        above = (at - 1) >> 1
+def _sift(heap: Fields, place: Fields, keys: Keys, at: int) -> None:
+    """Move the field at this index of the heap up or down to where its keys belong."""
+    field, last = heap[at], heap[0]
+    while at > 1 and before(keys, field, heap[at >> 1]):
+        above = at >> 1
         heap[at] = heap[above]
-        place[heap[at]] = at + 1
+        place[heap[at]] = at
         at = above
     while True:
-        below = 2 * at + 1
-        if below + 1 < size and before(keys, heap[below + 1], heap[below]):
+        below = 2 * at
+        if below < last and before(keys, heap[below + 1], heap[below]):
             below += 1
-        if below >= size or not before(keys, heap[below], field):
+        if below > last or not before(keys, heap[below], field):
             break
         heap[at] = heap[below]
-        place[heap[at]] = at + 1
+        place[heap[at]] = at
         at = below
     heap[at] = field
-    place[field] = at + 1
+    place[field] = at
 
 
 @njit(cache=True, nogil=True)
-def put(heap: Fields, place: Fields, keys: Keys, size: int, field: int, first: float, second: float) -> int:
-    """Let the field wait with these keys, whether it waits already or not."""
+def put(queue: Queue, field: int, first: float, second: float) -> None:
+    """Add the field with these keys or, if it waits already, change its keys."""
+    heap, place, keys = queue
     keys[field, 0], keys[field, 1] = first, second
-    at = place[field] - 1
-    if at < 0:
-        at = size
+    at = place[field]
+    if at == 0:
+        heap[0] += 1
+        at = heap[0]
         heap[at] = field
-        size += 1
-    _settle(heap, place, keys, size, at)
-    return size
+    _sift(heap, place, keys, at)
 
 
 @njit(cache=True, nogil=True)
-def take_out(heap: Fields, place: Fields, keys: Keys, size: int, field: int) -> int:
-    """Let the field wait no longer, if it does."""
-    at = place[field] - 1
-    if at < 0:
-        return size
+def take_out(queue: Queue, field: int) -> None:
+    """Remove the field, if it waits."""
+    heap, place, keys = queue
+    at, last = place[field], heap[0]
+    if at == 0:
+        return
     place[field] = 0
-    size -= 1
-    if at < size:
-        heap[at] = heap[size]
-        _settle(heap, place, keys, size, at)
-    return size
+    heap[0] = last - 1
+    if at < last:
+        heap[at] = heap[last]
+        _sift(heap, place, keys, at)

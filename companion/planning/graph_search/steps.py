@@ -1,6 +1,8 @@
-"""Steps from field to field, as graph searches take them. Compiled."""
+"""Steps from field to field, their costs, and the octile distance, for graph searches. Compiled."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -17,6 +19,16 @@ STEP_Y = np.array((0, 1, 0, -1, 1, 1, -1, -1))
 """The eight steps, straight ones first. Never written to."""
 
 
+class Query(NamedTuple):
+    """Between which free fields a path is searched, and whether it may cut corners."""
+
+    start_x: int
+    start_y: int
+    target_x: int
+    target_y: int
+    corner_cutting: bool
+
+
 @njit(cache=True, nogil=True, fastmath=True)
 def _least_weight(fields: Floats) -> float:
     least = OBSTACLE
@@ -27,16 +39,16 @@ def _least_weight(fields: Floats) -> float:
 
 @njit(cache=True, nogil=True)
 def least_cost(fields: Floats, guess: float) -> float:
-    """The least that any field costs to enter. If none is cheaper than the guess, that takes a fifth of the time."""
+    """The least cost of any field. If none is cheaper than the guess, it takes a fifth of the time."""
     cheaper = 0
-    for i in range(len(fields)):  # no way out before the end: so it is vectorised
+    for i in range(len(fields)):  # without an early exit it is vectorised
         cheaper |= fields[i] < guess
     return max(guess, MIN_WEIGHT) if cheaper == 0 else _least_weight(fields)
 
 
 @njit(cache=True, nogil=True, inline="always")
 def octile(delta_x: int, delta_y: int) -> float:
-    """The length of the shortest way over an empty map."""
+    """The length of the shortest path over an empty map."""
     across, along = abs(delta_x), abs(delta_y)
     return max(across, along) + (SQRT2 - 1.0) * min(across, along)
 

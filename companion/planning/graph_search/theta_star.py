@@ -1,28 +1,28 @@
 """Theta*: graph search whose path may turn at any angle. Compiled.
 
-Nash, Koenig & Tovey 2010 (Lazy Theta*). A field's predecessor need not be its neighbour, but any field in a straight line of sight. A new field
-is given its neighbour's predecessor on trust; the line is looked at only when the field's turn comes, once for each field, and if it is blocked,
-or dearer than a step from a neighbour, the best neighbour takes its place.
+Nash, Koenig & Tovey 2010 (Lazy Theta*). A field's predecessor need not be its neighbour: it may be any field in a
+straight line of sight. A new field is given its neighbour's predecessor without a check. The line is checked only when
+the field is expanded, once for each field. If it is blocked, or costlier than a step from a neighbour, the best
+neighbour becomes the predecessor.
 
-The paper's ground is free or blocked. Here ground has weights, so a straight line costs its length times the mean weight of the
-fields under it, and is taken only where that is no dearer.
+In the paper ground is free or blocked. Here it has weights, so a straight line costs its length times the mean weight
+of the fields under it, and is used only where that is no costlier.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
-from numpy.random import Generator
 from numpy.typing import NDArray
 
-from companion.core.grid import OBSTACLE, Cell
-from companion.planning.ends import ends_free
-from companion.planning.graph_search.heap import put, take_out
+from companion.core.grid import OBSTACLE, Cell, Weights
+from companion.planning.graph_search.heap import Queue, empty_queue, put, take_out
 from companion.planning.graph_search.steps import STEP_X, STEP_Y, least_cost, step_cost
-from companion.planning.planner import Capabilities
-from companion.planning.problem import MIN_WEIGHT, Budget, Path, PlanningProblem, PlanResult, PlanStatus
+from companion.planning.planner import Capabilities, CompletePlanner
+from companion.planning.problem import MIN_WEIGHT, Path, PlanningProblem
 from companion.planning.raster import (
     HALF,
     ONE,
@@ -31,32 +31,57 @@ from companion.planning.raster import (
     CellArray,
     cells_cost,
     fine_steps,
-    plain,
     polyline,
     without_loops,
 )
-from companion.settings import PlannerSettings
 
 Floats = NDArray[np.float64]
 Fields = NDArray[np.int32]
 Mask = NDArray[np.bool_]
-NO_CELLS = (0, 2)
 ANYWHERE: Mask = np.zeros(0, np.bool_)
 SHORT_PIECE = 16
-"""So many fields of a line are looked at one by one."""
+"""A piece of a line with at most so many fields is checked field by field."""
 START_COST = 1e-300
-"""What the start costs: not 0, which means not reached, but lost in any sum."""
+"""The cost of the start: not 0, which means not reached, but too small to change any sum."""
+
+
+class Ground(NamedTuple):
+    """The map, and what makes the cost of a line fast.
+
+    ``counts``: see ``others_before``; pieces of a line over ground of the weight ``even`` are not checked field by
+    field.
+    """
+
+    weights: Floats
+    counts: Fields
+    even: float
+    corner_cutting: bool
+
+
+class Search(NamedTuple):
+    """A search; arrays have an entry for each field.
+
+    ``reached``: the cost of a field, 0 not reached, positive before and negative after the check of its line.
+    ``come_from``: its predecessor; the start is its own. ``corridor``: True where corners of the path may be; empty:
+    anywhere.
+    """
+
+    ground: Ground
+    reached: Floats
+    come_from: Fields
+    queue: Queue
+    corridor: Mask
 
 
 @njit(cache=True, nogil=True, inline="always")
 def _length(x: int, y: int) -> float:
-    """``math.hypot`` guards against overflow, which takes several times as long."""
+    """As ``math.hypot`` without its guard against overflow, which takes several times as long."""
     return math.sqrt(float(x * x + y * y))
 
 
 @njit(cache=True, nogil=True)
 def others_before(weights: Floats, even: float) -> Fields:
-    """Shape (height + 1, width + 1): how many fields with y and x less than these do not have this weight."""
+    """Shape (height + 1, width + 1): how many fields with smaller y and smaller x have another weight than this."""
     height, width = weights.shape
     counts = np.empty((height + 1, width + 1), np.int32)
     counts[0, :] = 0
@@ -71,19 +96,15 @@ def others_before(weights: Floats, even: float) -> Fields:
 
 @njit(cache=True, nogil=True)
 def _is_even(counts: Fields, x0: int, y0: int, x1: int, y1: int) -> bool:
-    """Whether all fields of the rectangle between two have the weight that ``counts`` were made for."""
+    """Whether all fields of the rectangle between two have the weight that ``counts`` was made for."""
     left, right, low, high = min(x0, x1), max(x0, x1) + 1, min(y0, y1), max(y0, y1) + 1
     return bool(counts[high, right] - counts[high, left] - counts[low, right] + counts[low, left] == 0)
 
 
-@njit(cache=True, nogil=True)
-def line_cost(
-    weights: Floats, counts: Fields, even: float, x0: int, y0: int, x1: int, y1: int, corner_cutting: bool
-) -> float:
-    """The cost of the straight line between two different fields, drawn as ``raster.polyline`` does; inf if it is blocked.
-
-    ``counts`` are ``others_before(weights, even)``: pieces of the line in even ground are not looked at field by field.
-    """
+@njit(cache=True, nogil=True, forceinline=True)
+def line_cost(ground: Ground, x0: int, y0: int, x1: int, y1: int) -> float:
+    """The cost of the line between two different fields, drawn as by ``raster.polyline``; inf if it is blocked."""
+    weights, counts, even, corner_cutting = ground
     steps, step_x, step_y = fine_steps(x1 - x0, y1 - y0)
     fine_x, fine_y = x0 * ONE + HALF, y0 * ONE + HALF
     last_x, last_y, total, done = x0, y0, 0.0, 0
@@ -126,21 +147,14 @@ def _piece_cost(
     return total
 
 
-@njit(cache=True, nogil=True)
-def _look(
-    weights: Floats,
-    counts: Fields,
-    even: float,
-    reached: Floats,
-    come_from: Fields,
-    field: int,
-    corner_cutting: bool,
-) -> float:
-    """Look at the line that the field was reached by on trust; put right its predecessor if need be. What it costs."""
+@njit(cache=True, nogil=True, forceinline=True)
+def _check_line(search: Search, field: int) -> float:
+    """Check the line to the field from its predecessor and, if need be, replace the predecessor. The field's cost."""
+    ground, reached, come_from = search.ground, search.reached, search.come_from
+    weights, corner_cutting = ground.weights, ground.corner_cutting
     width = weights.shape[1]
     x, y, seen_from = field % width, field // width, come_from[field]
-    from_x, from_y = seen_from % width, seen_from // width
-    best = -reached[seen_from] + line_cost(weights, counts, even, from_x, from_y, x, y, corner_cutting)
+    best = -reached[seen_from] + line_cost(ground, seen_from % width, seen_from // width, x, y)
     for i in range(8):
         # From the field back to a neighbour; the step itself is the opposite one.
         back = step_cost(weights, x, y, i, corner_cutting)
@@ -155,36 +169,24 @@ def _look(
 
 
 @njit(cache=True, nogil=True)
-def _search(
-    weights: Floats,
-    reached: Floats,
-    come_from: Fields,
-    heap: Fields,
-    place: Fields,
-    keys: Floats,
-    start: int,
-    target: int,
-    corner_cutting: bool,
-    corridor: Mask,
-) -> bool:
-    """Whether there is a way. Costs in ``reached`` as for A*: 0 not reached, positive on trust, negative looked at."""
+def _is_found(search: Search, start: int, target: int) -> bool:
+    """Search until the target is expanded (True) or nothing is left to expand (False)."""
+    ground, reached, come_from, queue, corridor = search
+    weights, corner_cutting = ground.weights, ground.corner_cutting
     anywhere = len(corridor) == 0
     width = weights.shape[1]
     target_x, target_y = target % width, target // width
-    even = weights[target_y, target_x]
-    least, counts = least_cost(weights.ravel(), even), others_before(weights, even)
+    least = least_cost(weights.ravel(), ground.even)
     reached[start], come_from[start] = START_COST, start
-    size = put(heap, place, keys, 0, start, 0.0, 0.0)
-    while size > 0:
-        here = heap[0]
-        size = take_out(heap, place, keys, size, here)
-        reached[here] = (
-            -_look(weights, counts, even, reached, come_from, here, corner_cutting) if here != start else -START_COST
-        )
+    put(queue, start, 0.0, 0.0)
+    while queue.heap[0] > 0:
+        here = queue.heap[1]
+        take_out(queue, here)
+        reached[here] = -_check_line(search, here) if here != start else -START_COST
         if here == target:
             return True
         x, y = here % width, here // width
-        # From where this field is seen its neighbours may be too: their cost grows along the line as it does by the step.
+        # The predecessor of this field may see its neighbours too: the cost along that line grows by the step's share.
         seen_from = come_from[here]
         near_x, near_y, near_cost = x - seen_from % width, y - seen_from // width, -reached[seen_from]
         near = _length(near_x, near_y)
@@ -200,7 +202,7 @@ def _search(
                 continue
             reached[field], come_from[field] = cost, seen_from
             ahead = least * _length(target_x - to_x, target_y - to_y)
-            size = put(heap, place, keys, size, field, cost + ahead, -cost)
+            put(queue, field, cost + ahead, -cost)
     return False
 
 
@@ -222,20 +224,21 @@ def _corners(come_from: Fields, width: int, target: int) -> CellArray:
 @njit(cache=True, nogil=True)
 def _any_angle(
     weights: Floats,
-    reached: Floats,
-    come_from: Fields,
-    heap: Fields,
-    place: Fields,
-    keys: Floats,
+    corner_cutting: bool,
     start: int,
     target: int,
-    corner_cutting: bool,
+    reached: Floats,
+    come_from: Fields,
+    queue: Queue,
     corridor: Mask,
 ) -> CellArray:
-    """The corners of the path; none if there is none. The arrays are zeros, one row for each field."""
-    if not _search(weights, reached, come_from, heap, place, keys, start, target, corner_cutting, corridor):
-        return np.empty(NO_CELLS, np.int64)
-    return _corners(come_from, weights.shape[1], target)
+    """The corners of the path; no rows if there is none. ``reached`` and ``come_from`` are zeros."""
+    width = weights.shape[1]
+    even = weights[target // width, target % width]
+    ground = Ground(weights, others_before(weights, even), even, corner_cutting)
+    if not _is_found(Search(ground, reached, come_from, queue, corridor), start, target):
+        return np.empty((0, 2), np.int64)
+    return _corners(come_from, width, target)
 
 
 def any_angle(weights: Floats, start: Cell, target: Cell, corner_cutting: bool, corridor: Mask = ANYWHERE) -> CellArray:
@@ -244,37 +247,28 @@ def any_angle(weights: Floats, start: Cell, target: Cell, corner_cutting: bool, 
     ``corridor``: True for fields, row after row, where corners may be; empty: anywhere.
     """
     fields, width = weights.size, weights.shape[1]
-    # Zeros of numpy's come from the system as needed: only what is searched is ever touched.
-    waiting, place, come_from = (np.zeros(fields, np.int32) for _ in range(3))
-    reached, keys = np.zeros(fields), np.zeros((fields, 2))
     ends = (start.y * width + start.x, target.y * width + target.x)
-    return _any_angle(weights, reached, come_from, waiting, place, keys, *ends, corner_cutting, corridor)
+    # numpy's zeros come from the system when they are used, so only what is searched is ever touched.
+    reached, come_from = np.zeros(fields), np.zeros(fields, np.int32)
+    return _any_angle(weights, corner_cutting, *ends, reached, come_from, empty_queue(fields), corridor)
 
 
 @njit(cache=True, nogil=True)
 def _drawn(weights: Floats, corners: CellArray) -> tuple[CellArray, float]:
-    """The fields of the path and what they cost."""
+    """The fields of the path and their cost."""
     cells = without_loops(polyline(corners))
     return cells, cells_cost(weights, cells)
 
 
-class ThetaStar:
-    """A path of straight lines at any angle, nearly as short as can be, or the proof that there is none."""
+class ThetaStar(CompletePlanner):
+    """A path of straight lines at any angle, nearly as short as possible, or the proof that there is none."""
 
     name = "theta-star"
     capabilities = Capabilities(proves_no_path=True, any_angle=True)
 
-    def __init__(self, settings: PlannerSettings) -> None:
-        del settings  # nothing to set
-
-    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
-        """See ``Planner.plan``. FOUND or NO_PATH; budget and generator are left alone. The curve is the corners."""
-        del budget, rng
-        if not ends_free(problem):
-            return PlanResult(PlanStatus.NO_PATH, None, self.name)
-        weights = plain(problem.weights)
+    def _path(self, problem: PlanningProblem, weights: Weights) -> Path | None:
         corners = any_angle(weights, problem.start, problem.target, problem.corner_cutting)
         if len(corners) == 0:
-            return PlanResult(PlanStatus.NO_PATH, None, self.name)
+            return None
         cells, cost = _drawn(weights, corners)
-        return PlanResult(PlanStatus.FOUND, Path(cells, cost, corners.astype(np.float64)), self.name)
+        return Path(cells, cost, corners.astype(np.float64))

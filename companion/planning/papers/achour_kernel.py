@@ -1,7 +1,7 @@
-"""The compiled part of the segment-wise genetic algorithm of Achour & Chaalal 2011.
+"""The compiled part of the genetic algorithm of Achour & Chaalal 2011, whose chromosomes are segments.
 
-A chromosome is a segment, two nodes of two whole coordinates each. All segments of a generation begin at the node where the path has got to, so
-only their final nodes are stored: arrays of shape (n, 2), columns x and y.
+A segment has two nodes of two whole coordinates each. All segments of a generation begin at the last node of the path
+so far, so only their final nodes are stored: arrays of shape (n, 2), columns x and y.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ import numpy as np
 from numba import njit
 
 from companion.core.grid import OBSTACLE, Weights
-from companion.planning.line_of_sight import free_samples, sees, shortened
+from companion.planning.papers.line_of_sight import free_samples, sees, shortened
 from companion.planning.random_numbers import State, seeded, whole
 from companion.planning.raster import CellArray
 
 
 class Task(NamedTuple):
-    """Where from and where to, the rule for corners, and how many fields the unit of length of the equations has."""
+    """Start, target, the rule for corners, and how many fields the unit of length in the equations has."""
 
     start_x: int
     start_y: int
@@ -30,7 +30,7 @@ class Task(NamedTuple):
 
 
 class Effort(NamedTuple):
-    """How hard to try; see ``AchourSettings``."""
+    """How long to search; see ``AchourSettings``."""
 
     samples: int
     neighbours: int
@@ -39,17 +39,13 @@ class Effort(NamedTuple):
     shorten: bool
 
 
-TaskValues = tuple[int, int, int, int, bool, float]
-EffortValues = tuple[int, int, int, int, bool]
-
-
 @njit(cache=True, nogil=True)
 def fitness(x: int, y: int, final_x: int, final_y: int, task: Task) -> float:
-    """Equations 4 to 6 for the segment from (x, y) to another field; more is better.
+    """Equations 4 to 6 for the segment from (x, y) to another field; higher is better.
 
-    d is the length of the way to the target through the segment's final node (equation 5), theta the slope of the straight line from
-    there to the target (equation 6), as a magnitude. Where theta is 0 equation 4 has its limit 1 / d. No segment is fitter than the one that
-    ends at the target.
+    d is the length of the way to the target through the segment's final node (equation 5). theta is the magnitude of
+    the slope of the straight line from there to the target (equation 6). Where theta is 0 equation 4 has its limit 1/d.
+    No segment is fitter than the one that ends at the target.
     """
     to_x, to_y = abs(task.target_x - final_x), abs(task.target_y - final_y)
     way = (math.hypot(final_x - x, final_y - y) + math.hypot(to_x, to_y)) / task.unit_fields
@@ -61,7 +57,7 @@ def fitness(x: int, y: int, final_x: int, final_y: int, task: Task) -> float:
 
 @njit(cache=True, nogil=True)
 def is_among(points: CellArray, x: int, y: int) -> bool:
-    """Whether a field is one of these."""
+    """Whether a field is one of the points."""
     for i in range(len(points)):  # noqa: SIM110 - compiled
         if points[i, 0] == x and points[i, 1] == y:
             return True
@@ -72,7 +68,10 @@ def is_among(points: CellArray, x: int, y: int) -> bool:
 def nearest_in_sight(
     weights: Weights, samples: CellArray, walk: CellArray, task: Task, finals: CellArray, most: int
 ) -> int:
-    """The first population: write the samples nearest to the end of the walk that it sees and has not been to. How many."""
+    """The first population: the samples nearest to the end of the walk that it sees and has not visited.
+
+    They are written to ``finals``; returns how many.
+    """
     x, y = walk[-1]
     squares = np.empty(most, np.int64)
     count = 0
@@ -96,9 +95,10 @@ def nearest_in_sight(
 
 @njit(cache=True, nogil=True)
 def cross(weights: Weights, walk: CellArray, task: Task, finals: CellArray, count: int, state: State) -> int:
-    """Pair the segments at random and exchange a coordinate of their final nodes (figure 3). How many there are with the offspring.
+    """Pair the segments at random and exchange a coordinate of their final nodes (figure 3).
 
-    Offspring that collide, that the initial node does not see, or where the walk has been, are not born.
+    Offspring are left out that collide, that the initial node does not see, or that the walk has visited. Returns the
+    number of segments with the offspring.
     """
     for i in range(count - 1, 0, -1):
         j = whole(state, 0, i)
@@ -120,12 +120,12 @@ def cross(weights: Weights, walk: CellArray, task: Task, finals: CellArray, coun
 
 @njit(cache=True, nogil=True)
 def fittest(walk: CellArray, task: Task, finals: CellArray, count: int) -> int:
-    """Which of the segments from the end of the walk is the fittest."""
+    """The index of the fittest segment from the end of the walk."""
     best, highest = 0, -np.inf
     for i in range(count):
         value = fitness(walk[-1, 0], walk[-1, 1], finals[i, 0], finals[i, 1], task)
         is_target = finals[i, 0] == task.target_x and finals[i, 1] == task.target_y
-        if is_target:  # by the equations it is the fittest; rounding must not say otherwise
+        if is_target:  # by the equations it is the fittest; rounding must not change that
             return i
         if value > highest:
             best, highest = i, value
@@ -134,7 +134,7 @@ def fittest(walk: CellArray, task: Task, finals: CellArray, count: int) -> int:
 
 @njit(cache=True, nogil=True)
 def attempt(weights: Weights, task: Task, effort: Effort, walk: CellArray, state: State) -> tuple[int, bool, int]:
-    """New samples, and segment by segment towards the target: nodes of the walk, whether it got there, segments rated.
+    """New samples, then segment by segment towards the target: nodes of the walk, whether it arrived, segments rated.
 
     ``walk`` has room for ``effort.iterations + 1`` nodes.
     """
@@ -159,14 +159,13 @@ def attempt(weights: Weights, task: Task, effort: Effort, walk: CellArray, state
 
 
 @njit(cache=True, nogil=True)
-def search(
-    weights: Weights, places: TaskValues, settings: EffortValues, seed: int
-) -> tuple[CellArray, int, int, int, int]:
+def search(weights: Weights, task: Task, effort: Effort, seed: int) -> tuple[CellArray, int, int, int, int]:
     """One whole search between two different free fields.
 
-    The nodes of the path (no rows: none was found), attempts made, iterations of the last one and of all, segments rated.
+    Returns the nodes of the path (no rows if none was found), the attempts made, the iterations of the last attempt and
+    of all, and the segments rated.
     """
-    task, effort, state = Task(*places), Effort(*settings), seeded(seed)
+    state = seeded(seed)
     walk = np.empty((effort.iterations + 1, 2), np.int64)
     iterations, rated = 0, 0
     for made in range(1, effort.attempts + 1):

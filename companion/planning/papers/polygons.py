@@ -1,8 +1,8 @@
-"""The obstacles of a map as polygons (shapely), for planners that go from corner to corner.
+"""The obstacles of a map as polygons (shapely), for planners whose paths go from corner to corner.
 
-A polygon here is an obstacle enlarged by the safe distance and rounded outward to field centres, so that a rover may stand
-on its corners. Lines between corners that keep out of the polygons are correct paths when they are drawn on the
-fields: no field of an obstacle is touched and no corner is cut.
+A polygon is an obstacle enlarged by the safe distance and rounded outward to field centres, so that a rover may be at
+its corners. Lines between corners that stay outside the polygons are correct paths when they are drawn on the fields:
+they touch no field of an obstacle and cut no corner.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from companion.core.grid import OBSTACLE, Weights, inflated
 Ints = NDArray[np.int64]
 
 GROWTH = 0.25
-"""How far beyond its fields an obstacle is drawn: obstacles that touch at a corner become one, two with one free field
-between them do not, and rounding a corner to whole fields always leads outward."""
+"""An obstacle is enlarged by this beyond its fields. So obstacles that touch at a corner are joined, two with a free
+field between them are not, and rounding a corner to whole fields always moves it outward."""
 NOTCH_FIELDS = 1.0
 
 
@@ -29,9 +29,9 @@ NOTCH_FIELDS = 1.0
 class Polygons:
     """All obstacles of a map, numbered from 1.
 
-    ``owner``: shape (height, width), the obstacle each field belongs to, 0 where the rover may go. ``corners``: shape
-    (n, 2), columns x and y in fields, ring after ring; a few may lie outside the map. ``rings``: shape (r, 2), columns first
-    corner and the one after the last; ``obstacle_rings[i - 1]`` to ``obstacle_rings[i]`` are the rings of obstacle i.
+    ``owner``: the obstacle of each field, 0 where the rover may go, shape (height, width). ``corners``: shape (n, 2),
+    columns x and y in fields, ring after ring; a few may be outside the map. ``rings``: shape (r, 2), columns first
+    corner and the index after the last. The rings of obstacle i are ``obstacle_rings[i - 1]`` to ``obstacle_rings[i]``.
     """
 
     owner: NDArray[np.int32]
@@ -85,8 +85,8 @@ def _painted(height: int, width: int, boxes: Ints, owners: Ints) -> NDArray[np.i
 def without_notches(corners: Ints, depth: float) -> Ints:
     """A ring (obstacle to the left) without the corners that no shortest path needs.
 
-    Those are points on a straight side and inward corners no deeper than ``depth``: the steps of a slanting side. Outward corners
-    stay, so the polygon only grows, and what it gains is too small to drive in.
+    Those are points on a straight side, and inward corners no deeper than ``depth``, as in the staircase of a slanting
+    side. Outward corners stay, so the polygon only grows, by notches that are too small to drive into.
     """
     count = len(corners)
     after, before = np.arange(1, count + 1) % count, np.arange(-1, count - 1) % count
@@ -102,7 +102,7 @@ def without_notches(corners: Ints, depth: float) -> Ints:
             after[p], before[n] = n, p
             left -= 1
             unchanged = 0
-            at = p  # what lies behind has a new neighbour: look at it again
+            at = p  # the one before has a new neighbour: check it again
         else:
             unchanged += 1
             at = n
@@ -134,9 +134,9 @@ def _rings_of(parts: NDArray[np.object_]) -> tuple[list[Ints], Ints]:
 
 
 def polygons_of(weights: Weights, safe_fields: float) -> Polygons:
-    """The obstacles of a map (float64, row after row), enlarged so that a point keeps ``safe_fields`` from their fields.
+    """The obstacles of a map (float64, row after row), enlarged to keep ``safe_fields`` from their fields.
 
-    Half a field is the least, the distance of a field's middle from its edge. See ``Polygons``.
+    The minimum is half a field, the distance of a field's centre from its edge. See ``Polygons``.
     """
     if safe_fields > 0.5:
         weights = inflated(weights, safe_fields)
@@ -150,7 +150,7 @@ def polygons_of(weights: Weights, safe_fields: float) -> Polygons:
             np.zeros(1, np.int64),
         )
     low, high = boxes[:, :2] - (0.5 + GROWTH), boxes[:, 2:] + (0.5 + GROWTH)
-    # Buffering them together by nothing unites them, in half the time of union_all.
+    # A buffer of 0 around all of them unites them in half the time of union_all.
     parts = shapely.get_parts(shapely.buffer(shapely.multipolygons(shapely.box(*low.T, *high.T)), 0.0))
     tree = shapely.STRtree(parts)
     found = tree.query(shapely.points((low + high) / 2.0), predicate="intersects")

@@ -1,7 +1,7 @@
-"""The compiled part of PRM with Lazy A*: the reference of Achour & Chaalal 2011, section IV.
+"""The compiled part of PRM (probabilistic roadmap) with Lazy A*: Achour & Chaalal 2011, section IV.
 
-Nodes are fields, shape (n, 2), columns x and y; node 0 is the start, node 1 the target. Nothing is known of a node or an edge until
-the query asks for it.
+Nodes are fields, shape (n, 2), columns x and y; node 0 is the start, node 1 the target. A node or an edge is not
+checked until the query needs it.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.core.grid import OBSTACLE, Weights
-from companion.planning.graph_search.heap import put, take_out
-from companion.planning.line_of_sight import DRAWS_A_SAMPLE, sees
+from companion.core.grid import OBSTACLE, Cell, Weights
+from companion.planning.graph_search.heap import Queue, put, take_out
+from companion.planning.papers.line_of_sight import DRAWS_A_SAMPLE, sees
 from companion.planning.random_numbers import State, seeded, uniform, whole
 from companion.planning.raster import CellArray
 
@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 
 
 class Effort(NamedTuple):
-    """How hard to try, and how edges are measured; see ``PrmSettings``."""
+    """How long to search, and how edges are measured; see ``PrmSettings``."""
 
     samples: int
     neighbours: int
@@ -34,9 +34,6 @@ class Effort(NamedTuple):
     weight_x: float
     weight_y: float
     corner_cutting: bool
-
-
-EffortValues = tuple[int, int, int, float, float, float, float, bool]
 
 
 @njit(cache=True, nogil=True)
@@ -49,7 +46,7 @@ def distance(nodes: CellArray, a: int, b: int, effort: Effort) -> float:
 
 @njit(cache=True, nogil=True)
 def link(nodes: CellArray, blocked: NDArray[np.bool_], effort: Effort) -> Ints:
-    """The B nearest of every node, seen or not, leaving out nodes known to be blocked; -1 where there are no more."""
+    """The B nearest of every node, in sight or not, without nodes known to be blocked; -1 where there are no more."""
     most = effort.neighbours
     near = np.full((len(nodes), most), -1, np.int32)
     lengths = np.empty(most)
@@ -74,7 +71,10 @@ def link(nodes: CellArray, blocked: NDArray[np.bool_], effort: Effort) -> Ints:
 
 @njit(cache=True, nogil=True)
 def edges_of(near: Ints) -> tuple[Ints, Ints, Ints]:
-    """Every link both ways, once: for node a the edges ``first[a]`` to ``first[a + 1]``, and where each comes from and leads to."""
+    """Every link once in both directions: (first edges, where each edge comes from, where it leads).
+
+    The edges of node a are ``first[a]`` to ``first[a + 1]``.
+    """
     count = len(near)
     degree = np.zeros(count + 1, np.int32)
     for a in range(count):
@@ -104,30 +104,27 @@ def query(
     tried: NDArray[np.int64],
     effort: Effort,
 ) -> Ints:
-    """Lazy A*: each node's predecessor on the best way from the start, -1 where none is known; the start is its own.
+    """Lazy A*: each node's predecessor on the best path from the start, -1 where none is known; the start is its own.
 
-    An edge waits at the price it would have and is looked at only when its turn comes: first the node it leads to, then the line. ``tried``
-    (columns: lines looked at, and of them blocked) is filled for both ends.
+    An edge waits in the queue with the cost it would have, and is checked only when it is expanded: first the node it
+    leads to, then the line. ``tried`` (columns: lines checked, lines blocked) is counted up for both ends of the line.
     """
     first, come_from, lead_to = edges_of(near)
-    heap, place, keys = (
-        np.empty(len(lead_to) + 1, np.int32),
-        np.zeros(len(lead_to), np.int32),
-        np.empty((len(lead_to), 2)),
-    )
+    count = len(lead_to)
+    queue = Queue(np.zeros(count + 1, np.int32), np.zeros(count, np.int32), np.empty((count, 2)))
     parent, cost = np.full(len(nodes), -1, np.int32), np.zeros(len(nodes))
     parent[0] = 0
-    here, size = 0, 0
+    here = 0
     while here != 1:
         for edge in range(first[here], first[here + 1]):
             there = lead_to[edge]
             if parent[there] < 0:
                 so_far = cost[here] + distance(nodes, here, there, effort)
-                size = put(heap, place, keys, size, edge, so_far + distance(nodes, there, 1, effort), -so_far)
+                put(queue, edge, so_far + distance(nodes, there, 1, effort), -so_far)
         here = -1
-        while size > 0 and here < 0:
-            edge = heap[0]
-            size = take_out(heap, place, keys, size, edge)
+        while queue.heap[0] > 0 and here < 0:
+            edge = queue.heap[1]
+            take_out(queue, edge)
             a, b = come_from[edge], lead_to[edge]
             blocked[b] = weights[nodes[b, 1], nodes[b, 0]] >= OBSTACLE
             if parent[b] >= 0 or blocked[b]:
@@ -135,7 +132,7 @@ def query(
             tried[a, 0] += 1
             tried[b, 0] += 1
             if sees(weights, nodes[a, 0], nodes[a, 1], nodes[b, 0], nodes[b, 1], effort.corner_cutting):
-                parent[b], cost[b], here = a, -keys[edge, 1], b
+                parent[b], cost[b], here = a, -queue.keys[edge, 1], b
             else:
                 tried[a, 1] += 1
                 tried[b, 1] += 1
@@ -161,9 +158,9 @@ def sample_difficult(
     new: CellArray,
     state: State,
 ) -> None:
-    """Fill ``new`` with fields around the nodes whose lines were blocked, the more the larger the share of them.
+    """Fill ``new`` with fields around the nodes whose lines were blocked, in proportion to the share of blocked ones.
 
-    ``reach``: how far to each side. Where no line was blocked there is no difficult region, and the fields are anywhere.
+    ``reach``: how far to each side. If no line was blocked there is no difficult region, and the fields are anywhere.
     """
     height, width = weights.shape
     shares = tried[:, 1] / np.maximum(tried[:, 0], 1)
@@ -183,14 +180,13 @@ def sample_difficult(
 
 
 @njit(cache=True, nogil=True)
-def search(
-    weights: Weights, start: tuple[int, int], target: tuple[int, int], settings: EffortValues, seed: int
-) -> tuple[CellArray, int, int, int]:
+def search(weights: Weights, start: Cell, target: Cell, effort: Effort, seed: int) -> tuple[CellArray, int, int, int]:
     """One whole search between two different free fields.
 
-    The nodes of the path (no rows: none was found), nodes of the roadmap, rounds of extra samples, lines looked at.
+    Returns the nodes of the path (no rows if none was found), the number of nodes of the roadmap, the rounds of extra
+    samples and the lines checked.
     """
-    effort, state = Effort(*settings), seeded(seed)
+    state = seeded(seed)
     shape = weights.shape
     reach = effort.reach * math.sqrt(shape[0] * shape[1] / effort.samples)
     nodes = np.empty((2 + effort.samples * (1 + effort.rounds), 2), np.int64)
@@ -198,32 +194,32 @@ def search(
     nodes[0, 0], nodes[0, 1] = start
     nodes[1, 0], nodes[1, 1] = target
     sample_anywhere(shape, nodes[2 : 2 + effort.samples], state)
-    looked = 0
+    checked = 0
     for done in range(effort.rounds + 1):
         used = 2 + effort.samples * (1 + done)
         tried = np.zeros((used, 2), np.int64)
         near = link(nodes[:used], blocked[:used], effort)
         parent = query(weights, nodes[:used], near, blocked, tried, effort)
-        looked += tried[:, 0].sum() // 2
+        checked += tried[:, 0].sum() // 2
         if parent[1] >= 0:
-            return _way(nodes, parent), used - 2, done, looked
+            return _path_nodes(nodes, parent), used - 2, done, checked
         if done < effort.rounds:
             sample_difficult(
                 weights, nodes[:used], tried, reach, effort.difficult_share, nodes[used : used + effort.samples], state
             )
-    return np.empty((0, 2), np.int64), used - 2, effort.rounds, looked
+    return np.empty((0, 2), np.int64), used - 2, effort.rounds, checked
 
 
 @njit(cache=True, nogil=True)
-def _way(nodes: CellArray, parent: Ints) -> CellArray:
-    """The nodes from the start to the target."""
+def _path_nodes(nodes: CellArray, parent: Ints) -> CellArray:
+    """The nodes of the path from the start to the target."""
     count, here = 1, 1
     while here != 0:
         here = parent[here]
         count += 1
-    way = np.empty((count, 2), np.int64)
+    path = np.empty((count, 2), np.int64)
     here = 1
     for i in range(count - 1, -1, -1):
-        way[i] = nodes[here]
+        path[i] = nodes[here]
         here = parent[here]
-    return way
+    return path

@@ -1,4 +1,7 @@
-"""The genetic algorithm of Sedighi et al. 2004, and its two forerunners. Compiled: one call is one search."""
+"""Selection, crossover and mutation of Sedighi et al. 2004 and its two predecessors.
+
+Compiled: one call is one search.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,7 @@ ROW_WISE, ONE_FLAG, SWITCHING = 0, 1, 2
 
 
 class Tuning(NamedTuple):
-    """The settings of the algorithm as the kernel wants them; see ``SedighiSettings``. ``freedom``: ROW_WISE and so on."""
+    """The settings of the algorithm; see ``SedighiSettings``. ``freedom``: ROW_WISE, ONE_FLAG or SWITCHING."""
 
     freedom: int
     population: int
@@ -58,7 +61,7 @@ def rate(measures: Numbers, fitness: NDArray[np.float64], tuning: Tuning) -> Non
 
 @njit(cache=True, nogil=True)
 def rank(fitness: NDArray[np.float64], order: Numbers) -> None:
-    """Put the indices of the population in order of fitness, best first. They are nearly so: insertion."""
+    """Sort the indices of the population by fitness, best first. By insertion, as they are nearly sorted."""
     for i in range(len(order)):
         order[i] = i
     for i in range(1, len(order)):
@@ -81,7 +84,7 @@ def select(order: Numbers, state: State) -> int:
 
 @njit(cache=True, nogil=True)
 def scatter(population: Chromosomes, sides: int, tuning: Tuning, state: State) -> None:
-    """The first population: every part anywhere."""
+    """The first population: every part of a chromosome at random."""
     count, genes = population.locations.shape
     for i in range(count):
         for k in range(genes):
@@ -105,7 +108,7 @@ def inherit(old: Chromosomes, new: Chromosomes, child: int, head: int, tail: int
 
 @njit(cache=True, nogil=True)
 def mutate(population: Chromosomes, child: int, sides: int, tuning: Tuning, state: State) -> None:
-    """Every gene, the flag and each switch value anew, each with the mutation's probability (section IV.C)."""
+    """Draw genes, the flag and switch values again, each with the mutation's probability (section IV.C)."""
     genes = population.locations.shape[1]
     probability = tuning.mutated_genes / genes
     for k in range(genes):
@@ -143,9 +146,10 @@ def breed(
 
 @njit(cache=True, nogil=True)
 def elite_of(order: Numbers, measures: Numbers) -> int:
-    """The fittest without collisions, and only where there is none the fittest of all.
+    """The fittest chromosome without collisions or, if there is none, the fittest of all.
 
-    By equations 1 and 2 alone the longest way round with the most turns, free as it is, may rate below a way that collides.
+    By equations 1 and 2 alone, a free path that is the longest and has the most turns may be less fit than one that
+    collides.
     """
     for i in order:
         if measures[i, 2] == 0:

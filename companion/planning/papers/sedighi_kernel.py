@@ -1,9 +1,10 @@
-"""What a chromosome of Sedighi et al. 2004 means: its path, and what that measures. Compiled.
+"""The path of a chromosome of Sedighi et al. 2004, and its length, turns and collisions. Compiled.
 
-A chromosome has n genes. Gene k stands for a row (row-wise movement) or for a column (column-wise), its location for the place
-in it: together the vertex k of the path. Vertices are joined by a horizontal and a vertical line; the direction of gene k says
-which of the two comes first on the way to vertex k + 1. ``modes`` has the flag (0: begins row-wise, 1: column-wise) and the two
-switch values: after gene s the movement is of the other kind; n - 1 is the paper's "no switch". Genes count from 0.
+A chromosome has n genes. Gene k stands for a row (row-wise movement) or a column (column-wise), and its location for
+the place in it: together vertex k of the path. Vertices are joined by a horizontal and a vertical line; the direction
+of gene k says which of the two comes first on the way to vertex k + 1. ``modes`` has the flag (0: begins row-wise, 1:
+column-wise) and two switch values: after gene s the movement is of the other kind; n - 1 is the paper's "no switch".
+Genes count from 0.
 """
 
 from __future__ import annotations
@@ -23,10 +24,10 @@ Counts = NDArray[np.int32]
 
 
 class Square(NamedTuple):
-    """The search space, n x n, laid over the map: which of the map's rows and columns belong to what is in a chromosome.
+    """The search space, n x n, laid over the map: the map's row and column for each gene and for each location.
 
-    ``gene_rows``, ``gene_columns``: shape (n,), of each gene; the first and last vertex are start and target (x, y), whatever
-    is in there. ``place_rows``, ``place_columns``: shape (side of the map,), of each location.
+    ``gene_rows``, ``gene_columns``: shape (n,), for each gene; the first and last vertex are always start and target
+    (x, y). ``place_rows``, ``place_columns``: shape (side of the map,), for each location.
     """
 
     gene_rows: Numbers
@@ -38,9 +39,9 @@ class Square(NamedTuple):
 
 
 class Ground(NamedTuple):
-    """Obstacles summed up, so that a line of any length is looked up at once.
+    """Cumulative counts of obstacles, so that a line of any length takes two look-ups.
 
-    ``across[y, x]``: obstacles of row y west of x, shape (height, width + 1). ``along[x, y]``: of column x south of y.
+    ``across[y, x]``: obstacles in row y west of x, shape (height, width + 1). ``along[x, y]``: in column x south of y.
     """
 
     across: Counts
@@ -59,7 +60,8 @@ class Chromosomes(NamedTuple):
 def spread(first: int, last: int, size: int, count: int) -> Numbers:
     """``count`` rows (or columns) from that of the start to that of the target, evenly.
 
-    Where these are fewer than ``count`` the stretch is widened to both sides, as far as the map (``size``) reaches.
+    If there are fewer than ``count`` between them, the range is widened to both sides as far as the map (``size``)
+    allows.
     """
     low, high = min(first, last), max(first, last)
     spare = max(min(count, size) - (high - low + 1), 0)
@@ -75,7 +77,7 @@ def spread(first: int, last: int, size: int, count: int) -> Numbers:
 
 @njit(cache=True, nogil=True)
 def square_over(width: int, height: int, start: tuple[int, int], target: tuple[int, int]) -> Square:
-    """The paper's square search space for any map and any ends: from corner to corner of a square map it is the map."""
+    """The paper's square search space for any map and any ends. From corner to corner of a square map it is the map."""
     genes = max(abs(target[0] - start[0]), abs(target[1] - start[1])) + 1
     side = max(width, height)
     places = np.arange(side)
@@ -105,7 +107,7 @@ def summed(weights: Weights) -> Ground:
 
 @njit(cache=True, nogil=True)
 def between(sums: Counts, line: int, here: int, there: int) -> int:
-    """Obstacles that a straight way along a row or column enters, the field it leaves not counted."""
+    """Obstacles on a straight line along a row or column, without its first field."""
     if there > here:
         return int(sums[line, there + 1] - sums[line, here + 1])
     return int(sums[line, here] - sums[line, there])
@@ -113,7 +115,7 @@ def between(sums: Counts, line: int, here: int, there: int) -> int:
 
 @njit(cache=True, nogil=True)
 def column_wise(modes: Numbers, i: int, k: int) -> bool:
-    """How chromosome i comes to its vertex k: by its flag, changed by the switches before k (C.1, C.4)."""
+    """Whether chromosome i moves column-wise to its vertex k: by its flag and the switches before k (C.1, C.4)."""
     flag, first, second = modes[i, 0], modes[i, 1], modes[i, 2]
     switches = (first < k) ^ ((second < k) & (second != first))  # two equal values are one switch
     return bool((flag == 1) ^ switches)
@@ -123,7 +125,7 @@ def column_wise(modes: Numbers, i: int, k: int) -> bool:
 def measure(square: Square, ground: Ground, population: Chromosomes, measures: Numbers) -> None:
     """Write every path's length in fields, its turns and its steps onto obstacles (section IV.A).
 
-    All arrays are taken out of their tuples first: handed on to a function for each vertex they cost most of the time.
+    All arrays are taken out of their tuples first: passing tuples to a function for each vertex takes most of the time.
     """
     locations, directions, modes = population
     gene_rows, gene_columns, place_rows, place_columns, start, target = square

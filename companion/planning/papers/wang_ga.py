@@ -1,7 +1,7 @@
-"""Wang, Sillitoe & Mulvaney 2007: paths from obstacle corner to obstacle corner, with speeds, among moving obstacles.
+"""The genetic algorithm of Wang, Sillitoe & Mulvaney 2007: paths along obstacle corners, speeds, moving obstacles.
 
-``vertex++`` is the paper's planner. ``vertex`` is its forerunner for static environments: no speeds, no moving obstacles, shortest
-path. A plan on the way is a new plan from where the robot is then, with the obstacles' new motion.
+``vertex++`` is the paper's planner. ``vertex`` is its predecessor for static environments: no speeds, no moving
+obstacles, shortest path. To replan on the way, plan anew from the robot's place with the obstacles' new tracks.
 """
 
 from __future__ import annotations
@@ -11,16 +11,16 @@ from itertools import product
 
 import numpy as np
 from numba import njit
-from numpy.random import Generator
 from numpy.typing import NDArray
 
-from companion.planning.ends import answered_at_once
+from companion.core.grid import Weights
 from companion.planning.papers.polygons import Polygons, polygons_of
-from companion.planning.papers.wang_kernel import GroundValues, search
-from companion.planning.papers.wang_movers import fleet_of
-from companion.planning.planner import Capabilities
-from companion.planning.problem import Budget, Mover, Path, PlanningProblem, PlanResult, PlanStatus
-from companion.planning.random_numbers import draw_seed
+from companion.planning.papers.wang_kernel import search
+from companion.planning.papers.wang_lines import Ground
+from companion.planning.papers.wang_moving_obstacles import fleet_of
+from companion.planning.papers.wang_operators import Rules, Task
+from companion.planning.planner import Capabilities, Outcome, RandomPlanner, from_settings
+from companion.planning.problem import Budget, ObstacleTrajectory, Path, PlanningProblem
 from companion.planning.raster import CellArray, cells_cost, plain, polyline
 from companion.settings import PlannerSettings
 from companion.settings.planners import VertexSettings
@@ -31,10 +31,11 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Plan:
-    """A search and what came of it.
+    """The result of a search.
 
-    ``corners``: shape (n, 2), the vertices of the path, columns x and y; no rows if nothing was found. ``speeds_fields_s``: shape
-    (n - 1,). ``value``: equation 1, or 3 plus the constant of equation 4. ``first_feasible``: the generation, -1 if there was none.
+    ``corners``: shape (n, 2), the vertices of the path, columns x and y; no rows if nothing was found.
+    ``speeds_fields_s``: shape (n - 1,). ``value``: equation 1, or 3 plus the constant of equation 4.
+    ``first_feasible``: the generation, -1 if there was none.
     """
 
     corners: Ints
@@ -54,7 +55,7 @@ def planned(
     """
     height, width = problem.weights.shape
     polygons = _polygons_for(problem, settings)
-    movers = problem.movers if timed else ()
+    movers = problem.moving_obstacles if timed else ()
     start, target = problem.start.y * width + problem.start.x, problem.target.y * width + problem.target.x
     corner_fields = _numbered(polygons.corners, width, height)
     around = _numbered(_mover_corners(movers, settings), width, height)
@@ -62,33 +63,23 @@ def planned(
     pool = pool[(pool >= 0) & (pool != start) & (pool != target)]
     low, high = problem.motion.speeds_fields_s
     speeds = np.linspace(low, high, settings.speed_levels) if timed and high > low else np.array([high])
-    weights = (settings.length_weight, settings.time_weight) if timed else (1.0, 0.0)
-    fields, levels, value, first, generations, evaluations = search(
+    weights = {} if timed else {"length_weight": 1.0, "time_weight": 0.0}
+    task = Task(
         _ground(polygons, corner_fields, len(pool), problem.corner_cutting),
         fleet_of(movers, settings.mover_safe_fields, settings.mover_timing_s),
-        (
-            *weights,
-            settings.population,
-            settings.generations,
-            settings.populations,
-            settings.most_genes,
-            settings.shorter_side,
-            settings.straight_line,
-            first_only,
-        ),
+        from_settings(Rules, settings, first_only=first_only, **weights),
         speeds,
         pool,
         start,
         target,
-        seed,
     )
-    return Plan(
-        np.column_stack((fields % width, fields // width)), speeds[levels[:-1]], value, first, generations, evaluations
-    )
+    fields, levels, value, first, generations, evaluations = search(task, seed)
+    corners = np.column_stack((fields % width, fields // width))
+    return Plan(corners, speeds[levels[:-1]], value, first, generations, evaluations)
 
 
 def _polygons_for(problem: PlanningProblem, settings: VertexSettings) -> Polygons:
-    """The obstacles enlarged by the safe distance, or by less if start or target would lie inside them."""
+    """The obstacles enlarged by the safe distance, or by less if start or target would be inside them."""
     weights = plain(problem.weights)
     for share in (1.0, 0.5, 0.0):
         polygons = polygons_of(weights, settings.safe_fields * share)
@@ -104,8 +95,8 @@ def _numbered(corners: Ints, width: int, height: int) -> Ints:
     return np.where(inside, y * width + x, -1)
 
 
-def _mover_corners(movers: tuple[Mover, ...], settings: VertexSettings) -> Ints:
-    """The corners of squares around moving obstacles where their segments begin and end: vertices like any other."""
+def _mover_corners(movers: tuple[ObstacleTrajectory, ...], settings: VertexSettings) -> Ints:
+    """The corners of squares around moving obstacles, where their segments begin and end: vertices like any other."""
     corners = [
         (round(x + right * reach), round(y + up * reach))
         for mover in movers
@@ -116,11 +107,11 @@ def _mover_corners(movers: tuple[Mover, ...], settings: VertexSettings) -> Ints:
     return np.array(corners, np.int64).reshape(-1, 2)
 
 
-def _ground(polygons: Polygons, corner_fields: Ints, vertices: int, corner_cutting: bool) -> GroundValues:
+def _ground(polygons: Polygons, corner_fields: Ints, vertices: int, corner_cutting: bool) -> Ground:
     size = 1024
     while size < min(4 * vertices * vertices, 1 << 18):
         size *= 2
-    return (
+    return Ground(
         polygons.owner,
         corner_fields,
         polygons.rings,
@@ -131,8 +122,8 @@ def _ground(polygons: Polygons, corner_fields: Ints, vertices: int, corner_cutti
     )
 
 
-class VertexGa:
-    """Both planners; they never prove that there is no path."""
+class WangGa(RandomPlanner):
+    """Both planners. Population and generations come from the settings, not from the budget."""
 
     def __init__(self, settings: PlannerSettings, timed: bool) -> None:
         self._settings = settings.vertex
@@ -140,19 +131,13 @@ class VertexGa:
         self.name = "vertex++" if timed else "vertex"
         self.capabilities = Capabilities(random=True, any_angle=True, moving_obstacles=timed, speeds=timed)
 
-    def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
-        """See ``Planner.plan``. FOUND or BUDGET_SPENT; population and generations are the planner's own settings."""
-        del budget
-        seed = draw_seed(rng)
-        if (answer := answered_at_once(problem, self.name)) is not None:
-            return answer
+    def _search(self, problem: PlanningProblem, weights: Weights, budget: Budget, seed: int) -> Outcome:
         plan = planned(problem, self._settings, seed, timed=self._timed)
         if len(plan.corners) == 0:
-            return PlanResult(PlanStatus.BUDGET_SPENT, None, self.name, plan.evaluations, plan.generations)
-        cells, cost = _drawn(plain(problem.weights), plan.corners)
+            return None, plan.evaluations, plan.generations, 0
+        cells, cost = _drawn(weights, plan.corners)
         speeds = plan.speeds_fields_s if self._timed else None
-        path = Path(cells, cost, plan.corners.astype(np.float64), speeds)
-        return PlanResult(PlanStatus.FOUND, path, self.name, plan.evaluations, plan.generations)
+        return Path(cells, cost, plan.corners.astype(np.float64), speeds), plan.evaluations, plan.generations, 0
 
 
 @njit(cache=True, nogil=True)
@@ -161,11 +146,11 @@ def _drawn(weights: Floats, corners: Ints) -> tuple[CellArray, float]:
     return cells, cells_cost(weights, cells)
 
 
-def vertex(settings: PlannerSettings) -> VertexGa:
+def vertex(settings: PlannerSettings) -> WangGa:
     """The planner for static environments."""
-    return VertexGa(settings, timed=False)
+    return WangGa(settings, timed=False)
 
 
-def vertex_plus(settings: PlannerSettings) -> VertexGa:
+def vertex_plus(settings: PlannerSettings) -> WangGa:
     """The planner with speeds and moving obstacles, ``vertex++``."""
-    return VertexGa(settings, timed=True)
+    return WangGa(settings, timed=True)

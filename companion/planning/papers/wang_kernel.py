@@ -1,51 +1,39 @@
-"""The genetic algorithm of Wang, Sillitoe & Mulvaney 2007, section II. Compiled: one call is one search.
+"""Fitness, selection and the main loop of Wang, Sillitoe & Mulvaney 2007, section II. Compiled: one call is one search.
 
-A chromosome is a row of genes, start and target included: a field, the speed towards the next one (as the number of a level) and
-whether the way there is infeasible. Fields are numbered row after row. Chromosomes live in rows of fixed length; ``order`` says
-which is best, second and so on, and its last two entries are rows for offspring.
+A chromosome is a row of genes, start and target included: a field, the speed towards the next one (the number of a
+level) and whether the segment to it is infeasible. Fields are numbered row after row. Chromosomes are stored in rows of
+fixed length. ``order`` lists these rows by fitness, best first; its last two entries are the rows for offspring.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.planning.papers.wang_lines import Ground, crossing_count
-from companion.planning.papers.wang_movers import Fleet, FleetValues, first_meeting, fit_shares
-from companion.planning.papers.wang_operators import Population, crossed, mutated, repaired, speed_mutated
+from companion.planning.papers.wang_lines import crossing_count
+from companion.planning.papers.wang_moving_obstacles import Fleet, Stretch, first_meeting, fit_shares
+from companion.planning.papers.wang_operators import (
+    Population,
+    Rules,
+    Task,
+    crossed,
+    mutated,
+    repaired,
+    speed_mutated,
+)
 from companion.planning.random_numbers import State, seeded, uniform, whole
 from companion.planning.raster import HALF, ONE, SHIFT, fine_steps
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
-GroundValues = tuple[NDArray[np.int32], Ints, Ints, Ints, bool, Ints, NDArray[np.int32]]
-RulesValues = tuple[float, float, int, int, int, int, float, bool, bool]
-
-
-class Rules(NamedTuple):
-    """The settings as the kernel wants them, see ``VertexSettings``.
-
-    ``speed_levels`` 1 is the planner for static environments: three operators. ``first_only``: stop at the first feasible path.
-    """
-
-    length_weight: float
-    time_weight: float
-    population: int
-    generations: int
-    populations: int
-    most_genes: int
-    shorter_side: float
-    straight_line: bool
-    first_only: bool
 
 
 @njit(cache=True, nogil=True)
 def own_crossing(width: int, fields: Ints, length: int, marks: Ints, mark: int) -> int:
-    """The first segment that comes to a field the path was on before; -1: none. A planner's path visits no field twice."""
+    """The first segment that visits a field again; -1: none. A planner's path must not visit a field twice."""
     marks[fields[0]] = mark
     for i in range(length - 1):
         x, y = fields[i] % width, fields[i] // width
@@ -66,18 +54,18 @@ def meetings(fleet: Fleet, time_s: float, x: int, y: int, to_x: int, to_y: int, 
     """How many moving obstacles a robot meets on its way from field to field."""
     distance = math.hypot(to_x - x, to_y - y)
     speed_x, speed_y = speed * (to_x - x) / distance, speed * (to_y - y) / distance
+    stretch = Stretch(time_s, time_s + distance / speed, float(x), float(y), speed_x, speed_y)
     count = 0
     for mover in range(len(fleet.radii)):
-        if first_meeting(fleet, mover, time_s, x, y, speed_x, speed_y, time_s + distance / speed) < np.inf:
+        if first_meeting(fleet, mover, stretch) < np.inf:
             count += 1
     return count
 
 
 @njit(cache=True, nogil=True)
-def evaluate(
-    ground: Ground, fleet: Fleet, speeds: Floats, rules: Rules, penalty: float, crowd: Population, row: int
-) -> None:
+def evaluate(task: Task, penalty: float, crowd: Population, row: int) -> None:
     """Set a chromosome's infeasibility bits and its value: equations 1 and 2, or 3 plus the constant of 4."""
+    ground, fleet, speeds, rules = task.ground, task.fleet, task.speeds, task.rules
     width = ground.owner.shape[1]
     fields, length = crowd.fields[row], crowd.lengths[row]
     distance, time_s, hits, bad = 0.0, 0.0, 0, 0
@@ -106,13 +94,12 @@ def evaluate(
 
 
 @njit(cache=True, nogil=True)
-def scatter(
-    crowd: Population, row: int, start: int, target: int, pool: Ints, longest: int, levels: int, state: State
-) -> None:
-    """A random chromosome (II.B): random length, random vertices without repetition, random speeds. Shuffles ``pool``."""
+def scatter(task: Task, crowd: Population, row: int, longest: int, state: State) -> None:
+    """A random chromosome (II.B): random length, random vertices without repetition, random speeds."""
+    pool, levels = task.pool, len(task.speeds)
     inner = whole(state, 0, longest - 2)
     fields = crowd.fields[row]
-    fields[0], fields[inner + 1] = start, target
+    fields[0], fields[inner + 1] = task.start, task.target
     for i in range(inner):
         other = whole(state, i, len(pool) - 1)
         pool[i], pool[other] = pool[other], pool[i]
@@ -124,7 +111,7 @@ def scatter(
 
 @njit(cache=True, nogil=True)
 def ranking(population: int) -> Floats:
-    """The roulette wheel: where each rank's slot ends, slots as wide as the square of the rank counted from the worst."""
+    """The roulette wheel: where each rank's slot ends. Its width is the square of the rank counted from the worst."""
     ends = np.empty(population)
     total = 0.0
     for rank in range(population):
@@ -135,7 +122,7 @@ def ranking(population: int) -> Floats:
 
 @njit(cache=True, nogil=True)
 def settle(crowd: Population, population: int, children: int) -> None:
-    """The offspring replace the worst; ``order`` is put right."""
+    """The offspring replace the worst; ``order`` is sorted again."""
     order, values = crowd.order, crowd.values
     for i in range(children):
         worst, child = population - 1 - i, population + i
@@ -149,29 +136,19 @@ def settle(crowd: Population, population: int, children: int) -> None:
 
 
 @njit(cache=True, nogil=True)
-def offspring(
-    ground: Ground,
-    fleet: Fleet,
-    speeds: Floats,
-    rules: Rules,
-    penalty: float,
-    wheel: Floats,
-    pool: Ints,
-    crowd: Population,
-    state: State,
-) -> int:
-    """One operator, chosen at random, on parents from the wheel (II.D, II.E); how many offspring it made."""
-    order, population = crowd.order, rules.population
-    kind = whole(state, 0, 3 if len(speeds) > 1 else 2)
+def offspring(task: Task, penalty: float, wheel: Floats, crowd: Population, state: State) -> int:
+    """Apply one operator, chosen at random, to parents from the wheel (II.D, II.E). Returns the number of offspring."""
+    order, population, levels = crowd.order, task.rules.population, len(task.speeds)
+    kind = whole(state, 0, 3 if levels > 1 else 2)
     rank = np.searchsorted(wheel, uniform(state), side="right")
     parent = order[rank]
     if kind == 0:
         other = order[np.searchsorted(wheel, uniform(state), side="right")]
         return crossed(crowd, parent, other, state)
     if kind == 1:
-        return mutated(crowd, parent, pool, state)
+        return mutated(crowd, parent, task.pool, state)
     if kind == 3:
-        return speed_mutated(crowd, parent, len(speeds), state)
+        return speed_mutated(crowd, parent, levels, state)
     feasible = 0
     while feasible < population and crowd.values[order[feasible]] < penalty:
         feasible += 1
@@ -179,7 +156,7 @@ def offspring(
         return 0
     if rank < feasible:
         parent = order[whole(state, feasible, population - 1)]
-    return repaired(ground, fleet, speeds, crowd, parent, rules.shorter_side, state)
+    return repaired(task, crowd, parent, state)
 
 
 @njit(cache=True, nogil=True)
@@ -203,32 +180,22 @@ def room_for(population: int, longest: int, fields: int) -> Population:
 
 @njit(cache=True, nogil=True)
 def settled(rules: Rules, generation: int, first: int, best: float, bound: float) -> bool:
-    """Whether to stop: nothing feasible in all populations, all generations used up since there was, or nothing can be better.
-
-    A population without a feasible path when its generations are used up is given up for a new one.
-    """
+    """Whether to stop: all populations ended without a feasible path, all generations after the first feasible path are
+    over, or no path can be better.  A population that has no feasible path after its generations is replaced by a new
+    one."""
     if first < 0:
         return generation >= rules.populations * rules.generations
     return generation >= first + rules.generations or rules.first_only or best <= bound * (1.0 + 1e-12)
 
 
 @njit(cache=True, nogil=True)
-def search(
-    ground_values: GroundValues,
-    fleet_values: FleetValues,
-    rules_values: RulesValues,
-    speeds: Floats,
-    pool: Ints,
-    start: int,
-    target: int,
-    seed: int,
-) -> tuple[Ints, Ints, float, int, int, int]:
-    """One whole search. ``speeds``: the levels, rising. ``pool``: the vertices to choose from, which are shuffled.
+def search(task: Task, seed: int) -> tuple[Ints, Ints, float, int, int, int]:
+    """One whole search.
 
-    Gives fields and speeds of the best chromosome (none if none is feasible), its value, the generation of the first feasible
-    one (-1: there was none), generations and evaluations.
+    Returns fields and speeds of the best chromosome (none if none is feasible), its value, the generation of the first
+    feasible one (-1: there was none), generations and evaluations.
     """
-    ground, fleet, rules = Ground(*ground_values), Fleet(*fleet_values), Rules(*rules_values)
+    ground, fleet, rules, speeds, pool, start, target = task
     height, width = ground.owner.shape
     state = seeded(seed)
     fit_shares(fleet, start % width, start // width, speeds[-1])
@@ -244,8 +211,8 @@ def search(
         if best >= penalty and generation % rules.generations == 0:
             for row in range(size):
                 genes = 2 if rules.straight_line and row == 0 else longest
-                scatter(crowd, row, start, target, pool, genes, len(speeds), state)
-                evaluate(ground, fleet, speeds, rules, penalty, crowd, row)
+                scatter(task, crowd, row, genes, state)
+                evaluate(task, penalty, crowd, row)
             crowd.order[:] = np.arange(size + 2)
             crowd.order[:size] = np.argsort(crowd.values[:size], kind="mergesort")
             evaluations += size
@@ -255,9 +222,9 @@ def search(
         if settled(rules, generation, first, best, bound):
             break
         generation += 1
-        children = offspring(ground, fleet, speeds, rules, penalty, wheel, pool, crowd, state)
+        children = offspring(task, penalty, wheel, crowd, state)
         for i in range(children):
-            evaluate(ground, fleet, speeds, rules, penalty, crowd, crowd.order[size + i])
+            evaluate(task, penalty, crowd, crowd.order[size + i])
         settle(crowd, size, children)
         evaluations += children
         best = crowd.values[crowd.order[0]]

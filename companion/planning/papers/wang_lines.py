@@ -1,4 +1,4 @@
-"""What lies under a straight line from field to field: which obstacles, and where it enters and leaves them. Compiled.
+"""Obstacles under a straight line from field to field, and detours along their corners. Compiled.
 
 Lines are those of ``raster.line_into``. Fields are numbered row after row: number = y * width + x.
 """
@@ -17,10 +17,10 @@ Ints = NDArray[np.int64]
 
 
 class Ground(NamedTuple):
-    """``polygons.Polygons`` with corners as field numbers (-1: outside the map), the rule for corners, and what is known already.
+    """``polygons.Polygons`` with corners as field numbers (-1: outside the map), rule for corners, a cache of lines.
 
-    ``corner_fields`` is in the order of the rings. ``known_lines`` and ``known_counts``: a table of lines that were looked at
-    before; a line's place follows from its ends, a newer one takes it over.
+    ``corner_fields`` is in the order of the rings. ``known_lines`` and ``known_counts`` are the cache: a line's place
+    in it follows from its ends, and a newer line replaces an older one.
     """
 
     owner: NDArray[np.int32]
@@ -34,9 +34,10 @@ class Ground(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def crossings(ground: Ground, start: int, end: int, found: Ints) -> int:
-    """How often a line between two free fields runs into obstacles; a cut corner counts.
+    """How often a line between two free fields enters an obstacle; a cut corner counts too.
 
-    The first of them are written to ``found``: columns obstacle, last field before it, first field behind it.
+    The first of these obstacles are written to ``found``: columns obstacle, last field before it, first field behind
+    it.
     """
     owner = ground.owner
     width = owner.shape[1]
@@ -66,7 +67,7 @@ def crossings(ground: Ground, start: int, end: int, found: Ints) -> int:
 
 @njit(cache=True, nogil=True)
 def crossing_count(ground: Ground, start: int, end: int, nothing: Ints) -> int:
-    """``crossings`` without the details, from the table if the line is in it. ``nothing`` has no rows."""
+    """``crossings`` without the details, from the cache if the line is in it. ``nothing`` has no rows."""
     line = start * ground.owner.size + end
     mask = len(ground.known_lines) - 1
     place = ((line * 0x9E3779B1) >> 15) & mask
@@ -102,9 +103,9 @@ def ring_of(ground: Ground, corner: int) -> int:
 
 @njit(cache=True, nogil=True)
 def walk(ground: Ground, ring: int, begin: int, end: int, step: int, chain: Ints, used: int) -> int:
-    """Add the fields of the corners from ``begin`` to ``end``, forwards or backwards round the ring, to ``chain[:used]``.
+    """Add the fields of the corners from ``begin`` to ``end``, either way round the ring, to ``chain[:used]``.
 
-    How many are used then, or -1: the way leads outside the map, or there are too many.
+    Returns how many are used then, or -1 if a corner is outside the map or there are too many.
     """
     first, past = ground.rings[ring, 0], ground.rings[ring, 1]
     at = begin
@@ -133,7 +134,7 @@ def chain_length(width: int, chain: Ints, begin: int, end: int) -> float:
 
 @njit(cache=True, nogil=True)
 def pulled(ground: Ground, chain: Ints, used: int, reach: int, nothing: Ints) -> int:
-    """Leave out the points of a chain that a free line can skip, at most ``reach`` at a time; how many are left."""
+    """Drop the points of a chain that a free line can skip, at most ``reach`` at a time. Returns how many are left."""
     kept, at = 1, 0
     while at < used - 1:
         ahead = min(at + reach, used - 1)

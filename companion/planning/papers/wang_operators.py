@@ -1,6 +1,6 @@
-"""The four operators of Wang, Sillitoe & Mulvaney 2007, II.D. Compiled. Offspring go to the rows behind the population.
+"""The four operators of Wang, Sillitoe & Mulvaney 2007, II.D: crossover, mutation, repair, speed mutation. Compiled.
 
-Each gives the number of offspring it made; 0 where it is inhibited.
+Offspring go to the rows behind the population. Each operator returns the number of offspring, 0 if it is inhibited.
 """
 
 from __future__ import annotations
@@ -13,20 +13,51 @@ from numba import njit
 from numpy.typing import NDArray
 
 from companion.planning.papers.wang_lines import Ground, chain_length, crossings, nearest_corner, pulled, ring_of, walk
-from companion.planning.papers.wang_movers import Fleet, exclusion, first_meeting, place
+from companion.planning.papers.wang_moving_obstacles import Fleet, Stretch, exclusion, first_meeting, place
 from companion.planning.random_numbers import State, uniform, whole
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 REACH = 16
-"""How many points of a detour one straight line may save: looking further takes longer than it is worth."""
+"""How many points of a detour one straight line may skip: more takes longer than it is worth."""
+
+
+class Rules(NamedTuple):
+    """The settings of the algorithm, see ``VertexSettings``. ``first_only``: stop at the first feasible path."""
+
+    length_weight: float
+    time_weight: float
+    population: int
+    generations: int
+    populations: int
+    most_genes: int
+    shorter_side: float
+    straight_line: bool
+    first_only: bool
+
+
+class Task(NamedTuple):
+    """What is to be solved, between two free fields.
+
+    ``speeds``: the levels, rising; a single one makes the planner for static environments, with three operators.
+    ``pool``: the vertices to choose from; the search shuffles them.
+    """
+
+    ground: Ground
+    fleet: Fleet
+    rules: Rules
+    speeds: Floats
+    pool: Ints
+    start: int
+    target: int
 
 
 class Population(NamedTuple):
-    """Chromosomes, a row each, and room to work in.
+    """Chromosomes, a row each, and scratch arrays.
 
-    ``marks``: one word a field, and ``marked``, the last mark given: a set of fields is emptied by taking the next mark.
+    ``marks``: a set of fields, one number for each field of the map. A field is in the set if its number is
+    ``marked[0]``, so adding 1 to that empties the set.
     """
 
     fields: Ints
@@ -44,9 +75,9 @@ class Population(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def put(crowd: Population, child: int, length: int) -> bool:
-    """Make a chromosome of the genes in ``room`` (fields in its first row, speeds in its second), without repeated vertices.
+    """Make a chromosome of the genes in ``room`` (row 0: fields, row 1: speeds), without repeated vertices.
 
-    Of repeated ones those of lower locus go. False if it is too long all the same.
+    Of repeated ones those of lower locus are dropped. False if the chromosome is still too long.
     """
     genes, levels = crowd.room[0], crowd.room[1]
     crowd.marked[0] += 1
@@ -70,7 +101,7 @@ def put(crowd: Population, child: int, length: int) -> bool:
 
 @njit(cache=True, nogil=True)
 def load(crowd: Population, row: int, begin: int, end: int, used: int) -> int:
-    """Add some genes of a chromosome to ``room``; how much of it is used then."""
+    """Add some genes of a chromosome to ``room``. Returns how many are used then."""
     for i in range(begin, end):
         crowd.room[0, used], crowd.room[1, used] = crowd.fields[row, i], crowd.speeds[row, i]
         used += 1
@@ -97,7 +128,7 @@ def crossed(crowd: Population, a: int, b: int, state: State) -> int:
 
 @njit(cache=True, nogil=True)
 def mutated(crowd: Population, parent: int, pool: Ints, state: State) -> int:
-    """Another vertex for one gene; inhibited if it is in the chromosome already."""
+    """Another vertex for one gene; inhibited if the chromosome contains it already."""
     length = crowd.lengths[parent]
     if length < 3 or len(pool) == 0:
         return 0
@@ -122,7 +153,7 @@ def speed_mutated(crowd: Population, parent: int, levels: int, state: State) -> 
 
 @njit(cache=True, nogil=True)
 def faulty_segment(crowd: Population, row: int, state: State) -> int:
-    """One of the infeasible segments, any with the same chance; -1: there is none."""
+    """One of the infeasible segments, each with the same probability; -1: there is none."""
     chosen, seen = -1, 0
     for i in range(crowd.lengths[row] - 1):
         if crowd.faulty[row, i]:
@@ -134,7 +165,7 @@ def faulty_segment(crowd: Population, row: int, state: State) -> int:
 
 @njit(cache=True, nogil=True)
 def round_obstacle(ground: Ground, crowd: Population, which: int, used: int, shorter_side: float, state: State) -> int:
-    """Add the corners round an obstacle that was run into to the detour in ``room[2]``; how many points it has then."""
+    """Add the corners round an obstacle to the detour in ``room[2]``. Returns how many points it has then."""
     found, chain, other = crowd.found, crowd.room[2], crowd.room[3]
     begin = nearest_corner(ground, found[which, 0], -1, found[which, 1])
     if begin < 0:
@@ -158,10 +189,9 @@ def round_obstacle(ground: Ground, crowd: Population, which: int, used: int, sho
 
 
 @njit(cache=True, nogil=True)
-def mover_corner(
-    ground: Ground, fleet: Fleet, speeds: Floats, crowd: Population, parent: int, segment: int, state: State
-) -> int:
-    """A corner of the exclusion area that this segment runs into, where it will be by then; -1: none is on free ground."""
+def mover_corner(task: Task, crowd: Population, parent: int, segment: int, state: State) -> int:
+    """A corner of the exclusion area that this segment enters, at that time; -1: no mover, or not on free ground."""
+    ground, fleet, speeds = task.ground, task.fleet, task.speeds
     height, width = ground.owner.shape
     fields, time_s = crowd.fields[parent], 0.0
     for i in range(segment + 1):
@@ -169,9 +199,10 @@ def mover_corner(
         speed, distance = speeds[crowd.speeds[parent, i]], math.hypot(to_x - x, to_y - y)
         time_s += distance / speed
     speed_x, speed_y = speed * (to_x - x) / distance, speed * (to_y - y) / distance
+    stretch = Stretch(time_s - distance / speed, time_s, float(x), float(y), speed_x, speed_y)
     soonest, met = np.inf, -1
     for mover in range(len(fleet.radii)):
-        when = first_meeting(fleet, mover, time_s - distance / speed, x, y, speed_x, speed_y, time_s)
+        when = first_meeting(fleet, mover, stretch)
         if when < soonest:
             soonest, met = when, mover
     if met < 0:
@@ -190,10 +221,9 @@ def mover_corner(
 
 
 @njit(cache=True, nogil=True)
-def repaired(
-    ground: Ground, fleet: Fleet, speeds: Floats, crowd: Population, parent: int, shorter_side: float, state: State
-) -> int:
-    """Lead one infeasible segment round everything that it runs into."""
+def repaired(task: Task, crowd: Population, parent: int, state: State) -> int:
+    """Lead one infeasible segment round all obstacles that it enters."""
+    ground, shorter_side = task.ground, task.rules.shorter_side
     segment = faulty_segment(crowd, parent, state)
     fields, length = crowd.fields[parent], crowd.lengths[parent]
     detour = crowd.room[2]
@@ -202,7 +232,7 @@ def repaired(
     for i in range(min(count, len(crowd.found))):
         used = round_obstacle(ground, crowd, i, used, shorter_side, state)
     if count == 0:
-        corner = mover_corner(ground, fleet, speeds, crowd, parent, segment, state)
+        corner = mover_corner(task, crowd, parent, segment, state)
         if corner < 0 or corner == fields[0] or corner == fields[length - 1]:
             return 0
         detour[1], used = corner, 2

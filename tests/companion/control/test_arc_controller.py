@@ -21,7 +21,7 @@ from companion.executive.goal_driver import GoalDriver
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
-from companion.navigation.search_budget import Searcher
+from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import InlineRunner
 from companion.perception.moving_obstacles import Moving
 from companion.planning.problem import PlanningProblem
@@ -308,7 +308,7 @@ def test_the_planner_is_told_heading_and_radius() -> None:
             asked.append(problem)
             return planner.plan(problem, budget, rng)
 
-    searcher = Searcher(Spy(), SETTINGS.navigator, np.random.default_rng(1))
+    searcher = PathSearcher(Spy(), SETTINGS.navigator, np.random.default_rng(1))
     driver = GoalDriver(ground(), ROVER, SETTINGS, searcher, InlineRunner())
     start = pose(30.0)
     there = NedPoint(MIDDLE, MIDDLE + 10.0)

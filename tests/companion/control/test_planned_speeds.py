@@ -16,7 +16,7 @@ from companion.executive.setpoint_sender import SentSetpoints
 from companion.mapping.evidence_map import integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
-from companion.navigation.search_budget import Searcher
+from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import InlineRunner
 from companion.perception.moving_obstacles import Moving
 from companion.planning.planner import Capabilities
@@ -52,7 +52,7 @@ def driver(planner: Straight) -> GoalDriver:
     scan = RangeScan(0.0, bearings, np.full(72, np.inf), 0.1, 8.0, np.radians(5.0), "test")
     for stamp in (1, 2, 3):
         integrate(evidence, at(0.0), scan, stamp)
-    searcher = Searcher(planner, SETTINGS.navigator, np.random.default_rng(1))
+    searcher = PathSearcher(planner, SETTINGS.navigator, np.random.default_rng(1))
     result = GoalDriver(evidence, RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, InlineRunner())
     result.head_for(GOAL, at(0.0))
     return result

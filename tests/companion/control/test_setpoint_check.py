@@ -287,4 +287,4 @@ def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path
     driver.update = lambda *_: (out, None)  # type: ignore[method-assign]
     rig.run_for(15.0)
     assert any("setpoint leads over the border of the autopilot's fence" in text for text in rig.texts())
-    assert rig.simulator._vehicle.plan.fence.count == 0 and rig.speed_m_s < 0.05
+    assert rig.simulator._vehicle.fence.count == 0 and rig.speed_m_s < 0.05

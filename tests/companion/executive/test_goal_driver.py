@@ -14,7 +14,7 @@ from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Decision, NavState
-from companion.navigation.search_budget import Searcher
+from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import InlineRunner, StepCall, StepRunner, ThreadRunner
 from companion.planning.registry import make_planner
 from companion.settings import Settings
@@ -66,7 +66,7 @@ def seen_map(pose: Pose) -> EvidenceMap:
 
 def driver(runner: StepRunner, pose: Pose) -> GoalDriver:
     planner = make_planner("hybrid", SETTINGS.planner)
-    searcher = Searcher(planner, SETTINGS.navigator, np.random.default_rng(1))
+    searcher = PathSearcher(planner, SETTINGS.navigator, np.random.default_rng(1))
     return GoalDriver(seen_map(pose), RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, runner)
 
 

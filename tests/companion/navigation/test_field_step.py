@@ -15,7 +15,7 @@ from companion.navigation.field_step import (
     Part,
     SearchKind,
     abandon_path,
-    begin,
+    initial_state,
     is_clear,
     simplified,
     step,
@@ -80,13 +80,13 @@ def returning(past: tuple[Cell, ...] = ROW[:6], until_search: int = 3) -> NavSta
 
 def test_the_first_step_has_no_path_and_searches_thoroughly():
     search = Scripted(Path(ROW, 4.5))
-    state, decision = step(begin(ROW[0], TARGET), ground(), ROW[0], search)
+    state, decision = step(initial_state(ROW[0], TARGET), ground(), ROW[0], search)
     assert search.asked == [(THOROUGH, ROW[0], TARGET)]
     assert (decision.action, decision.part, decision.path) == (Action.FOLLOW, Part.SEARCH, ROW)
     assert decision.new_path is state.current and not state.returning
 
 
-@pytest.mark.parametrize("state", [begin(ROW[0], ROW[0]), replace(exploring(8), target=ROW[9])])
+@pytest.mark.parametrize("state", [initial_state(ROW[0], ROW[0]), replace(exploring(8), target=ROW[9])])
 def test_the_loop_ends_at_the_target(state):
     _, decision = step(state, ground(), state.target, unused)
     assert decision.action is Action.REACHED and decision.path == ()
@@ -288,7 +288,7 @@ def test_a_new_path_is_followed_for_five_fields_before_the_next_look():
 
 
 def test_the_number_of_fields_between_looks_is_a_setting():
-    state = replace(begin(ROW[0], TARGET, better_every=2), current=Path(ROW, 4.5))
+    state = replace(initial_state(ROW[0], TARGET, better_every=2), current=Path(ROW, 4.5))
     search = Scripted(NEVER)
     for x in range(1, 7):
         state, _ = step(state, ground(), ROW[x], search)
@@ -354,13 +354,13 @@ def test_in_vain_the_past_path_is_simplified_and_part_a_follows_in_the_same_step
 
 def test_in_vain_at_the_start_is_unreachable_in_the_same_step():
     search = Scripted(PROVED)
-    _, decision = step(begin(ROW[0], TARGET), ground(), ROW[0], search)
+    _, decision = step(initial_state(ROW[0], TARGET), ground(), ROW[0], search)
     assert decision.action is Action.UNREACHABLE and decision.proved
     assert decision.searches == (THOROUGH, THOROUGH) == tuple(search.kinds)
 
 
 def test_in_vain_at_the_start_the_last_search_may_still_find_a_path():
-    _, decision = step(begin(ROW[0], TARGET), ground(), ROW[0], Scripted(NEVER, Path(ROW, 4.5)))
+    _, decision = step(initial_state(ROW[0], TARGET), ground(), ROW[0], Scripted(NEVER, Path(ROW, 4.5)))
     assert decision.action is Action.FOLLOW and not decision.proved
 
 

@@ -11,9 +11,9 @@ from scipy.stats import binom
 
 from companion.core.grid import Cell
 from companion.planning.graph_search.dijkstra import Dijkstra
-from companion.planning.line_of_sight import sees
 from companion.planning.papers.achour_ga import walked
 from companion.planning.papers.achour_kernel import Task, cross, fitness, fittest, nearest_in_sight
+from companion.planning.papers.line_of_sight import sees
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
 from companion.planning.random_numbers import seeded
 from companion.planning.raster import is_path
@@ -35,7 +35,8 @@ def task(target, unit_fields=1.0, corner_cutting=False):
 @pytest.mark.parametrize(
     ("node", "final", "target", "unit_fields", "value"),
     [
-        # by hand from the printed equations: d = 5 + 5, theta = atan(4/3) = 0.9272952: e^-0.09272952 / 10 - e^-10.784052
+        # by hand from the printed equations: d = 5 + 5, theta = atan(4/3) = 0.9272952: e^-0.09272952 / 10 -
+        # e^-10.784052
         ((0, 0), (3, 4), (6, 8), 1.0, 0.091123272),
         # d = 5 + 8, theta = pi/2: e^-0.12083049 / 13 - e^-8.2760571
         ((30, 20), (60, 60), (60, 140), 10.0, 0.067913474),

@@ -8,8 +8,6 @@ from hypothesis import strategies as st
 from companion.core.grid import Cell
 from companion.planning.bspline_ga import bspline
 from companion.planning.bspline_ga.fitness import (
-    Task,
-    Tuning,
     fitness,
     is_correct,
     large_value,
@@ -17,8 +15,9 @@ from companion.planning.bspline_ga.fitness import (
     way_points_for,
 )
 from companion.planning.bspline_ga.operators import breed, scatter
+from companion.planning.bspline_ga.parameters import Lifetime, Task, Tuning, tuning_of
 from companion.planning.bspline_ga.planner import BsplineGa
-from companion.planning.bspline_ga.population import evolve, measured
+from companion.planning.bspline_ga.population import Evolution, evolve, measured
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
 from companion.planning.random_numbers import seeded
 from companion.planning.raster import first_fault, polyline
@@ -26,7 +25,7 @@ from companion.settings import PlannerSettings
 from tests.support.planning_maps import drawn, one_obstacle
 
 VLN = 100_000.0
-TUNING = Tuning(5, 0, 0.8, 0.25, 0.4, 1.0, 0.5, 0.2, 0.2, 1, VLN)
+TUNING = Tuning(*tuning_of(PlannerSettings(span_way_points=0, obstacle_value=VLN)))
 TABLE_1 = {"GA 1": Budget(1, 500, (4,), 40), "GA 2": Budget(1, 500, (4,), 100), "GA 3": Budget(1, 500, (5,), 100)}
 
 
@@ -35,29 +34,32 @@ def ga(**changes):
 
 
 def value_of(weights, genes, corner_cutting=True, way_points=5, limit=np.inf):
-    first, basis = bspline.basis(len(genes), way_points)
-    return fitness(weights, genes, first, basis, corner_cutting, VLN, limit)
+    basis = bspline.basis(len(genes), way_points)
+    return fitness(weights, genes, basis, Task(0, 0, 0, 0, corner_cutting), VLN, limit)
 
 
 def test_by_length_the_straighter_of_two_ways_over_as_many_fields_is_fitter():
     """Both lead over 40 fields of open ground; fields alone cannot tell them apart."""
     weights = np.full((30, 41), 0.5)
-    first, basis = bspline.basis(4, 5)
+    basis = bspline.basis(4, 5)
     straight = np.array([[0, 10], [13, 10], [27, 10], [40, 10]])
     bent = np.array([[0, 10], [13, 16], [27, 16], [40, 10]])
     counted, by_length = (
-        [fitness(weights, genes, first, basis, False, VLN, np.inf, flag) for genes in (straight, bent)]
+        [
+            fitness(weights, genes, basis, Task(0, 0, 0, 0, False, by_length=flag), VLN, np.inf)
+            for genes in (straight, bent)
+        ]
         for flag in (False, True)
     )
     assert counted[0] == counted[1] == by_length[0] == pytest.approx(19.5)
-    places = [way_point(bent, first, basis, i) for i in range(5)]
+    places = [way_point(bent, basis, i) for i in range(5)]
     length = sum(np.hypot(b[0] - a[0], b[1] - a[1]) for a, b in pairwise(places))
     assert by_length[1] == pytest.approx(0.5 * length - 0.5)
 
 
 def walk_of(genes, way_points=5):
-    first, basis = bspline.basis(len(genes), way_points)
-    return polyline(np.array([way_point(genes, first, basis, i) for i in range(way_points)]))
+    basis = bspline.basis(len(genes), way_points)
+    return polyline(np.array([way_point(genes, basis, i) for i in range(way_points)]))
 
 
 def cluttered(seed, share=0.1):
@@ -184,13 +186,14 @@ def test_mutation_hits_four_genes_of_ten_within_half_the_smaller_side_and_never_
     assert (changed != 0).mean() == pytest.approx(0.4 * 50 / 51, abs=0.018)
 
 
-def plainly_evolved(weights, task, tuning, control_points, population, min_epochs, max_epochs, state):
+def plainly_evolved(weights, task, tuning, lifetime, control_points, state):
     """Section 3 without any shortcut: whole populations, whole sums, a stable sort."""
+    population, min_epochs, max_epochs = lifetime
     height, width = weights.shape
-    first, basis = bspline.basis(control_points, way_points_for(control_points, tuning))
+    basis = bspline.basis(control_points, way_points_for(control_points, tuning))
 
     def measured(genes):
-        return fitness(weights, genes, first, basis, task.corner_cutting, VLN, np.inf)
+        return fitness(weights, genes, basis, task, VLN, np.inf)
 
     people = []
     for i in range(population):
@@ -217,7 +220,7 @@ def plainly_evolved(weights, task, tuning, control_points, population, min_epoch
 def test_keeping_only_the_selected_and_stopping_sums_early_changes_nothing(seed, control_points, population, cutting):
     weights = cluttered(seed, 0.25)
     task = Task(0, 15, 39, 15, cutting)
-    arguments = (weights, task, TUNING, control_points, population, 4, 12)
+    arguments = (weights, task, TUNING, Lifetime(population, 4, 12), control_points)
     value, genes, epochs, evaluations = evolve(*arguments, seeded(seed))
     expected_value, expected_genes, expected_epochs = plainly_evolved(*arguments, seeded(seed))
     assert value == pytest.approx(expected_value, rel=1e-12)
@@ -284,11 +287,11 @@ def test_a_glance_at_a_large_map_rejects_only_what_the_whole_sum_would(seed, obs
         weights[rng.integers(0, 400) :, x : x + 60] = 1.0
     genes = np.array([(3, 300), *rng.integers((0, 0), (1200, 600), (2, 2)), (1190, 300)])
     weights[300, [3, 1190]] = 0.5
-    first, basis = bspline.basis(4, 5)
+    basis = bspline.basis(4, 5)
     limit = obstacles * VLN
     task = Task(3, 300, 1190, 300, False)
-    whole = fitness(weights, genes, first, basis, False, VLN, np.inf)
-    value = measured(weights, genes, first, basis, task, VLN, limit)
+    whole = fitness(weights, genes, basis, task, VLN, np.inf)
+    value = measured(Evolution(weights, task, TUNING, Lifetime(30, 1, 500), VLN), genes, basis, limit)
     assert value == whole if whole < limit else value >= limit
 
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.planning.bspline_ga.planner import BsplineGa
-from companion.planning.problem import Motion, PlanStatus, path_cost
+from companion.planning.problem import PlanStatus, VehicleMotion, path_cost
 from companion.planning.raster import first_fault, plain
 from companion.settings import PlannerSettings
 from tests.companion.planning.test_planner_contract import BUDGET, problems
@@ -19,7 +19,7 @@ VARIANTS = {
     "islands": {"islands": 3, "migrate_every": 4},
     "all": {"adaptive": True, "islands": 2, "migrate_every": 1, "threads": 1},
 }
-motions = st.builds(Motion, st.one_of(st.none(), st.floats(-4.0, 4.0)), st.sampled_from([0.0, 0.7, 2.0, 50.0]))
+motions = st.builds(VehicleMotion, st.one_of(st.none(), st.floats(-4.0, 4.0)), st.sampled_from([0.0, 0.7, 2.0, 50.0]))
 
 
 @pytest.mark.parametrize("name", VARIANTS)

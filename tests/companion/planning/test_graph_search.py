@@ -12,8 +12,8 @@ from companion.planning.graph_search.astar import Astar
 from companion.planning.graph_search.astar_kernel import shortest
 from companion.planning.graph_search.dijkstra import Dijkstra
 from companion.planning.graph_search.dstar_lite import DstarLite
-from companion.planning.graph_search.steps import least_cost
-from companion.planning.graph_search.theta_star import ThetaStar, line_cost, others_before
+from companion.planning.graph_search.steps import Query, least_cost
+from companion.planning.graph_search.theta_star import Ground, ThetaStar, line_cost, others_before
 from companion.planning.problem import MIN_WEIGHT, Budget, PlanningProblem, PlanStatus
 from companion.planning.raster import cells_cost, is_path, polyline
 from companion.settings import PlannerSettings
@@ -90,7 +90,7 @@ def test_the_path_is_a_cheapest_one_however_little_room_the_queue_begins_with(wo
     start, target = some_cell(rng, weights), some_cell(rng, weights)
     weights[start.y, start.x] = weights[target.y, target.x] = 0.5
     best = plan(Dijkstra(SETTINGS), PlanningProblem(weights, start, target, corner_cutting)).path
-    cells = shortest(weights, np.zeros(weights.size, np.int64), room, *start, *target, corner_cutting)
+    cells = shortest(weights, np.zeros(weights.size, np.int64), room, Query(*start, *target, corner_cutting))
     assert (len(cells) == 0) == (best is None)
     if best is not None:
         assert cells_cost(weights, cells) == pytest.approx(best.cost, rel=1e-9)
@@ -148,15 +148,15 @@ def test_dstar_lite_repeats_for_the_same_sequence(seed):
 def test_dstar_lite_repairs_instead_of_searching_anew():
     problem, planner = one_obstacle(4), DstarLite(SETTINGS)
     path = plan(planner, problem).path
-    begun = planner._memory
+    begun = planner._search
     weights = problem.weights.copy()
     x, y = path.cells[-5]  # near the target, where the search began: not even the easiest case
     weights[y, x] = 1.0
     changed = PlanningProblem(weights, path.cells[3], problem.target)
     assert_as_cheap(plan(planner, changed), plan(Dijkstra(SETTINGS), changed))
-    assert planner._memory.g is begun.g
+    assert planner._search.g is begun.g
     plan(planner, PlanningProblem(weights, path.cells[3], Cell(1, 1)))
-    assert planner._memory.g is not begun.g
+    assert planner._search.g is not begun.g
 
 
 def test_theta_star_goes_straight_at_any_angle():
@@ -176,7 +176,7 @@ def test_theta_star_turns_only_at_the_obstacles_corners():
 
 def cost_of_line(weights, x0, y0, x1, y1, corner_cutting):
     even = weights[y1, x1]
-    return line_cost(weights, others_before(weights, even), even, x0, y0, x1, y1, corner_cutting)
+    return line_cost(Ground(weights, others_before(weights, even), even, corner_cutting), x0, y0, x1, y1)
 
 
 @given(st.integers(0, 2**32 - 1), st.integers(0, 4), st.booleans())

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom
 
-from companion.planning.line_of_sight import free_samples, sees, shortened
+from companion.planning.papers.line_of_sight import free_samples, sees, shortened
 from companion.planning.random_numbers import seeded
 from companion.planning.raster import first_fault, polyline
 from tests.support.planning_maps import drawn

@@ -1,4 +1,4 @@
-"""Obstacles as polygons: which fields they own, where their corners lie, and that lines between corners are correct paths."""
+"""Obstacles as polygons: their fields and corners, and that lines between corners are correct paths."""
 
 import numpy as np
 import pytest

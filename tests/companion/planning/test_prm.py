@@ -1,4 +1,4 @@
-"""The roadmap of Achour & Chaalal 2011: weighted L-infinity, Lazy A*, extra samples where lines are blocked, and success."""
+"""The roadmap of Achour & Chaalal 2011: weighted L-infinity, Lazy A*, extra samples near blocked lines, success."""
 
 from itertools import pairwise
 
@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.stats import binom
 
 from companion.core.grid import Cell
-from companion.planning.line_of_sight import sees
+from companion.planning.papers.line_of_sight import sees
 from companion.planning.papers.prm import queried
 from companion.planning.papers.prm_kernel import Effort, distance, link, query, sample_difficult
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
@@ -93,7 +93,7 @@ def test_lazy_a_star_finds_the_shortest_way_along_lines_in_sight(made):
 
 
 def test_lazy_a_star_looks_at_few_lines():
-    """On open ground half of the queries look at fewer than a fifth of the lines there are, and none at fewer than its path has."""
+    """On open ground half of the queries check fewer than a fifth of all lines, and none fewer than its path has."""
     problem = PlanningProblem(np.full((200, 200), 0.5), Cell(10, 10), Cell(180, 190))
     queries = [queried(problem, PrmSettings(), seed) for seed in range(100)]
     assert all(len(made.nodes) - 1 <= made.lines for made in queries)

@@ -105,7 +105,7 @@ def test_taut_corners_see_each_other(problem):
 
 
 def test_taut_is_nearly_as_short_as_any_angle_search_on_the_whole_map():
-    """A corridor is enough: over random clutter the mean is within 3 % of a search of the whole map, room at corners included."""
+    """A corridor is enough: in random clutter the mean is within 3 % of a search of the whole map."""
     ratios = []
     for seed in range(20):
         rng = np.random.default_rng(seed)

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from companion.core.grid import Cell
 from companion.planning.bspline_ga import bspline
 from companion.planning.bspline_ga.planner import BsplineGa
-from companion.planning.bspline_ga.turning import sharpest
-from companion.planning.problem import Budget, Motion, PlanningProblem
+from companion.planning.bspline_ga.turning import greatest_curvature_per_field
+from companion.planning.problem import Budget, PlanningProblem, VehicleMotion
 from companion.settings import PlannerSettings
 from tests.support.planning_maps import one_obstacle
 
@@ -24,7 +24,7 @@ def plan(problem, seed, budget=BUDGET, **changes):
 
 
 def turning(problem, radius, heading=None):
-    return PlanningProblem(problem.weights, problem.start, problem.target, motion=Motion(heading, radius))
+    return PlanningProblem(problem.weights, problem.start, problem.target, motion=VehicleMotion(heading, radius))
 
 
 def greatest_curvature(line):
@@ -39,7 +39,7 @@ def greatest_curvature(line):
 @given(st.lists(st.tuples(st.integers(0, 60), st.integers(0, 60)), min_size=3, max_size=7))
 def test_the_sharpest_curvature_is_that_of_a_fine_line(points):
     control = np.array(points, float)
-    exact = max(sharpest(control, span) for span in range(len(control) - 2))
+    exact = max(greatest_curvature_per_field(control, span) for span in range(len(control) - 2))
     if exact > 2.0:  # nearly a cusp: differences over finite lengths cannot see it
         return
     line = bspline.curve(control, FINE)

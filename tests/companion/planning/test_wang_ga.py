@@ -7,7 +7,7 @@ from companion.core.grid import BASE_WEIGHT, Cell
 from companion.planning.papers.wang_ga import planned
 from companion.planning.papers.wang_kernel import ranking, room_for, settle
 from companion.planning.papers.wang_operators import crossed, mutated, put, speed_mutated
-from companion.planning.problem import Budget, Motion, Mover, PlanningProblem, PlanStatus
+from companion.planning.problem import Budget, ObstacleTrajectory, PlanningProblem, PlanStatus, VehicleMotion
 from companion.planning.random_numbers import seeded
 from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
@@ -53,39 +53,41 @@ def crowded(seed):
     for _ in range(8):
         x, y = rng.integers(8, 85), rng.integers(0, 45)
         weights[y : y + rng.integers(2, 10), x : x + rng.integers(2, 10)] = 1.0
-    return PlanningProblem(weights, Cell(0, 24), Cell(98, 24), movers=tuple(_wanderer(rng) for _ in range(5)))
+    return PlanningProblem(weights, Cell(0, 24), Cell(98, 24), moving_obstacles=tuple(_wanderer(rng) for _ in range(5)))
 
 
 def _wanderer(rng):
     places = rng.uniform((10, 0), (90, 49), (int(rng.integers(2, 6)), 2))
     steps_s = np.hypot(*np.diff(places, axis=0).T) / rng.uniform(0.2, 3.0, len(places) - 1)
-    return Mover(float(rng.uniform(0.5, 3.0)), np.column_stack((np.concatenate(([0.0], np.cumsum(steps_s))), places)))
+    return ObstacleTrajectory(
+        float(rng.uniform(0.5, 3.0)), np.column_stack((np.concatenate(([0.0], np.cumsum(steps_s))), places))
+    )
 
 
 def test_no_contact_with_moving_obstacles():
-    """200 worlds: nearly always a path, and every path keeps the safe distance from start to target, at every moment."""
+    """200 worlds: nearly always a path, and every path keeps the safe distance at every moment."""
     gaps = []
     for seed in range(200):
         problem = crowded(seed)
         path = plan(problem, seed).path
         if path is not None:
-            gaps.append(least_gap(path, problem.movers))
+            gaps.append(least_gap(path, problem.moving_obstacles))
     assert len(gaps) >= 196
     assert min(gaps) >= SETTINGS.mover_safe_fields - 1e-6
 
 
 def test_the_obstacles_are_in_the_way():
-    """The same worlds planned without regard to what moves: contact in many of them, so the test above tests something."""
+    """The same worlds planned without moving obstacles: contact in many of them, so the test above is not trivial."""
     contacts = 0
     for seed in range(60):
         problem = crowded(seed)
         path = plan(PlanningProblem(problem.weights, problem.start, problem.target), seed).path
-        contacts += path is not None and least_gap(path, problem.movers) < 0.0
+        contacts += path is not None and least_gap(path, problem.moving_obstacles) < 0.0
     assert contacts >= 15
 
 
 def test_a_new_plan_when_the_motion_changes():
-    """On the way the obstacles get new tracks: from the field where the rover is then, the new plan keeps clear of them."""
+    """The obstacles get new tracks on the way: a new plan from the rover's field keeps clear of them."""
     found = 0
     for seed in range(60):
         problem = crowded(seed)
@@ -100,7 +102,7 @@ def test_a_new_plan_when_the_motion_changes():
         )
         if not movers:
             continue
-        again = plan(PlanningProblem(problem.weights, here, problem.target, movers=movers), seed).path
+        again = plan(PlanningProblem(problem.weights, here, problem.target, moving_obstacles=movers), seed).path
         if again is not None:
             found += 1
             assert again.cells[0] == here
@@ -121,7 +123,7 @@ def test_one_obstacle_is_passed_on_the_shortest_way():
 def test_the_fastest_way_is_driven_at_the_highest_speed():
     path = plan(one_obstacle()).path
     assert path is not None and path.speeds_fields_s is not None
-    assert path.speeds_fields_s == pytest.approx(Motion().speeds_fields_s[1])
+    assert path.speeds_fields_s == pytest.approx(VehicleMotion().speeds_fields_s[1])
     assert len(path.speeds_fields_s) == len(path.curve) - 1
 
 
@@ -130,9 +132,13 @@ def test_it_slows_down_for_an_obstacle_that_crosses():
     weights = np.full((21, 60), 1.0)
     weights[10, :] = BASE_WEIGHT
     weights[:, 30] = BASE_WEIGHT
-    crossing = Mover(1.0, np.array([(0.0, 30.0, 30.0), (60.0, 30.0, -30.0)]))
+    crossing = ObstacleTrajectory(1.0, np.array([(0.0, 30.0, 30.0), (60.0, 30.0, -30.0)]))
     problem = PlanningProblem(
-        weights, Cell(0, 10), Cell(59, 10), movers=(crossing,), motion=Motion(speeds_fields_s=(0.5, 1.5))
+        weights,
+        Cell(0, 10),
+        Cell(59, 10),
+        moving_obstacles=(crossing,),
+        motion=VehicleMotion(speeds_fields_s=(0.5, 1.5)),
     )
     for seed in range(20):
         path = plan(problem, seed).path
@@ -154,7 +160,10 @@ def test_weights_of_the_criteria():
 
 def test_a_mover_that_is_upon_the_rover_already_leaves_no_path():
     problem = PlanningProblem(
-        np.full((20, 20), BASE_WEIGHT), Cell(2, 2), Cell(17, 17), movers=(Mover(3.0, np.array([(0.0, 3.0, 2.0)])),)
+        np.full((20, 20), BASE_WEIGHT),
+        Cell(2, 2),
+        Cell(17, 17),
+        moving_obstacles=(ObstacleTrajectory(3.0, np.array([(0.0, 3.0, 2.0)])),),
     )
     assert plan(problem).status is PlanStatus.BUDGET_SPENT
     assert plan(problem, name="vertex").status is PlanStatus.FOUND

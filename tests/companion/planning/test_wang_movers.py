@@ -5,14 +5,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.planning.papers.wang_movers import Fleet, exclusion, first_meeting, fit_shares, fleet_of, place
-from companion.planning.problem import Mover
+from companion.planning.papers.wang_moving_obstacles import (
+    Stretch,
+    exclusion,
+    first_meeting,
+    fit_shares,
+    fleet_of,
+    place,
+)
+from companion.planning.problem import ObstacleTrajectory
 
 NUMBERS = st.floats(-20.0, 20.0)
 
 
 def fleet(track, radius=2.0, safe=0.0, timing=0.0):
-    return Fleet(*fleet_of((Mover(radius, np.array(track, float)),), safe, timing))
+    return fleet_of((ObstacleTrajectory(radius, np.array(track, float)),), safe, timing)
 
 
 @pytest.mark.parametrize(
@@ -40,7 +47,7 @@ def test_first_meeting_agrees_with_small_steps(points, robot, radius, begin_s):
     track = np.array(points)
     track[:, 0] = np.cumsum(track[:, 0])
     x, y, speed_x, speed_y = robot
-    found_s = first_meeting(fleet(track, radius), 0, begin_s, x, y, speed_x, speed_y, begin_s + 10.0)
+    found_s = first_meeting(fleet(track, radius), 0, Stretch(begin_s, begin_s + 10.0, x, y, speed_x, speed_y))
     times_s = np.arange(begin_s, begin_s + 10.0, 0.002)
     gaps = np.hypot(
         x + speed_x * (times_s - begin_s) - np.interp(times_s, track[:, 0], track[:, 1]),
@@ -70,7 +77,7 @@ def test_the_exclusion_area_grows_with_both_speeds_each_in_its_direction():
 )
 def test_meetings_without_a_crossing_point(track, meets):
     """Head on, an obstacle that stands in the way, and one that stands aside."""
-    assert np.isfinite(first_meeting(fleet(track), 0, 0.0, 0.0, 0.0, 1.0, 0.0, 10.0)) == meets
+    assert np.isfinite(first_meeting(fleet(track), 0, Stretch(0.0, 10.0, 0.0, 0.0, 1.0, 0.0))) == meets
 
 
 def test_margins_shrink_where_the_robot_is_inside_them_already():
@@ -82,4 +89,4 @@ def test_margins_shrink_where_the_robot_is_inside_them_already():
     assert far.shares[0] == 1.0
     inside = fleet([(0, 1, 0), (50, 51, 0)], radius=2.0, safe=1.0, timing=1.0)
     fit_shares(inside, 0.0, 0.0, 1.0)
-    assert inside.shares[0] == 0.0 and first_meeting(inside, 0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0) == 0.0
+    assert inside.shares[0] == 0.0 and first_meeting(inside, 0, Stretch(0.0, 1.0, 0.0, 0.0, -1.0, 0.0)) == 0.0

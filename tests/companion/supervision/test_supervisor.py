@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from companion.app import Companion
+from companion.checkpoint.checkpointer import RunMoment
 from companion.core.clock import stopwatch_s
-from companion.core.rounds import Mark
+from companion.core.round_marks import Mark
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity
 from companion.executive.mission_executor import MissionExecutor
@@ -68,18 +69,18 @@ class Log(NullRecorder):
 class Kept:
     """Stands in for what keeps the state of a run."""
 
-    kept: None = None
+    previous: None = None
     sticks: Sticks = field(default_factory=Sticks)
     notes: list[bool] = field(default_factory=list)
     problem: str = ""
 
-    def take_up(self, executor: MissionExecutor, *others: object) -> bool:
+    def resume(self, executor: MissionExecutor, *others: object) -> bool:
         return False
 
-    def note(self, *given: object) -> None:
-        self.notes.append(bool(given[-1]))
+    def update(self, moment: RunMoment) -> None:
+        self.notes.append(moment.done)
 
-    def heed_problem(self, log: object) -> str:
+    def problem_text(self, log: object) -> str:
         return self.problem
 
 
@@ -92,7 +93,7 @@ class Whole:
         memory: Any = self.memory
         self.mode, self.armed = int(MANUAL), False
         self.companion = Companion(
-            link, self.clock, yard(folder), SETTINGS, InlineRunner(), self.log, seed=0, arm=True, memory=memory
+            link, self.clock, yard(folder), SETTINGS, InlineRunner(), self.log, seed=0, arm=True, checkpointer=memory
         )
 
     def heard(self) -> list[Event]:
@@ -243,7 +244,7 @@ def test_the_pace_is_that_of_the_settings_and_does_not_catch_up_after_a_stall() 
     assert 0.0 <= pace.elapsed_s <= stopwatch_s()
 
 
-def test_without_a_memory_nothing_is_kept(tmp_path: Path) -> None:
+def test_without_a_state_file_nothing_is_kept(tmp_path: Path) -> None:
     desk = Desk(tmp_path)
     executor = desk.begin()
     told: list[str] = []
@@ -252,4 +253,4 @@ def test_without_a_memory_nothing_is_kept(tmp_path: Path) -> None:
     keeper = Keeper(desk.run, None, Log(), notifier, unused, unused)
     keeper.note(10.0, done=True)
     keeper.tell_faults(10.0)
-    assert not keeper.take_up(executor, 10.0) and told == [""]
+    assert not keeper.resume(executor, 10.0) and told == [""]

@@ -8,8 +8,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.area import inside, outside
-from sitl.autopilot.items import Item
+from sitl.autopilot.fence import inside, outside
+from sitl.autopilot.mission_items import Item
 from tests.support.mission_client import FENCE, at, do, heard, in_auto, place_m, run_until, upload
 from tests.support.sitl_client import Client, open_ground, ready
 

@@ -7,9 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sitl.autopilot.control import COAST, LOOP_HZ, TURN_RATE, new_control, new_estimate, new_tuning
-from sitl.autopilot.guided import begin_guided, begin_target
-from sitl.autopilot.params import DEFAULTS, Parameters, steered_wheels
+from sitl.autopilot.control.guided import begin_guided, begin_target
+from sitl.autopilot.control.records import (
+    COAST,
+    LOOP_HZ,
+    TURN_RATE,
+    MotionRecords,
+    new_control,
+    new_estimate,
+    new_tuning,
+)
+from sitl.autopilot.parameters import DEFAULTS, Parameters, steered_wheels
 from sitl.plant.main_loop import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.plant.rover import new_rover
 from sitl.world.world import World
@@ -39,8 +47,8 @@ class Plant:
             left = 5
             while left:
                 left -= run_loops(
-                    self.rover, self.estimate, self.control, self.tuning, np.zeros(2), noise,
-                    np.zeros((left, NOISE_COLUMNS)), world.obstacles, 0.0, 0.0, 1.0, world.ground, *world.fleet, 0.0,
+                    self.rover, MotionRecords(self.estimate, self.control, self.tuning), np.zeros(2), noise,
+                    np.zeros((left, NOISE_COLUMNS)), world.surroundings(0.0), 0.0,
                 )  # fmt: skip
                 self.control["arrived"] = 0
             rover, control = self.rover[0], self.control[0]
@@ -64,7 +72,7 @@ class Plant:
 
 
 def everything(changes: dict[str, float], radius_m: float = 0.0) -> np.ndarray[Any, Any]:
-    """Ahead, then to the right behind, then turning while it drives, then by the pilot's sticks, forwards and backwards."""
+    """Ahead, then to the right behind, then turning while driving, then with the sticks, forwards and backwards."""
     plant = Plant(changes, radius_m)
     plant.drive_to(10.0, 0.0, 11.0)
     plant.drive_to(8.0, 8.0, 8.0)

@@ -1,4 +1,4 @@
-"""The soak: its ground can be driven, its faults end, its person helps only when asked, and what it counts is what happened."""
+"""The soak: its ground can be driven, its faults end, its person helps only when asked, and its counts are right."""
 
 from pathlib import Path
 
@@ -8,7 +8,7 @@ import pytest
 from companion.core.grid import OBSTACLE, inflated
 from companion.mission.check import check_mission
 from companion.safety.reasons import Activity, Reason, RunPhase, WaitReason
-from sitl.autopilot.vehicle import Mode
+from sitl.autopilot.state import Mode
 from sitl.experiments import soak, soak_faults
 from sitl.experiments.experiment import Options
 from sitl.experiments.soak import Ended, Person, Soaked, SoakReport, soaked

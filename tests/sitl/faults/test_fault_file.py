@@ -14,9 +14,10 @@ from typer.testing import CliRunner
 from companion.mission.load import load_mission
 from sitl.cli.commands import app
 from sitl.faults.fault_file import FaultFileError, load_faults
-from sitl.faults.plan import Fault, GpsGlitch, LinkFault, PilotTakesOver, Reboot, SensorFault
+from sitl.faults.plan import Fault, GpsGlitch, LinkEffect, LinkFault, PilotTakesOver, Reboot, SensorFault
 from sitl.faults.tables import KINDS
 from sitl.scenario import ScenarioError, scenario_from_mission, with_faults
+from sitl.sensors.range_sensors import Defect
 
 ROOT = Path(__file__).resolve().parents[3]
 SHIPPED = sorted((ROOT / "missions" / "faults").glob("*.toml"))
@@ -85,11 +86,11 @@ def test_what_is_said_is_understood(tmp_path: Path) -> None:
     plan = load_faults(plan_file(tmp_path, text))
     assert plan.seed == 7
     assert plan.faults == (
-        LinkFault(1.5, 4.0, "boot", 10.0, "delay", 1.0, 0.2, 0.1, "to_vehicle", (2, 3)),
+        LinkFault(1.5, 4.0, "boot", 10.0, LinkEffect.DELAY, 1.0, 0.2, 0.1, "to_vehicle", (2, 3)),
         GpsGlitch(5.0, 7.0, "driving", metres=10.0, bearing_deg=90.0),
         PilotTakesOver(0.0, mode="MANUAL", steering=-0.5, throttle=0.25),
-        SensorFault(0.0, what="stuck", beams=(2,)),
-        SensorFault(0.0, what="stuck in view"),
+        SensorFault(0.0, defect=Defect.STUCK, beams=(2,)),
+        SensorFault(0.0, defect=Defect.STUCK_IN_VIEW),
     )
 
 

@@ -1,4 +1,4 @@
-"""What link faults do to packets: how many are lost, late, doubled, damaged and overtaken, in the direction and on the links meant."""
+"""Link faults: shares of packets lost, late, duplicated, damaged and reordered; directions and links."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.faults.link_faults import Packets, Way
-from sitl.faults.plan import FaultPlan, LinkFault
+from sitl.faults.link_faults import LinkQueue, Packets
+from sitl.faults.plan import FaultPlan, LinkEffect, LinkFault
 from sitl.network import open_endpoint
 from sitl.network.endpoint import datagrams
 from sitl.network.server import serve
@@ -26,7 +26,8 @@ from tests.sitl.network.test_server import free_port
 from tests.support.sitl_client import Client, open_ground, ready
 
 SENT = 4000
-"""Packets in each statistic. With probability p the share differs by more than 5 standard deviations in one run of 1.7 million."""
+"""Packets in each statistic. With probability p the share differs by more than 5 standard deviations in one run of
+1.7 million."""
 
 
 def packets(count: int) -> list[bytes]:
@@ -40,7 +41,7 @@ def packets(count: int) -> list[bytes]:
 
 def through(*faults: LinkFault, count: int = SENT, every_s: float = 0.02, seed: int = 0) -> list[tuple[float, bytes]]:
     """Packets sent one by one from 0 s on: when which bytes arrived."""
-    way = Way(1, "from_vehicle")
+    way = LinkQueue(1, "from_vehicle")
     rngs = [(fault, np.random.default_rng([seed, i])) for i, fault in enumerate(faults)]
     arrived = []
     for number, packet in enumerate(packets(count)):
@@ -62,20 +63,20 @@ def within(count: int, probability: float, of: int = SENT) -> bool:
 
 @pytest.mark.parametrize("probability", [0.05, 0.3, 0.9])
 def test_loss(probability: float) -> None:
-    left = numbers(through(LinkFault(what="loss", probability=probability)))
+    left = numbers(through(LinkFault(effect=LinkEffect.LOSS, probability=probability)))
     assert within(SENT - len(left), probability)
     assert left == sorted(left)
 
 
 def test_losses_do_not_depend_on_each_other() -> None:
-    left = set(numbers(through(LinkFault(what="loss", probability=0.5))))
+    left = set(numbers(through(LinkFault(effect=LinkEffect.LOSS, probability=0.5))))
     pairs = sum(n not in left and n + 1 not in left for n in range(0, SENT, 2))
     assert within(pairs, 0.25, SENT // 2)
 
 
 @pytest.mark.parametrize("probability", [0.05, 0.5])
 def test_duplicates(probability: float) -> None:
-    came = numbers(through(LinkFault(what="duplicate", probability=probability)))
+    came = numbers(through(LinkFault(effect=LinkEffect.DUPLICATE, probability=probability)))
     assert within(len(came) - SENT, probability)
     assert came == sorted(came)
     assert set(came) == set(range(SENT))
@@ -84,11 +85,13 @@ def test_duplicates(probability: float) -> None:
 @pytest.mark.parametrize("probability", [0.05, 0.5])
 def test_corruption(probability: float) -> None:
     sent = packets(SENT)
-    way = Way(1, "from_vehicle")
+    way = LinkQueue(1, "from_vehicle")
     rng = np.random.default_rng(5)
     came = []
     for packet in sent:
-        way.pass_on(packet, 0.0, lambda fault: True, [(LinkFault(what="corrupt", probability=probability), rng)])
+        way.pass_on(
+            packet, 0.0, lambda fault: True, [(LinkFault(effect=LinkEffect.CORRUPT, probability=probability), rng)]
+        )
         came.append(way.arrived(0.0))
     assert [len(one) for one in came] == [len(one) for one in sent]
     damaged = [sum(a != b for a, b in zip(one, was, strict=True)) for one, was in zip(came, sent, strict=True)]
@@ -97,7 +100,7 @@ def test_corruption(probability: float) -> None:
 
 
 def test_delay_and_jitter() -> None:
-    came = through(LinkFault(what="delay", delay_s=0.5, jitter_s=0.2), every_s=0.02)
+    came = through(LinkFault(effect=LinkEffect.DELAY, delay_s=0.5, jitter_s=0.2), every_s=0.02)
     sent_s = {number: 0.02 * number for number in range(SENT)}
     order = numbers(came)
     assert order == list(range(SENT)), "a slow line keeps the order"
@@ -108,7 +111,7 @@ def test_delay_and_jitter() -> None:
 
 
 def test_reordering() -> None:
-    came = numbers(through(LinkFault(what="reorder", probability=0.1, delay_s=0.05)))
+    came = numbers(through(LinkFault(effect=LinkEffect.REORDER, probability=0.1, delay_s=0.05)))
     assert sorted(came) == list(range(SENT))
     overtaken = sum(one > after for one, after in pairwise(came))
     # Each that is held back is overtaken by the next two, unless the one before was held back too and comes out first.
@@ -116,7 +119,7 @@ def test_reordering() -> None:
 
 
 def test_outage_is_from_begin_to_end() -> None:
-    left = numbers(through(LinkFault(2.0, 4.0, what="outage"), count=300))
+    left = numbers(through(LinkFault(2.0, 4.0, effect=LinkEffect.OUTAGE), count=300))
     assert left == [*range(100), *range(200, 300)]
 
 
@@ -173,7 +176,7 @@ def streamed(simulator: Simulator, seconds: float = 40.0) -> tuple[Client, Clien
 
 
 def test_only_the_links_that_are_meant_lose_packets() -> None:
-    fault = LinkFault(10.0, what="loss", probability=0.5, links=(2,))
+    fault = LinkFault(10.0, effect=LinkEffect.LOSS, probability=0.5, links=(2,))
     first, second = streamed(open_ground(faults=plan(fault)))
     assert len(first.of("ATTITUDE")) == 800
     assert within(len(second.of("ATTITUDE")), 0.5, 800)
@@ -183,7 +186,7 @@ def test_only_the_links_that_are_meant_lose_packets() -> None:
     ("direction", "heard", "answered"), [("to_vehicle", True, False), ("from_vehicle", False, True)]
 )
 def test_only_the_direction_that_is_meant_is_cut(direction: Any, heard: bool, answered: bool) -> None:
-    client = Client(open_ground(faults=plan(LinkFault(45.0, what="outage", direction=direction))))
+    client = Client(open_ground(faults=plan(LinkFault(45.0, effect=LinkEffect.OUTAGE, direction=direction))))
     client.run_to(46.0)
     client.received.clear()
     client.command(176, 1, 4)
@@ -195,7 +198,7 @@ def test_only_the_direction_that_is_meant_is_cut(direction: Any, heard: bool, an
 
 def test_what_is_late_arrives_to_the_loop() -> None:
     """A command 0.5 s late is answered 1 s after it was sent, within two main loops."""
-    fault = LinkFault(45.0, what="delay", delay_s=0.5)
+    fault = LinkFault(45.0, effect=LinkEffect.DELAY, delay_s=0.5)
     client = Client(open_ground(faults=plan(fault)))
     client.run_to(50.0)
     client.command(511, 30, 100_000)
@@ -207,7 +210,7 @@ def test_what_is_late_arrives_to_the_loop() -> None:
 
 
 def test_a_damaged_stream_leaves_simulator_and_clients_up() -> None:
-    client = hardened(ready(open_ground(faults=plan(LinkFault(44.0, what="corrupt", probability=0.5)))))
+    client = hardened(ready(open_ground(faults=plan(LinkFault(44.0, effect=LinkEffect.CORRUPT, probability=0.5)))))
     client.drive_to(20.0, 0.0)
     for _ in range(20):
         client.command(176, 1, 15)
@@ -232,8 +235,9 @@ def fingerprint(faults: FaultPlan | None, seed: int, step_s: float = 0.1) -> str
 
 
 EVERYTHING = tuple(
-    LinkFault(44.0, 53.0, what=what, probability=0.2, delay_s=0.1, jitter_s=0.1)
-    for what in ("loss", "delay", "reorder", "duplicate", "corrupt")
+    LinkFault(44.0, 53.0, effect=effect, probability=0.2, delay_s=0.1, jitter_s=0.1)
+    for effect in LinkEffect
+    if effect is not LinkEffect.OUTAGE
 )
 
 
@@ -248,12 +252,14 @@ def test_the_bytes_do_not_depend_on_how_often_one_looks() -> None:
 
 
 def test_a_plan_that_does_nothing_changes_no_byte() -> None:
-    assert fingerprint(None, 3) == fingerprint(plan(LinkFault(1000.0, what="outage")), 3)
+    assert fingerprint(None, 3) == fingerprint(plan(LinkFault(1000.0, effect=LinkEffect.OUTAGE)), 3)
 
 
 def test_on_the_network_links_count_in_the_order_in_which_they_open() -> None:
     """Two TCP clients of a served rover; the second one hears nothing for two seconds."""
-    simulator = open_ground(faults=plan(LinkFault(4.0, 6.0, what="outage", direction="from_vehicle", links=(2,))))
+    simulator = open_ground(
+        faults=plan(LinkFault(4.0, 6.0, effect=LinkEffect.OUTAGE, direction="from_vehicle", links=(2,)))
+    )
     port = free_port()
     endpoint = open_endpoint(f"tcp:127.0.0.1:{port}", simulator)
     looks = itertools.count(1)

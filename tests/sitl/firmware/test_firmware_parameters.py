@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sitl.autopilot.params import DEFAULTS, steered_wheels
+from sitl.autopilot.parameters import DEFAULTS, steered_wheels
 from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
 from sitl.firmware.parameter_files import ParameterFile
 from sitl.firmware.physics import servo_output
@@ -55,13 +55,13 @@ def test_what_becomes_of_a_users_own_parameters_is_told() -> None:
     file = ParameterFile(Path("x.parm"), own, {})
     told = firmware_parameters(own, SUITES["beams"], steered=False)
     assert file.firmware_notes(told) == (
-        "x.parm: outside of the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); see if they are meant",
-        "x.parm: SERVO1_FUNCTION 74 becomes 73, as our rover is built",
-        "x.parm: RNGFND1_TYPE 10 becomes 100, as our rover is built",
-        "x.parm: 1 parameters that are not known here are passed on as they are: FOO",
+        "x.parm: outside the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); is that intended?",
+        "x.parm: SERVO1_FUNCTION 74 becomes 73, as the simulated rover is built",
+        "x.parm: RNGFND1_TYPE 10 becomes 100, as the simulated rover is built",
+        "x.parm: 1 unknown parameters are passed on unchanged: FOO",
     )
     (note,) = ParameterFile(Path("x.parm"), {"FOO": 3.0}, {}).firmware_notes(None)
-    assert "--write-params FILE writes the rest" in note
+    assert "--write-params FILE writes the other parameters" in note
 
 
 def test_every_parameter_that_is_written_is_in_the_manual() -> None:

@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
-from sitl.autopilot.params import DEFAULTS
+from sitl.autopilot.parameters import DEFAULTS
 from sitl.cli.commands import app
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.parameter_ranges import RANGES, outside
@@ -52,18 +52,18 @@ def test_types_are_taken_and_other_components_left_out(tmp_path: Path) -> None:
     [
         ("WP_SPEED,1\nWP_RADIUS\n", ":2:", "not NAME,VALUE"),
         ("WP_SPEED 1 2\n", ":1:", "not NAME,VALUE"),
-        ("\n# x\nWP_SPEED,fast\n", ":3:", "WP_SPEED: 'fast' is no number"),
-        ("WP_SPEED nan\n", ":1:", "is no number"),
-        ("WP_SPEED,1e39\n", ":1:", "is no number"),
+        ("\n# x\nWP_SPEED,fast\n", ":3:", "WP_SPEED: 'fast' is not a number"),
+        ("WP_SPEED nan\n", ":1:", "is not a number"),
+        ("WP_SPEED,1e39\n", ":1:", "is not a number"),
         ("WP_SPEED inf\n", ":1:", "write one such as 1.5"),
-        ("MAV_SYSID 300\n", ":1:", "MAV_SYSID: 300: a MAVLink system has a number from 1 to 255; choose one"),
+        ("MAV_SYSID 300\n", ":1:", "MAV_SYSID: 300: a MAVLink system id is 1 to 255; choose one"),
         ("WP_SPEED 1\nMAV_SYSID,0\n", ":2:", "MAV_SYSID: 0: a MAVLink system"),
-        ("wp_speed 1\n", ":1:", "'wp_speed' is no parameter's name"),
-        ("A_NAME_THAT_IS_TOO_LONG 1\n", ":1:", "no parameter's name"),
-        ("<html>,1\n", ":1:", "no parameter's name"),
-        ("# nothing\n", ":", "no parameters in it"),
-        (b"WP_SPEED,\xff\n", ":", "is no text"),
-        (b"WP_SPEED,1\n" * 100_000, ":", "too many"),
+        ("wp_speed 1\n", ":1:", "'wp_speed' is not a parameter name"),
+        ("A_NAME_THAT_IS_TOO_LONG 1\n", ":1:", "not a parameter name"),
+        ("<html>,1\n", ":1:", "not a parameter name"),
+        ("# nothing\n", ":", "no parameters"),
+        (b"WP_SPEED,\xff\n", ":", "not UTF-8 text"),
+        (b"WP_SPEED,1\n" * 100_000, ":", "larger than"),
     ],
 )
 def test_a_bad_line_is_named(tmp_path: Path, text: str | bytes, place: str, reason: str) -> None:
@@ -98,7 +98,7 @@ def value_of(client: Client, name: str) -> tuple[float, int]:
 
 def test_known_ones_count_and_unknown_ones_are_kept(tmp_path: Path) -> None:
     loaded = scenario(tmp_path, "WP_SPEED,1.25\n1 1 FOO_BAR 3.7 4\nNEW_ONE 0.5\nMIS_TOTAL 12\n")
-    note = "2 of 4 parameters are not simulated and only kept to be read back: FOO_BAR, NEW_ONE"
+    note = "2 of 4 parameters are not simulated and only stored to be read back: FOO_BAR, NEW_ONE"
     assert loaded.notes == (f"{tmp_path / 'rover.param'}: {note}",)
     client = Client(loaded.simulator(0))
     client.run_for(1.0)
@@ -118,7 +118,8 @@ def test_known_ones_count_and_unknown_ones_are_kept(tmp_path: Path) -> None:
 def test_only_the_first_unknown_names_are_told() -> None:
     file = ParameterFile(Path("x.param"), {f"NO_{n}": 1.0 for n in range(700)} | {"WP_SPEED": 1.0}, {})
     assert file.note() == (
-        "x.param: 700 of 701 parameters are not simulated and only kept to be read back: NO_0, NO_1, NO_2, NO_3, NO_4, ..."
+        "x.param: 700 of 701 parameters are not simulated and only stored to be read back: "
+        "NO_0, NO_1, NO_2, NO_3, NO_4, ..."
     )
 
 
@@ -126,9 +127,9 @@ def test_values_that_are_most_likely_slips_are_told_in_one_line(tmp_path: Path) 
     odd = "WP_SPEED -3\nATC_DECEL_MAX -5\nTURN_RADIUS -1\nSCHED_LOOP_RATE 0\nWP_RADIUS 1e38\nCRUISE_SPEED 101\n"
     (note,) = scenario(tmp_path, odd).notes
     assert note == (
-        f"{tmp_path / 'rover.param'}: outside of the range that ArduRover documents: ATC_DECEL_MAX -5 (0 to 10), "
+        f"{tmp_path / 'rover.param'}: outside the range that ArduRover documents: ATC_DECEL_MAX -5 (0 to 10), "
         "CRUISE_SPEED 101 (0 to 100), SCHED_LOOP_RATE 0 (50 to 400), TURN_RADIUS -1 (0 to 10), "
-        "WP_RADIUS 1e+38 (0 to 100), ...; see if they are meant"
+        "WP_RADIUS 1e+38 (0 to 100), ...; is that intended?"
     )
     client = Client(scenario(tmp_path, odd).simulator(0))
     client.run_for(1.0)
@@ -137,7 +138,7 @@ def test_values_that_are_most_likely_slips_are_told_in_one_line(tmp_path: Path) 
 
 def test_values_that_contradict_each_other_are_told(tmp_path: Path) -> None:
     (note,) = scenario(tmp_path, "WP_SPEED 1\nWP_RADIUS 2\nWP_SPEED 1.5\nWP_RADIUS 2\n").notes
-    assert note == f"{tmp_path / 'rover.param'}: WP_SPEED: there more than once; the last value counts"
+    assert note == f"{tmp_path / 'rover.param'}: WP_SPEED: given more than once; the last value counts"
 
 
 def test_nothing_that_the_simulator_starts_with_lies_outside_of_its_range() -> None:
@@ -181,7 +182,7 @@ def test_a_bad_file_gets_one_line(tmp_path: Path, command: str) -> None:
     mission, bad = written(tmp_path, MISSION, "mission.toml"), written(tmp_path, "WP_SPEED fast\n", "bad.param")
     result = CliRunner().invoke(app, [command, str(mission), "--params", str(bad)])
     assert result.exit_code == 2 and result.output == (
-        f"{bad}:1: WP_SPEED: 'fast' is no number that a parameter can hold; write one such as 1.5, or put # before the line\n"
+        f"{bad}:1: WP_SPEED: 'fast' is not a number for a parameter; write one such as 1.5, or put # before the line\n"
     )
     result = CliRunner().invoke(app, [command, str(mission), "--params", str(tmp_path / "none.param")])
     assert result.exit_code == 2 and result.output.count("\n") == 1 and "cannot be read" in result.output

@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint
 from sitl.firmware.physics import LONGEST_STEP_S, Physics, servo_output
-from sitl.firmware.physics_news import PhysicsNews, summary
+from sitl.firmware.physics_log import PhysicsLog, summary
 from sitl.plant.rover import SPEED_LAG_S, TOP_SPEED_M_S, TURN_RATE_RAD_S, WHEEL_MOST_RAD, WHEEL_RATE_RAD_S
 from sitl.sensors.range_flaws import Flaws
 from sitl.sensors.range_sensors import SUITES, Beam, SensorSuite
@@ -278,7 +278,8 @@ def test_a_firmware_may_go_on_from_another_address() -> None:
 @pytest.mark.parametrize(
     "datagram",
     [
-        b"", b"\x1a", frame(0)[:-1], frame(0) + b"\0", frame(0, channels=32)[:40], frame(0)[:2] + frame(0, channels=32)[2:],
+        b"", b"\x1a", frame(0)[:-1], frame(0) + b"\0", frame(0, channels=32)[:40],
+        frame(0)[:2] + frame(0, channels=32)[2:],
         struct.pack("<HHI16H", 18459, 400, 0, *[1500] * 16), frame(0, rate_hz=0), b"\n{}\n", bytes(70000),
     ],
 )  # fmt: skip
@@ -353,7 +354,7 @@ def test_nothing_seen_is_out_of_range_and_nothing_known_is_no_reading() -> None:
 
 
 def test_more_rangefinders_than_six_are_refused() -> None:
-    with pytest.raises(ValueError, match="7 rangefinders: the firmware takes 6 at most"):
+    with pytest.raises(ValueError, match="7 rangefinders: the firmware accepts at most 6"):
         physics(suite=SensorSuite(beams=(Beam(0, 0.2, 6.0),) * 7))
 
 
@@ -441,15 +442,15 @@ def test_without_a_firmware_there_is_nothing_to_sum_up() -> None:
     behind = physics()
     assert summary(behind) == "stopped; no firmware has asked"
     behind.answer(b"noise")
-    assert summary(behind) == "stopped; no firmware has asked (1 no frames)"
+    assert summary(behind) == "stopped; no firmware has asked (1 not frames)"
 
 
-def test_news_are_told_once_and_summed_up() -> None:
+def test_events_are_logged_once_and_summed_up() -> None:
     behind = physics(walled())
     said: list[str] = []
     now_s = 0.0
-    news = PhysicsNews(behind, said.append, lambda: now_s)
-    news.look()
+    log = PhysicsLog(behind, said.append, lambda: now_s)
+    log.look()
     assert said == []
     one = firmware(behind)
     while len(behind.collisions) < 1:
@@ -459,19 +460,19 @@ def test_news_are_told_once_and_summed_up() -> None:
     behind.answer(frame(5), "another")
     one.count += 2
     one.update()
-    news.look()
-    news.look()
+    log.look()
+    log.look()
     assert [line.split(";")[0].split(":")[0] for line in said] == [
         "the firmware has started and is answered",
-        "something that is no frame of ArduPilot's JSON interface came",
+        "a datagram was no frame of ArduPilot's JSON interface",
         "a second firmware asks at the same port",
-        "frames were lost on the way",
+        "frames were lost",
         "collision 1",
     ]
     assert summary(behind) == (
-        f"stopped; {behind.tally.steps} steps, 2 lost, 1 from strangers, 3 no frames; "
+        f"stopped; {behind.tally.steps} steps, 2 lost, 1 from another firmware, 3 not frames; "
         f"since the firmware's last start {behind.time_s:.0f} s and 1 collision"
     )
     behind.answer(frame(0, 1500, 1500))
-    news.look()
+    log.look()
     assert said[-1].startswith("the firmware has started again")

@@ -15,7 +15,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.network import Endpoint, ListenError, open_endpoint
 from sitl.network.serial import SerialEndpoint
-from sitl.network.udp import MOST_PARTNERS, SILENT_S
+from sitl.network.udp import MOST_CLIENTS, SILENT_S
 from sitl.simulator import Simulator
 from tests.sitl.network.test_server import free_port
 from tests.support.party import split
@@ -177,7 +177,7 @@ def test_a_speed_that_no_line_has(bench: Bench, tmp_path: Path, baud: str) -> No
     """Zero would hang up, and what does not fit into the system's field is no speed."""
     name = tmp_path / "ttyV0"
     bench.open(f"pty:{name}")
-    with pytest.raises(ListenError, match=f"ttyV0:{baud}: {baud} baud is no speed of a line; choose one up to 4000000"):
+    with pytest.raises(ListenError, match=f"ttyV0:{baud}: {baud} is not a baud rate; choose one up to 4000000"):
         bench.open(f"serial:{name}:{baud}")
 
 
@@ -185,7 +185,7 @@ def test_the_name_of_a_terminal_in_use_is_left_alone(bench: Bench, tmp_path: Pat
     name = tmp_path / "ttyV0"
     bench.open(f"pty:{name}")
     terminal = os.readlink(name)
-    with pytest.raises(ListenError, match=r"ttyV0: cannot be opened: File exists; name a link that is not there yet"):
+    with pytest.raises(ListenError, match=r"ttyV0: cannot be opened: File exists; name a link that does not exist yet"):
         bench.open(f"pty:{name}")
     assert os.readlink(name) == terminal
 
@@ -223,7 +223,7 @@ def run_and_read(bench: Bench, file: int) -> bytes:
 @pytest.mark.parametrize("place", ["/dev/none", "/dev/none:57600", "/dev/null:9600"])
 def test_a_device_that_is_not_there_is_one_line(bench: Bench, place: str) -> None:
     with pytest.raises(
-        ListenError, match=r"^serial:/dev/.* cannot be opened: .*; see that the device is there"
+        ListenError, match=r"^serial:/dev/.* cannot be opened: .*; check that the device exists"
     ) as told:
         bench.open(f"serial:{place}")
     assert "\n" not in str(told.value) and "Errno" not in str(told.value)
@@ -290,11 +290,11 @@ def test_when_there_are_too_many_the_longest_silent_goes(bench: Bench) -> None:
     port = free_port(socket.SOCK_DGRAM)
     bench.open(f"udpin:127.0.0.1:{port}")
     with contextlib.ExitStack() as stack:
-        partners = [stack.enter_context(udp(port)) for _ in range(MOST_PARTNERS + 1)]
+        partners = [stack.enter_context(udp(port)) for _ in range(MOST_CLIENTS + 1)]
         for partner in partners:
             partner.send(beat())
             bench.run(0.5)
         for partner in partners:
             read_all(partner)
         bench.run(2.0)
-        assert [bool(read_all(partner)) for partner in partners] == [False] + [True] * MOST_PARTNERS
+        assert [bool(read_all(partner)) for partner in partners] == [False] + [True] * MOST_CLIENTS

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from sitl.cli.commands import app
 from sitl.network import Endpoint, ListenError, open_endpoint
 from sitl.network.endpoint import datagrams
-from sitl.network.news import News
+from sitl.network.event_log import EventLog
 from sitl.network.server import serve
 from sitl.simulator import Simulator
 from sitl.world.truth import Collision
@@ -28,7 +28,7 @@ class Bench:
         self.endpoints: list[Endpoint] = []
         self.said: list[str] = []
         self.real_s = 0.0
-        self.news = News(self.said.append, lambda: self.real_s)
+        self.log = EventLog(self.said.append, lambda: self.real_s)
 
     def run(self, seconds: float) -> None:
         goal_s = self.simulator.time_s + seconds
@@ -40,10 +40,10 @@ class Bench:
             now_s += 0.005
             return now_s
 
-        serve(self.simulator, self.endpoints, clock, 10.0, lambda: self.simulator.time_s < goal_s, self.news)
+        serve(self.simulator, self.endpoints, clock, 10.0, lambda: self.simulator.time_s < goal_s, self.log)
 
     def open(self, url: str) -> None:
-        self.endpoints.append(open_endpoint(url, self.simulator, self.news))
+        self.endpoints.append(open_endpoint(url, self.simulator, self.log))
 
 
 @pytest.fixture
@@ -103,9 +103,9 @@ def test_tcp_clients_that_come_and_go_are_told_of(bench: Bench) -> None:
     with socket.create_connection(("127.0.0.1", port)) as client:
         who = f"127.0.0.1:{client.getsockname()[1]}"
         bench.run(1.0)
-        assert bench.said == [f"{who} has come (tcp:127.0.0.1:{port})"]
+        assert bench.said == [f"{who} has connected (tcp:127.0.0.1:{port})"]
     bench.run(1.0)
-    assert bench.said[1:] == [f"{who} has left (tcp:127.0.0.1:{port})"]
+    assert bench.said[1:] == [f"{who} has disconnected (tcp:127.0.0.1:{port})"]
 
 
 def test_a_udp_partner_that_falls_silent_is_told_of_once(bench: Bench) -> None:
@@ -116,34 +116,34 @@ def test_a_udp_partner_that_falls_silent_is_told_of_once(bench: Bench) -> None:
             partner.sendto(request_version(), ("127.0.0.1", port))
             bench.run(1.0)
         who = f"127.0.0.1:{partner.getsockname()[1]}"
-        assert bench.said == [f"{who} has come (udpin:127.0.0.1:{port})"]
+        assert bench.said == [f"{who} has connected (udpin:127.0.0.1:{port})"]
         for real_s in (4.0, 6.0, 12.0):
             bench.real_s = real_s
             bench.run(1.0)
         assert bench.said[1:] == [f"{who} has been silent for 5 s (udpin:127.0.0.1:{port})"]
         partner.sendto(request_version(), ("127.0.0.1", port))
         bench.run(1.0)
-        assert len(bench.said) == 3 and "has come" in bench.said[2]
+        assert len(bench.said) == 3 and "has connected" in bench.said[2]
 
 
 def test_collisions_are_told_of_with_their_place_not_more_than_one_a_second() -> None:
     said: list[str] = []
     real_s = 0.0
-    news = News(said.append, lambda: real_s)
+    log = EventLog(said.append, lambda: real_s)
     simulator = open_ground()
-    news.look(simulator)
+    log.look(simulator)
     touched: list[Collision] = []
     stand_in = SimpleNamespace(start=simulator.start, collisions=touched)
     start = simulator.start
     touched.append(Collision(61.3, start.north_m + 3.0, start.east_m - 1.5))
-    news.look(cast(Simulator, stand_in))
+    log.look(cast(Simulator, stand_in))
     assert said == ["collision 1: the rover touched an obstacle at 61.3 s, north 3.0 m, east -1.5 m of its start"]
     for _ in range(3):
         touched.append(Collision(61.5, start.north_m, start.east_m, "cart"))
-        news.look(cast(Simulator, stand_in))
+        log.look(cast(Simulator, stand_in))
     assert len(said) == 1
     real_s = 1.5
-    news.look(cast(Simulator, stand_in))
+    log.look(cast(Simulator, stand_in))
     assert said[1].startswith("collision 4: the rover touched cart at 61.5 s")
 
 
@@ -230,7 +230,7 @@ def test_bad_addresses_are_told(bench: Bench, url: str) -> None:
 
 @pytest.mark.parametrize("port", ["0", "65536", "99999", "9" * 5000])
 def test_a_port_that_is_none_is_told(bench: Bench, port: str) -> None:
-    with pytest.raises(ListenError, match=r"is no port; choose one from 1 to 65535"):
+    with pytest.raises(ListenError, match=r"is not a port; choose one from 1 to 65535"):
         bench.open(f"udpin:127.0.0.1:{port}")
 
 

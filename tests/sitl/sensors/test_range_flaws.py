@@ -14,7 +14,7 @@ from companion.mission.mission import MissionError
 from companion.mission.sensor_tables import SensorsTable
 from sitl.cli.commands import app
 from sitl.scenario import scenario_from_mission, with_sensors
-from sitl.sensors.range_flaws import Flaws, Sun, spoiled
+from sitl.sensors.range_flaws import Flaws, Sun, with_flaws
 from sitl.sensors.range_sensors import UNKNOWN, RangeSensing, SensorSuite
 from sitl.sensors.suites import suite_of
 from sitl.simulator import Simulator
@@ -31,7 +31,7 @@ MISSIONS = Path(__file__).resolve().parents[3] / "missions"
 def ranges(true_m: float, flaws: Flaws, bearing_rad: float = 0.0, noise_m: float = 0.0) -> Any:
     """Many ranges of something that is ``true_m`` away."""
     bearings_rad = np.full(COUNT, bearing_rad)
-    return spoiled(np.full(COUNT, true_m), bearings_rad, LIMITS_M, flaws, noise_m, np.random.default_rng(7))
+    return with_flaws(np.full(COUNT, true_m), bearings_rad, LIMITS_M, flaws, noise_m, np.random.default_rng(7))
 
 
 def share_within(found: float, expected: float) -> bool:
@@ -74,7 +74,8 @@ def test_one_flaw_does_not_move_the_dice_of_another() -> None:
 
 
 @pytest.mark.parametrize(
-    ("true_m", "aside_deg", "seen"), [(3.0, 0.0, True), (5.0, 0.0, False), (5.0, 29.0, False), (5.0, 31.0, True), (7.9, 180.0, True)]
+    ("true_m", "aside_deg", "seen"),
+    [(3.0, 0.0, True), (5.0, 0.0, False), (5.0, 29.0, False), (5.0, 31.0, True), (7.9, 180.0, True)]
 )  # fmt: skip
 def test_towards_the_sun_it_sees_less_far(true_m: float, aside_deg: float, seen: bool) -> None:
     sun = Sun(math.radians(170.0), math.radians(60.0), 0.5)
@@ -281,7 +282,8 @@ def test_a_mission_describes_sensors_or_names_them(tmp_path: Path) -> None:
         mission = load_mission(path)
         assert mission.sitl is not None
         assert str(mission.sitl.sensors) == "proximity sectors"
-    for text, words in (('sensors = "sonar"', "unknown sensors 'sonar'"), ('sensors = "gone.toml"', "gone.toml: cannot be read"),
+    for text, words in (('sensors = "sonar"', "unknown sensors 'sonar'"),
+                        ('sensors = "gone.toml"', "gone.toml: cannot be read"),
                         ("[sitl.sensors]\nsonar = 3", "sitl.sensors: sonar: unknown key")):  # fmt: skip
         path.write_text(HEAD + text)
         with pytest.raises(MissionError, match=words) as caught:

@@ -1,4 +1,4 @@
-"""The terminal view: a pure function of the state, looked at as text; what it is made of; the terminal that it needs."""
+"""The terminal view as text, what it collects from the simulator, and the terminal that it needs."""
 
 import io
 import math
@@ -26,7 +26,7 @@ from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.sim_link import PacketCounter
 from sitl.simulator import Simulator
 from sitl.view.sketch import COARSEST_M, Disc, Kind, Layer, Place, Scene, frame_for, paint
-from sitl.view.view import LOOKS, STATE_SIGNS, Fact, Section, View, arrow, render
+from sitl.view.view import LOOKS, PLACE_LOOKS, Fact, Section, View, arrow, render
 from sitl.view.watching import Rates, Watching
 from sitl.world.doors import Door
 from sitl.world.movers import Mover, timed_track
@@ -80,8 +80,8 @@ def test_arrows(degrees: float, sign: str) -> None:
 @pytest.mark.parametrize(("columns", "rows"), [(80, 24), (100, 30), (200, 60), (60, 16), (59, 30), (20, 5), (1, 1)])
 @pytest.mark.parametrize("colour", [True, False])
 def test_it_fits_into_any_terminal(columns: int, rows: int, colour: bool) -> None:
-    news = tuple(f"{n} s: something that takes more than one line to tell" for n in range(40))
-    lines = screen(a_view(scene(ROOM), news=news), columns, rows, colour=colour)
+    events = tuple(f"{n} s: something that takes more than one line to tell" for n in range(40))
+    lines = screen(a_view(scene(ROOM), events=events), columns, rows, colour=colour)
     assert len(lines) <= rows or columns < 60
     if not colour:
         assert max(map(len, lines)) <= columns
@@ -95,15 +95,15 @@ def test_everything_in_sight_is_in_the_legend(columns: int, rows: int, colour: b
     whole = np.ones((1, 2), dtype=np.bool_)
     layers = tuple(Layer(kind, whole, 1.0, 2.0 * number, 0.0) for number, kind in enumerate(Kind))
     places = tuple(
-        Place(state, 5.0, east_m, state) for east_m, state in zip((5.0, 9.0, 13.0, 17.0), STATE_SIGNS, strict=True)
+        Place(state.name, 5.0, east_m, state) for east_m, state in zip((5.0, 9.0, 13.0, 17.0), PLACE_LOOKS, strict=True)
     )
     one = Scene(layers, Disc(1.0, 5.0, 0.3), 0.0, np.empty((0, 2)), places=places, bounds_m=(0.0, 0.0, 26.0, 26.0))
     lines = screen(a_view(one), columns, rows, colour=colour)
     told = " ".join(line.split("│")[1] for line in lines if line.count("│") > 3) if not colour else "\n".join(lines)
     for look in LOOKS.values():
         assert look.name in told
-    for sign, name in zip(STATE_SIGNS.values(), ("target", "reached", "given up", "start"), strict=True):
-        assert f"{sign} {name}" in told
+    for place in PLACE_LOOKS.values():
+        assert f"{place.sign} {place.name}" in told
     assert colour or "█▀▄ obstacle" in told
     assert len(lines) <= rows
 
@@ -224,7 +224,7 @@ def test_after_a_reboot_the_destination_is_where_the_rover_goes_and_the_news_tel
             client.command(246, 1.0)
             simulator.advance_to_s(simulator.time_s + 0.5)
             watching.note()
-    told = [text.partition(" s: ")[2] for text in watching.news]
+    told = [text.partition(" s: ")[2] for text in watching.events]
     begun = ["mode GUIDED, was MANUAL", "armed"]
     assert told == [*begun, "the autopilot has booted: MANUAL, disarmed", *begun]
 
@@ -254,7 +254,7 @@ def test_without_a_terminal_there_is_one_line(tmp_path: Path, command: str) -> N
     mission = tmp_path / "open.toml"
     mission.write_text(MISSION)
     result = CliRunner().invoke(app, [command, str(mission), "--view"])
-    assert result.exit_code == 2 and result.output.count("\n") == 1 and "no terminal" in result.output
+    assert result.exit_code == 2 and result.output.count("\n") == 1 and "not a terminal" in result.output
 
 
 def on_a_terminal(arguments: list[str], until: bytes, number: signal.Signals, **variables: str) -> tuple[int, bytes]:

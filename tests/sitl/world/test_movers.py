@@ -13,7 +13,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from sitl.scenario import ScenarioError, scenario_from_mission
 from sitl.simulator import Simulator
-from sitl.world.movers import Mover, timed_track
+from sitl.world.movers import Announcement, Mover, timed_track
 from sitl.world.truth import SimStart
 from sitl.world.world import World
 from tests.support.sitl_client import READY_S, Client
@@ -22,10 +22,11 @@ HOME = GeoPoint(-35.3632613, 149.1652299)
 HEAD = '[[target]]\nnorth_m = 10.0\neast_m = 0.0\n[sitl]\nsensors = "none"\n[[sitl.movers]]\n'
 
 
-def mover(places: list[tuple[float, float]], speed_m_s: float = 1.0, start_s: float = 0.0, **options: object) -> Mover:
-    repeats = bool(options.pop("repeats", False))
-    track = timed_track(places, speed_m_s, start_s, repeats=repeats)
-    return Mover("m", float(options.pop("radius_m", 0.5)), track, repeats, str(options.pop("announce", "")))  # type: ignore[arg-type]
+def mover(
+    places: list[tuple[float, float]], speed_m_s: float = 1.0, start_s: float = 0.0, *,
+    repeats: bool = False, radius_m: float = 0.5, announce: Announcement | None = None,
+) -> Mover:  # fmt: skip
+    return Mover("m", radius_m, timed_track(places, speed_m_s, start_s, repeats=repeats), repeats, announce)
 
 
 def world(*movers: Mover) -> World:
@@ -109,7 +110,7 @@ def test_the_rover_stops_at_what_it_runs_into() -> None:
 
 
 def test_what_announces_itself_tells_the_truth() -> None:
-    kinds = ("vehicle", "adsb", "ais")
+    kinds = tuple(Announcement)
     routes = [[(10.0 * i, 0.0), (10.0 * i, 40.0)] for i in range(1, 4)]
     movers = [mover(route, 1.5, announce=kind) for route, kind in zip(routes, kinds, strict=True)]
     client = Client(Simulator(world(*movers), SimStart(0.0, 0.0, 0.0, HOME), "none", noise=False))
@@ -165,6 +166,6 @@ def test_bad_movers_get_one_line(tmp_path: Path, text: str, words: str) -> None:
 def test_a_mover_must_not_begin_on_the_rover(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text(HEAD + "radius_m = 0.5\nspeed_m_s = 1.0\nroute_m = [[0.5, 0.0], [5, 9]]")
-    with pytest.raises(ScenarioError, match=r"sitl.movers 1: begins where the rover stands") as caught:
+    with pytest.raises(ScenarioError, match=r"sitl.movers 1: starts where the rover stands") as caught:
         scenario_from_mission(load_mission(path))
     assert "\n" not in str(caught.value)

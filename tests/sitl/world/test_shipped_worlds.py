@@ -150,7 +150,7 @@ def test_the_depot_keeps_out_of_what_no_lidar_sees_and_can_be_driven_once_its_ga
     assert closed[depot.glass].all() and closed[depot.black].all()
     (target,) = result.targets
     start, end = ((cell.y * 5 + 2, cell.x * 5 + 2) for cell in (result.home_cell, target.cell))
-    solid = {time_s: depot.layers(time_s).solid for time_s in (0.0, 60.0, 81.0)}
+    solid = {time_s: depot.layers(time_s).solid.fields for time_s in (0.0, 60.0, 81.0)}
     rover = ndimage.distance_transform_edt
     ways = {time_s: joined(rover(~there) > 4.0, start, end) for time_s, there in solid.items()}
     assert ways == {0.0: False, 60.0: False, 81.0: True}
@@ -179,6 +179,7 @@ def test_the_fence_of_the_field_mission_lies_across_the_straight_way() -> None:
     assert mission.planned_home is not None
     result = resolve(mission, LocalFrame(mission.planned_home), NedPoint(0.0, 0.0))
     second, third = result.targets[1].point, result.targets[2].point
-    steps = [NedPoint(*(a + t / 100 * (b - a) for a, b in ((second.north_m, third.north_m), (second.east_m, third.east_m)))) for t in range(101)]  # fmt: skip
+    ends = ((second.north_m, third.north_m), (second.east_m, third.east_m))
+    steps = [NedPoint(*(a + t / 100 * (b - a) for a, b in ends)) for t in range(101)]
     assert any(result.grid.is_obstacle(result.grid.cell_at(step)) for step in steps)
     assert all(point.distance_m(NedPoint(0.0, 0.0)) < 100.0 for point in (second, third))

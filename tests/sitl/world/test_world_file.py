@@ -59,7 +59,7 @@ def test_fields_cover_a_polygon_and_hardly_more(corners: list[tuple[float, float
     fields, shape = shape_of({"polygon_m": [list(corner) for corner in hull.exterior.coords[:-1]]})
     rows, columns = np.nonzero(fields)
     middles = shapely.points((columns + 0.5) * 0.1, (rows + 0.5) * 0.1)
-    # A mitred corner of a sharp angle reaches farther than half a field; five halves is shapely's own limit, and there the tip is cut off square.
+    # A mitred sharp corner reaches farther than half a field; at five halves, a limit of shapely, the tip is cut.
     assert shapely.distance(shape, middles).max() <= math.hypot(5.0 * 0.05, 0.05) + 1e-6
     missed = shape.difference(
         shapely.union_all(shapely.box(columns * 0.1, rows * 0.1, columns * 0.1 + 0.1, rows * 0.1 + 0.1))
@@ -171,9 +171,11 @@ def test_a_ros_map_says_how_large_its_fields_are(tmp_path: Path) -> None:
         (SIZE + POST + 'material = "wood"\n', "obstacle 1.material"),
         (SIZE + POST + "colour = 3\n", "unknown key"),
         (SIZE + POST.replace("obstacle", "door"), "door 1.open_s: field required"),
-        (SIZE + POST.replace("obstacle", "door") + "open_s = [[5.0, 5.0]]\n", "door 1: open_s: the span from 5 s ends at 5 s"),
+        (SIZE + POST.replace("obstacle", "door") + "open_s = [[5.0, 5.0]]\n",
+         "door 1: open_s: the span from 5 s ends at 5 s"),
         (SIZE + POST.replace("obstacle", "door") + "open_s = [[5.0]]\nperiod_s = 9.0\n", "goes beyond period_s"),
-        (SIZE + POST.replace("obstacle", "door") + "open_s = [[1.0, 2.0], [1.5, 4.0]]\n", "from 1 s and from 1.5 s overlap; make"),
+        (SIZE + POST.replace("obstacle", "door") + "open_s = [[1.0, 2.0], [1.5, 4.0]]\n",
+         "from 1 s and from 1.5 s overlap; make"),
         (SIZE + POST.replace("obstacle", "door") + "open_s = [[5.0], [7.0, 8.0]]\n", "from 5 s and from 7 s overlap"),
         ("size_m = [10.0]\n", "size_m 2: field required, it is missing; docs/worlds.md describes the file"),
         (SIZE + POST.replace("obstacle", "slippery") + "grip = 1.5\n", "slippery 1.grip"),
@@ -185,7 +187,7 @@ def test_a_ros_map_says_how_large_its_fields_are(tmp_path: Path) -> None:
         ('base = "gone.png"\n', "gone.png: no such file; check the path"),
         ('base = "world.toml"\n', "it must be a map"),
         ('base = "map.png"\nresolution_m = 0.3\n', "does not divide"),
-        ('base = "map.png"\n' + SIZE, "says how large the world is"),
+        ('base = "map.png"\n' + SIZE, "already has a size"),
     ],
 )  # fmt: skip
 def test_a_bad_world_gets_one_line(tmp_path: Path, text: str, words: str) -> None:
@@ -229,7 +231,8 @@ def test_the_rover_stands_in_a_field_of_the_mission(tmp_path: Path) -> None:
     [
         (SIZE + POST.replace("10.0", "2.0").replace("5.0", "2.0"), "", "touches an obstacle"),
         (SIZE + POST, "start = [99, 3]\n", "lies outside"),
-        (SIZE + "[[mover]]\nradius_m = 0.5\nspeed_m_s = 1.0\nroute_m = [[2.2, 2.2], [9, 9]]\n", "", "world.toml: mover 1: begins"),
+        (SIZE + "[[mover]]\nradius_m = 0.5\nspeed_m_s = 1.0\nroute_m = [[2.2, 2.2], [9, 9]]\n", "",
+         "world.toml: mover 1: starts"),
     ],
 )  # fmt: skip
 def test_a_start_where_something_is_gets_one_line(tmp_path: Path, world: str, sitl: str, words: str) -> None:

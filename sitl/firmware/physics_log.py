@@ -1,0 +1,60 @@
+"""Log lines of the physics: starts of the firmware, collisions, unexpected datagrams; a summary at the end."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from sitl.firmware.physics import Physics
+from sitl.network.event_log import COLLISIONS_EVERY_S, collision_line
+
+
+class PhysicsLog:
+    """Reports what has happened since the last look, one line each, to ``tell``; ``now_s`` reads real seconds."""
+
+    def __init__(self, physics: Physics, tell: Callable[[str], None], now_s: Callable[[], float]) -> None:
+        self._physics = physics
+        self._tell = tell
+        self._now_s = now_s
+        self._starts = 0
+        self._reported: set[str] = set()
+        self._collisions = 0
+        self._collisions_told_s = -math.inf
+
+    def look(self) -> None:
+        """Report what is new."""
+        tally, collisions = self._physics.tally, self._physics.collisions
+        if tally.starts != self._starts:
+            again = "again: the rover is back at its start, the time is 0" if self._starts else "and is answered"
+            self._tell(f"the firmware has started {again}")
+            self._starts, self._collisions = tally.starts, 0
+        if tally.bad:
+            self._tell_once("a datagram was no frame of ArduPilot's JSON interface; ignored, like all that follow")
+        if tally.strangers:
+            self._tell_once(
+                "a second firmware asks at the same port; ignored: start another physics with its own --port for it"
+            )
+        if tally.lost:
+            self._tell_once("frames were lost; the rover's time does not count them")
+        if len(collisions) > self._collisions and self._now_s() - self._collisions_told_s >= COLLISIONS_EVERY_S:
+            self._collisions, self._collisions_told_s = len(collisions), self._now_s()
+            self._tell(collision_line(collisions[-1], len(collisions), self._physics.start))
+
+    def _tell_once(self, line: str) -> None:
+        if line not in self._reported:
+            self._reported.add(line)
+            self._tell(line)
+
+
+def summary(physics: Physics) -> str:
+    """One line about everything that was received."""
+    tally, collisions = physics.tally, len(physics.collisions)
+    counts = {
+        "steps": tally.steps, "asked again": tally.repeated, "lost": tally.lost, "late": tally.late,
+        "from another firmware": tally.strangers, "not frames": tally.bad,
+    }  # fmt: skip
+    frames = ", ".join(f"{count} {what}" for what, count in counts.items() if count)
+    if not tally.starts:
+        return f"stopped; no firmware has asked{f' ({frames})' if frames else ''}"
+    touched = f"{collisions} collision{'s' if collisions != 1 else ''}"
+    return f"stopped; {frames}; since the firmware's last start {physics.time_s:.0f} s and {touched}"

@@ -1,0 +1,61 @@
+"""Log lines of a served simulator: clients that connect and disconnect, and collisions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from sitl.simulator import Simulator
+from sitl.world.truth import Collision, SimStart
+
+SILENT_S = 5.0
+"""A UDP client that has been silent for this long counts as gone."""
+COLLISIONS_EVERY_S = 1.0
+"""Minimum time between lines about collisions: a rover that scrapes along a wall touches it many times."""
+
+
+class EventLog:
+    """Reports each event in one line to ``tell`` (by default nowhere); ``now_s`` reads real seconds."""
+
+    def __init__(
+        self, tell: Callable[[str], None] = lambda line: None, now_s: Callable[[], float] = lambda: 0.0
+    ) -> None:
+        self._tell = tell
+        self._now_s = now_s
+        self._heard_s: dict[tuple[str, str], float] = {}
+        self._collisions = 0
+        self._collisions_reported_s = -math.inf
+
+    def connected(self, client: str, url: str) -> None:
+        """A client has connected."""
+        self._tell(f"{client} has connected ({url})")
+
+    def disconnected(self, client: str, url: str, *, dropped: bool) -> None:
+        """A client has disconnected, or was ``dropped`` by the vehicle."""
+        self._tell(f"{client} has {'been dropped: the autopilot restarts' if dropped else 'disconnected'} ({url})")
+
+    def heard(self, client: str, url: str) -> None:
+        """A client has sent something over a protocol without connections."""
+        if (client, url) not in self._heard_s:
+            self.connected(client, url)
+        self._heard_s[client, url] = self._now_s()
+
+    def look(self, simulator: Simulator) -> None:
+        """Report clients that have fallen silent, and collisions since the last look."""
+        now_s = self._now_s()
+        for (client, url), last_s in list(self._heard_s.items()):
+            if now_s - last_s > SILENT_S:
+                del self._heard_s[client, url]
+                self._tell(f"{client} has been silent for {SILENT_S:g} s ({url})")
+        collisions = simulator.collisions
+        if len(collisions) > self._collisions and now_s - self._collisions_reported_s >= COLLISIONS_EVERY_S:
+            self._collisions, self._collisions_reported_s = len(collisions), now_s
+            self._tell(collision_line(collisions[-1], len(collisions), simulator.start))
+
+
+def collision_line(collision: Collision, count: int, start: SimStart) -> str:
+    """What was touched, when and where; relative to the rover's start, like LOCAL_POSITION_NED."""
+    north_m, east_m = collision.north_m - start.north_m, collision.east_m - start.east_m
+    what = "an obstacle" if collision.mover is None else collision.mover
+    where = f"north {north_m:.1f} m, east {east_m:.1f} m of its start"
+    return f"collision {count}: the rover touched {what} at {collision.time_s:.1f} s, {where}"
