@@ -109,9 +109,15 @@ class Entry:
 
 
 COLUMNS = (
-    "offline_length_m", "offline_time_s", "length_m", "time_s", "first_generations", "first_ms", "all_ms",
+    "offline_length_m",
+    "offline_time_s",
+    "length_m",
+    "time_s",
+    "first_generations",
+    "first_ms",
+    "all_ms",
     "least_gap_m",
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)

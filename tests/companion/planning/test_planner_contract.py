@@ -19,16 +19,20 @@ EIGHT, FOUR = np.ones((3, 3)), None
 
 @st.composite
 def problems(draw):
+    """Mostly solvable ones with many corners: most faults show only where a path is found beside obstacles."""
     width, height = draw(st.integers(1, 14)), draw(st.integers(1, 14))
-    seed, share = draw(st.integers(0, 2**32 - 1)), draw(st.sampled_from([0.0, 0.1, 0.25, 0.4]))
+    seed, share = draw(st.integers(0, 2**32 - 1)), draw(st.sampled_from([0.25, 0.1, 0.4, 0.0]))
     rng = np.random.default_rng(seed)
-    weights = draw(
-        st.sampled_from([np.full((height, width), 0.5), rng.random((height, width)), np.zeros((height, width))])
-    )
-    weights = weights.copy()
+    ground = draw(st.sampled_from(["even", "rough", "free of cost"]))
+    weights = {"even": np.full((height, width), 0.5), "free of cost": np.zeros((height, width))}.get(ground)
+    weights = rng.random((height, width)) if weights is None else weights
     weights[rng.random((height, width)) < share] = 1.0
-    start = Cell(draw(st.integers(-1, width)), draw(st.integers(-1, height)))
-    target = Cell(draw(st.integers(-1, width)), draw(st.integers(-1, height)))
+    if draw(st.integers(0, 4)) == 0:  # ends anywhere: on obstacles, outside the map
+        start, target = (Cell(draw(st.integers(-1, width)), draw(st.integers(-1, height))) for _ in range(2))
+    else:  # free and usually far apart
+        low, high = sorted(rng.integers(0, width, 2))
+        start, target = Cell(int(low), int(rng.integers(height))), Cell(int(high), int(rng.integers(height)))
+        weights[start.y, start.x] = weights[target.y, target.x] = 0.5
     weights.flags.writeable = draw(st.booleans())
     return PlanningProblem(weights, start, target, draw(st.booleans()))
 
@@ -45,7 +49,7 @@ def reachable(problem: PlanningProblem) -> bool:
 
 @pytest.mark.parametrize("name", PLANNERS)
 @given(problem=problems(), seed=st.integers(0, 2**32 - 1))
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=120, deadline=None)  # enough for planted faults of one condition in one kernel
 def test_contract(name, problem, seed):
     planner = make_planner(name, SETTINGS)
     before = problem.weights.copy()
