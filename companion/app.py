@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.checkpoint.checkpointer import Memory
+from companion.checkpoint.checkpointer import Checkpointer
 from companion.core.clock import Clock
 from companion.core.frames import GeoPoint
 from companion.executive.goal_driver import GoalDriver
@@ -16,7 +16,7 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.mission import Mission
 from companion.navigation.step_runner import StepRunner
 from companion.operator.notifications import Outcome, Status, status_of
-from companion.recording.recorder import DecisionLog
+from companion.recording.recorder import RunLog
 from companion.settings import Settings
 from companion.supervision.assembly import Options, assemble
 from companion.vehicle.state import VehicleState
@@ -37,14 +37,14 @@ class Companion:
         mission: Mission,
         settings: Settings,
         runner: StepRunner,
-        log: DecisionLog,
+        log: RunLog,
         *,
         seed: int,
         arm: bool,
-        memory: Memory | None = None,
+        checkpointer: Checkpointer | None = None,
         keep_settings: Callable[[Settings], None] | None = None,
     ) -> None:
-        options = Options(seed, arm, memory, keep_settings)
+        options = Options(seed, arm, checkpointer, keep_settings)
         parts = assemble(autopilot, clock, mission, settings, runner, log, options)
         self._autopilot = autopilot
         self._clock = clock

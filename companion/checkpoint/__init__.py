@@ -1,1 +1,1 @@
-"""What outlasts the program, so that a run can go on after a crash."""
+"""Saves the state of a run to disk, and resumes a run that was interrupted."""

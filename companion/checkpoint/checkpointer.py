@@ -1,155 +1,215 @@
-"""Keeps what a run would need to go on after its end: looks each tick whether it is time, takes it, and hands it to a writer."""
+"""The checkpointer: decides in each tick whether the state of the run must be saved, and takes the snapshots that are written."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
+from dataclasses import dataclass, field
+from typing import Any, Protocol
 
-from companion.checkpoint.format import BandPlace, Raster
-from companion.checkpoint.model import SavedDraws, SavedTally
-from companion.checkpoint.resume import Kept, clock_ahead_s, nav_state, shift_of
-from companion.checkpoint.snapshot import Snapshot
-from companion.checkpoint.writer import Update, Writer
-from companion.core.frames import NedPoint
-from companion.core.grid import Cell
-from companion.core.rounds import Mark
-from companion.executive.goal_driver import Tally
+from companion.checkpoint.resume import PreviousRun, clock_ahead_s, resume_mission
+from companion.checkpoint.state_format import (
+    MAX_DURATION_S,
+    Raster,
+    RowBand,
+    SavedGenerator,
+    SavedGoalRequest,
+    SavedGrid,
+    SavedNavState,
+    SavedPlace,
+    SavedProgress,
+    SavedState,
+    SavedTally,
+)
+from companion.core.frames import GeoPoint, LocalFrame, NedPoint
+from companion.core.grid import Cell, Grid
+from companion.core.round_mark import Mark
 from companion.executive.mission_executor import MissionExecutor
-from companion.executive.mission_progress import MissionPhase, MissionProgress
+from companion.executive.mission_progress import MissionProgress
 from companion.mapping.evidence_map import EvidenceMap
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
-from companion.recording.recorder import DecisionLog
+from companion.mission.resolve import ResolvedTarget
+from companion.navigation.field_step import NavState
+from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Control
 from companion.vehicle.events.vehicle import LocalPositionSeen
 from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 
-SAVE_S = 5.0
-"""The state is written this often while the rover moves, and at once when something has happened."""
-MOVED_M = 0.3
-CARRIED_M = 25.0
-"""A rover that is found farther than this from where it was has been carried: the leg begins anew where it stands."""
+SAVE_INTERVAL_S = 5.0
+"""Interval between saves while the rover moves. A change of the mission, mode or arming is saved immediately."""
+SAVE_DISTANCE_M = 0.3
 UNSAVED = "The state cannot be saved: no --resume from here"
 BAND_CELLS = 250_000
-"""So much of the map is copied in one tick, a megabyte; larger maps take several."""
+"""How much of the map is copied in one tick (1 MB). Larger maps take several ticks."""
 
-Occasion = tuple[MissionProgress, Control, bool, bool, bool]
+Condition = tuple[MissionProgress, Control, bool, bool, bool]
+"""Progress, control, armed, released, ended: a change of any of them is saved immediately."""
 
 
-class Memory:
-    """Of one run. ``kept`` is what an earlier one has left, if it is to be taken up."""
+@dataclass(frozen=True, eq=False, slots=True)
+class RunMoment:
+    """The run at the end of a tick. ``released``: the program has put the rover into HOLD; ``done``: the run ends now."""
 
-    def __init__(self, mission: Mission, writer: Writer, kept: Kept | None = None) -> None:
-        self.kept = kept
+    now_s: float
+    vehicle: VehicleState
+    control: Control
+    executor: MissionExecutor
+    position_doubted: bool
+    released: bool
+    done: bool
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Snapshot:
+    """A run at one moment, by references to values that never change: cheap to take in a tick, converted in another thread.
+
+    ``now_s``: the program's clock. ``draws``: the random generator's state in numpy's form. The others as in ``SavedState``.
+    """
+
+    mission: str
+    mission_sha256: str
+    now_s: float
+    ended: bool
+    control: Control
+    released: bool
+    armed: bool
+    boot_s: float
+    ahead_s: float
+    origin: GeoPoint
+    home: GeoPoint
+    progress: MissionProgress
+    nav_state: NavState | None
+    doubts_left: int
+    trail: tuple[Cell, ...]
+    base: Grid
+    subdivisions: int
+    tally: SavedTally
+    draws: Mapping[str, Any] | None
+    sticks_us: tuple[int, int] | None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class StateUpdate:
+    """What changed: copied rows of the map (``new_map``: all older rows are void). With a snapshot the file is to be written."""
+
+    rows: Mapping[RowBand, Raster] = field(default_factory=dict)
+    snapshot: Snapshot | None = None
+    new_map: bool = False
+
+
+class StateWriter(Protocol):
+    """Takes updates in order and writes the state file."""
+
+    @property
+    def busy(self) -> bool:
+        """Whether updates are still being processed."""
+        ...
+
+    @property
+    def problem(self) -> str:
+        """Why the last write failed; empty if it succeeded."""
+        ...
+
+    def put(self, update: StateUpdate) -> None:
+        """Process an update, now or later."""
+        ...
+
+    def close(self) -> None:
+        """Process what is left."""
+        ...
+
+
+class Checkpointer:
+    """Saves the state of one run. ``previous``: the interrupted run that it resumes."""
+
+    def __init__(self, mission: Mission, writer: StateWriter, previous: PreviousRun | None = None) -> None:
+        self.previous = previous
         self._name = mission.name
         self._sha256 = fingerprint(mission)
         self._writer = writer
-        self._occasion: Occasion | None = None
+        self._condition: Condition | None = None
         self._map: tuple[int, bool] | None = None
-        self._rows: Iterator[tuple[BandPlace, Raster]] | None = None
-        self._complete = False
+        self._rows: Iterator[tuple[RowBand, Raster]] | None = None
+        self._map_complete = False
         self._saved_s = -math.inf
         self._saved_at = NedPoint(math.inf, math.inf)
         self._draws: Mapping[str, Any] | None = None
 
     @property
     def sticks(self) -> Sticks:
-        """Where a rover's sticks rested that is still ours: who has taken hold of them since is not to be left without it."""
-        ours = self.kept is not None and self.kept.state.control is Control.COMPANION
-        return Sticks(self.kept.state.sticks_us if self.kept is not None and ours else None)
+        """The pilot's sticks to start with."""
+        return Sticks() if self.previous is None else self.previous.sticks
 
     @property
     def problem(self) -> str:
-        """Why the state cannot be saved; empty while it can."""
+        """Why the state cannot be saved; empty if it can."""
         return self._writer.problem
 
-    def heed_problem(self, log: DecisionLog) -> str:
-        """What people are told of it, in words that follow from the record: the disk's own reason is known to this computer only."""
+    def problem_text(self, log: RunLog) -> str:
+        """The text for the ground station, noted in the record. The disk's own reason would not be reproducible in a replay."""
         if not self.problem:
             return ""
         log.mark(Mark.UNSAVED)
         return UNSAVED
 
-    def take_up(self, executor: MissionExecutor, vehicle: VehicleState, now_s: float) -> bool:
-        """Go on in the middle of the leg: once, with an executor on the ground of ``lay_resumed``. False: there is nothing to take up."""
-        if self.kept is None:
+    def resume(self, executor: MissionExecutor, vehicle: VehicleState, now_s: float) -> bool:
+        """Continue the interrupted run, once, with an executor on the ground of ``resumed_layout``. False if there is none."""
+        if self.previous is None:
             return False
-        state = self.kept.state
-        tally = Tally(state.tally.steps, state.tally.return_steps, state.tally.stuck)
-        executor.driver.go_on(tally, state.tally.epoch)
-        if state.draws is not None:
-            executor.driver.searcher.rng.bit_generator.state = _generator(state.draws)
-        shift = shift_of(state, executor.layout)
-        for x, y in state.trail:
-            executor.trail.enter(Cell(x + shift.x, y + shift.y))
-        _look(executor, vehicle)
-        progress, leg, pose = executor.progress, state.leg, vehicle.pose_at(now_s)
-        drives = progress.phase in (MissionPhase.TRAVEL, MissionPhase.HOME) and not executor.target_refused
-        if leg is not None and pose is not None and drives:
-            past = nav_state(leg, shift)
-            if executor.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
-                executor.driver.take_up(progress.goal, past, leg.doubts_left, pose)
+        resume_mission(self.previous, executor, vehicle, now_s)
         return True
 
-    def note(
-        self,
-        now_s: float,
-        vehicle: VehicleState,
-        control: Control,
-        executor: MissionExecutor,
-        doubted: bool,
-        released: bool,
-        done: bool,
-    ) -> None:
-        """One tick is over. ``doubted``: the position is; ``released``: we have put the rover into HOLD; ``done``: the run ends."""
-        position, heartbeat = vehicle.position, vehicle.heartbeat
+    def update(self, moment: RunMoment) -> None:
+        """At the end of each tick: copy a part of the map, and write the state, if it is time."""
+        executor, position, heartbeat = moment.executor, moment.vehicle.position, moment.vehicle.heartbeat
         if position is None or heartbeat is None:
             return
         if not executor.driver.planning:
             self._draws = executor.driver.searcher.rng.bit_generator.state
-        ended = done and executor.progress.ended
-        occasion = (executor.progress, control, heartbeat.armed, released, ended)
-        happened, self._occasion = occasion != self._occasion, occasion
-        afresh, self._map = self._map not in (None, (executor.maps_begun, doubted)), (executor.maps_begun, doubted)
-        if afresh:
+        ended = moment.done and executor.progress.ended
+        condition = (executor.progress, moment.control, heartbeat.armed, moment.released, ended)
+        changed, self._condition = condition != self._condition, condition
+        the_map = (executor.maps_begun, moment.position_doubted)
+        new_map, self._map = self._map not in (None, the_map), the_map
+        if new_map:
             self._rows = None
-        elif self._rows is None and not doubted and self._is_due(now_s, position) and not self._writer.busy:
+        elif self._rows is None and self._is_due(moment, position):
             self._rows = _rows(executor.evidence)
         band = None if self._rows is None else next(self._rows, None)
-        if done and not doubted:  # nobody waits any more
-            self._writer.put(Update(dict(_rows(executor.evidence))))
+        if moment.done and not moment.position_doubted:  # no further tick is delayed by copying the whole map
+            self._writer.put(StateUpdate(dict(_rows(executor.evidence))))
         elif band is not None:
-            self._writer.put(Update(dict([band])))
-        through = self._rows is not None and band is None
-        if through:
-            self._rows, self._complete = None, True
-            self._saved_s, self._saved_at = now_s, NedPoint(position.north_m, position.east_m)
-        if afresh or through or done or (happened and self._complete):
-            now = self._snapshot(now_s, position, vehicle.sticks, executor, occasion)
-            self._writer.put(Update(snapshot=now, afresh=afresh))
+            self._writer.put(StateUpdate(dict([band])))
+        copied = self._rows is not None and band is None
+        if copied:
+            self._rows, self._map_complete = None, True
+            self._saved_s, self._saved_at = moment.now_s, NedPoint(position.north_m, position.east_m)
+        if new_map or copied or moment.done or (changed and self._map_complete):
+            self._writer.put(StateUpdate(snapshot=self._snapshot(moment, position, condition), new_map=new_map))
 
     def close(self) -> None:
         """Write what is left."""
         self._writer.close()
 
-    def _is_due(self, now_s: float, position: LocalPositionSeen) -> bool:
-        """Not while the rover stands: then nothing is lost but seconds."""
+    def _is_due(self, moment: RunMoment, position: LocalPositionSeen) -> bool:
+        """Not while the rover stands: an older state is as good then."""
+        if moment.position_doubted or self._writer.busy:
+            return False
         moved_m = NedPoint(position.north_m, position.east_m).distance_m(self._saved_at)
-        return now_s - self._saved_s >= SAVE_S and moved_m >= MOVED_M
+        return moment.now_s - self._saved_s >= SAVE_INTERVAL_S and moved_m >= SAVE_DISTANCE_M
 
-    def _snapshot(
-        self, now_s: float, position: LocalPositionSeen, sticks: Sticks, executor: MissionExecutor, occasion: Occasion
-    ) -> Snapshot:
-        _, control, armed, released, ended = occasion
+    def _snapshot(self, moment: RunMoment, position: LocalPositionSeen, condition: Condition) -> Snapshot:
+        executor = moment.executor
+        progress, control, armed, released, ended = condition
         driver, layout = executor.driver, executor.layout
-        leg, doubts_left, epoch = driver.leg
+        nav_state, doubts_left, epoch = driver.leg
         tally = driver.tally
         return Snapshot(
             mission=self._name,
             mission_sha256=self._sha256,
-            now_s=now_s,
+            now_s=moment.now_s,
             ended=ended,
             control=control,
             released=released,
@@ -158,37 +218,92 @@ class Memory:
             ahead_s=clock_ahead_s(position),
             origin=layout.origin,
             home=layout.home,
-            progress=executor.progress,
-            leg=leg if driver.goal == executor.progress.goal else None,
+            progress=progress,
+            nav_state=nav_state if driver.goal == progress.goal else None,
             doubts_left=doubts_left,
             trail=executor.trail.back()[::-1],
             base=executor.evidence.base,
             subdivisions=executor.evidence.subdivisions,
             tally=SavedTally(steps=tally.steps, return_steps=tally.return_steps, stuck=tally.stuck, epoch=epoch),
             draws=self._draws,
-            sticks_us=sticks.rest_us,
+            sticks_us=moment.vehicle.sticks.rest_us,
         )
 
 
-def _look(executor: MissionExecutor, vehicle: VehicleState) -> None:
-    """A rover that is found driving is beyond what had been seen when the state was written: what it sees now comes before the first target."""
-    seen, attitude = vehicle.scan_ahead, vehicle.attitude
-    pose = None if seen is None else vehicle.pose_at(seen.time_s)
-    if seen is not None and attitude is not None and pose is not None:
-        executor.map_scan(pose, attitude.yaw_rate_rad_s, seen.scan)
-
-
-def _rows(evidence: EvidenceMap) -> Iterator[tuple[BandPlace, Raster]]:
-    """The map in bands, each copied when it is asked for: some seconds may lie between the first and the last of a large one."""
+def _rows(evidence: EvidenceMap) -> Iterator[tuple[RowBand, Raster]]:
+    """The map in bands of rows, each copied when it is asked for. With a large map the last may be seconds newer than the first."""
     for name, raster in (("log_odds", evidence.log_odds), ("penalty", evidence.penalty)):
         height, width = raster.shape
         step = max(1, BAND_CELLS // width)
         for row in range(0, height, step):
             rows = raster[row : row + step].copy()
-            yield BandPlace(name, row, len(rows)), rows
+            yield RowBand(name, row, len(rows)), rows
 
 
-def _generator(draws: SavedDraws) -> dict[str, Any]:
-    """As numpy takes it."""
-    inner = {"state": draws.state, "inc": draws.inc}
-    return {"bit_generator": "PCG64", "state": inner, "has_uint32": draws.has_uint32, "uinteger": draws.uinteger}
+def saved_state(snapshot: Snapshot) -> SavedState:
+    """The snapshot as the values of the state file. Raises ValueError for a value outside their limits."""
+    home, corner = LocalFrame(snapshot.origin).to_ned(snapshot.home), snapshot.base.south_west
+    ground = SavedGrid(
+        north_m=corner.north_m - home.north_m,
+        east_m=corner.east_m - home.east_m,
+        resolution_m=snapshot.base.resolution_m,
+        width=snapshot.base.width,
+        height=snapshot.base.height,
+        subdivisions=snapshot.subdivisions,
+    )
+    return SavedState(
+        mission=snapshot.mission,
+        mission_sha256=snapshot.mission_sha256,
+        ended=snapshot.ended,
+        control=snapshot.control,
+        released=snapshot.released,
+        armed=snapshot.armed,
+        boot_s=snapshot.boot_s,
+        ahead_s=snapshot.ahead_s,
+        origin=(snapshot.origin.lat_deg, snapshot.origin.lon_deg),
+        home=(snapshot.home.lat_deg, snapshot.home.lon_deg),
+        progress=_saved_progress(snapshot.progress, snapshot.now_s),
+        leg=None if snapshot.nav_state is None else _saved_nav_state(snapshot.nav_state, snapshot.doubts_left),
+        trail=snapshot.trail,
+        ground=ground,
+        tally=snapshot.tally,
+        draws=None if snapshot.draws is None else _saved_generator(snapshot.draws),
+        sticks_us=snapshot.sticks_us,
+    )
+
+
+def _saved_progress(progress: MissionProgress, now_s: float) -> SavedProgress:
+    home, give_up_s = progress.home, progress.give_up_s
+    return SavedProgress(
+        start=SavedPlace(name=home.name, north_m=home.point.north_m, east_m=home.point.east_m),
+        statuses=progress.statuses,
+        index=progress.index,
+        leg=progress.phase,
+        left_s=_left_s(progress.until_s, now_s),
+        give_up_left_s=None if give_up_s is None else _left_s(give_up_s, now_s),
+        errand=None if progress.requested is None else _saved_request(progress.requested),
+    )
+
+
+def _left_s(until_s: float, now_s: float) -> float:
+    return min(max(0.0, until_s - now_s), MAX_DURATION_S)
+
+
+def _saved_request(goal: ResolvedTarget) -> SavedGoalRequest:
+    point = goal.point
+    return SavedGoalRequest(name=goal.name, north_m=point.north_m, east_m=point.east_m, speed_m_s=goal.speed_m_s)
+
+
+def _saved_nav_state(state: NavState, doubts_left: int) -> SavedNavState:
+    return SavedNavState(
+        past=state.past,
+        returning=state.returning,
+        until_search=state.until_search,
+        since_better=state.since_better,
+        draws=state.draws,
+        doubts_left=doubts_left,
+    )
+
+
+def _saved_generator(state: Mapping[str, Any]) -> SavedGenerator:
+    return SavedGenerator(**state["state"], has_uint32=state["has_uint32"], uinteger=state["uinteger"])

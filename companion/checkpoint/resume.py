@@ -1,18 +1,20 @@
-"""Taking up a run that has been interrupted: whose rover it is now, and where the mission, its progress and its map lie now."""
+"""Resuming an interrupted run: who controls the rover now, and the mission, its progress and its map in the present frame."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from companion.checkpoint.model import SavedLeg, SavedPlace, SavedState
+from companion.checkpoint.state_format import Raster, SavedGenerator, SavedNavState, SavedPlace, SavedState
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell
+from companion.executive.goal_driver import Tally
+from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
-from companion.executive.mission_progress import MissionProgress
+from companion.executive.mission_progress import MissionPhase, MissionProgress
 from companion.mapping.evidence_map import restore
 from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, OnBlocked
@@ -21,64 +23,73 @@ from companion.navigation.field_step import NavState
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
 from companion.vehicle.events.vehicle import LocalPositionSeen, RoverMode
+from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 
-SAME_CLOCKS_S = 1.0
-"""Two clocks that have both gone on differ by no more than this from what they differed by: a link's delays."""
+SAME_BOOT_S = 1.0
+"""While autopilot and computer both keep running, the difference of their clocks changes by no more than this (link delays)."""
 SAME_ORIGIN_M = 0.2
-
-Raster = NDArray[np.float32]
+CARRIED_M = 25.0
+"""A rover found farther than this from its last field was carried: the way to the target begins again where it stands."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Kept:
-    """What an earlier run has left: its state and its map, ``log_odds`` and ``penalty``."""
+class PreviousRun:
+    """What an interrupted run saved: its state and the rasters of its map, ``log_odds`` and ``penalty``."""
 
     state: SavedState
     rasters: Mapping[str, Raster]
 
+    @property
+    def sticks(self) -> Sticks:
+        """The sticks' rest position if the program had control: sticks moved since then count as a takeover by a person."""
+        return Sticks(self.state.sticks_us if self.state.control is Control.COMPANION else None)
+
 
 @dataclass(frozen=True, slots=True)
-class Ownership:
-    """Whether a person has taken the rover since, and whether it may be armed by us."""
+class ResumePermission:
+    """What a resumed run may do: ``control`` is PERSON if a person has taken the rover since; ``may_arm``: it may arm."""
 
     control: Control
     may_arm: bool
 
 
 def clock_ahead_s(position: LocalPositionSeen) -> float:
-    """By how much our clock is ahead of the autopilot's."""
+    """How far the program's clock is ahead of the autopilot's time since boot."""
     return position.time_s - position.boot_s
 
 
 def same_boot(state: SavedState, position: LocalPositionSeen) -> bool:
-    """Whether autopilot and computer have both been on all the time since."""
-    return abs(clock_ahead_s(position) - state.ahead_s) <= SAME_CLOCKS_S
+    """Whether neither the autopilot nor the computer has restarted since."""
+    return abs(clock_ahead_s(position) - state.ahead_s) <= SAME_BOOT_S
 
 
-def ownership(state: SavedState, vehicle: VehicleState) -> Ownership | None:
-    """Whose the rover is that an earlier run left behind; None while too little has been heard.
+def resume_permission(state: SavedState, vehicle: VehicleState) -> ResumePermission | None:
+    """Who controls the rover of an interrupted run, and whether it may be armed; None until heartbeat and position are known.
 
-    A rover that a person had taken stays with that person, over any restart, until somebody sets GUIDED. One that was ours and that has left GUIDED
-    without us was taken meanwhile, unless its autopilot has restarted; and one that has been disarmed without us is not armed. One that we have
-    stopped in HOLD ourselves waits there for us only as we have left it: a person may have driven it, switched it off, put it away.
+    - A person who had control keeps it over any restart, until somebody sets GUIDED.
+    - If the program had control and the rover has left GUIDED since, a person has taken it, unless the autopilot has restarted.
+    - A rover that was disarmed since, without a restart, is not armed again.
+    - If the program had stopped the rover in HOLD, it continues only if mode, arming and boot are unchanged: otherwise a person may have
+      driven it, switched it off or moved it.
     """
     heartbeat, position = vehicle.heartbeat, vehicle.position
     if heartbeat is None or position is None:
         return None
     if state.control is Control.PERSON:
-        return Ownership(Control.PERSON, may_arm=False)
+        return ResumePermission(Control.PERSON, may_arm=False)
     restarted = position.boot_s < state.boot_s
     if state.released:
-        as_left = heartbeat.mode == RoverMode.HOLD and heartbeat.armed == state.armed and not restarted
-        return Ownership(Control.NOBODY if as_left else Control.PERSON, may_arm=as_left and state.armed)
+        unchanged = heartbeat.mode == RoverMode.HOLD and heartbeat.armed == state.armed and not restarted
+        control = Control.NOBODY if unchanged else Control.PERSON
+        return ResumePermission(control, may_arm=unchanged and state.armed)
     if heartbeat.mode != RoverMode.GUIDED and (heartbeat.armed or not restarted):
-        return Ownership(Control.PERSON, may_arm=False)
-    return Ownership(Control.NOBODY, may_arm=restarted)
+        return ResumePermission(Control.PERSON, may_arm=False)
+    return ResumePermission(Control.NOBODY, may_arm=restarted)
 
 
-def lay_resumed(
-    kept: Kept,
+def resumed_layout(
+    previous: PreviousRun,
     mission: Mission,
     settings: MappingSettings,
     origin: GeoPoint,
@@ -87,58 +98,80 @@ def lay_resumed(
     same: bool,
     fence: AutopilotFence = NO_FENCE,
 ) -> tuple[MissionLayout, MissionProgress, str]:
-    """The mission where it lies now with the map of then, the progress, and what is to be said of the map.
+    """The mission in the present frame with the saved map, the saved progress, and a text about the map for people.
 
-    ``same``: the autopilot has been on since, so that its frame is the one of then unless its origin has moved. Otherwise a new estimate may put
-    everything some metres elsewhere: no ground counts as seen free, and obstacles as such that have hardly been seen. Raises MissionError.
+    ``same``: the autopilot has not restarted, so its frame is the same unless its origin has moved. Otherwise a new position estimate may
+    be some metres off: no ground counts as seen free, and the obstacles count as barely seen. Raises MissionError.
     """
-    state, then = kept.state, GeoPoint(*kept.state.origin)
-    start = _now_at(state.progress.start, then, origin)
-    began_at = Pose(start.north_m, start.east_m, 0.0, now_s)
-    layout = lay(mission, settings, origin, GeoPoint(*state.home), began_at, fence)
-    progress = _progress(layout, state, then, now_s)
-    evidence, shift = layout.evidence, shift_of(state, layout)
+    state, saved_origin = previous.state, GeoPoint(*previous.state.origin)
+    start = _in_frame(state.progress.start, saved_origin, origin)
+    start_pose = Pose(start.north_m, start.east_m, 0.0, now_s)
+    layout = lay(mission, settings, origin, GeoPoint(*state.home), start_pose, fence)
+    progress = _progress(layout, state, saved_origin, now_s)
+    evidence, shift = layout.evidence, grid_shift(state, layout)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:
         return layout, progress, "without its map (the settings of the map have changed)"
-    same = same and apart_m(origin, then) <= SAME_ORIGIN_M
-    fine = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
-    log_odds = _moved(kept.rasters["log_odds"], evidence.log_odds.shape, fine)
-    penalty = _moved(kept.rasters["penalty"], evidence.penalty.shape, shift)
+    same = same and apart_m(origin, saved_origin) <= SAME_ORIGIN_M
+    cell_shift = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
+    log_odds = _shifted(previous.rasters["log_odds"], evidence.log_odds.shape, cell_shift)
+    penalty = _shifted(previous.rasters["penalty"], evidence.penalty.shape, shift)
     if not same:
         log_odds = np.where(log_odds >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
         penalty = np.zeros_like(penalty)
     restore(evidence, log_odds, penalty)
-    said = "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
-    return layout, progress, said
+    text = "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
+    return layout, progress, text
 
 
-def shift_of(state: SavedState, layout: MissionLayout) -> Cell:
-    """By how many fields the grid's corner lies elsewhere from home than it did: what was field f is now f + shift.
+def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: VehicleState, now_s: float) -> None:
+    """Continue in the middle of a leg: counts, random generator, trail, and the navigator's state.
 
-    Home is in the middle of a field of either grid; but a grid that is laid round places in degrees may be a field larger in another frame.
+    The leg begins again if the rover was carried, or if it must not be driven.
+    """
+    state = previous.state
+    tally = Tally(state.tally.steps, state.tally.return_steps, state.tally.stuck)
+    executor.driver.go_on(tally, state.tally.epoch)
+    if state.draws is not None:
+        executor.driver.searcher.rng.bit_generator.state = _numpy_state(state.draws)
+    shift = grid_shift(state, executor.layout)
+    for x, y in state.trail:
+        executor.trail.enter(Cell(x + shift.x, y + shift.y))
+    _map_newest_scan(executor, vehicle)
+    progress, saved, pose = executor.progress, state.leg, vehicle.pose_at(now_s)
+    drives = progress.phase in (MissionPhase.TRAVEL, MissionPhase.HOME) and not executor.target_refused
+    if saved is not None and pose is not None and drives:
+        nav_state = resumed_nav_state(saved, shift)
+        if executor.evidence.base.centre_of(nav_state.past[-1]).distance_m(pose.point) <= CARRIED_M:
+            executor.driver.take_up(progress.goal, nav_state, saved.doubts_left, pose)
+
+
+def grid_shift(state: SavedState, layout: MissionLayout) -> Cell:
+    """The offset between the saved grid and the present one: the saved field f is now f + shift.
+
+    Home is in the middle of a field in both grids; but a grid around places in degrees may be a field larger in another frame.
     """
     corner, resolution_m = from_home(layout).south_west, layout.evidence.base.resolution_m
     east, north = state.ground.east_m - corner.east_m, state.ground.north_m - corner.north_m
     return Cell(round(east / resolution_m), round(north / resolution_m))
 
 
-def nav_state(leg: SavedLeg, shift: Cell) -> NavState:
-    """The navigator's memory in the fields of now; its target is still to be put in, and its path is planned anew."""
+def resumed_nav_state(saved: SavedNavState, shift: Cell) -> NavState:
+    """The navigator's state in fields of the present grid. The driver sets its target; the path is planned again."""
     return NavState(
         target=Cell(0, 0),
-        past=tuple(Cell(x + shift.x, y + shift.y) for x, y in leg.past),
-        returning=leg.returning,
-        until_search=leg.until_search,
-        since_better=leg.since_better,
-        draws=leg.draws,
+        past=tuple(Cell(x + shift.x, y + shift.y) for x, y in saved.past),
+        returning=saved.returning,
+        until_search=saved.until_search,
+        since_better=saved.since_better,
+        draws=saved.draws,
     )
 
 
-def _progress(layout: MissionLayout, state: SavedState, then: GeoPoint, now_s: float) -> MissionProgress:
-    """How far the mission had come, on the targets where they lie now."""
+def _progress(layout: MissionLayout, state: SavedState, saved_origin: GeoPoint, now_s: float) -> MissionProgress:
+    """The saved progress, with the targets in the present frame."""
     saved, requested = state.progress, None
     if saved.errand is not None:
-        point = _now_at(saved.errand, then, layout.origin)
+        point = _in_frame(saved.errand, saved_origin, layout.origin)
         cell = layout.evidence.base.cell_at(point)
         requested = ResolvedTarget(saved.errand.name, point, cell, 0.0, OnBlocked.SKIP, saved.errand.speed_m_s)
     return MissionProgress(
@@ -153,13 +186,13 @@ def _progress(layout: MissionLayout, state: SavedState, then: GeoPoint, now_s: f
     )
 
 
-def _now_at(place: SavedPlace, then: GeoPoint, origin: GeoPoint) -> NedPoint:
-    """A place of the frame of then, in the frame of now."""
-    return LocalFrame(origin).to_ned(LocalFrame(then).to_geo(NedPoint(place.north_m, place.east_m)))
+def _in_frame(place: SavedPlace, saved_origin: GeoPoint, origin: GeoPoint) -> NedPoint:
+    """A saved place in the present frame."""
+    return LocalFrame(origin).to_ned(LocalFrame(saved_origin).to_geo(NedPoint(place.north_m, place.east_m)))
 
 
-def _moved(raster: Raster, shape: tuple[int, ...], shift: Cell) -> Raster:
-    """The raster on another one of this shape, this much farther east and north; zero where it says nothing."""
+def _shifted(raster: Raster, shape: tuple[int, ...], shift: Cell) -> Raster:
+    """The raster on another one of this shape, moved by ``shift`` to the east and north; zero where it says nothing."""
     result = np.zeros(shape, np.float32)
     height, width = shape
     y0, x0 = max(0, shift.y), max(0, shift.x)
@@ -167,3 +200,16 @@ def _moved(raster: Raster, shape: tuple[int, ...], shift: Cell) -> Raster:
     if y0 < y1 and x0 < x1:
         result[y0:y1, x0:x1] = raster[y0 - shift.y : y1 - shift.y, x0 - shift.x : x1 - shift.x]
     return result
+
+
+def _map_newest_scan(executor: MissionExecutor, vehicle: VehicleState) -> None:
+    """A rover that is still moving is beyond the ground seen when the state was saved: map what it sees before the first setpoint."""
+    seen, attitude = vehicle.scan_ahead, vehicle.attitude
+    pose = None if seen is None else vehicle.pose_at(seen.time_s)
+    if seen is not None and attitude is not None and pose is not None:
+        executor.map_scan(pose, attitude.yaw_rate_rad_s, seen.scan)
+
+
+def _numpy_state(draws: SavedGenerator) -> dict[str, Any]:
+    inner = {"state": draws.state, "inc": draws.inc}
+    return {"bit_generator": "PCG64", "state": inner, "has_uint32": draws.has_uint32, "uinteger": draws.uinteger}

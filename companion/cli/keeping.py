@@ -6,10 +6,10 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.checkpoint.checkpointer import Memory
-from companion.checkpoint.place import StatePlace, StatePlaceError, default_directory
-from companion.checkpoint.resume import Kept
-from companion.checkpoint.writer import StateFile, ThreadWriter
+from companion.checkpoint.checkpointer import Checkpointer
+from companion.checkpoint.resume import PreviousRun
+from companion.checkpoint.state_directory import StateDirectory, StateDirectoryError, default_directory
+from companion.checkpoint.state_writer import StateFile, ThreadStateWriter
 from companion.executive.mission_progress import TargetStatus
 from companion.mission.mission import Mission
 from companion.storage.beside import Patience
@@ -19,19 +19,19 @@ from companion.storage.disk import OsDisk
 class Keeping:
     """The state of one run. A context manager: in the end what is left is written, and the directory is free for others.
 
-    Nobody has to keep a state: where none was asked for, a place that cannot be used is only told (``say``). Otherwise raises StatePlaceError.
+    Nobody has to keep a state: where none was asked for, a place that cannot be used is only told (``say``). Otherwise raises StateDirectoryError.
     """
 
     def __init__(self, mission: Mission, directory: Path | None, *, resume: bool, say: Callable[[str], None]) -> None:
-        self.memory: Memory | None = None
-        self.kept: Kept | None = None
+        self.checkpointer: Checkpointer | None = None
+        self.previous: PreviousRun | None = None
         self._mission = mission
         self._resume = resume
-        self._place: StatePlace | None = None
+        self._place: StateDirectory | None = None
         try:
-            self._place = StatePlace(directory or default_directory(os.environ))
+            self._place = StateDirectory(directory or default_directory(os.environ))
             self._load(say)
-        except StatePlaceError as error:
+        except StateDirectoryError as error:
             self.close()
             if directory is not None or resume:
                 raise
@@ -40,7 +40,7 @@ class Keeping:
     @property
     def ended(self) -> bool:
         """Whether there is nothing to take up, because that mission has been driven to its end."""
-        return self.kept is not None and self.kept.state.ended
+        return self.previous is not None and self.previous.state.ended
 
     @property
     def file(self) -> Path | None:
@@ -50,43 +50,42 @@ class Keeping:
     @property
     def problem(self) -> str:
         """Why the state is not that of the end of the run, and what to do; empty while all is well."""
-        if self.memory is None or not self.memory.problem or self.file is None:
+        if self.checkpointer is None or not self.checkpointer.problem or self.file is None:
             return ""
         stale = f", and do not --resume: {self.file.name} is older than this run" if self.file.exists() else ""
-        return f"{self.memory.problem}; make room there or name another place with --state DIR{stale}"
+        return f"{self.checkpointer.problem}; make room there or name another place with --state DIR{stale}"
 
     @property
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """What became of the targets of a mission that has ended."""
-        if self.kept is None:
+        if self.previous is None:
             return []
         names = (target.name for target in self._mission.targets)
-        return list(zip(names, self.kept.state.progress.statuses, strict=True))
+        return list(zip(names, self.previous.state.progress.statuses, strict=True))
 
     def start(self, patience: Patience | None = None) -> None:
         """From now on the state is written."""
         if self._place is not None:
-            writer = ThreadWriter(StateFile(self._place.file, OsDisk()), patience)
-            self.memory = Memory(self._mission, writer, self.kept)
+            writer = ThreadStateWriter(StateFile(self._place.file, OsDisk()), patience)
+            self.checkpointer = Checkpointer(self._mission, writer, self.previous)
 
     def close(self) -> None:
         """Write what is left."""
-        if self.memory is not None:
-            self.memory.close()
+        if self.checkpointer is not None:
+            self.checkpointer.close()
         if self._place is not None:
             self._place.close()
 
     def _load(self, say: Callable[[str], None]) -> None:
         assert self._place is not None
         if not self._resume:
-            self._place.begin_anew()
+            self._place.set_aside()
             return
-        found = self._place.load(self._mission)
-        if found is None:
+        self.previous = self._place.load(self._mission)
+        if self.previous is None:
             say(f"no state in {self._place.directory}: the mission begins at its first target")
             return
-        self.kept = Kept(*found)
-        state = self.kept.state
+        state = self.previous.state
         what = "was driven to its end" if state.ended else "goes on"
         say(f"{self._mission.name} {what}: {state.reached} of {len(state.progress.statuses)} targets reached")
         if state.ended:

@@ -11,9 +11,9 @@ from companion.cli.inputs import OutputError, picture
 from companion.cli.why_image import save_why
 from companion.mapping.map_files import MapError
 from companion.recording.reader import Record, load_record
-from companion.recording.recorded_files import RecordError
-from companion.replay.explain import Watcher, in_words
-from companion.replay.replay import Replayed
+from companion.recording.record_format import RecordError
+from companion.replay.explain import DecisionExplainer, explanation_lines
+from companion.replay.replay import ReplayResult
 from companion.replay.replay import replay as run_again
 
 EXIT_SAME, EXIT_DIFFERENT, EXIT_BAD_INPUT = 0, 1, 2
@@ -34,16 +34,16 @@ def replay(
         record = load_record(directory)
         if image is not None and why is None:
             raise OutputError("--image goes with --why: it shows one decision")
-        watcher = None
+        explainer = None
         if why is not None:
             if why > len(record.decisions):
                 raise RecordError(f"{directory}: there is no decision {why}, the last one is {len(record.decisions)}")
             image = image or directory / f"why-{why}.png"
             picture(image)
-            watcher = Watcher(why, record.settings, record.mission.rover.turning_radius_m)
-        result = run_again(record, watcher)
-        if watcher is not None and image is not None:
-            _explain(watcher, image)
+            explainer = DecisionExplainer(why, record.settings, record.mission.rover.turning_radius_m)
+        result = run_again(record, explainer)
+        if explainer is not None and image is not None:
+            _explain(explainer, image)
     except (RecordError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -51,16 +51,16 @@ def replay(
     raise typer.Exit(EXIT_DIFFERENT if result.differences else EXIT_SAME)
 
 
-def _explain(watcher: Watcher, image: Path) -> None:
-    if watcher.explanation is None:
+def _explain(explainer: DecisionExplainer, image: Path) -> None:
+    if explainer.explanation is None:
         return  # the replay did not come so far, and says so
-    for line in in_words(watcher.explanation):
+    for line in explanation_lines(explainer.explanation):
         typer.echo(line)
-    save_why(image, watcher.explanation)
+    save_why(image, explainer.explanation)
     typer.echo(f"picture: {image}")
 
 
-def _print(record: Record, result: Replayed) -> None:
+def _print(record: Record, result: ReplayResult) -> None:
     for note in record.notes:
         typer.echo(note, err=True)
     for name, status in result.targets:

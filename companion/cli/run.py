@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from companion.app import Companion, Status
-from companion.checkpoint.place import StatePlaceError
+from companion.checkpoint.state_directory import StateDirectoryError
 from companion.cli.inputs import OutputError, usable_settings
 from companion.cli.keeping import Keeping
 from companion.cli.levels import ERROR, INFO, Reader, levelled, reader_of
@@ -31,7 +31,8 @@ from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError
 from companion.mission.mission import Mission, MissionError
 from companion.navigation.step_runner import ThreadRunner
-from companion.recording.recorder import STATE, NullRecorder, Recorder, RecordError
+from companion.recording.record_format import STATE, RecordError
+from companion.recording.recorder import NullRecorder, Recorder
 from companion.safety.reasons import PowerReason, Reason
 from companion.settings import Settings, SettingsError
 from companion.storage.beside import Beside, Patience
@@ -44,7 +45,7 @@ BAD_INPUT = (
     MapError,
     LinkError,
     RecordError,
-    StatePlaceError,
+    StateDirectoryError,
     OutputError,
     SigningKeyError,
 )
@@ -102,7 +103,7 @@ def run(
             ends.callback(keeping.close)
             if keeping.ended:
                 raise typer.Exit(_told(keeping.statuses))
-            given = {"settings": settings_file, STATE: keeping.file if keeping.kept else None}
+            given = {"settings": settings_file, STATE: keeping.file if keeping.previous else None}
             recorder = (
                 Recorder(record, mission, settings, seed, arm=arm, files=given, beside=Beside("record", patience))
                 if record
@@ -160,7 +161,7 @@ def _drive(outfit: _Outfit, *, seed: int, arm: bool) -> int:
         outfit.recorder,
         seed=seed,
         arm=arm,
-        memory=outfit.keeping.memory,
+        checkpointer=outfit.keeping.checkpointer,
         keep_settings=outfit.files.keep,
     )
     outfit.stop.listener = companion

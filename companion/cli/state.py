@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.checkpoint.place import default_directory
+from companion.checkpoint.state_directory import default_directory
 from companion.cli.inputs import OutputError, writable
 from companion.mavlink.signing import Signer, load_key
 from companion.mavlink.signing_time import TimeFile

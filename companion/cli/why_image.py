@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw, ImageFont
 from companion.cli.inputs import OutputError
 from companion.cli.plan_image import OBSTACLE_COLOUR, SIDE_PIXELS, START_COLOUR, TARGET_COLOUR
 from companion.core.grid import OBSTACLE
-from companion.replay.explain import Candidate, Explanation, cost_in_words
+from companion.replay.explain import Candidate, Explanation, cost_text
 
 UNSEEN_TINT = np.array([0.86, 0.9, 1.0])
 UNSEEN_COLOUR = (160, 167, 185)
@@ -56,7 +56,7 @@ def draw(why: Explanation) -> Image.Image:
     for number, candidate in enumerate(why.candidates):
         colour = CANDIDATE_COLOURS[number % len(CANDIDATE_COLOURS)]
         line(_places(candidate), colour, thick)
-        entries.append((f"{candidate.name}: {cost_in_words(candidate)}; {candidate.note}", colour))
+        entries.append((f"{candidate.name}: {cost_text(candidate)}; {candidate.note}", colour))
     goal = why.state.target
     _dot(pen, ((goal.x + 0.5) * scale, (grid.height - 0.5 - goal.y) * scale), scale, TARGET_COLOUR)
     _rover(pen, why, scale)

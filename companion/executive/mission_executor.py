@@ -44,7 +44,7 @@ from companion.navigation.step_runner import StepRunner
 from companion.perception.moving_obstacles import announced, merged
 from companion.perception.object_tracker import ObjectTracker
 from companion.planning.registry import make_planner
-from companion.recording.recorder import DecisionLog
+from companion.recording.recorder import RunLog
 from companion.safety.reasons import RunPhase
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.state import VehicleState
@@ -81,7 +81,7 @@ class MissionExecutor:
         progress: MissionProgress,
         scan: RangeScan,
         runner: StepRunner,
-        log: DecisionLog,
+        log: RunLog,
         notifier: TextSink,
         rng: np.random.Generator,
     ) -> None:

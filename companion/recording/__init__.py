@@ -1,1 +1,1 @@
-"""The record of a run: written while it drives, read afterwards."""
+"""Writes the record of a run while it drives, and reads it back."""

@@ -1,10 +1,10 @@
-"""The record of a run: what went in, what was decided, what was said, and what it was run with (docs/record.md)."""
+"""Writes the record of a run: packets, decisions, rounds, and copies of the files that the run depends on (docs/record.md)."""
 
 from __future__ import annotations
 
 import hashlib
 import json
-import struct
+import os
 import zlib
 from collections.abc import Mapping
 from dataclasses import replace
@@ -13,46 +13,58 @@ from pathlib import Path
 from typing import IO, Protocol
 
 from companion.core.clock import unix_time_us
-from companion.core.rounds import Mark, Round
+from companion.core.round_mark import Mark
 from companion.mission.as_json import to_json
+from companion.mission.files import files_of
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Decision
-from companion.recording.recorded_files import Copied, RecordError, copied, in_record
+from companion.recording.record_format import (
+    DECISIONS,
+    FORMAT,
+    INPUTS,
+    META,
+    MISSION,
+    PACKETS,
+    ROUNDS,
+    STAMP,
+    FileLength,
+    InputFile,
+    RecordError,
+    RecordMeta,
+    Round,
+    decision_line,
+    packed_round,
+    run_sum,
+    settings_sum,
+)
 from companion.settings import Settings
 from companion.settings.versions import versions
 from companion.storage.beside import Beside, Job
 from companion.storage.disk import write_whole
-from companion.storage.reading import refuse_pipe
+from companion.storage.reading import open_file, refuse_pipe
 
-__all__ = ["DecisionLog", "NullRecorder", "RecordError", "Recorder", "decision_line", "unused"]
-
-FORMAT = 3
-"""Of the whole directory; a reader refuses others."""
-META, MISSION, PACKETS, ROUNDS, DECISIONS = "meta.json", "mission.json", "link.tlog", "rounds.bin", "decisions.jsonl"
-STATE = "state"
-"""The kind of input file that an earlier run has left."""
-FLUSH_S = 1.0
-MOST_WAITING_BYTES = 20_000_000
-"""An hour of driving, for a disk that does not answer."""
+FLUSH_INTERVAL_S = 1.0
+MAX_UNWRITTEN_BYTES = 20_000_000
+"""The limit for a disk that does not answer: an hour of driving."""
 NO_ANSWER = "the disk does not answer"
 
 
-class DecisionLog(Protocol):
-    """Takes the navigator's decisions, and what came to the companion other than in bytes."""
+class RunLog(Protocol):
+    """What the companion records beside packets: decisions, and marks of rounds."""
 
     problem: str
-    """Why the record has ended early; empty while all is well."""
+    """Why the record has ended early; empty while it is complete."""
 
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
-        """One decision on the way to a target; ``time_s`` is the companion's clock."""
+        """A decision of the navigator on the way to a target; ``time_s`` is the companion's clock."""
         ...
 
     def begin(self, time_s: float, mark: Mark) -> None:
-        """A round in which nothing is heard: the companion was made, or goes its way out."""
+        """A round in which nothing is heard: the companion was made, or shuts down after an error."""
         ...
 
     def mark(self, mark: Mark) -> None:
-        """Something has come from outside in this round."""
+        """Something happened in this round that does not follow from bytes."""
         ...
 
 
@@ -83,11 +95,9 @@ class NullRecorder:
 class Recorder:
     """Writes the directory that docs/record.md describes.
 
-    A directory that has a record keeps it: the new one goes to the same name with a number, see ``directory``. ``files`` are further files that
-    the run follows from, by what they are (None: there is none); they are copied.
-    What comes is written once a second; with ``beside`` by a thread, which ``close`` ends, and no round waits for the disk.
-    ``start_us`` is the beginning in microseconds since 1970, by default now. Raises RecordError if the directory cannot be written. Later a full
-    disk ends the record, never the run: see ``problem``.
+    A directory that already has a record keeps it: the new one goes to the same name with a number, see ``directory``.
+    Data is written once a second; with ``beside`` by a thread, which ``close`` ends, so that no round waits for the disk.
+    A full disk ends the record, never the run: see ``problem``.
     """
 
     def __init__(
@@ -102,29 +112,41 @@ class Recorder:
         start_us: int | None = None,
         beside: Beside | None = None,
     ) -> None:
+        """``files``: by kind, further files that the run depends on; they are copied. None stands for no file of that kind.
+
+        ``start_us``: the start in microseconds since 1970, by default now. Raises RecordError if the directory cannot be written.
+        """
         self.directory = unused(directory)
         self.problem = ""
-        """Why the record ends early; empty while all is well."""
+        """Why the record ends early; empty while it is complete."""
         self._files: dict[str, IO[bytes]] = {}
         self._waiting: dict[str, bytearray] = {}
         self._sums: dict[str, tuple[int, int]] = {}
-        self._given = self._taken = 0
+        self._given_bytes = self._written_bytes = 0
         self._closed = False
         self._beside = beside
         self._clock_at_start_s: float | None = None
         self._flushed_s = 0.0
-        self._start_us = unix_time_us() if start_us is None else start_us
         self._round: Round | None = None
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
-            inputs = copied(self.directory, mission, files or {})
+            inputs = _copied_inputs(self.directory, mission, files or {})
             if mission is not None:
-                known = None if mission.prior_map is None else Path(in_record(inputs, mission.prior_map))
-                text = to_json(replace(mission, prior_map=known)).encode()
-                write_whole(self.directory / MISSION, text)
-                inputs.append(Copied("mission", MISSION, str(mission.source or ""), hashlib.sha256(text).hexdigest()))
-            self._meta = _meta(mission, settings, seed, arm, self._start_us, inputs)
-            self._write_meta(None)
+                inputs.append(_written_mission(self.directory, mission, inputs))
+            self._meta = RecordMeta(
+                format=FORMAT,
+                mission=None if mission is None else mission.name,
+                seed=seed,
+                arm=arm,
+                settings=settings.model_dump(mode="json"),
+                settings_sha256=settings_sum(settings),
+                run_sha256=run_sum(seed, settings_sum(settings), arm=arm),
+                start_unix_us=unix_time_us() if start_us is None else start_us,
+                versions=versions(),
+                inputs=inputs,
+                end=None,
+            )
+            self._write_meta()
             for name in (PACKETS, ROUNDS, DECISIONS):
                 refuse_pipe(self.directory / name)
                 self._files[name] = (self.directory / name).open("wb", buffering=0)
@@ -134,32 +156,31 @@ class Recorder:
             remedy = "choose a directory that can be written"
             if isinstance(error, FileExistsError):
                 raise RecordError(f"{error.filename}: is a file, no directory; {remedy}") from error
-            raise RecordError(
-                f"{error.filename or self.directory}: cannot record here: {error.strerror or error}; {remedy}"
-            ) from error
+            place, reason = error.filename or self.directory, error.strerror or error
+            raise RecordError(f"{place}: cannot record here: {reason}; {remedy}") from error
 
     def begin(self, time_s: float, mark: Mark) -> None:
         """A round in which nothing is heard."""
         self.heard(time_s, [], mark)
 
     def heard(self, time_s: float, packets: list[bytes], mark: Mark = Mark(0)) -> None:  # noqa: B008 - frozen
-        """A new round, and the packets that came in it."""
+        """A new round, and the packets that were heard in it."""
         self._end_round()
         self._round = Round(time_s, len(packets), 0, mark)
         for raw in packets:
             self._packet(time_s, raw)
-        if time_s - self._flushed_s >= FLUSH_S:
+        if time_s - self._flushed_s >= FLUSH_INTERVAL_S:
             self._flushed_s = time_s
             self._hand_over()
 
     def said(self, time_s: float, raw: bytes) -> None:
-        """One packet of ours."""
+        """One packet that the companion sent."""
         if self._round is not None:
             self._round = self._round._replace(said=self._round.said + 1)
         self._packet(time_s, raw)
 
     def mark(self, mark: Mark) -> None:
-        """Something has come from outside in this round."""
+        """Something happened in this round that does not follow from bytes."""
         if self._round is not None:
             self._round = self._round._replace(marks=self._round.marks | mark)
 
@@ -168,7 +189,7 @@ class Recorder:
         self._write(DECISIONS, decision_line(time_s, target, decision).encode() + b"\n")
 
     def close(self) -> None:
-        """Write what is left, and that it is all, but give up on a disk that hangs; more than once is fine."""
+        """Write what is left, and that the record is complete. Gives up on a disk that hangs. May be called more than once."""
         if self._closed:
             return
         self._end_round()
@@ -179,16 +200,16 @@ class Recorder:
             self.problem = self.problem or self._ended(NO_ANSWER)
 
     def _packet(self, time_s: float, raw: bytes) -> None:
-        """Microseconds since 1970, big-endian, then the bytes, as ground stations write it."""
+        """A time stamp and the bytes."""
         if self._clock_at_start_s is None:
             self._clock_at_start_s = time_s
-        stamp_us = max(0, self._start_us + round((time_s - self._clock_at_start_s) * 1e6))
-        self._write(PACKETS, struct.pack(">Q", stamp_us) + raw)
+        stamp_us = max(0, self._meta.start_unix_us + round((time_s - self._clock_at_start_s) * 1e6))
+        self._write(PACKETS, STAMP.pack(stamp_us) + raw)
 
     def _end_round(self) -> None:
         ended, self._round = self._round, None
         if ended is not None:
-            self._write(ROUNDS, ended.packed())
+            self._write(ROUNDS, packed_round(ended))
 
     def _write(self, name: str, data: bytes) -> None:
         if self._closed or self.problem:
@@ -198,22 +219,22 @@ class Recorder:
         self._sums[name] = (size + len(data), zlib.crc32(data, crc))
 
     def _hand_over(self) -> None:
-        """What waits goes to the disk; unless too much is on its way already: memory has an end as well."""
+        """Give the waiting data to the disk. Ends the record if too much is unwritten already, because memory is limited."""
         batch = {name: bytes(data) for name, data in self._waiting.items() if data}
         for data in self._waiting.values():
             data.clear()
         size = sum(len(data) for data in batch.values())
-        if self._given + size - self._taken > MOST_WAITING_BYTES:
+        if self._given_bytes + size - self._written_bytes > MAX_UNWRITTEN_BYTES:
             self.problem = self.problem or self._ended(NO_ANSWER)
         if batch and not self.problem:
-            self._given += size
-            self._do(partial(self._take, batch))
+            self._given_bytes += size
+            self._do(partial(self._write_batch, batch))
 
     def _do(self, job: Job) -> None:
         job() if self._beside is None else self._beside.put(job)
 
-    def _take(self, batch: Mapping[str, bytes]) -> None:
-        """Write; after a problem nothing more. Must not raise."""
+    def _write_batch(self, batch: Mapping[str, bytes]) -> None:
+        """Write, unless there has been a problem. Must not raise."""
         try:
             for name, data in batch.items():
                 view = memoryview(data)
@@ -221,14 +242,15 @@ class Recorder:
                     view = view[self._files[name].write(view) :]
         except OSError as error:
             self.problem = self._ended(error.strerror or str(error))
-        self._taken += sum(len(data) for data in batch.values())
+        self._written_bytes += sum(len(data) for data in batch.values())
 
     def _finish(self) -> None:
-        """Close the files; say that they are whole, if they are. Must not raise."""
+        """Close the files, and note their lengths if they are complete. Must not raise."""
         self._close_files()
         if not self.problem:
             try:
-                self._write_meta({name: {"bytes": size, "crc32": crc} for name, (size, crc) in self._sums.items()})
+                self._meta.end = {name: FileLength(bytes=size, crc32=crc) for name, (size, crc) in self._sums.items()}
+                self._write_meta()
             except OSError as error:
                 self.problem = self._ended(error.strerror or str(error))
 
@@ -242,40 +264,12 @@ class Recorder:
     def _ended(self, reason: str) -> str:
         return f"{self.directory}: the record has ended: {reason}"
 
-    def _write_meta(self, end: dict[str, dict[str, int]] | None) -> None:
-        meta = {**self._meta, "end": end}
-        write_whole(self.directory / META, json.dumps(meta, indent=2).encode() + b"\n")
-
-
-def decision_line(time_s: float, target: str, decision: Decision) -> str:
-    """A decision as one line of JSON."""
-    return json.dumps(
-        {
-            "time_s": time_s,
-            "target": target,
-            "action": decision.action.value,
-            "part": decision.part.value,
-            "reason": decision.reason,
-            "searches": [kind.value for kind in decision.searches],
-            "proved": decision.proved,
-            "new_path": decision.new_path is not None,
-            "path": [[cell.x, cell.y] for cell in decision.path],
-        }
-    )
-
-
-def settings_sum(settings: Settings) -> str:
-    """SHA-256 of all settings."""
-    return hashlib.sha256(json.dumps(settings.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()
-
-
-def run_sum(seed: int, settings_sha256: str, *, arm: bool) -> str:
-    """SHA-256 of what a run follows from beside its files."""
-    return hashlib.sha256(f"{seed} {arm} {settings_sha256}".encode()).hexdigest()
+    def _write_meta(self) -> None:
+        write_whole(self.directory / META, json.dumps(self._meta.model_dump(), indent=2).encode() + b"\n")
 
 
 def unused(directory: Path) -> Path:
-    """The directory itself, or with the first number from 2 on that has no record in it yet."""
+    """The directory itself, or its name with the first number from 2 on that has no record yet."""
     candidate, number = directory, 2
     while (candidate / META).exists():
         candidate = directory.with_name(f"{directory.name}-{number}")
@@ -283,18 +277,38 @@ def unused(directory: Path) -> Path:
     return candidate
 
 
-def _meta(
-    mission: Mission | None, settings: Settings, seed: int, arm: bool, start_us: int, inputs: list[Copied]
-) -> dict[str, object]:
-    return {
-        "format": FORMAT,
-        "mission": None if mission is None else mission.name,
-        "seed": seed,
-        "arm": arm,
-        "settings": settings.model_dump(mode="json"),
-        "settings_sha256": settings_sum(settings),
-        "run_sha256": run_sum(seed, settings_sum(settings), arm=arm),
-        "start_unix_us": start_us,
-        "versions": versions(),
-        "inputs": [entry._asdict() for entry in inputs],
-    }
+def _written_mission(directory: Path, mission: Mission, inputs: list[InputFile]) -> InputFile:
+    """Write the mission as it was understood, with the known map's name in the record."""
+    prior_map = mission.prior_map
+    if prior_map is not None:
+        copy = next((entry.name for entry in inputs if entry.source == str(prior_map)), str(prior_map))
+        mission = replace(mission, prior_map=Path(copy))
+    text = to_json(mission).encode()
+    write_whole(directory / MISSION, text)
+    return InputFile(
+        kind="mission", name=MISSION, source=str(mission.source or ""), sha256=hashlib.sha256(text).hexdigest()
+    )
+
+
+def _copied_inputs(directory: Path, mission: Mission | None, files: Mapping[str, Path | None]) -> list[InputFile]:
+    """Copy the files of a mission in their folders, and the others by their kind. Raises OSError."""
+    entries: list[InputFile] = []
+    mission_files = () if mission is None else files_of(mission)
+    folders = [os.path.dirname(os.path.abspath(path)) for path in mission_files]
+    common = os.path.commonpath(folders) if folders else ""
+    for path in mission_files:
+        place = Path(INPUTS, "mission", os.path.relpath(path, common))
+        entries.append(_copy(directory, "mission file", place, path))
+    for kind, given in files.items():
+        if given is not None:
+            entries.append(_copy(directory, kind, Path(INPUTS, kind, given.name), given))
+    return entries
+
+
+def _copy(directory: Path, kind: str, place: Path, path: Path) -> InputFile:
+    with open_file(path) as file:
+        data = file.read()
+    (directory / place).parent.mkdir(parents=True, exist_ok=True)
+    refuse_pipe(directory / place)
+    (directory / place).write_bytes(data)
+    return InputFile(kind=kind, name=place.as_posix(), source=str(path), sha256=hashlib.sha256(data).hexdigest())

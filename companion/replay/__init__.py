@@ -1,1 +1,1 @@
-"""A recorded run again: compared, and explained."""
+"""Runs a recorded drive again, compares it, and explains a decision."""

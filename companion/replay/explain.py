@@ -1,4 +1,4 @@
-"""Why a decision was made: the map as it was known, every way that was weighed, and what it cost. For replays."""
+"""Explains a decision during a replay: the map as it was known, every path that was considered, and its cost."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ from companion.planning.planner import Capabilities, Planner
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanResult
 from companion.planning.raster import CellArray, cells_cost, plain
 from companion.planning.smoothing import curve_cost
-from companion.replay.replay import Observer
+from companion.replay.replay import ReplayObserver
 from companion.settings import Settings
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Candidate:
-    """A way that was weighed. ``cost``: of its fields, inf without a way; ``curve_cost``: of driving along its curve, if it has one.
+    """A path that was considered. ``cost``: of its fields, inf without a path; ``curve_cost``: of driving along its curve, if it has one.
 
-    ``part_of``: it was one planner's proposal among those of a search.
+    ``part_of``: the proposal of one planner within a search.
     """
 
     name: str
@@ -42,8 +42,10 @@ class Candidate:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Explanation:
-    """One decision. ``ground``, ``grid`` and ``weighed``: the mission's own weights, those with what had been seen, and those with what
-    turning costs, over which was searched; ``known``: which fields had been seen. ``state``: the navigator's before the step.
+    """One decision, with what was known before it.
+
+    ``ground``: the mission's own weights; ``grid``: with the obstacles seen so far; ``weighed``: with the cost of turning as well, which the
+    search used. ``known``: the fields that had been seen. ``state``: the navigator's state before the step.
     """
 
     number: int
@@ -61,7 +63,7 @@ class Explanation:
 
 @dataclass
 class _Scene:
-    """What is known when a step begins."""
+    """What is known at the beginning of a step."""
 
     pose: Pose
     state: NavState
@@ -69,14 +71,14 @@ class _Scene:
     grid: Grid
     weighed: Grid
     known: NDArray[np.bool_]
-    found: list[Candidate] = field(default_factory=list)
+    candidates: list[Candidate] = field(default_factory=list)
 
 
-Tell = Callable[[Candidate], None]
+OnCandidate = Callable[[Candidate], None]
 
 
-class Watcher(Observer):
-    """Waits for one decision and keeps what led to it: ``explanation``, None until then."""
+class DecisionExplainer(ReplayObserver):
+    """Waits for one decision and keeps what led to it in ``explanation``, None until then."""
 
     def __init__(self, number: int, settings: Settings, turning_radius_m: float) -> None:
         self.explanation: Explanation | None = None
@@ -86,28 +88,28 @@ class Watcher(Observer):
         self._scene: _Scene | None = None
 
     def step_begins(self, companion: Companion) -> None:
-        """Look at everything, and from now on at the planners' answers."""
+        """Note what is known, and wrap the planner to see its answers."""
         if self.explanation is None:
-            self._scene = self._seen(companion)
+            self._scene = self._noted(companion)
             driver = companion.driver
             assert driver is not None
-            if not isinstance(driver.searcher.planner, _Overheard):
-                driver.searcher.planner = _overheard(driver.searcher.planner, self._take)
+            if not isinstance(driver.searcher.planner, _ObservedPlanner):
+                driver.searcher.planner = _observed(driver.searcher.planner, self._add)
 
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
-        """Keep it if it is the one."""
+        """Keep it if it is the decision to explain."""
         if number == self._number and self.explanation is None:
-            scene = self._scene or self._seen(companion)
+            scene = self._scene or self._noted(companion)
             if scene is None:
                 return
-            left = [] if scene.state.current is None else [_what_is_left(scene)]
+            rest = [] if scene.state.current is None else [_rest_of_path(scene)]
             self.explanation = Explanation(
                 number, time_s, target, decision, scene.pose, scene.state, scene.ground, scene.grid, scene.weighed,
-                scene.known, (*left, *scene.found),
+                scene.known, (*rest, *scene.candidates),
             )  # fmt: skip
         self._scene = None
 
-    def _seen(self, companion: Companion) -> _Scene | None:
+    def _noted(self, companion: Companion) -> _Scene | None:
         driver, pose = companion.driver, companion.status().pose
         state = None if driver is None else driver.leg[0]
         if driver is None or state is None or pose is None:
@@ -116,13 +118,13 @@ class Watcher(Observer):
         weighed = with_turning_cost(grid, pose, self._settings.guidance, self._turning_radius_m)
         return _Scene(pose, state, driver.evidence.base, grid, weighed, known_fields(driver.evidence))
 
-    def _take(self, candidate: Candidate) -> None:
+    def _add(self, candidate: Candidate) -> None:
         if self._scene is not None:
-            self._scene.found.append(candidate)
+            self._scene.candidates.append(candidate)
 
 
-def _what_is_left(scene: _Scene) -> Candidate:
-    """The path that was being followed, from here on."""
+def _rest_of_path(scene: _Scene) -> Candidate:
+    """The path that was being followed, from the present field on."""
     assert scene.state.current is not None
     current = scene.state.current
     ahead = current.cell_array[scene.state.index :]
@@ -132,18 +134,18 @@ def _what_is_left(scene: _Scene) -> Candidate:
 
 
 def cost_of(grid: Grid, cells: CellArray) -> float:
-    """Cost of a way over a grid, inf where it leaves it."""
+    """Cost of a path on a grid, inf if it leaves the grid."""
     x, y = cells.T
     inside = len(cells) == 0 or (x.min() >= 0 and y.min() >= 0 and x.max() < grid.width and y.max() < grid.height)
     return float(cells_cost(plain(grid.weights), cells)) if inside else math.inf
 
 
-class _Overheard:
-    """A planner whose answers are told. ``part_of``: another one asks it."""
+class _ObservedPlanner:
+    """A planner whose answers are passed on. ``part_of``: another planner calls it."""
 
-    def __init__(self, planner: Planner, tell: Tell, *, part_of: bool) -> None:
+    def __init__(self, planner: Planner, on_candidate: OnCandidate, *, part_of: bool) -> None:
         self._planner = planner
-        self._tell = tell
+        self._on_candidate = on_candidate
         self._part_of = part_of
 
     @property
@@ -157,18 +159,18 @@ class _Overheard:
         return self._planner.capabilities
 
     def plan(self, problem: PlanningProblem, budget: Budget, rng: Generator) -> PlanResult:
-        """The planner's answer."""
+        """The planner's answer, which is passed on."""
         result = self._planner.plan(problem, budget, rng)
-        self._tell(_candidate(problem, result, part_of=self._part_of))
+        self._on_candidate(_candidate(problem, result, part_of=self._part_of))
         return result
 
 
-def _overheard(planner: Planner, tell: Tell) -> Planner:
-    """The planner, and those that it asks in its turn."""
+def _observed(planner: Planner, on_candidate: OnCandidate) -> Planner:
+    """The planner, with the planners that it calls."""
     if isinstance(planner, Hybrid):
-        planner.genetic = _Overheard(planner.genetic, tell, part_of=True)
-        planner.graph = _Overheard(planner.graph, tell, part_of=True)
-    return _Overheard(planner, tell, part_of=False)
+        planner.genetic = _ObservedPlanner(planner.genetic, on_candidate, part_of=True)
+        planner.graph = _ObservedPlanner(planner.graph, on_candidate, part_of=True)
+    return _ObservedPlanner(planner, on_candidate, part_of=False)
 
 
 def _candidate(problem: PlanningProblem, result: PlanResult, *, part_of: bool) -> Candidate:
@@ -181,8 +183,8 @@ def _candidate(problem: PlanningProblem, result: PlanResult, *, part_of: bool) -
     return Candidate(name, note, path, math.inf if path is None else path.cost, along, part_of)
 
 
-def in_words(why: Explanation) -> list[str]:
-    """The explanation, line by line."""
+def explanation_lines(why: Explanation) -> list[str]:
+    """The explanation as text, line by line."""
     decision, pose = why.decision, why.pose
     here, goal = why.state.past[-1], why.state.target
     cell = why.grid.cell_at(pose.point)
@@ -197,7 +199,7 @@ def in_words(why: Explanation) -> list[str]:
     ]
     for candidate in why.candidates:
         lines.append(
-            f"{'    ' if candidate.part_of else '  '}{candidate.name}: {cost_in_words(candidate)}; {candidate.note}"
+            f"{'    ' if candidate.part_of else '  '}{candidate.name}: {cost_text(candidate)}; {candidate.note}"
         )
     if not why.candidates:
         lines.append("  nothing was searched, and there was no path to follow")
@@ -206,7 +208,7 @@ def in_words(why: Explanation) -> list[str]:
     return lines
 
 
-def cost_in_words(candidate: Candidate) -> str:
+def cost_text(candidate: Candidate) -> str:
     """Cost and length of a candidate."""
     if candidate.path is None:
         return "no path"
@@ -215,7 +217,7 @@ def cost_in_words(candidate: Candidate) -> str:
 
 
 def _shares(why: Explanation, cells: CellArray) -> str:
-    """What the cost of the way that was decided on is made of."""
+    """The parts of the cost of the path that was chosen."""
     ground, seen, whole = (cost_of(grid, cells) for grid in (why.ground, why.grid, why.weighed))
     return (
         f"taken: {len(cells)} fields, cost {whole:.2f} = {ground:.2f} ground + {seen - ground:.2f} beside obstacles or "

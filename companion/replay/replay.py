@@ -1,7 +1,7 @@
-"""Runs a companion again on what a record says that it heard, and compares what it decides and says with what was recorded.
+"""Replay: runs the companion again on what a record says that it heard, and compares its decisions and packets with the recorded ones.
 
-It reads files and nothing else: no link, no clock, no thread. The moment at which a thread's answer arrived is recorded, and so is
-everything else that did not follow from bytes and files (docs/record.md).
+It reads files and nothing else: no link, no clock, no thread. The record contains everything that did not follow from bytes and files, such as
+the round in which the answer of a thread arrived (docs/record.md).
 """
 
 from __future__ import annotations
@@ -11,11 +11,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 from companion.app import Companion
-from companion.checkpoint.checkpointer import Memory
-from companion.checkpoint.format import MAX_FILE_BYTES, StateError, decoded
-from companion.checkpoint.resume import Kept
-from companion.checkpoint.writer import Update
-from companion.core.rounds import Mark, Round
+from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
+from companion.checkpoint.resume import PreviousRun
+from companion.checkpoint.state_format import MAX_FILE_BYTES, StateError, decode_state
+from companion.core.round_mark import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.naming import compared, named
@@ -23,21 +22,20 @@ from companion.mavlink.signing import Recorded, without_signature
 from companion.mission.mission import MissionError
 from companion.navigation.field_step import Decision, NavState
 from companion.navigation.step_runner import StepCall
-from companion.recording.reader import Heard, Record
-from companion.recording.recorded_files import RecordError
-from companion.recording.recorder import STATE, decision_line
+from companion.recording.reader import Record, RecordedRound
+from companion.recording.record_format import STATE, RecordError, Round, decision_line
 from companion.storage.reading import read_at_most
 
 Answer = tuple[NavState, Decision]
 
 
 class EndOfRecordError(Exception):
-    """The companion wants to go on, and the record does not."""
+    """The companion continues after the end of the record."""
 
 
 @dataclass
-class Replayed:
-    """What came of it."""
+class ReplayResult:
+    """Counts, differences (a line each) and what became of the targets. ``companion``: the one that was run."""
 
     rounds: int = 0
     seconds: float = 0.0
@@ -49,19 +47,19 @@ class Replayed:
     companion: Companion | None = None
 
 
-class Tape:
-    """The record as link, clock and log of a companion: it stands at one round after the other."""
+class RecordPlayer:
+    """Plays a record round by round: it is the link, the clock and the log of the companion that is run again."""
 
     description = "record"
     problem = ""
 
     def __init__(self, record: Record, on_decision: Callable[[int, float, str, Decision], None]) -> None:
-        self.result = Replayed()
+        self.result = ReplayResult()
         self.signatures = Recorded()
         self._record = record
-        self._rounds: Iterator[Heard] = record.rounds()
+        self._rounds: Iterator[RecordedRound] = record.rounds()
         self._next = next(self._rounds, None)
-        self._at = Heard(Round(0.0), [], [])
+        self._current = RecordedRound(Round(0.0), [], [])
         self._began_s: float | None = None
         self._unread: list[bytes] = []
         self._said: list[bytes] = []
@@ -70,21 +68,21 @@ class Tape:
     @property
     def round(self) -> Round:
         """The present round."""
-        return self._at.round
+        return self._current.round
 
     @property
     def next_marks(self) -> Mark | None:
-        """What comes from outside in the next round; None when there is none left."""
+        """Marks of the next round; None if there is none left."""
         return None if self._next is None else Mark(self._next.round.marks)
 
     def advance(self) -> None:
-        """To the next round. Raises EndOfRecordError."""
+        """Go to the next round. Raises EndOfRecordError."""
         self._compare_said(last=self._next is None)
         if self._next is None:
             raise EndOfRecordError
-        self._at, self._next = self._next, next(self._rounds, None)
+        self._current, self._next = self._next, next(self._rounds, None)
         self.signatures.take(self.round.marks)
-        self._unread, self._said = list(self._at.heard), []
+        self._unread, self._said = list(self._current.heard), []
         self._began_s = self.round.time_s if self._began_s is None else self._began_s
         self.result.rounds += 1
         self.result.seconds = self.round.time_s - self._began_s
@@ -94,7 +92,7 @@ class Tape:
         self.result.differences.append(f"{self.result.seconds:.2f} s: {what}")
 
     def end(self) -> None:
-        """Nothing more is replayed: look at the last round, and at what was not asked for again."""
+        """The replay is over: compare the last round, and note what it left out."""
         self._compare_said(last=True)
         if self._next is not None:
             self.differs("the replay has ended, and the run went on")
@@ -109,7 +107,7 @@ class Tape:
         return self.round.time_s
 
     def sleep_until_s(self, time_s: float) -> None:
-        """The companion's sleep takes it to the next round, however long the real one slept."""
+        """The companion's sleep goes to the next round, however long the recorded one slept."""
         self.advance()
 
     def read(self) -> bytes:
@@ -118,10 +116,10 @@ class Tape:
         return data
 
     def write(self, data: bytes) -> None:
-        """Goes nowhere; ``said`` has it packet by packet."""
+        """Ignored; ``said`` gets it packet by packet."""
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Nothing to close."""
 
     # The companion's log -----------------------------------------------------------------------------------------
 
@@ -130,14 +128,14 @@ class Tape:
         self.result.heard += len(packets)
 
     def said(self, time_s: float, raw: bytes) -> None:
-        """To be compared when the round is over."""
+        """Compared when the round is over."""
         self._said.append(raw)
 
     def begin(self, time_s: float, mark: Mark) -> None:
-        """The record has it."""
+        """It is in the record."""
 
     def mark(self, mark: Mark) -> None:
-        """What the replay makes of it must be what was recorded."""
+        """The recorded round must have this mark."""
         if not self.round.marks & mark:
             self.differs(f"{mark.name} in this round, not so in the run")
 
@@ -146,19 +144,19 @@ class Tape:
         number, self.result.decisions = self.result.decisions, self.result.decisions + 1
         self._on_decision(self.result.decisions, self.result.seconds, target, decision)
         if number >= len(self._record.decisions):
-            if self._record.whole:
+            if self._record.complete:
                 self.differs(f"decision {number + 1} ({decision.reason}) was not made in the run")
         elif self._record.decisions[number] != decision_line(time_s, target, decision):
             self.differs(f"decision {number + 1}: {decision.reason}, recorded: {self._record.decisions[number]:.200}")
 
     def _is_due(self, line: str) -> bool:
-        """Whether a recorded decision should have been made by now; of a record that was cut the last rounds may be missing."""
+        """Whether a recorded decision should have been made by now. The last rounds may be missing in an incomplete record."""
         time_s = json.loads(line)["time_s"]
-        return self._record.whole or time_s < self.round.time_s
+        return self._record.complete or time_s < self.round.time_s
 
     def _compare_said(self, *, last: bool) -> None:
-        """A run may have been broken off in the middle of its last round."""
-        recorded, now = self._at.said, self._said
+        """Compare packets. The recorded run may have ended in the middle of its ``last`` round, so more packets are no difference there."""
+        recorded, now = self._current.said, self._said
         self._said = []
         self.result.said += len(now)
         for was, is_now in zip(recorded, now, strict=False):
@@ -170,26 +168,26 @@ class Tape:
             self.differs(f"{named(raw)} is said in the replay, not in the run")
 
 
-class TapeRunner:
-    """Computes at once, and hands the answer over in the round in which the run got it."""
+class ReplayStepRunner:
+    """Computes a step at once, and returns the answer in the round in which the recorded run got it."""
 
-    def __init__(self, tape: Tape, on_start: Callable[[], None]) -> None:
-        self._tape = tape
+    def __init__(self, player: RecordPlayer, on_start: Callable[[], None]) -> None:
+        self._player = player
         self._on_start = on_start
         self._answer: Answer | Exception | None = None
 
     @property
     def busy(self) -> bool:
-        """Whether the answer has not been taken."""
+        """Whether an answer has not been taken."""
         return self._answer is not None
 
     @property
     def working(self) -> bool:
-        """Whether the run's thread was computing in this round."""
-        return bool(self._tape.round.marks & Mark.WORKING)
+        """Whether the thread of the recorded run was computing in this round."""
+        return bool(self._player.round.marks & Mark.WORKING)
 
     def start(self, call: StepCall) -> None:
-        """Compute now."""
+        """Compute now. An error is kept and raised by ``take``."""
         self._on_start()
         try:
             self._answer = call()
@@ -197,8 +195,8 @@ class TapeRunner:
             self._answer = error
 
     def take(self) -> Answer | None:
-        """The answer, once, and not before the run had it."""
-        if self._answer is None or not self._tape.round.marks & Mark.ANSWER:
+        """The answer, once, and not before the recorded run had it."""
+        if self._answer is None or not self._player.round.marks & Mark.ANSWER:
             return None
         answer, self._answer = self._answer, None
         if isinstance(answer, Exception):
@@ -209,87 +207,88 @@ class TapeRunner:
         """Nothing to end."""
 
 
-class Observer:
-    """Looks on; this one at nothing."""
+class ReplayObserver:
+    """Is called during a replay. This one does nothing."""
 
     def step_begins(self, companion: Companion) -> None:
-        """The navigator's step is about to be computed."""
+        """A step of the navigator is about to be computed."""
 
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
-        """A decision was made; they count from 1, and the seconds from the beginning of the run."""
+        """A decision was made. ``number`` counts from 1, ``time_s`` from the beginning of the run."""
 
 
-def replay(record: Record, observer: Observer | None = None) -> Replayed:
-    """Run the companion of a record again. Raises RecordError when the record turns out to be damaged."""
-    look = observer or Observer()
-    tape = Tape(record, lambda *decided: look.decided(companion, *decided))
-    runner = TapeRunner(tape, lambda: look.step_begins(companion))
-    tape.advance()
+def replay(record: Record, observer: ReplayObserver | None = None) -> ReplayResult:
+    """Run the companion of a record again. Raises RecordError if the record is damaged."""
+    notified = observer or ReplayObserver()
+    player = RecordPlayer(record, lambda *decided: notified.decided(companion, *decided))
+    runner = ReplayStepRunner(player, lambda: notified.step_begins(companion))
+    player.advance()
     link = record.settings.link
-    autopilot = AutopilotLink(tape, Codec(link, recorded=tape.signatures), link, tape)
+    autopilot = AutopilotLink(player, Codec(link, recorded=player.signatures), link, player)
     companion = Companion(
         autopilot,
-        tape,
+        player,
         record.mission,
         record.settings,
         runner,
-        tape,
+        player,
         seed=record.meta.seed,
         arm=record.meta.arm,
-        memory=_memory(record, tape),
+        checkpointer=_checkpointer(record, player),
     )
-    tape.result.companion = companion
+    player.result.companion = companion
     try:
-        while not companion.done and _round(companion, tape):
+        while not companion.done and _round(companion, player):
             pass
     except EndOfRecordError:
         pass
-    tape.end()
-    tape.result.targets = [(name, str(status)) for name, status in companion.statuses()]
-    return tape.result
+    player.end()
+    player.result.targets = [(name, str(status)) for name, status in companion.statuses()]
+    return player.result
 
 
-def _memory(record: Record, tape: Tape) -> Memory:
-    """With what an earlier run has left, if this one took it up. Raises RecordError."""
-    file = record.input(STATE)
+def _checkpointer(record: Record, player: RecordPlayer) -> Checkpointer:
+    """A checkpointer that writes nothing, with the interrupted run that the recorded one resumed. Raises RecordError."""
+    writer, file = _NoStateWriter(player), record.input(STATE)
     if file is None:
-        return Memory(record.mission, _NoWriter(tape))
+        return Checkpointer(record.mission, writer)
     try:
-        return Memory(record.mission, _NoWriter(tape), Kept(*decoded(read_at_most(file, MAX_FILE_BYTES))))
+        previous = PreviousRun(*decode_state(read_at_most(file, MAX_FILE_BYTES)))
     except OSError as error:
         raise RecordError(f"{file}: cannot be read: {error.strerror}; the run cannot be replayed without it") from error
     except StateError as error:
         raise RecordError(f"{file}: {error}") from error
+    return Checkpointer(record.mission, writer, previous)
 
 
-class _NoWriter:
-    """A replay keeps nothing, but fails when the run did."""
+class _NoStateWriter:
+    """Writes nothing, but fails where the recorded run failed to write."""
 
     busy = False
 
-    def __init__(self, tape: Tape) -> None:
-        self._tape = tape
+    def __init__(self, player: RecordPlayer) -> None:
+        self._player = player
 
     @property
     def problem(self) -> str:
-        """Whether the run could not save its state."""
-        return "not saved" if self._tape.round.marks & Mark.UNSAVED else ""
+        """Whether the recorded run could not save its state."""
+        return "not saved" if self._player.round.marks & Mark.UNSAVED else ""
 
-    def put(self, update: Update) -> None:
-        """Not kept."""
+    def put(self, update: StateUpdate) -> None:
+        """Ignored."""
 
     def close(self) -> None:
         """Nothing to write."""
 
 
-def _round(companion: Companion, tape: Tape) -> bool:
-    """One round, whatever kind it was; False when there is none left."""
-    marks = tape.next_marks
+def _round(companion: Companion, player: RecordPlayer) -> bool:
+    """Run one round of any kind. False if there is none left."""
+    marks = player.next_marks
     if marks is None:
         return False
     if marks & Mark.CLOSE:
-        tape.differs("the run was broken off by an error that the replay does not have")
-        tape.advance()
+        player.differs("the run was broken off by an error that the replay does not have")
+        player.advance()
         companion.close()
         return True
     if marks & Mark.STOP:
@@ -299,16 +298,16 @@ def _round(companion: Companion, tape: Tape) -> bool:
     except EndOfRecordError:
         raise
     except Exception as error:
-        _broken_off(companion, tape, error)
+        _broken_off(companion, player, error)
     return True
 
 
-def _broken_off(companion: Companion, tape: Tape, error: Exception) -> None:
-    """The replay has run into an error: the run must have, too."""
-    if tape.next_marks is None or not tape.next_marks & Mark.CLOSE:
+def _broken_off(companion: Companion, player: RecordPlayer, error: Exception) -> None:
+    """The replay was broken off by an error: the recorded run must have been, too. Raises the error if it is unexpected."""
+    if player.next_marks is None or not player.next_marks & Mark.CLOSE:
         if not isinstance(error, MissionError):
             raise error
-        tape.differs(f"the replay is broken off by an error that the run did not have: {error}")
+        player.differs(f"the replay is broken off by an error that the run did not have: {error}")
         return
-    tape.advance()
+    player.advance()
     companion.close()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from companion.checkpoint.resume import Kept, Ownership, lay_resumed, ownership, same_boot
+from companion.checkpoint.resume import PreviousRun, ResumePermission, resume_permission, resumed_layout, same_boot
 from companion.control.point_controller import STANDSTILL
 from companion.core.severity import Severity
 from companion.executive.mission_layout import MissionLayout, lay
@@ -100,7 +100,7 @@ def overruled(ack: AckSeen | None, heartbeat: HeartbeatSeen | None) -> bool:
 
 
 class Arming:
-    """The way there, tick by tick. ``kept``: the run that is to be taken up."""
+    """The way there, tick by tick. ``previous``: the run that is to be taken up."""
 
     def __init__(
         self,
@@ -111,17 +111,17 @@ class Arming:
         notifier: Notifier,
         *,
         arm: bool,
-        kept: Kept | None = None,
+        previous: PreviousRun | None = None,
     ) -> None:
         self._run = run
         self._autopilot = autopilot
         self._limits = limits
         self._settings = settings
         self._notifier = notifier
-        self._kept = kept
+        self._previous = previous
         self._arm = arm
         self._awaited: Reason[WaitReason] | None = None
-        self._owner: Ownership | None = None
+        self._owner: ResumePermission | None = None
         self._asked: Command | None = None
         self._asked_s = -math.inf
         self._mode: int | None = None
@@ -157,7 +157,7 @@ class Arming:
         While AUTO is served, GUIDED is a person's.
         """
         vehicle, heartbeat = self._run.vehicle, self._run.vehicle.heartbeat
-        ours = self._kept is not None and self._kept.state.control is Control.COMPANION and not vehicle.in_auto
+        ours = self._previous is not None and self._previous.state.control is Control.COMPANION and not vehicle.in_auto
         return ours and heartbeat is not None and heartbeat.mode == RoverMode.GUIDED and heartbeat.armed
 
     def _look(self, vehicle: VehicleState, now_s: float) -> Cleared | None:
@@ -192,12 +192,12 @@ class Arming:
         self._left_since_s = min(self._left_since_s, now_s)
         if now_s - self._left_since_s < LEFT_S and not vehicle.sticks.moved:
             return STANDSTILL.setpoint
-        self._owner = Ownership(Control.PERSON, may_arm=False)
+        self._owner = ResumePermission(Control.PERSON, may_arm=False)
         return SetMode(RoverMode.HOLD)
 
     def _give(self, command: Command | None, now_s: float) -> None:
         """The command, if it is not too soon; a run that is taken up waits only with one that has just been given."""
-        if self._kept is None:
+        if self._previous is None:
             soon = now_s - self._asked_s <= ASK_AGAIN_S
         else:
             soon = command == self._asked and now_s - self._asked_s <= AGAIN_RESUMED_S
@@ -239,8 +239,8 @@ class Arming:
         """Who drives. Where an earlier run had the rover that is looked at once, then the mode decides as always."""
         taken = overruled(self._autopilot.last_ack(SetMode(RoverMode.GUIDED)), vehicle.heartbeat)
         control = Control.PERSON if taken else self._run.latch.control
-        if self._owner is None and self._kept is not None:
-            self._owner = ownership(self._kept.state, vehicle)
+        if self._owner is None and self._previous is not None:
+            self._owner = resume_permission(self._previous.state, vehicle)
             self._arm = self._arm and (self._owner is None or self._owner.may_arm)
         return self._owner.control if self._owner is not None and control is Control.NOBODY else control
 
@@ -255,7 +255,7 @@ class Arming:
         if cleared is None:
             return
         # A run that is taken up may find that a fence has closed meanwhile: its target is refused when its turn comes.
-        if self._kept is None and cleared.layout.refused:
+        if self._previous is None and cleared.layout.refused:
             mission, reason = self._run.mission, next(iter(cleared.layout.refused.values()))
             raise MissionError(f"{mission.source or mission.name}: {reason}")
         self._checked, self._bounds = ground, cleared.layout.bounds
@@ -275,8 +275,8 @@ class Arming:
         if vehicle.origin is None or vehicle.home is None or pose is None:
             return None
         origin, mapping = vehicle.origin.point, self._settings.current.mapping
-        if self._kept is None or vehicle.position is None:
+        if self._previous is None or vehicle.position is None:
             layout = lay(mission, mapping, origin, vehicle.home.point, pose, fence)
             return Cleared(layout, plan_progress(layout.targets, layout.start))
-        same = same_boot(self._kept.state, vehicle.position)
-        return Cleared(*lay_resumed(self._kept, mission, mapping, origin, now_s, same=same, fence=fence))
+        same = same_boot(self._previous.state, vehicle.position)
+        return Cleared(*resumed_layout(self._previous, mission, mapping, origin, now_s, same=same, fence=fence))

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.checkpoint.checkpointer import Memory
+from companion.checkpoint.checkpointer import Checkpointer
 from companion.core.clock import Clock
-from companion.core.rounds import Mark
+from companion.core.round_marks import Mark
 from companion.core.scan import RangeScan
 from companion.executive.autopilot_mission import MissionChangeMonitor
 from companion.executive.goal_requests import GoalRequests
@@ -24,7 +24,7 @@ from companion.navigation.step_runner import NotedRunner, StepRunner
 from companion.operator.figures import Telemetry
 from companion.operator.notifications import Notifier, Outcome
 from companion.operator.parameter_server import ParameterServer
-from companion.recording.recorder import DecisionLog
+from companion.recording.recorder import RunLog
 from companion.safety.battery_monitor import BatteryMonitor
 from companion.safety.watchdogs import DataMonitor, LoopMonitor, ScanMonitor, SticksMonitor
 from companion.settings import Settings
@@ -62,7 +62,7 @@ class Options:
 
     seed: int
     arm: bool
-    memory: Memory | None = None
+    checkpointer: Checkpointer | None = None
     keep_settings: Callable[[Settings], None] | None = None
 
 
@@ -72,11 +72,11 @@ def assemble(
     mission: Mission,
     settings: Settings,
     runner: StepRunner,
-    log: DecisionLog,
+    log: RunLog,
     options: Options,
 ) -> Parts:
     """The parts of a companion that has heard nothing yet."""
-    memory, live, outcome = options.memory, LiveSettings(settings), Outcome()
+    checkpointer, live, outcome = options.checkpointer, LiveSettings(settings), Outcome()
     notifier, noted = Notifier(autopilot, clock, outcome.said), NotedRunner(runner, log.mark)
     sender = SetpointSender(autopilot, live, notifier)
     rng = np.random.default_rng(options.seed)
@@ -84,7 +84,7 @@ def assemble(
     def make_executor(layout: MissionLayout, progress: MissionProgress, scan: RangeScan) -> MissionExecutor:
         return MissionExecutor(mission, live, layout, progress, scan, noted, log, notifier, rng)
 
-    vehicle = VehicleState(in_auto=mission.in_auto, sticks=memory.sticks if memory else Sticks())
+    vehicle = VehicleState(in_auto=mission.in_auto, sticks=checkpointer.sticks if checkpointer else Sticks())
     run = MissionRun(mission, vehicle, sender, live, notifier, make_executor)
     log.begin(clock.now_s(), Mark.BEGIN)
 
@@ -108,18 +108,18 @@ def assemble(
     listening = (changes, *monitors, batteries, requests)
     listener = Listener(run, autopilot, notifier, parameters, telemetry, listening, scans, localization)
     limits = MissionLimits(run, fences, batteries, rivals, settings.power, outcome)
-    kept = memory.kept if memory else None
+    previous = checkpointer.previous if checkpointer else None
     pace = Pace(clock, live, localization)
     shutdown = Shutdown(run, autopilot, live, notifier)
     supervisor = Supervisor(
         run,
         Judge(run, monitors, live, notifier),
-        Arming(run, autopilot, limits, live, notifier, arm=options.arm, kept=kept),
+        Arming(run, autopilot, limits, live, notifier, arm=options.arm, previous=previous),
         limits,
         shutdown,
         loop=LoopWatch(loop, pace, noted),
         localization=localization,
-        keeper=Keeper(run, memory, log, notifier, localization, shutdown),
+        keeper=Keeper(run, checkpointer, log, notifier, localization, shutdown),
         log=log,
         notifier=notifier,
         outcome=outcome,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from companion.core.clock import Clock
-from companion.core.rounds import Mark
+from companion.core.round_marks import Mark
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_executor import Task
 from companion.executive.mission_run import MissionRun, Order
 from companion.navigation.step_runner import StepRunner
 from companion.operator.notifications import Outcome
-from companion.recording.recorder import DecisionLog
+from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Reaction, Verdict
 from companion.safety.reasons import EndReason, Reason
 from companion.safety.watchdogs import LoopMonitor
@@ -51,7 +51,7 @@ class Supervisor:
         loop: LoopWatch,
         localization: LocalizationMonitor,
         keeper: Keeper,
-        log: DecisionLog,
+        log: RunLog,
         notifier: TextSink,
         outcome: Outcome,
     ) -> None:

@@ -15,7 +15,8 @@ from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
 from companion.mapping.map_files import MapError
 from companion.mission.mission import MissionError
-from companion.recording.recorder import NullRecorder, Recorder, RecordError
+from companion.recording.record_format import RecordError
+from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import SettingsError
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_untold

@@ -10,9 +10,8 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from companion.checkpoint.format import SUM_BYTES, StateError, decoded, encoded
+from companion.checkpoint.state_format import SUM_BYTES, StateError, decode_state, encode_state
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
-from companion.core.rounds import Round
 from companion.mapping.map_files import MapError, load_map
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -23,7 +22,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.mission.resolve import resolve
 from companion.recording.reader import load_record
-from companion.recording.recorded_files import RecordError
+from companion.recording.record_format import RecordError, Round, packed_round
 from companion.settings import Settings, SettingsError, load_settings
 from companion.settings.tunable_parameters import with_tuned
 from companion.vehicle.state import VehicleState, fold
@@ -130,7 +129,7 @@ def signing_key(data: bytes) -> None:
 def state(data: bytes) -> None:
     """What a run has left; the check sum is put right, or nothing else would ever be looked at."""
     with refusing():
-        decoded(data + hashlib.sha256(data).digest())
+        decode_state(data + hashlib.sha256(data).digest())
 
 
 def record(data: bytes) -> None:
@@ -140,7 +139,7 @@ def record(data: bytes) -> None:
         for name in ("link.tlog", "decisions.jsonl"):
             (path.parent / name).write_bytes(b"")
         (path.parent / "mission.json").write_bytes(A_MISSION)
-        (path.parent / "rounds.bin").write_bytes(Round(0.0, 0, 0).packed())
+        (path.parent / "rounds.bin").write_bytes(packed_round(Round(0.0, 0, 0)))
         load_record(path.parent)
 
     _file("meta.json", data, use)
@@ -273,7 +272,7 @@ def driving_examples() -> tuple[bytes, ...]:
 
 def state_examples() -> tuple[bytes, ...]:
     """A state without its check sum."""
-    return (encoded(a_state(), {})[:-SUM_BYTES],)
+    return (encode_state(a_state(), {})[:-SUM_BYTES],)
 
 
 def record_examples() -> tuple[bytes, ...]:

@@ -21,7 +21,7 @@ from typer.testing import CliRunner
 from companion.app import Companion
 from companion.cli.commands import app
 from companion.cli.why_image import FREE_COLOUR
-from companion.core.rounds import CHECKED, Mark, unpacked
+from companion.core.round_mark import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import Signer
@@ -31,8 +31,8 @@ from companion.mission.mission import Mission
 from companion.navigation.field_step import Decision, NavState
 from companion.navigation.step_runner import InlineRunner, StepCall
 from companion.recording.reader import Record, load_record
-from companion.recording.recorded_files import RecordError
-from companion.recording.recorder import Recorder, run_sum
+from companion.recording.record_format import CHECKED_ROUND, RecordError, run_sum, unpacked_rounds
+from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
 from companion.settings import Settings
 from sitl.cli.commands import app as sitl_app
@@ -138,7 +138,7 @@ class Recorded(Rig):
 
     def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
         assert self._state is not None
-        memory = kept_in(self._state, mission, resume=resume)
+        checkpointer = kept_in(self._state, mission, resume=resume)
         files = {"state": self.state_file if resume else None}
         self.recorder = Recorder(self.place, mission, self.settings, 0, arm=True, files=files)
         near, self._far = MemoryLink.pair()
@@ -146,7 +146,15 @@ class Recorded(Rig):
             near, Codec(self.settings.link, signer=self._signer), self.settings.link, self.recorder
         )
         self.companion = Companion(
-            self.link, self, mission, self.settings, LateRunner(), self.recorder, seed=0, arm=True, memory=memory
+            self.link,
+            self,
+            mission,
+            self.settings,
+            LateRunner(),
+            self.recorder,
+            seed=0,
+            arm=True,
+            checkpointer=checkpointer,
         )
 
 
@@ -156,7 +164,7 @@ def test_answers_of_a_thread_are_handed_over_when_the_run_had_them(tmp_path: Pat
     rig.recorder.close()
     assert_same(rig.place)
     # Without the marks of the answers no decision is made: they are what tells when.
-    rounds, _ = unpacked((rig.place / "rounds.bin").read_bytes())
+    rounds, _ = unpacked_rounds((rig.place / "rounds.bin").read_bytes())
     assert sum(bool(entry.marks & Mark.ANSWER) for entry in rounds) > 5
     unmarked = b"".join(entry._replace(marks=entry.marks & ~Mark.ANSWER).packed() for entry in rounds)
     (rig.place / "rounds.bin").write_bytes(unmarked)
@@ -353,14 +361,14 @@ def test_a_record_that_is_cut_anywhere_is_replayed_as_far_as_it_goes(
     lengths = {}
     for name in FILES:
         size = (copy / name).stat().st_size
-        lengths[name] = data.draw(st.integers(CHECKED.size if name == "rounds.bin" else 0, size - 1), name)
+        lengths[name] = data.draw(st.integers(CHECKED_ROUND.size if name == "rounds.bin" else 0, size - 1), name)
         with (copy / name).open("r+b") as file:
             file.truncate(lengths[name])
     loaded = load_record(copy)
     result = replay(loaded)
     assert result.differences == []
     assert loaded.notes and all("\n" not in note for note in loaded.notes)
-    assert result.rounds <= lengths["rounds.bin"] // CHECKED.size
+    assert result.rounds <= lengths["rounds.bin"] // CHECKED_ROUND.size
 
 
 def test_the_packets_are_a_log_that_ground_stations_open(record: Path) -> None:
@@ -396,7 +404,7 @@ def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
 
 def test_why_tells_the_seconds_since_the_beginning(copy: Path) -> None:
     time_s = json.loads(load_record(copy).decisions[1])["time_s"]
-    rounds, _ = unpacked((copy / "rounds.bin").read_bytes())
+    rounds, _ = unpacked_rounds((copy / "rounds.bin").read_bytes())
     later = b"".join(entry._replace(time_s=entry.time_s + 50000.0).packed() for entry in rounds)
     (copy / "rounds.bin").write_bytes(later)  # as on a computer that has run for half a day
     reopened(copy)

@@ -10,9 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.checkpoint.format import decoded
-from companion.checkpoint.model import SavedState
-from companion.checkpoint.resume import Kept
+from companion.checkpoint.resume import PreviousRun
+from companion.checkpoint.state_format import SavedState, decode_state
 from companion.core.grid import Cell
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -32,7 +31,7 @@ def rig_of(folder: Path, targets: str = TWO, *, seed: int = 0, sealed: bool = Fa
 
 
 def state_in(folder: Path) -> SavedState:
-    return decoded((folder / "state" / "mission.state").read_bytes())[0]
+    return decode_state((folder / "state" / "mission.state").read_bytes())[0]
 
 
 def kill_and_resume(rig: Rig, mission: Mission) -> None:
@@ -321,7 +320,7 @@ def test_a_jump_of_the_position_is_not_survived_by_the_map(tmp_path: Path) -> No
 
     rig.change = moved
     rig.until(lambda: any("Position jumped" in text for text in rig.texts()), 3.0)
-    kept = Kept(*decoded((tmp_path / "state" / "mission.state").read_bytes()))
+    kept = PreviousRun(*decode_state((tmp_path / "state" / "mission.state").read_bytes()))
     assert not kept.rasters["log_odds"].any()
     kill_and_resume(rig, mission)
     rig.until(lambda: rig.companion.evidence is not None, 3.0)

@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from companion.checkpoint.format import decoded, encoded
-from companion.checkpoint.model import SavedProgress
+from companion.checkpoint.state_format import SavedProgress, decode_state, encode_state
 from companion.cli.commands import app
 from companion.mission.identity import fingerprint
 from companion.recording.reader import load_record
@@ -60,7 +59,7 @@ def test_sigterm_stops_the_rover_saves_and_is_gone_within_a_second(tmp_path: Pat
             took_s = time.monotonic() - began_s
         assert code == 130 and took_s < 2.0, err
         assert world.mode() == HOLD
-        state, rasters = decoded((tmp_path / "state" / "mission.state").read_bytes())
+        state, rasters = decode_state((tmp_path / "state" / "mission.state").read_bytes())
         assert state.released and not state.ended and rasters["log_odds"].any()
         with process("companion", *run_it, "--connect", world.url, "--resume") as run:
             assert run.stderr is not None
@@ -99,7 +98,7 @@ def test_sigterm_is_obeyed_within_a_second_by_a_run_whose_disk_hangs(tmp_path: P
         assert world.mode() == HOLD
     assert err.count("the disk does not answer") == 3 and "Traceback" not in err  # state, map, record
     cut = load_record(tmp_path / "record")
-    assert not cut.whole and replay(cut).differences == []
+    assert not cut.complete and replay(cut).differences == []
 
 
 @pytest.mark.parametrize(
@@ -124,7 +123,7 @@ def test_a_state_that_cannot_be_taken_up_is_told_before_anything_is_connected(
     mission = yard(tmp_path)
     values = {**a_state().progress.model_dump(), "statuses": ["reached"], "leg": "done", "index": 1}
     state = a_state(mission_sha256=fingerprint(mission), ended=True, progress=SavedProgress.model_validate(values))
-    data = encoded(state, {})
+    data = encode_state(state, {})
     (tmp_path / "state").mkdir()
     (tmp_path / "state" / "mission.state").write_bytes(data[:-50] if fault == "damaged" else data)
     if fault == "another mission":

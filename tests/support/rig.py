@@ -16,10 +16,9 @@ from PIL import Image
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.app import Companion
-from companion.checkpoint.checkpointer import Memory
-from companion.checkpoint.place import StatePlace
-from companion.checkpoint.resume import Kept
-from companion.checkpoint.writer import InlineWriter, StateFile
+from companion.checkpoint.checkpointer import Checkpointer
+from companion.checkpoint.state_directory import StateDirectory
+from companion.checkpoint.state_writer import InlineStateWriter, StateFile
 from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -154,7 +153,7 @@ class Rig:
 
     def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
         """A companion that knows nothing yet takes the place of the one before, or with ``resume`` one that takes up what that has left."""
-        memory = None if self._state is None else kept_in(self._state, mission, resume=resume)
+        checkpointer = None if self._state is None else kept_in(self._state, mission, resume=resume)
         near, self._far = MemoryLink.pair()
         self.link = AutopilotLink(
             near, Codec(self.settings.link, signer=self.signer), self.settings.link, self.recorder
@@ -168,7 +167,7 @@ class Rig:
             self.recorder,
             seed=self._seed,
             arm=self._arm,
-            memory=memory,
+            checkpointer=checkpointer,
         )
         self._watch_positions()
 
@@ -299,12 +298,12 @@ class QuickDisk(OsDisk):
         pass
 
 
-def kept_in(directory: Path, mission: Mission, *, resume: bool) -> Memory:
-    """What a run of ``rover-companion`` makes of its state directory."""
-    place = StatePlace(directory)
-    kept = place.load(mission) if resume else None
-    place.close()  # who is killed gives up its lock
-    return Memory(mission, InlineWriter(StateFile(place.file, QuickDisk())), None if kept is None else Kept(*kept))
+def kept_in(directory: Path, mission: Mission, *, resume: bool) -> Checkpointer:
+    """The checkpointer that ``rover-companion run`` makes for its state directory."""
+    place = StateDirectory(directory)
+    previous = place.load(mission) if resume else None
+    place.close()  # a process that is killed loses its lock
+    return Checkpointer(mission, InlineStateWriter(StateFile(place.file, QuickDisk())), previous)
 
 
 def repacked(message: Any) -> bytes:

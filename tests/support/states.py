@@ -10,15 +10,20 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from companion.checkpoint.format import LENGTH, MAGIC, VERSION, BandPlace, Raster, deflated
-from companion.checkpoint.model import (
-    SavedDraws,
-    SavedGround,
-    SavedLeg,
+from companion.checkpoint.state_format import (
+    LENGTH,
+    MAGIC,
+    VERSION,
+    Raster,
+    RowBand,
+    SavedGenerator,
+    SavedGrid,
+    SavedNavState,
     SavedPlace,
     SavedProgress,
     SavedState,
     SavedTally,
+    compressed_rows,
 )
 from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.safety.mode_latch import Control
@@ -45,7 +50,7 @@ def states(draw: st.DrawFn) -> SavedState:
     count = st.integers(0, 2**60)
     word = st.integers(0, 2**128 - 1)
     leg = st.builds(
-        SavedLeg,
+        SavedNavState,
         past=st.lists(st.tuples(FIELD, FIELD), min_size=1, max_size=30).map(tuple),
         returning=st.booleans(),
         until_search=st.integers(-3, 3),
@@ -54,7 +59,7 @@ def states(draw: st.DrawFn) -> SavedState:
         doubts_left=st.integers(0, 3),
     )
     draws = st.builds(
-        SavedDraws, state=word, inc=word, has_uint32=st.integers(0, 1), uinteger=st.integers(0, 2**32 - 1)
+        SavedGenerator, state=word, inc=word, has_uint32=st.integers(0, 1), uinteger=st.integers(0, 2**32 - 1)
     )
     return SavedState(
         mission=draw(st.text(max_size=20)),
@@ -70,7 +75,7 @@ def states(draw: st.DrawFn) -> SavedState:
         progress=draw(progresses()),
         leg=draw(st.none() | leg),
         trail=draw(st.lists(st.tuples(FIELD, FIELD), max_size=30).map(tuple)),
-        ground=SavedGround(
+        ground=SavedGrid(
             north_m=draw(METRES),
             east_m=draw(METRES),
             resolution_m=0.5,
@@ -90,12 +95,12 @@ def rasters_of(state: SavedState, seed: int) -> dict[str, Raster]:
     return {"log_odds": log_odds, "penalty": rng.random((ground.height, ground.width)).astype(np.float32)}
 
 
-def bands_of(rasters: dict[str, Raster], step: int) -> dict[BandPlace, bytes]:
+def bands_of(rasters: dict[str, Raster], step: int) -> dict[RowBand, bytes]:
     bands = {}
     for name, raster in rasters.items():
         for row in range(0, len(raster), step):
             rows = raster[row : row + step]
-            bands[BandPlace(name, row, len(rows))] = deflated(rows)
+            bands[RowBand(name, row, len(rows))] = compressed_rows(rows)
     return bands
 
 
@@ -131,8 +136,8 @@ def a_state(**changes: Any) -> SavedState:
             left_s=0.0,
             give_up_left_s=None,
         ),
-        "leg": SavedLeg(past=((1, 2),), returning=False, until_search=0, since_better=0, draws=1, doubts_left=3),
-        "ground": SavedGround(north_m=0.0, east_m=0.0, resolution_m=1.0, width=7, height=5, subdivisions=2),
+        "leg": SavedNavState(past=((1, 2),), returning=False, until_search=0, since_better=0, draws=1, doubts_left=3),
+        "ground": SavedGrid(north_m=0.0, east_m=0.0, resolution_m=1.0, width=7, height=5, subdivisions=2),
         "tally": SavedTally(),
         "draws": None,
     }

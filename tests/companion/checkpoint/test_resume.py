@@ -8,8 +8,15 @@ import numpy as np
 import pytest
 
 from companion.checkpoint.checkpointer import BAND_CELLS, _rows
-from companion.checkpoint.model import SavedGround, SavedLeg, SavedPlace, SavedProgress
-from companion.checkpoint.resume import Kept, Ownership, lay_resumed, nav_state, ownership, shift_of
+from companion.checkpoint.resume import (
+    PreviousRun,
+    ResumePermission,
+    grid_shift,
+    resume_permission,
+    resumed_layout,
+    resumed_nav_state,
+)
+from companion.checkpoint.state_format import SavedGrid, SavedNavState, SavedPlace, SavedProgress
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell, empty_grid
 from companion.executive.mission_layout import lay
@@ -58,19 +65,19 @@ def test_whose_the_rover_is(
     control: Control, released: bool, mode: int, armed: bool, restarted: bool, owner: Control, may_arm: bool
 ) -> None:
     state = a_state(control=control, released=released, boot_s=60.0)
-    assert ownership(state, found(mode, armed, 20.0 if restarted else 65.0)) == Ownership(owner, may_arm)
+    assert resume_permission(state, found(mode, armed, 20.0 if restarted else 65.0)) == ResumePermission(owner, may_arm)
 
 
 def test_nothing_is_said_of_a_rover_that_has_hardly_been_heard() -> None:
-    assert ownership(a_state(), VehicleState()) is None
-    assert ownership(a_state(), VehicleState(heartbeat=HeartbeatSeen(1.0, GUIDED, True, 1))) is None
+    assert resume_permission(a_state(), VehicleState()) is None
+    assert resume_permission(a_state(), VehicleState(heartbeat=HeartbeatSeen(1.0, GUIDED, True, 1))) is None
 
 
 HOME = GeoPoint(53.1327, 23.169)
 ORIGIN = GeoPoint(53.1326, 23.1689)
 
 
-def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[Kept, Mission]:
+def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[PreviousRun, Mission]:
     """A state of the yard with something on its map."""
     frame = LocalFrame(origin)
     home = frame.to_ned(HOME)
@@ -89,7 +96,7 @@ def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[Kept, Mission]:
             left_s=2.0,
             give_up_left_s=100.0,
         ),
-        ground=SavedGround(
+        ground=SavedGrid(
             north_m=corner.north_m - home.north_m,
             east_m=corner.east_m - home.east_m,
             resolution_m=1.0,
@@ -101,12 +108,12 @@ def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[Kept, Mission]:
     log_odds, penalty = np.zeros_like(layout.evidence.log_odds), np.zeros_like(layout.evidence.penalty)
     log_odds[10:20, 30:34], log_odds[20:60, 30:34], log_odds[60, 60] = 3.0, -1.2, 0.9
     penalty[3, 3] = 0.15
-    return Kept(state, {"log_odds": log_odds, "penalty": penalty}), mission
+    return PreviousRun(state, {"log_odds": log_odds, "penalty": penalty}), mission
 
 
 def test_in_the_same_frame_the_map_is_what_it_was(tmp_path: Path) -> None:
     kept, mission = kept_of(tmp_path)
-    layout, progress, said = lay_resumed(kept, mission, MappingSettings(), ORIGIN, 500.0, same=True)
+    layout, progress, said = resumed_layout(kept, mission, MappingSettings(), ORIGIN, 500.0, same=True)
     assert np.array_equal(layout.evidence.log_odds, kept.rasters["log_odds"])
     assert np.array_equal(layout.evidence.penalty, kept.rasters["penalty"])
     assert layout.evidence.grid.weights[1, 3] >= 1.0, "and the fields know it"
@@ -123,7 +130,7 @@ def test_in_a_frame_that_may_be_another_only_obstacles_count_and_lie_on_the_same
 ) -> None:
     kept, mission = kept_of(tmp_path)
     origin = LocalFrame(ORIGIN).to_geo(NedPoint(north_m, east_m))
-    layout, _, said = lay_resumed(kept, mission, MappingSettings(), origin, 0.0, same=same)
+    layout, _, said = resumed_layout(kept, mission, MappingSettings(), origin, 0.0, same=same)
     settings, log_odds = MappingSettings(), layout.evidence.log_odds
     assert (log_odds >= 0.0).all(), "no ground counts as seen"
     assert np.array_equal(log_odds > 0.0, kept.rasters["log_odds"] > 0.0)
@@ -131,7 +138,7 @@ def test_in_a_frame_that_may_be_another_only_obstacles_count_and_lie_on_the_same
     assert not layout.evidence.penalty.any()
     assert "obstacles" in said
     corner = layout.evidence.base.south_west
-    before = lay_resumed(kept, mission, MappingSettings(), ORIGIN, 0.0, same=True)[0].evidence.base.south_west
+    before = resumed_layout(kept, mission, MappingSettings(), ORIGIN, 0.0, same=True)[0].evidence.base.south_west
     assert corner.distance_m(NedPoint(before.north_m - north_m, before.east_m - east_m)) < 0.01
 
 
@@ -140,19 +147,19 @@ def test_a_grid_that_has_become_a_field_larger_takes_the_map_along(tmp_path: Pat
     ground = kept.state.ground.model_copy(
         update={"east_m": kept.state.ground.east_m + 2.0, "north_m": kept.state.ground.north_m - 1.0}
     )
-    moved = Kept(kept.state.model_copy(update={"ground": ground}), kept.rasters)
-    layout, _, _ = lay_resumed(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
-    assert shift_of(moved.state, layout) == Cell(2, -1)
+    moved = PreviousRun(kept.state.model_copy(update={"ground": ground}), kept.rasters)
+    layout, _, _ = resumed_layout(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
+    assert grid_shift(moved.state, layout) == Cell(2, -1)
     s = layout.evidence.subdivisions
     assert np.array_equal(layout.evidence.log_odds[:-s, 2 * s :], kept.rasters["log_odds"][s:, : -2 * s])
     assert not layout.evidence.log_odds[:, : 2 * s].any()
-    leg = SavedLeg(past=((4, 4), (5, 4)), returning=True, until_search=2, since_better=1, draws=9, doubts_left=1)
-    assert nav_state(leg, shift_of(moved.state, layout)).past == (Cell(6, 3), Cell(7, 3))
+    leg = SavedNavState(past=((4, 4), (5, 4)), returning=True, until_search=2, since_better=1, draws=9, doubts_left=1)
+    assert resumed_nav_state(leg, grid_shift(moved.state, layout)).past == (Cell(6, 3), Cell(7, 3))
 
 
 def test_other_settings_of_the_map_cost_the_map_and_not_the_progress(tmp_path: Path) -> None:
     kept, mission = kept_of(tmp_path)
-    layout, progress, said = lay_resumed(kept, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
+    layout, progress, said = resumed_layout(kept, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
     assert not layout.evidence.log_odds.any() and "without its map" in said
     assert progress.statuses == (TargetStatus.UNREACHABLE,)
 

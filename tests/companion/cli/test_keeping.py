@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.checkpoint.checkpointer import Memory
+from companion.checkpoint.checkpointer import Checkpointer
 from companion.cli.keeping import Keeping
 from tests.support.rig import yard
 
@@ -17,7 +17,7 @@ def test_a_state_that_is_older_than_the_run_is_told_with_the_remedy(
     with_state = Keeping(yard(tmp_path), tmp_path / "state", resume=False, say=lambda _: None)
     with_state.start()
     assert with_state.problem == ""
-    monkeypatch.setattr(Memory, "problem", "mission.state: the state cannot be saved: No space left on device")
+    monkeypatch.setattr(Checkpointer, "problem", "mission.state: the state cannot be saved: No space left on device")
     assert with_state.problem.endswith("; make room there or name another place with --state DIR")
     assert with_state.file is not None
     with_state.file.write_bytes(b"as it was")

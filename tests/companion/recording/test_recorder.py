@@ -9,13 +9,14 @@ import pytest
 from pymavlink import mavutil
 
 from companion.core.grid import Cell
-from companion.core.rounds import Mark, Round, unpacked
+from companion.core.round_mark import Mark
 from companion.mission.as_json import from_json
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Action, Decision, Part, SearchKind
 from companion.planning.problem import Path as FieldPath
-from companion.recording.recorder import NullRecorder, Recorder, RecordError
+from companion.recording.record_format import RecordError, Round, unpacked_rounds
+from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from tests.support.mavlink_vehicle import Station
 
@@ -88,7 +89,7 @@ def test_it_is_on_disk_after_a_second_without_closing(tmp_path: Path) -> None:
     recorder.heard(0.5, [packet])
     recorder.heard(1.5, [packet])
     assert (tmp_path / "run" / "link.tlog").stat().st_size == 3 * (8 + len(packet))
-    assert unpacked((tmp_path / "run" / "rounds.bin").read_bytes())[0] == [Round(0.0, 1), Round(0.5, 1)]
+    assert unpacked_rounds((tmp_path / "run" / "rounds.bin").read_bytes())[0] == [Round(0.0, 1), Round(0.5, 1)]
     assert json.loads((tmp_path / "run" / "meta.json").read_text())["end"] is None
     recorder.close()
 

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from companion.checkpoint.writer import StateFile, ThreadWriter, Update
-from companion.core.rounds import Mark
+from companion.checkpoint.state_writer import StateFile, StateUpdate, ThreadStateWriter
+from companion.core.round_mark import Mark
 from companion.recording.reader import load_record
-from companion.recording.recorder import MOST_WAITING_BYTES, Recorder
+from companion.recording.recorder import MAX_UNWRITTEN_BYTES, Recorder
 from companion.settings import Settings
 from companion.storage.beside import Beside, Patience
 from companion.storage.saving import Saver
@@ -92,8 +92,8 @@ def test_state_settings_and_record_wait_with_one_patience(tmp_path: Path, hangin
     patience = NoPatience()
     saver = Saver(hanging, patience)
     saver.save(tmp_path / "tuned.toml", b"new")
-    writer = ThreadWriter(StateFile(tmp_path / "state", hanging), patience)
-    writer.put(Update())
+    writer = ThreadStateWriter(StateFile(tmp_path / "state", hanging), patience)
+    writer.put(StateUpdate())
     recorder = Recorder(tmp_path / "run", None, Settings(), 0, beside=Beside("record", patience))
     for part in (saver, writer, recorder):
         part.close()
@@ -102,9 +102,9 @@ def test_state_settings_and_record_wait_with_one_patience(tmp_path: Path, hangin
 
 def test_a_state_that_is_not_saved_in_time_is_told(tmp_path: Path, hanging: HangingDisk) -> None:
     file = StateFile(tmp_path / "state", hanging)
-    writer = ThreadWriter(file, Patience(0.01))
-    file.take = lambda update: hanging.sync(0)  # type: ignore[method-assign]
-    writer.put(Update())
+    writer = ThreadStateWriter(file, Patience(0.01))
+    file.apply = lambda update: hanging.sync(0)  # type: ignore[method-assign]
+    writer.put(StateUpdate())
     assert writer.problem == ""
     writer.close()
     assert writer.problem == f"{tmp_path / 'state'}: the state is not saved yet: the disk does not answer"
@@ -124,7 +124,7 @@ def test_a_disk_that_hangs_does_not_keep_the_record_from_being_closed(
     recorder.close()
     assert recorder.problem == f"{tmp_path / 'run'}: the record has ended: the disk does not answer"
     record = load_record(tmp_path / "run")
-    assert not record.whole and any("was not closed" in note for note in record.notes)
+    assert not record.complete and any("was not closed" in note for note in record.notes)
     free.set()
     beside.close()
 
@@ -136,12 +136,12 @@ def test_a_disk_that_hangs_for_minutes_ends_the_record_before_the_memory(tmp_pat
     recorder = Recorder(tmp_path / "run", None, Settings(), 0, beside=beside)
     recorder.begin(0.0, Mark.BEGIN)
     for second in range(1, 30):
-        recorder.said(float(second), bytes(MOST_WAITING_BYTES // 20))
+        recorder.said(float(second), bytes(MAX_UNWRITTEN_BYTES // 20))
         assert (recorder.problem == "") == (second <= 20), second
         recorder.heard(float(second), [])
     free.set()
     recorder.close()
-    assert (tmp_path / "run" / "link.tlog").stat().st_size <= MOST_WAITING_BYTES
+    assert (tmp_path / "run" / "link.tlog").stat().st_size <= MAX_UNWRITTEN_BYTES
 
 
 def test_with_a_thread_the_record_is_the_same(tmp_path: Path) -> None:

@@ -121,7 +121,7 @@ OPENERS = {"open", "read_text", "read_bytes"}
 OPENED_OTHERWISE = {
     "companion/storage/reading.py": "the way itself",
     "companion/storage/disk.py": "writes",
-    "companion/checkpoint/place.py": "the lock: opened for reading and writing, a pipe is not waited for",
+    "companion/checkpoint/state_directory.py": "the lock: opened for reading and writing, a pipe is not waited for",
     "companion/recording/recorder.py": "writes, after refuse_pipe",
     "companion/cli/inputs.py": "writes, after refuse_pipe",
     "companion/mission/waypoints_reader.py": "mission/text_file.py's read_text",

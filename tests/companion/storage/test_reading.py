@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from companion.checkpoint.place import StatePlace, StatePlaceError
+from companion.checkpoint.state_directory import StateDirectory, StateDirectoryError
 from companion.cli.commands import app
 from companion.cli.inputs import OutputError
 from companion.cli.state import StateFiles
@@ -33,13 +33,13 @@ HUGE = 3_000_000_000
 
 
 def load_state(path: Path) -> None:
-    StatePlace(path.parent).load(load_mission(path.parent / "yard.toml"))
+    StateDirectory(path.parent).load(load_mission(path.parent / "yard.toml"))
 
 
 READERS: dict[str, tuple[Callable[[Path], object], type[Exception]]] = {
     "settings": (load_settings, SettingsError),
     "tuned.toml": (lambda path: with_tuned(Settings(), path), SettingsError),
-    "mission.state": (load_state, StatePlaceError),
+    "mission.state": (load_state, StateDirectoryError),
     "faults": (load_faults, FaultFileError),
     "params": (load_parameters, ParameterFileError),
 }
@@ -163,7 +163,7 @@ REMEDIES: dict[str, tuple[Callable[[Path], object], str]] = {
 def test_what_cannot_be_used_is_told_with_a_remedy(tmp_path: Path, what: str) -> None:
     use, words = REMEDIES[what]
     with pytest.raises(
-        (OutputError, StatePlaceError, LinkError, SigningKeyError, SettingsError, MissionError)
+        (OutputError, StateDirectoryError, LinkError, SigningKeyError, SettingsError, MissionError)
     ) as caught:
         use(tmp_path)
     assert words in str(caught.value) and "\n" not in str(caught.value)

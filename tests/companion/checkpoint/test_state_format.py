@@ -10,8 +10,14 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from companion.checkpoint.format import MAGIC, DamagedError, StateError, decoded, encoded
-from companion.checkpoint.model import SavedState
+from companion.checkpoint.state_format import (
+    MAGIC,
+    DamagedStateError,
+    SavedState,
+    StateError,
+    decode_state,
+    encode_state,
+)
 from tests.support.states import a_state, bands_of, forged, rasters_of, sealed, states
 
 QUICK = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -19,14 +25,14 @@ QUICK = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCh
 
 def written() -> bytes:
     state = a_state()
-    return encoded(state, bands_of(rasters_of(state, 1), 3))
+    return encode_state(state, bands_of(rasters_of(state, 1), 3))
 
 
 @QUICK
 @given(states(), st.integers(0, 2**32 - 1), st.integers(1, 30))
 def test_what_was_written_comes_back(state: SavedState, seed: int, step: int) -> None:
     rasters = rasters_of(state, seed)
-    found, map_found = decoded(encoded(state, bands_of(rasters, step)))
+    found, map_found = decode_state(encode_state(state, bands_of(rasters, step)))
     assert found == state
     assert all(np.array_equal(map_found[name], rasters[name]) for name in ("log_odds", "penalty"))
 
@@ -34,33 +40,33 @@ def test_what_was_written_comes_back(state: SavedState, seed: int, step: int) ->
 @QUICK
 @given(states())
 def test_what_has_not_been_written_yet_of_the_map_is_unknown(state: SavedState) -> None:
-    assert not any(raster.any() for raster in decoded(encoded(state, {}))[1].values())
+    assert not any(raster.any() for raster in decode_state(encode_state(state, {}))[1].values())
 
 
 def test_a_file_that_is_cut_anywhere_is_damaged() -> None:
     data = written()
     for length in range(len(data)):
-        with pytest.raises(DamagedError):
-            decoded(data[:length])
+        with pytest.raises(DamagedStateError):
+            decode_state(data[:length])
 
 
 def test_a_file_with_any_other_byte_is_damaged() -> None:
     data = written()
     for place in range(len(data)):
         for flip in (0x01, 0x80, 0xFF):
-            with pytest.raises(DamagedError):
-                decoded(data[:place] + bytes([data[place] ^ flip]) + data[place + 1 :])
+            with pytest.raises(DamagedStateError):
+                decode_state(data[:place] + bytes([data[place] ^ flip]) + data[place + 1 :])
 
 
 @QUICK
 @given(st.binary(max_size=300))
 def test_any_bytes_are_refused(data: bytes) -> None:
-    with pytest.raises(DamagedError):
-        decoded(data)
+    with pytest.raises(DamagedStateError):
+        decode_state(data)
     with pytest.raises(StateError):
-        decoded(sealed(data))
+        decode_state(sealed(data))
     with pytest.raises(StateError):
-        decoded(sealed(MAGIC + b"1\n" + data))
+        decode_state(sealed(MAGIC + b"1\n" + data))
 
 
 JSON = st.recursive(
@@ -74,8 +80,8 @@ JSON = st.recursive(
 @given(JSON)
 def test_a_head_that_is_none_is_refused_though_its_checksum_is_right(head: Any) -> None:
     for forgery in (head, {"state": head, "bands": []}, {"state": a_state().model_dump(mode="json"), "bands": [head]}):
-        with pytest.raises(DamagedError):
-            decoded(forged(forgery))
+        with pytest.raises(DamagedStateError):
+            decode_state(forged(forgery))
 
 
 def paths(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
@@ -101,8 +107,8 @@ def test_a_value_that_is_none_is_refused_or_harmless_wherever_it_stands() -> Non
     for path in paths(good):
         for wrong in WRONG:
             try:
-                state, rasters = decoded(forged({"state": replaced(good, path, wrong), "bands": []}))
-            except DamagedError as error:
+                state, rasters = decode_state(forged({"state": replaced(good, path, wrong), "bands": []}))
+            except DamagedStateError as error:
                 refused += 1
                 assert len(str(error).splitlines()) == 1
                 continue
@@ -141,11 +147,11 @@ def test_a_value_that_is_none_is_refused_or_harmless_wherever_it_stands() -> Non
     ],
 )
 def test_bands_that_do_not_fit_are_refused(table: list[Any], bands: bytes) -> None:
-    with pytest.raises(DamagedError):
-        decoded(forged({"state": a_state().model_dump(mode="json"), "bands": table}, bands))
+    with pytest.raises(DamagedStateError):
+        decode_state(forged({"state": a_state().model_dump(mode="json"), "bands": table}, bands))
 
 
 def test_another_version_is_named_and_not_called_damaged() -> None:
     with pytest.raises(StateError, match="format '7'") as caught:
-        decoded(sealed(MAGIC + b"7\n" + b"whatever"))
-    assert not isinstance(caught.value, DamagedError)
+        decode_state(sealed(MAGIC + b"7\n" + b"whatever"))
+    assert not isinstance(caught.value, DamagedStateError)

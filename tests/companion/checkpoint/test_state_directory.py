@@ -9,9 +9,8 @@ from pathlib import Path
 
 import pytest
 
-from companion.checkpoint.format import MAGIC, encoded
-from companion.checkpoint.model import SavedProgress
-from companion.checkpoint.place import StatePlace, StatePlaceError, default_directory
+from companion.checkpoint.state_directory import StateDirectory, StateDirectoryError, default_directory
+from companion.checkpoint.state_format import MAGIC, SavedProgress, encode_state
 from companion.cli.keeping import Keeping
 from companion.mission.identity import fingerprint
 from companion.mission.load import load_mission
@@ -21,16 +20,16 @@ from tests.support.rig import yard
 from tests.support.states import a_state, sealed
 
 
-def left(folder: Path, mission: Mission, **changes: object) -> StatePlace:
+def left(folder: Path, mission: Mission, **changes: object) -> StateDirectory:
     """A state of the mission, as a run has left it."""
-    place = StatePlace(folder / "state")
+    place = StateDirectory(folder / "state")
     state = a_state(**{"mission_sha256": fingerprint(mission), **changes})
-    replace_file(OsDisk(), place.file, encoded(state, {}))
+    replace_file(OsDisk(), place.file, encode_state(state, {}))
     return place
 
 
-def refused(place: StatePlace, mission: Mission) -> str:
-    with pytest.raises(StatePlaceError) as caught:
+def refused(place: StateDirectory, mission: Mission) -> str:
+    with pytest.raises(StateDirectoryError) as caught:
         place.load(mission)
     assert len(str(caught.value).splitlines()) == 1
     return str(caught.value)
@@ -39,11 +38,11 @@ def refused(place: StatePlace, mission: Mission) -> str:
 def test_the_state_of_this_mission_is_found(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     found = left(tmp_path, mission).load(mission)
-    assert found is not None and found[0].mission == "Yard"
+    assert found is not None and found.state.mission == "Yard"
 
 
 def test_nothing_there_is_no_fault(tmp_path: Path) -> None:
-    assert StatePlace(tmp_path / "new" / "state").load(yard(tmp_path)) is None
+    assert StateDirectory(tmp_path / "new" / "state").load(yard(tmp_path)) is None
 
 
 def test_another_missions_state_is_refused_and_left_where_it_is(tmp_path: Path) -> None:
@@ -87,22 +86,22 @@ def test_what_is_left_of_a_write_that_was_cut_is_cleared_away(tmp_path: Path) ->
     place = left(tmp_path, mission)
     place.close()
     (tmp_path / "state" / "mission.state.new").write_bytes(b"half a st")
-    assert StatePlace(tmp_path / "state").load(mission) is not None
+    assert StateDirectory(tmp_path / "state").load(mission) is not None
     assert sorted(path.name for path in (tmp_path / "state").iterdir()) == ["lock", "mission.state"]
 
 
 def test_one_directory_is_for_one_run_at_a_time(tmp_path: Path) -> None:
-    place = StatePlace(tmp_path)
-    with pytest.raises(StatePlaceError, match="another run keeps its state here; stop it, or use --state"):
-        StatePlace(tmp_path)
+    place = StateDirectory(tmp_path)
+    with pytest.raises(StateDirectoryError, match="another run keeps its state here; stop it, or use --state"):
+        StateDirectory(tmp_path)
     place.close()
-    StatePlace(tmp_path).close()
+    StateDirectory(tmp_path).close()
 
 
 def test_a_run_that_was_killed_keeps_nobody_out(tmp_path: Path) -> None:
-    code = f"import os, pathlib; from companion.checkpoint.place import StatePlace; StatePlace(pathlib.Path({str(tmp_path)!r})); os.abort()"
+    code = f"import os, pathlib; from companion.checkpoint.state_directory import StateDirectory; StateDirectory(pathlib.Path({str(tmp_path)!r})); os.abort()"
     assert subprocess.run([sys.executable, "-c", code], timeout=60, check=False).returncode < 0
-    StatePlace(tmp_path).close()
+    StateDirectory(tmp_path).close()
 
 
 def test_a_place_that_cannot_be_used_is_refused_only_where_it_was_asked_for(
@@ -110,23 +109,23 @@ def test_a_place_that_cannot_be_used_is_refused_only_where_it_was_asked_for(
 ) -> None:
     mission = yard(tmp_path)
     nowhere = tmp_path / "yard.toml" / "state"
-    with pytest.raises(StatePlaceError, match="choose another place with --state DIR"):
+    with pytest.raises(StateDirectoryError, match="choose another place with --state DIR"):
         Keeping(mission, nowhere, resume=False, say=print)
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "yard.toml"))
-    with pytest.raises(StatePlaceError, match="no state can be kept here"):
+    with pytest.raises(StateDirectoryError, match="no state can be kept here"):
         Keeping(mission, None, resume=True, say=print)
     said: list[str] = []
     keeping = Keeping(mission, None, resume=False, say=said.append)
     keeping.start()
     keeping.close()
-    assert keeping.memory is None and len(said) == 1 and said[0].endswith("this run cannot be resumed")
+    assert keeping.checkpointer is None and len(said) == 1 and said[0].endswith("this run cannot be resumed")
 
 
 def test_without_resume_a_mission_begins_anew_and_the_state_before_is_kept(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     left(tmp_path, mission).close()
     keeping = Keeping(mission, tmp_path / "state", resume=False, say=print)
-    assert keeping.kept is None
+    assert keeping.previous is None
     keeping.close()
     assert sorted(path.name for path in (tmp_path / "state").iterdir()) == ["lock", "mission.state.before"]
 

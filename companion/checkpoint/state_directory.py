@@ -1,4 +1,4 @@
-"""Where states are kept: one directory for one rover, used by one run at a time."""
+"""The directory of a rover's state file: where it is, its lock, and loading the state of a mission."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from companion.checkpoint.format import MAX_FILE_BYTES, DamagedError, Raster, StateError, decoded
-from companion.checkpoint.model import SavedState
+from companion.checkpoint.resume import PreviousRun
+from companion.checkpoint.state_format import MAX_FILE_BYTES, DamagedStateError, StateError, decode_state
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
 from companion.storage.disk import BESIDE, OsDisk, set_aside
@@ -18,12 +18,12 @@ NAME = "mission.state"
 LOCK = "lock"
 
 
-class StatePlaceError(Exception):
+class StateDirectoryError(Exception):
     """A directory or state that cannot be used; the text is one line with the file, the reason and the remedy."""
 
 
 def default_directory(environment: Mapping[str, str]) -> Path:
-    """What systemd has made for the service, else the user's own place for states (XDG)."""
+    """The directory that systemd made for the service, otherwise the user's own (XDG Base Directory Specification)."""
     if given := environment.get("STATE_DIRECTORY"):
         return Path(given.split(":")[0])
     base = environment.get("XDG_STATE_HOME", "")
@@ -31,8 +31,11 @@ def default_directory(environment: Mapping[str, str]) -> Path:
     return home / "rover-companion"
 
 
-class StatePlace:
-    """The directory, made if need be, and locked for as long as this lives. Raises StatePlaceError."""
+class StateDirectory:
+    """One directory for one rover, used by one run at a time: it is created if necessary and locked until ``close``.
+
+    Raises StateDirectoryError.
+    """
 
     def __init__(self, directory: Path) -> None:
         self.directory = directory
@@ -42,46 +45,55 @@ class StatePlace:
             directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             self._lock = os.open(directory / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self.file.with_name(NAME + BESIDE).unlink(missing_ok=True)  # an earlier run was killed while it wrote
+            self.file.with_name(NAME + BESIDE).unlink(missing_ok=True)  # an earlier run was killed while writing
         except BlockingIOError:
             self.close()
-            raise StatePlaceError(
+            raise StateDirectoryError(
                 f"{directory}: another run keeps its state here; stop it, or use --state DIR"
             ) from None
         except OSError as error:
             self.close()
-            raise StatePlaceError(
-                f"{directory}: no state can be kept here: {error.strerror or error}; choose another place with --state DIR"
+            reason = error.strerror or error
+            raise StateDirectoryError(
+                f"{directory}: no state can be kept here: {reason}; choose another place with --state DIR"
             ) from error
 
-    def load(self, mission: Mission) -> tuple[SavedState, dict[str, Raster]] | None:
-        """The state of this mission; None when there is none. Raises StatePlaceError; a damaged file is renamed first."""
+    def load(self, mission: Mission) -> PreviousRun | None:
+        """The run of this mission that was saved here; None if there is none. A damaged file is renamed.
+
+        Raises StateDirectoryError.
+        """
         try:
-            state, rasters = decoded(self._read())
+            run = PreviousRun(*decode_state(self._read()))
         except FileNotFoundError:
             return None
-        except DamagedError as error:
+        except DamagedStateError as error:
             kept = set_aside(self.file, "damaged")
-            raise StatePlaceError(
+            raise StateDirectoryError(
                 f"{self.file}: {error}; kept as {kept.name}; the next start begins the mission from its first target"
             ) from None
         except StateError as error:
-            raise StatePlaceError(
-                f"{self.file}: {error}; use that version, or start without --resume to begin anew"
+            raise StateDirectoryError(
+                f"{self.file}: {error}; use that version, or start without --resume to begin at the first target"
             ) from None
         except OSError as error:
-            raise StatePlaceError(
+            raise StateDirectoryError(
                 f"{self.file}: cannot be read: {error.strerror or error}; remove it, or start without --resume"
             ) from None
+        state = run.state
         if state.mission_sha256 != fingerprint(mission) or len(state.progress.statuses) != len(mission.targets):
             done = f"{state.reached} of {len(state.progress.statuses)} targets reached"
-            raise StatePlaceError(
-                f"{self.file}: of another mission ('{state.mission}', {done}); resume that one, or start without --resume"
+            raise StateDirectoryError(
+                f"{self.file}: of another mission ('{state.mission}', {done}); "
+                "resume that one, or start without --resume"
             )
-        return state, rasters
+        return run
 
-    def begin_anew(self) -> Path | None:
-        """A mission is begun at its first target: a state that is there is kept under another name, which is returned."""
+    def set_aside(self) -> Path | None:
+        """Rename a state that is there, because the mission begins at its first target. Returns the new name.
+
+        Raises StateDirectoryError.
+        """
         try:
             before = self.file.with_name(NAME + ".before")
             self.file.replace(before)
@@ -89,11 +101,11 @@ class StatePlace:
         except FileNotFoundError:
             return None
         except OSError as error:
-            raise StatePlaceError(f"{self.file}: cannot be renamed: {error.strerror or error}; remove it") from None
+            raise StateDirectoryError(f"{self.file}: cannot be renamed: {error.strerror or error}; remove it") from None
         return before
 
     def close(self) -> None:
-        """Let others use it."""
+        """Release the lock."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -102,5 +114,5 @@ class StatePlace:
         with open_file(self.file) as file:
             data = file.read(MAX_FILE_BYTES + 1)
         if len(data) > MAX_FILE_BYTES:
-            raise DamagedError("larger than any state is")
+            raise DamagedStateError("larger than any state file")
         return data

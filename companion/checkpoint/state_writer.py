@@ -1,0 +1,101 @@
+"""Writes the state file: immediately (in lock-step), or in a thread, so that no tick waits for a disk."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+
+from companion.checkpoint.checkpointer import Snapshot, StateUpdate, saved_state
+from companion.checkpoint.state_format import RowBand, compressed_rows, encode_state
+from companion.storage.beside import Beside, Patience
+from companion.storage.disk import Disk, replace_file
+
+
+class StateFile:
+    """The file, and the rows of the map that have been given so far. Every write is tried: a full disk may have room again."""
+
+    def __init__(self, path: Path, disk: Disk) -> None:
+        self.path = path
+        self.problem = ""
+        self._disk = disk
+        self._bands: dict[RowBand, bytes] = {}
+        self._written = b""
+
+    def apply(self, update: StateUpdate) -> None:
+        """Keep the rows. If there is a snapshot, write the file unless its content is unchanged."""
+        if update.new_map:
+            self._bands.clear()
+        for band, rows in update.rows.items():
+            self._bands[band] = compressed_rows(rows)
+        if update.snapshot is None:
+            return
+        try:
+            data = encode_state(saved_state(update.snapshot), self._bands)
+            if data != self._written or self.problem:
+                replace_file(self._disk, self.path, data)
+            self._written, self.problem = data, ""
+        except OSError as error:
+            self.problem = f"{self.path}: the state cannot be saved: {error.strerror or error}"
+        except ValueError as error:  # a value outside the limits of SavedState
+            self.problem = f"{self.path}: the state cannot be saved: {str(error).splitlines()[0]}"
+
+
+class InlineStateWriter:
+    """Writes immediately: equal runs leave equal files at every moment."""
+
+    def __init__(self, file: StateFile) -> None:
+        self._file = file
+
+    @property
+    def busy(self) -> bool:
+        """Never."""
+        return False
+
+    @property
+    def problem(self) -> str:
+        """See StateWriter."""
+        return self._file.problem
+
+    def put(self, update: StateUpdate) -> None:
+        """See StateWriter."""
+        self._file.apply(update)
+
+    def close(self) -> None:
+        """Nothing is left to write."""
+
+
+class ThreadStateWriter:
+    """Writes in a thread."""
+
+    def __init__(self, file: StateFile, patience: Patience | None = None) -> None:
+        self._file = file
+        self._newest: Snapshot | None = None
+        self._beside = Beside("state", patience)
+        self._is_late = False
+
+    @property
+    def busy(self) -> bool:
+        """See StateWriter."""
+        return self._beside.busy
+
+    @property
+    def problem(self) -> str:
+        """See StateWriter."""
+        late = f"{self._file.path}: the state is not saved yet: the disk does not answer"
+        return late if self._is_late else self._file.problem
+
+    def put(self, update: StateUpdate) -> None:
+        """See StateWriter."""
+        self._beside.put(partial(self._apply, update))
+
+    def close(self) -> None:
+        """See StateWriter. Gives up after some time."""
+        self._is_late = not self._beside.close()
+
+    def _apply(self, update: StateUpdate) -> None:
+        """When snapshots wait behind a slow disk, only the newest is written."""
+        self._file.apply(StateUpdate(update.rows, None, update.new_map))
+        self._newest = update.snapshot or self._newest
+        if self._newest is not None and not self._beside.behind:
+            self._file.apply(StateUpdate(snapshot=self._newest))
+            self._newest = None
