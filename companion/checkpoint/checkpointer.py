@@ -1,4 +1,7 @@
-"""The checkpointer: decides in each tick whether the state of the run must be saved, and takes the snapshots that are written."""
+"""Decides in each tick whether the state of the run must be saved, and takes the snapshots that are written.
+
+Nouns: checkpointer, snapshot.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +53,7 @@ Condition = tuple[MissionProgress, Control, bool, bool, bool]
 
 @dataclass(frozen=True, eq=False, slots=True)
 class RunMoment:
-    """The run at the end of a tick. ``released``: the program has put the rover into HOLD; ``done``: the run ends now."""
+    """The run at the end of a tick. ``released``: the program has set HOLD for the shutdown; ``done``: the run ends."""
 
     now_s: float
     vehicle: VehicleState
@@ -63,9 +66,10 @@ class RunMoment:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Snapshot:
-    """A run at one moment, by references to values that never change: cheap to take in a tick, converted in another thread.
+    """A run at one moment. It refers to immutable values: it is cheap to take in a tick, and another thread writes it.
 
-    ``now_s``: the program's clock. ``draws``: the random generator's state in numpy's form. The others as in ``SavedState``.
+    ``now_s``: the program's clock. ``draws``: the random generator's state in numpy's form. The others as in
+    ``SavedState``.
     """
 
     mission: str
@@ -92,7 +96,7 @@ class Snapshot:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class StateUpdate:
-    """What changed: copied rows of the map (``new_map``: all older rows are void). With a snapshot the file is to be written."""
+    """What changed: copied rows of the map (``new_map``: all older rows are void). A snapshot asks for a write."""
 
     rows: Mapping[RowBand, Raster] = field(default_factory=dict)
     snapshot: Snapshot | None = None
@@ -148,14 +152,14 @@ class Checkpointer:
         return self._writer.problem
 
     def problem_text(self, log: RunLog) -> str:
-        """The text for the ground station, noted in the record. The disk's own reason would not be reproducible in a replay."""
+        """The text for the ground station, empty without a problem. Noted in the record, without the reason."""
         if not self.problem:
             return ""
         log.mark(Mark.UNSAVED)
         return UNSAVED
 
     def resume(self, executor: MissionExecutor, vehicle: VehicleState, now_s: float) -> bool:
-        """Continue the interrupted run, once, with an executor on the ground of ``resumed_layout``. False if there is none."""
+        """Continue the interrupted run, whose executor has the layout of ``resumed_layout``. False if there is none."""
         if self.previous is None:
             return False
         resume_mission(self.previous, executor, vehicle, now_s)
@@ -231,7 +235,7 @@ class Checkpointer:
 
 
 def _rows(evidence: EvidenceMap) -> Iterator[tuple[RowBand, Raster]]:
-    """The map in bands of rows, each copied when it is asked for. With a large map the last may be seconds newer than the first."""
+    """The map in bands of rows, each copied when it is asked for: the last may be seconds newer than the first."""
     for name, raster in (("log_odds", evidence.log_odds), ("penalty", evidence.penalty)):
         height, width = raster.shape
         step = max(1, BAND_CELLS // width)

@@ -1,4 +1,7 @@
-"""Resuming an interrupted run: who controls the rover now, and the mission, its progress and its map in the present frame."""
+"""Resumes an interrupted run: who controls the rover now, and mission, progress and map in the present frame.
+
+Nouns: interrupted run.
+"""
 
 from __future__ import annotations
 
@@ -27,10 +30,10 @@ from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 
 SAME_BOOT_S = 1.0
-"""While autopilot and computer both keep running, the difference of their clocks changes by no more than this (link delays)."""
+"""The difference of two clocks that keep running changes by no more than this (link delays)."""
 SAME_ORIGIN_M = 0.2
 CARRIED_M = 25.0
-"""A rover found farther than this from its last field was carried: the way to the target begins again where it stands."""
+"""A rover found farther than this from its last field was carried: its leg begins again where it stands."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,13 +45,13 @@ class PreviousRun:
 
     @property
     def sticks(self) -> Sticks:
-        """The sticks' rest position if the program had control: sticks moved since then count as a takeover by a person."""
+        """Rest position of the sticks if the program had control: a person who has moved them since takes over."""
         return Sticks(self.state.sticks_us if self.state.control is Control.COMPANION else None)
 
 
 @dataclass(frozen=True, slots=True)
 class ResumePermission:
-    """What a resumed run may do: ``control`` is PERSON if a person has taken the rover since; ``may_arm``: it may arm."""
+    """What a resumed run may do. ``control``: PERSON if a person has taken the rover since."""
 
     control: Control
     may_arm: bool
@@ -65,13 +68,14 @@ def same_boot(state: SavedState, position: LocalPositionSeen) -> bool:
 
 
 def resume_permission(state: SavedState, vehicle: VehicleState) -> ResumePermission | None:
-    """Who controls the rover of an interrupted run, and whether it may be armed; None until heartbeat and position are known.
+    """Who controls the rover now, and whether it may be armed; None until heartbeat and position are known.
 
     - A person who had control keeps it over any restart, until somebody sets GUIDED.
-    - If the program had control and the rover has left GUIDED since, a person has taken it, unless the autopilot has restarted.
+    - If the program had control and the rover has left GUIDED since, a person has taken it, unless the autopilot has
+      restarted.
     - A rover that was disarmed since, without a restart, is not armed again.
-    - If the program had stopped the rover in HOLD, it continues only if mode, arming and boot are unchanged: otherwise a person may have
-      driven it, switched it off or moved it.
+    - If the program had stopped the rover in HOLD, it continues only if mode, arming and boot are unchanged: otherwise
+      a person may have driven it, switched it off or moved it.
     """
     heartbeat, position = vehicle.heartbeat, vehicle.position
     if heartbeat is None or position is None:
@@ -100,8 +104,9 @@ def resumed_layout(
 ) -> tuple[MissionLayout, MissionProgress, str]:
     """The mission in the present frame with the saved map, the saved progress, and a text about the map for people.
 
-    ``same``: the autopilot has not restarted, so its frame is the same unless its origin has moved. Otherwise a new position estimate may
-    be some metres off: no ground counts as seen free, and the obstacles count as barely seen. Raises MissionError.
+    ``same``: the autopilot has not restarted, so its frame is the same unless its origin has moved. Otherwise a new
+    position estimate may be some metres off: no ground counts as seen free, and the obstacles count as barely seen.
+    Raises MissionError.
     """
     state, saved_origin = previous.state, GeoPoint(*previous.state.origin)
     start = _in_frame(state.progress.start, saved_origin, origin)
@@ -148,7 +153,8 @@ def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: Ve
 def grid_shift(state: SavedState, layout: MissionLayout) -> Cell:
     """The offset between the saved grid and the present one: the saved field f is now f + shift.
 
-    Home is in the middle of a field in both grids; but a grid around places in degrees may be a field larger in another frame.
+    Home is in the middle of a field in both grids; but a grid around places in degrees may be a field larger in another
+    frame.
     """
     corner, resolution_m = from_home(layout).south_west, layout.evidence.base.resolution_m
     east, north = state.ground.east_m - corner.east_m, state.ground.north_m - corner.north_m
@@ -203,7 +209,7 @@ def _shifted(raster: Raster, shape: tuple[int, ...], shift: Cell) -> Raster:
 
 
 def _map_newest_scan(executor: MissionExecutor, vehicle: VehicleState) -> None:
-    """A rover that is still moving is beyond the ground seen when the state was saved: map what it sees before the first setpoint."""
+    """A rover that still moves is beyond the ground seen when the state was saved: a scan must come first."""
     seen, attitude = vehicle.scan_ahead, vehicle.attitude
     pose = None if seen is None else vehicle.pose_at(seen.time_s)
     if seen is not None and attitude is not None and pose is not None:

@@ -1,7 +1,10 @@
-"""The state file of a run: the values in it, and how they become bytes and are read back.
+"""The state file of a run: its values, and their encoding to bytes and back.
 
-The file: a line with its name and version, the length of the head, the head (JSON), the map in bands of rows, a SHA-256 of everything before.
-Head and bands are compressed one by one. A file that was cut, or in which one byte differs, is refused.
+The file: a line with its name and version, the length of the head, the head (JSON), the map in bands of rows, a SHA-256
+of everything before. Head and bands are compressed one by one. A file that was cut, or in which one byte differs, is
+refused.
+
+Nouns: saved state.
 """
 
 from __future__ import annotations
@@ -150,10 +153,10 @@ class SavedGenerator(SavedValues):
 class SavedState(SavedValues):
     """A run at one moment. The names are the keys in the file.
 
-    ``control``, ``armed``: who controlled the rover, and whether its motors were armed. ``released``: the program had stopped it and set HOLD.
-    ``boot_s``: the autopilot's time since boot. ``ahead_s``: how far the program's clock was ahead of it, constant while both keep running.
-    ``trail``: the way from the start of the mission to here, without loops. ``sticks_us``: rest position of the pilot's sticks (steering,
-    throttle), None if they were not seen.
+    ``control``, ``armed``: who controlled the rover, and whether its motors were armed. ``released``: the program had
+    stopped it and set HOLD. ``boot_s``: the autopilot's time since boot. ``ahead_s``: how far the program's clock was
+    ahead of it, constant while both keep running. ``trail``: the way from the start of the mission to here, without
+    loops. ``sticks_us``: rest position of the pilot's sticks (steering, throttle), None if they were not seen.
     """
 
     mission: str

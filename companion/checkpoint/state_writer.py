@@ -1,4 +1,7 @@
-"""Writes the state file: immediately (in lock-step), or in a thread, so that no tick waits for a disk."""
+"""Writes the state file: immediately (in lock-step), or in a thread, so that no tick waits for a disk.
+
+Nouns: state file.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,7 @@ from companion.storage.disk import Disk, replace_file
 
 
 class StateFile:
-    """The file, and the rows of the map that have been given so far. Every write is tried: a full disk may have room again."""
+    """The file, and the rows of the map given so far. Every write is tried: a full disk may have room again."""
 
     def __init__(self, path: Path, disk: Disk) -> None:
         self.path = path

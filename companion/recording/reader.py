@@ -1,4 +1,7 @@
-"""Reads a record back: checks it against its check sums, and yields as many rounds as there are."""
+"""Reads a record back: checks it against its check sums, and yields as many rounds as there are.
+
+Nouns: record.
+"""
 
 from __future__ import annotations
 
@@ -54,7 +57,7 @@ class RecordedRound(NamedTuple):
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Record:
-    """A record that can be replayed. ``complete``: it was closed in order; ``notes``: what people should know of it, a line each."""
+    """A record that can be replayed. ``complete``: nothing is missing at its end; ``notes``: lines for people."""
 
     directory: Path
     meta: RecordMeta

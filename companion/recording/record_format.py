@@ -1,4 +1,7 @@
-"""The format of a record (docs/record.md): names of its files, ``meta.json``, the rounds in bytes, a decision as a line of JSON."""
+"""The format of a record: names of its files, ``meta.json``, rounds as bytes, decisions as JSON (docs/record.md).
+
+Nouns: round.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +69,8 @@ class RecordMeta(BaseModel):
 class Round(NamedTuple):
     """One round of the companion: it listened, and acted.
 
-    ``time_s``: the companion's clock. ``heard``, ``said``: number of packets in the packet log, first those heard. ``marks``: bits of Mark.
+    ``time_s``: the companion's clock. ``heard``, ``said``: number of packets in the packet log, first those heard.
+    ``marks``: bits of Mark.
     """
 
     time_s: float

@@ -1,4 +1,7 @@
-"""Writes the record of a run: packets, decisions, rounds, and copies of the files that the run depends on (docs/record.md)."""
+"""Writes the record of a run: packets, rounds, decisions, and copies of the input files (docs/record.md).
+
+Nouns: recorder.
+"""
 
 from __future__ import annotations
 
@@ -96,8 +99,8 @@ class Recorder:
     """Writes the directory that docs/record.md describes.
 
     A directory that already has a record keeps it: the new one goes to the same name with a number, see ``directory``.
-    Data is written once a second; with ``beside`` by a thread, which ``close`` ends, so that no round waits for the disk.
-    A full disk ends the record, never the run: see ``problem``.
+    Data is written once a second; with ``beside`` by a thread, which ``close`` ends, so that no round waits for the
+    disk. A full disk ends the record, never the run: see ``problem``.
     """
 
     def __init__(
@@ -112,9 +115,10 @@ class Recorder:
         start_us: int | None = None,
         beside: Beside | None = None,
     ) -> None:
-        """``files``: by kind, further files that the run depends on; they are copied. None stands for no file of that kind.
+        """``files``: further input files by kind; they are copied. None: there is no file of that kind.
 
-        ``start_us``: the start in microseconds since 1970, by default now. Raises RecordError if the directory cannot be written.
+        ``start_us``: the start in microseconds since 1970, by default now. Raises RecordError if the directory cannot
+        be written.
         """
         self.directory = unused(directory)
         self.problem = ""
@@ -189,7 +193,7 @@ class Recorder:
         self._write(DECISIONS, decision_line(time_s, target, decision).encode() + b"\n")
 
     def close(self) -> None:
-        """Write what is left, and that the record is complete. Gives up on a disk that hangs. May be called more than once."""
+        """Write what is left, and mark the record complete. Gives up on a disk that hangs. May be called again."""
         if self._closed:
             return
         self._end_round()
@@ -219,7 +223,7 @@ class Recorder:
         self._sums[name] = (size + len(data), zlib.crc32(data, crc))
 
     def _hand_over(self) -> None:
-        """Give the waiting data to the disk. Ends the record if too much is unwritten already, because memory is limited."""
+        """Give the waiting data to the disk, or end the record if too much is unwritten: memory is limited."""
         batch = {name: bytes(data) for name, data in self._waiting.items() if data}
         for data in self._waiting.values():
             data.clear()

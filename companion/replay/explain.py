@@ -27,7 +27,7 @@ from companion.settings import Settings
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Candidate:
-    """A path that was considered. ``cost``: of its fields, inf without a path; ``curve_cost``: of driving along its curve, if it has one.
+    """A path that was considered. ``cost``: of its fields, inf without a path; ``curve_cost``: along its curve, if any.
 
     ``part_of``: the proposal of one planner within a search.
     """
@@ -44,8 +44,9 @@ class Candidate:
 class Explanation:
     """One decision, with what was known before it.
 
-    ``ground``: the mission's own weights; ``grid``: with the obstacles seen so far; ``weighed``: with the cost of turning as well, which the
-    search used. ``known``: the fields that had been seen. ``state``: the navigator's state before the step.
+    ``ground``: the mission's own weights; ``grid``: with the obstacles seen so far; ``weighed``: with the cost of
+    turning as well, which the search used. ``known``: the fields that had been seen. ``state``: the navigator's state
+    before the step.
     """
 
     number: int
@@ -188,14 +189,15 @@ def explanation_lines(why: Explanation) -> list[str]:
     decision, pose = why.decision, why.pose
     here, goal = why.state.past[-1], why.state.target
     cell = why.grid.cell_at(pose.point)
+    returning = ", going back along it" if why.state.returning else ""
     lines = [
-        f"decision {why.number} at {why.time_s:.2f} s, heading for {why.target}: {decision.action} (part {decision.part}): "
-        f"{decision.reason}",
+        f"decision {why.number} at {why.time_s:.2f} s, heading for {why.target}: "
+        f"{decision.action} (part {decision.part}): {decision.reason}",
         f"rover in field {cell.x}, {cell.y} (north {pose.north_m:.2f} m, east {pose.east_m:.2f} m, heading "
-        f"{math.degrees(pose.heading_rad) % 360.0:.0f} deg), last step in {here.x}, {here.y}; target field {goal.x}, {goal.y}; "
-        f"{len(why.state.past)} fields of past path{', going back along it' if why.state.returning else ''}",
-        f"map: {why.grid.width} x {why.grid.height} fields of {why.grid.resolution_m:g} m, {why.known.mean():.0%} seen, "
-        f"{int((why.grid.weights >= 1.0).sum())} are obstacles",
+        f"{math.degrees(pose.heading_rad) % 360.0:.0f} deg), last step in {here.x}, {here.y}; "
+        f"target field {goal.x}, {goal.y}; {len(why.state.past)} fields of past path{returning}",
+        f"map: {why.grid.width} x {why.grid.height} fields of {why.grid.resolution_m:g} m, "
+        f"{why.known.mean():.0%} seen, {int((why.grid.weights >= 1.0).sum())} are obstacles",
     ]
     for candidate in why.candidates:
         lines.append(

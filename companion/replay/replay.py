@@ -1,7 +1,9 @@
-"""Replay: runs the companion again on what a record says that it heard, and compares its decisions and packets with the recorded ones.
+"""Runs the companion again on the bytes of a record, and compares its decisions and packets with the recorded ones.
 
-It reads files and nothing else: no link, no clock, no thread. The record contains everything that did not follow from bytes and files, such as
-the round in which the answer of a thread arrived (docs/record.md).
+It reads files and nothing else: no link, no clock, no thread. The record contains everything that did not follow from
+bytes and files, such as the round in which the answer of a thread arrived (docs/record.md).
+
+Nouns: replay.
 """
 
 from __future__ import annotations
@@ -150,12 +152,12 @@ class RecordPlayer:
             self.differs(f"decision {number + 1}: {decision.reason}, recorded: {self._record.decisions[number]:.200}")
 
     def _is_due(self, line: str) -> bool:
-        """Whether a recorded decision should have been made by now. The last rounds may be missing in an incomplete record."""
+        """Whether a recorded decision should have been made by now: the last rounds of a record may be missing."""
         time_s = json.loads(line)["time_s"]
         return self._record.complete or time_s < self.round.time_s
 
     def _compare_said(self, *, last: bool) -> None:
-        """Compare packets. The recorded run may have ended in the middle of its ``last`` round, so more packets are no difference there."""
+        """Compare packets. In the ``last`` round more are no difference: the run may have ended in the middle of it."""
         recorded, now = self._current.said, self._said
         self._said = []
         self.result.said += len(now)
@@ -248,7 +250,7 @@ def replay(record: Record, observer: ReplayObserver | None = None) -> ReplayResu
 
 
 def _checkpointer(record: Record, player: RecordPlayer) -> Checkpointer:
-    """A checkpointer that writes nothing, with the interrupted run that the recorded one resumed. Raises RecordError."""
+    """Writes nothing; has the interrupted run that the recorded one resumed. Raises RecordError."""
     writer, file = _NoStateWriter(player), record.input(STATE)
     if file is None:
         return Checkpointer(record.mission, writer)
@@ -303,7 +305,7 @@ def _round(companion: Companion, player: RecordPlayer) -> bool:
 
 
 def _broken_off(companion: Companion, player: RecordPlayer, error: Exception) -> None:
-    """The replay was broken off by an error: the recorded run must have been, too. Raises the error if it is unexpected."""
+    """An error broke the replay off: the recorded run must have had it, too. Raises an unexpected error."""
     if player.next_marks is None or not player.next_marks & Mark.CLOSE:
         if not isinstance(error, MissionError):
             raise error
