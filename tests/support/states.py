@@ -5,11 +5,13 @@ from __future__ import annotations
 import hashlib
 import json
 import zlib
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from hypothesis import strategies as st
 
+from companion.checkpoint.state_directory import StateDirectory
 from companion.checkpoint.state_format import (
     LENGTH,
     MAGIC,
@@ -24,9 +26,13 @@ from companion.checkpoint.state_format import (
     SavedState,
     SavedTally,
     compressed_rows,
+    encode_state,
 )
 from companion.executive.mission_progress import MissionPhase, TargetStatus
+from companion.mission.identity import fingerprint
+from companion.mission.mission import Mission
 from companion.safety.mode_latch import Control
+from companion.storage.disk import OsDisk, replace_file
 
 FIELD = st.integers(-1000, 1000)
 METRES = st.floats(-1e6, 1e6)
@@ -142,3 +148,11 @@ def a_state(**changes: Any) -> SavedState:
         "draws": None,
     }
     return SavedState(**{**values, **changes})
+
+
+def leave_state(folder: Path, mission: Mission, **changes: object) -> StateDirectory:
+    """A state of the mission, as a run has left it."""
+    place = StateDirectory(folder / "state")
+    state = a_state(**{"mission_sha256": fingerprint(mission), **changes})
+    replace_file(OsDisk(), place.file, encode_state(state, {}))
+    return place

@@ -1,4 +1,4 @@
-"""Whose the rover is after a restart, and where what was mapped lies then."""
+"""A resumed run: whose the rover is, and where its mission and its map lie."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from companion.checkpoint.checkpointer import BAND_CELLS, _rows
 from companion.checkpoint.resume import (
     PreviousRun,
     ResumePermission,
@@ -18,10 +17,9 @@ from companion.checkpoint.resume import (
 )
 from companion.checkpoint.state_format import SavedGrid, SavedNavState, SavedPlace, SavedProgress
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
-from companion.core.grid import Cell, empty_grid
+from companion.core.grid import Cell
 from companion.executive.mission_layout import lay
 from companion.executive.mission_progress import MissionPhase, TargetStatus
-from companion.mapping.evidence_map import new_map
 from companion.mission.mission import Mission
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
@@ -77,7 +75,7 @@ HOME = GeoPoint(53.1327, 23.169)
 ORIGIN = GeoPoint(53.1326, 23.1689)
 
 
-def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[PreviousRun, Mission]:
+def previous_run(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[PreviousRun, Mission]:
     """A state of the yard with something on its map."""
     frame = LocalFrame(origin)
     home = frame.to_ned(HOME)
@@ -112,10 +110,10 @@ def kept_of(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[PreviousRun, Missi
 
 
 def test_in_the_same_frame_the_map_is_what_it_was(tmp_path: Path) -> None:
-    kept, mission = kept_of(tmp_path)
-    layout, progress, said = resumed_layout(kept, mission, MappingSettings(), ORIGIN, 500.0, same=True)
-    assert np.array_equal(layout.evidence.log_odds, kept.rasters["log_odds"])
-    assert np.array_equal(layout.evidence.penalty, kept.rasters["penalty"])
+    previous, mission = previous_run(tmp_path)
+    layout, progress, said = resumed_layout(previous, mission, MappingSettings(), ORIGIN, 500.0, same=True)
+    assert np.array_equal(layout.evidence.log_odds, previous.rasters["log_odds"])
+    assert np.array_equal(layout.evidence.penalty, previous.rasters["penalty"])
     assert layout.evidence.grid.weights[1, 3] >= 1.0, "and the fields know it"
     assert said == "with its map"
     assert (progress.phase, progress.until_s, progress.give_up_s) == (MissionPhase.WAIT, 502.0, 600.0)
@@ -128,47 +126,37 @@ def test_in_the_same_frame_the_map_is_what_it_was(tmp_path: Path) -> None:
 def test_in_a_frame_that_may_be_another_only_obstacles_count_and_lie_on_the_same_ground(
     tmp_path: Path, north_m: float, east_m: float, same: bool
 ) -> None:
-    kept, mission = kept_of(tmp_path)
+    previous, mission = previous_run(tmp_path)
     origin = LocalFrame(ORIGIN).to_geo(NedPoint(north_m, east_m))
-    layout, _, said = resumed_layout(kept, mission, MappingSettings(), origin, 0.0, same=same)
+    layout, _, said = resumed_layout(previous, mission, MappingSettings(), origin, 0.0, same=same)
     settings, log_odds = MappingSettings(), layout.evidence.log_odds
     assert (log_odds >= 0.0).all(), "no ground counts as seen"
-    assert np.array_equal(log_odds > 0.0, kept.rasters["log_odds"] > 0.0)
+    assert np.array_equal(log_odds > 0.0, previous.rasters["log_odds"] > 0.0)
     assert log_odds.max() < settings.sure_at, "and an obstacle may be doubted"
     assert not layout.evidence.penalty.any()
     assert "obstacles" in said
     corner = layout.evidence.base.south_west
-    before = resumed_layout(kept, mission, MappingSettings(), ORIGIN, 0.0, same=True)[0].evidence.base.south_west
+    before = resumed_layout(previous, mission, MappingSettings(), ORIGIN, 0.0, same=True)[0].evidence.base.south_west
     assert corner.distance_m(NedPoint(before.north_m - north_m, before.east_m - east_m)) < 0.01
 
 
 def test_a_grid_that_has_become_a_field_larger_takes_the_map_along(tmp_path: Path) -> None:
-    kept, mission = kept_of(tmp_path)
-    ground = kept.state.ground.model_copy(
-        update={"east_m": kept.state.ground.east_m + 2.0, "north_m": kept.state.ground.north_m - 1.0}
+    previous, mission = previous_run(tmp_path)
+    ground = previous.state.ground.model_copy(
+        update={"east_m": previous.state.ground.east_m + 2.0, "north_m": previous.state.ground.north_m - 1.0}
     )
-    moved = PreviousRun(kept.state.model_copy(update={"ground": ground}), kept.rasters)
+    moved = PreviousRun(previous.state.model_copy(update={"ground": ground}), previous.rasters)
     layout, _, _ = resumed_layout(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
     assert grid_shift(moved.state, layout) == Cell(2, -1)
     s = layout.evidence.subdivisions
-    assert np.array_equal(layout.evidence.log_odds[:-s, 2 * s :], kept.rasters["log_odds"][s:, : -2 * s])
+    assert np.array_equal(layout.evidence.log_odds[:-s, 2 * s :], previous.rasters["log_odds"][s:, : -2 * s])
     assert not layout.evidence.log_odds[:, : 2 * s].any()
     leg = SavedNavState(past=((4, 4), (5, 4)), returning=True, until_search=2, since_better=1, draws=9, doubts_left=1)
     assert resumed_nav_state(leg, grid_shift(moved.state, layout)).past == (Cell(6, 3), Cell(7, 3))
 
 
 def test_other_settings_of_the_map_cost_the_map_and_not_the_progress(tmp_path: Path) -> None:
-    kept, mission = kept_of(tmp_path)
-    layout, progress, said = resumed_layout(kept, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
+    previous, mission = previous_run(tmp_path)
+    layout, progress, said = resumed_layout(previous, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
     assert not layout.evidence.log_odds.any() and "without its map" in said
     assert progress.statuses == (TargetStatus.UNREACHABLE,)
-
-
-def test_a_large_map_is_copied_in_parts_of_a_megabyte() -> None:
-    evidence = new_map(empty_grid(1000, 900), 0.35, MappingSettings(evidence_m=0.5))
-    evidence.log_odds[:] = np.arange(evidence.log_odds.size, dtype=np.float32).reshape(evidence.log_odds.shape)
-    bands = list(_rows(evidence))
-    assert all(rows.size <= BAND_CELLS for _, rows in bands) and len(bands) > 10
-    fine = [(place, rows) for place, rows in bands if place.raster == "log_odds"]
-    assert np.array_equal(np.concatenate([rows for _, rows in fine]), evidence.log_odds)
-    assert [place.first_row for place, _ in fine] == list(np.cumsum([0, *[place.rows for place, _ in fine]])[:-1])

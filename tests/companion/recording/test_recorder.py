@@ -8,26 +8,15 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from companion.core.grid import Cell
 from companion.core.round_mark import Mark
 from companion.mission.as_json import from_json
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
-from companion.navigation.field_step import Action, Decision, Part, SearchKind
-from companion.planning.problem import Path as FieldPath
 from companion.recording.record_format import RecordError, Round, unpacked_rounds
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from tests.support.mavlink_vehicle import Station
-
-DECISION = Decision(
-    action=Action.FOLLOW,
-    part=Part.SEARCH,
-    path=(Cell(0, 24), Cell(1, 24)),
-    new_path=FieldPath((Cell(0, 24), Cell(1, 24)), 1.5),
-    reason="the path is blocked",
-    searches=(SearchKind.THOROUGH,),
-)
+from tests.support.records import DECISION
 
 
 @pytest.fixture

@@ -1,0 +1,40 @@
+"""A decision in words: candidates and their costs."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from companion.core.grid import empty_grid
+from companion.planning.problem import Path
+from companion.planning.raster import CellArray
+from companion.replay.explain import Candidate, cost_of, cost_text
+
+
+def cells(*pairs: tuple[int, int]) -> CellArray:
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+def test_the_cost_of_a_path_on_a_grid() -> None:
+    grid = empty_grid(4, 3)
+    straight = cost_of(grid, cells((0, 0), (1, 0), (2, 0)))
+    weights = grid.weights.copy()
+    weights[0, 1] = 0.9
+    assert cost_of(grid.with_weights(weights), cells((0, 0), (1, 0), (2, 0))) > straight > 0.0
+    assert cost_of(grid, cells()) == 0.0
+
+
+@pytest.mark.parametrize("outside", [(-1, 0), (0, -1), (4, 0), (0, 3)])
+def test_a_path_that_leaves_the_grid_has_no_finite_cost(outside: tuple[int, int]) -> None:
+    assert cost_of(empty_grid(4, 3), cells((0, 0), outside)) == math.inf
+
+
+def test_cost_and_length_of_a_candidate() -> None:
+    path = Path(cells((0, 0), (1, 0), (2, 0)), 2.0)
+    assert "2.00" in cost_text(Candidate("a", "", path, 2.0)) and "curve" not in cost_text(
+        Candidate("a", "", path, 2.0)
+    )
+    assert "1.75" in cost_text(Candidate("a", "", path, 2.0, curve_cost=1.75))
+    assert cost_text(Candidate("a", "", None, math.inf)) == "no path"
