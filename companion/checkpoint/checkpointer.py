@@ -26,7 +26,7 @@ from companion.checkpoint.state_format import (
 )
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import Cell, Grid
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_progress import MissionProgress
 from companion.mapping.evidence_map import EvidenceMap

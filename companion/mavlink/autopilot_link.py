@@ -8,7 +8,7 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.mavlink.acks import AckKeeper
 from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec, Packet

@@ -15,7 +15,7 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.clock import unix_time_us
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.mavlink.framing import CHECKSUM, MAGIC_V2, SIGNATURE, SIGNED, Packet
 from companion.storage.reading import open_file
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO, Protocol
 
 from companion.core.clock import unix_time_us
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.mission.as_json import to_json
 from companion.mission.files import files_of
 from companion.mission.mission import Mission

@@ -16,7 +16,7 @@ from companion.app import Companion
 from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
 from companion.checkpoint.resume import PreviousRun
 from companion.checkpoint.state_format import MAX_FILE_BYTES, StateError, decode_state
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.naming import compared, named

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Decision

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.core.grid import Cell
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.navigation.field_step import Action, Decision, Part, SearchKind
 from companion.planning.problem import Path as FieldPath
 from companion.recording.recorder import Recorder

@@ -23,7 +23,7 @@ from companion.checkpoint.checkpointer import (
 from companion.checkpoint.resume import resumed_nav_state
 from companion.core.frames import GeoPoint, LocalFrame, Pose
 from companion.core.grid import Cell, empty_grid
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, lay

@@ -5,7 +5,7 @@ from __future__ import annotations
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.recording.record_format import Round, packed_round, unpacked_rounds
 
 COUNT = st.integers(0, 2**32 - 1)

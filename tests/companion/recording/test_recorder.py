@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.mission.as_json import from_json
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from companion.core.round_mark import Mark
+from companion.core.round_marks import Mark
 from companion.recording.reader import load_record
 from companion.recording.record_format import packed_round, unpacked_rounds
 from companion.replay.replay import EndOfRecordError, RecordPlayer, ReplayStepRunner
