@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from companion.executive.trail import Trail
 
 from companion.checkpoint.checkpointer import (
     BAND_CELLS,
@@ -28,7 +29,6 @@ from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import Leg, MissionProgress
-from companion.executive.trail import Trail
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import Mission
 from companion.navigation.field_step import NavState, begin
