@@ -28,7 +28,7 @@ from companion.core.round_marks import Mark
 from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, lay
-from companion.executive.mission_progress import Leg, MissionProgress
+from companion.executive.mission_progress import MissionPhase, MissionProgress
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import Mission
 from companion.navigation.field_step import NavState, begin
@@ -162,7 +162,7 @@ def test_it_is_saved_again_after_a_while_if_the_rover_has_moved(
 
 
 def leg_ends(bench: Bench) -> dict[str, Any]:
-    bench.executor.progress = replace(bench.executor.progress, leg=Leg.WAIT)
+    bench.executor.progress = replace(bench.executor.progress, phase=MissionPhase.WAIT)
     return {}
 
 
@@ -195,7 +195,7 @@ def test_at_the_end_the_whole_map_is_saved(bench: Bench) -> None:
 
 def test_the_state_has_what_a_resumed_run_needs(bench: Bench, mission: Mission) -> None:
     bench.until_saved()
-    bench.executor.progress = replace(bench.executor.progress, leg=Leg.STAY, until_s=bench.now_s + 7.0)
+    bench.executor.progress = replace(bench.executor.progress, phase=MissionPhase.STAY, until_s=bench.now_s + 7.0)
     (update,) = bench.update(released=True)
     assert update.snapshot is not None
     state = saved_state(update.snapshot)
