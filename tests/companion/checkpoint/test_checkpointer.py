@@ -9,7 +9,6 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from companion.executive.trail import Trail
 
 from companion.checkpoint.checkpointer import (
     BAND_CELLS,
@@ -28,7 +27,8 @@ from companion.core.round_marks import Mark
 from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, lay
-from companion.executive.mission_progress import MissionPhase, MissionProgress
+from companion.executive.mission_progress import MissionPhase, MissionProgress, plan_progress
+from companion.executive.return_path import Trail
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import Mission
 from companion.navigation.field_step import NavState, begin
@@ -127,8 +127,9 @@ def mission(tmp_path: Path) -> Mission:
 def bench(mission: Mission) -> Bench:
     home = LocalFrame(HOME).to_ned(HOME)
     layout = lay(mission, MappingSettings(), HOME, HOME, Pose(home.north_m, home.east_m, 0.0, 0.0))
-    driver = Driver(layout.progress.goal, begin(Cell(2, 7), layout.progress.goal.cell, 9, 5))
-    executor, writer = Executor(layout, driver, layout.progress), Writer()
+    progress = plan_progress(layout.targets, layout.start)
+    driver = Driver(progress.goal, begin(Cell(2, 7), progress.goal.cell, 9, 5))
+    executor, writer = Executor(layout, driver, progress), Writer()
     executor.trail.enter(Cell(2, 7))
     return Bench(Checkpointer(mission, writer), writer, executor)
 
