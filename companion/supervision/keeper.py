@@ -41,8 +41,9 @@ class Keeper:
         """Keep what this run would need to go on. ``done``: this is the last tick."""
         run = self._run
         if self._checkpointer is not None and run.executor is not None:
-            left, doubted = self._shutdown.stopped_ours, self._localization.position_doubted
-            moment = RunMoment(now_s, run.vehicle, run.latch.control, run.executor, doubted, left, done)
+            released, doubted = self._shutdown.stopped_ours, self._localization.position_doubted
+            control = run.latch.control
+            moment = RunMoment(now_s, run.vehicle, control, run.executor, doubted, released=released, done=done)
             self._checkpointer.update(moment)
 
     def tell_faults(self, now_s: float) -> None:
