@@ -147,7 +147,7 @@ def test_nothing_that_the_simulator_starts_with_lies_outside_of_its_range() -> N
 
 
 def test_steered_wheels_without_a_turning_radius_are_refused(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match=r"rover\.param: TURN_RADIUS -1: a rover with steered wheels needs"):
+    with pytest.raises(ScenarioError, match=r"rover\.param: TURN_RADIUS -1: steered wheels need"):
         scenario(tmp_path, "SERVO1_FUNCTION 26\nSERVO3_FUNCTION 70\nTURN_RADIUS -1\n")
 
 
