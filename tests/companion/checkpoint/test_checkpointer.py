@@ -9,7 +9,6 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from companion.executive.trail import Trail
 
 from companion.checkpoint.checkpointer import (
     BAND_CELLS,
@@ -29,6 +28,7 @@ from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import MissionPhase, MissionProgress, plan_progress
+from companion.executive.return_path import Trail
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import Mission
 from companion.navigation.field_step import NavState, initial_state
