@@ -14,6 +14,7 @@ from enum import StrEnum
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
+from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -70,7 +71,7 @@ class TrackPoint:
     part: str
 
 
-class Outcome(StrEnum):
+class DriveOutcome(StrEnum):
     """How a run ended; the values are those of ``--json``."""
 
     REACHED = "reached"
@@ -84,8 +85,8 @@ class Report:
     """Result of a lock-step run; ``as_json`` gives the documented keys."""
 
     seed: int
-    outcome: Outcome = Outcome.TIME_LIMIT
-    targets: list[tuple[str, str]] = field(default_factory=list)
+    outcome: DriveOutcome = DriveOutcome.TIME_LIMIT
+    targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
     steps: int = 0
     return_steps: int = 0
     searches: int = 0
@@ -108,7 +109,7 @@ class Report:
         """0 all targets reached without a collision, 3 a target missed, 4 a collision."""
         if self.collisions:
             return 4
-        return 0 if self.outcome is Outcome.REACHED else 3
+        return 0 if self.outcome is DriveOutcome.REACHED else 3
 
     def as_json(self) -> dict[str, object]:
         """The figures for ``--json``: everything except track and texts."""
@@ -167,9 +168,9 @@ class Drive:
     def _sum_up(self) -> None:
         report, companion = self.report, self.companion
         report.said = companion.outcome.said
-        report.targets = [(name, str(status)) for name, status in companion.statuses()]
+        report.targets = companion.statuses()
         report.collisions = len(self.simulator.collisions)
-        report.refused = companion.output_check.refused.total()
+        report.refused = companion.mission_run.setpoint_check.refused.total()
         report.distance_m = self.simulator.driven_m
         report.sim_time_s = self.simulator.time_s
         if companion.driver is not None:
@@ -187,6 +188,6 @@ class Drive:
         seconds = sorted(companion.outcome.step_seconds)
         report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0
         if report.collisions:
-            report.outcome = Outcome.COLLISION
+            report.outcome = DriveOutcome.COLLISION
         elif companion.done:
-            report.outcome = Outcome.REACHED if companion.outcome.complete else Outcome.INCOMPLETE
+            report.outcome = DriveOutcome.REACHED if companion.outcome.complete else DriveOutcome.INCOMPLETE

@@ -223,7 +223,7 @@ class Checkpointer:
             origin=layout.origin,
             home=layout.home,
             progress=progress,
-            nav_state=nav_state if driver.goal is progress.goal else None,
+            nav_state=nav_state if driver.goal == progress.goal else None,
             doubts_left=doubts_left,
             trail=executor.trail.back()[::-1],
             base=executor.evidence.base,
@@ -282,10 +282,10 @@ def _saved_progress(progress: MissionProgress, now_s: float) -> SavedProgress:
         start=SavedPlace(name=home.name, north_m=home.point.north_m, east_m=home.point.east_m),
         statuses=progress.statuses,
         index=progress.index,
-        leg=progress.leg,
+        leg=progress.phase,
         left_s=_left_s(progress.until_s, now_s),
         give_up_left_s=None if give_up_s is None else _left_s(give_up_s, now_s),
-        errand=None if progress.errand is None else _saved_request(progress.errand),
+        errand=None if progress.requested is None else _saved_request(progress.requested),
     )
 
 

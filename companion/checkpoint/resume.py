@@ -17,7 +17,7 @@ from companion.core.grid import Cell
 from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
-from companion.executive.mission_progress import Leg, MissionProgress
+from companion.executive.mission_progress import MissionPhase, MissionProgress
 from companion.mapping.evidence_map import restore
 from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, OnBlocked
@@ -101,8 +101,8 @@ def resumed_layout(
     *,
     same: bool,
     fence: AutopilotFence = NO_FENCE,
-) -> tuple[MissionLayout, str]:
-    """The mission in the present frame with the saved progress and map, and a text about the map for people.
+) -> tuple[MissionLayout, MissionProgress, str]:
+    """The mission in the present frame with the saved map, the saved progress, and a text about the map for people.
 
     ``same``: the autopilot has not restarted, so its frame is the same unless its origin has moved. Otherwise a new
     position estimate may be some metres off: no ground counts as seen free, and the obstacles count as barely seen.
@@ -112,10 +112,10 @@ def resumed_layout(
     start = _in_frame(state.progress.start, saved_origin, origin)
     start_pose = Pose(start.north_m, start.east_m, 0.0, now_s)
     layout = lay(mission, settings, origin, GeoPoint(*state.home), start_pose, fence)
-    layout = replace(layout, progress=_progress(layout, state, saved_origin, now_s))
+    progress = _progress(layout, state, saved_origin, now_s)
     evidence, shift = layout.evidence, grid_shift(state, layout)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:
-        return layout, "without its map (the settings of the map have changed)"
+        return layout, progress, "without its map (the settings of the map have changed)"
     same = same and apart_m(origin, saved_origin) <= SAME_ORIGIN_M
     cell_shift = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
     log_odds = _shifted(previous.rasters["log_odds"], evidence.log_odds.shape, cell_shift)
@@ -124,7 +124,8 @@ def resumed_layout(
         log_odds = np.where(log_odds >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
         penalty = np.zeros_like(penalty)
     restore(evidence, log_odds, penalty)
-    return layout, "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
+    text = "with its map" if same else "with the obstacles of its map: what was free is looked at anew"
+    return layout, progress, text
 
 
 def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: VehicleState, now_s: float) -> None:
@@ -142,7 +143,7 @@ def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: Ve
         executor.trail.enter(Cell(x + shift.x, y + shift.y))
     _map_newest_scan(executor, vehicle)
     progress, saved, pose = executor.progress, state.leg, vehicle.pose_at(now_s)
-    drives = progress.leg in (Leg.TRAVEL, Leg.HOME) and not executor.target_refused
+    drives = progress.phase in (MissionPhase.TRAVEL, MissionPhase.HOME) and not executor.target_refused
     if saved is not None and pose is not None and drives:
         nav_state = resumed_nav_state(saved, shift)
         if executor.evidence.base.centre_of(nav_state.past[-1]).distance_m(pose.point) <= CARRIED_M:
@@ -174,20 +175,20 @@ def resumed_nav_state(saved: SavedNavState, shift: Cell) -> NavState:
 
 def _progress(layout: MissionLayout, state: SavedState, saved_origin: GeoPoint, now_s: float) -> MissionProgress:
     """The saved progress, with the targets in the present frame."""
-    progress, errand = state.progress, None
-    if progress.errand is not None:
-        point = _in_frame(progress.errand, saved_origin, layout.origin)
+    saved, requested = state.progress, None
+    if saved.errand is not None:
+        point = _in_frame(saved.errand, saved_origin, layout.origin)
         cell = layout.evidence.base.cell_at(point)
-        errand = ResolvedTarget(progress.errand.name, point, cell, 0.0, OnBlocked.SKIP, progress.errand.speed_m_s)
-    return replace(
-        layout.progress,
-        home=replace(layout.progress.home, name=progress.start.name),
-        statuses=progress.statuses,
-        index=progress.index,
-        leg=progress.leg,
-        until_s=now_s + progress.left_s,
-        give_up_s=None if progress.give_up_left_s is None else now_s + progress.give_up_left_s,
-        errand=errand,
+        requested = ResolvedTarget(saved.errand.name, point, cell, 0.0, OnBlocked.SKIP, saved.errand.speed_m_s)
+    return MissionProgress(
+        layout.targets,
+        replace(layout.start, name=saved.start.name),
+        saved.statuses,
+        index=saved.index,
+        phase=saved.leg,
+        until_s=now_s + saved.left_s,
+        give_up_s=None if saved.give_up_left_s is None else now_s + saved.give_up_left_s,
+        requested=requested,
     )
 
 

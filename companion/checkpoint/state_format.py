@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from companion.executive.mission_progress import Leg, TargetStatus
+from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.safety.mode_latch import Control
 from companion.vehicle.rc_input import PULSES_US
@@ -59,7 +59,7 @@ FieldNumber = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 GeoPair = tuple[Latitude, Longitude]
 Pulse = Annotated[int, Field(ge=PULSES_US.start, lt=PULSES_US.stop)]
 
-NEEDS_TARGET = (Leg.TRAVEL, Leg.STAY, Leg.WAIT)
+NEEDS_TARGET = (MissionPhase.TRAVEL, MissionPhase.STAY, MissionPhase.WAIT)
 MAX_TARGETS = 1_000_000
 MAX_PAST_FIELDS = 4_000_000
 MAX_EVIDENCE_CELLS = 16_000_000
@@ -91,7 +91,7 @@ class SavedProgress(SavedValues):
     start: SavedPlace
     statuses: tuple[TargetStatus, ...] = Field(min_length=1, max_length=MAX_TARGETS)
     index: Count
-    leg: Leg
+    leg: MissionPhase
     left_s: Seconds
     give_up_left_s: Seconds | None
     errand: SavedGoalRequest | None = None

@@ -33,6 +33,7 @@ from companion.mission.mission import Mission, MissionError
 from companion.navigation.step_runner import ThreadRunner
 from companion.recording.record_format import STATE, RecordError
 from companion.recording.recorder import NullRecorder, Recorder
+from companion.safety.reasons import PowerReason, Reason
 from companion.settings import Settings, SettingsError
 from companion.storage.beside import Beside, Patience
 
@@ -188,7 +189,7 @@ def _drive(outfit: _Outfit, *, seed: int, arm: bool) -> int:
 
 def _ended(companion: Companion, outfit: _Outfit) -> int:
     """Say what came of it, and what could not be kept; the exit code."""
-    code = _told(companion.statuses(), companion.oversight.ended_by)
+    code = _told(companion.statuses(), companion.outcome.broken_off)
     with contextlib.suppress(OSError):  # nobody reads on: the exit code still tells
         for line in (outfit.files.close(), outfit.keeping.problem, str(outfit.autopilot.codec.counters.refused)):
             if line:
@@ -200,12 +201,12 @@ def _ended(companion: Companion, outfit: _Outfit) -> int:
     return code
 
 
-def _told(statuses: list[tuple[str, TargetStatus]], broken_off: str = "") -> int:
+def _told(statuses: list[tuple[str, TargetStatus]], broken_off: Reason[PowerReason] | None = None) -> int:
     """Print what became of each target, and why it was not even tried if the mission was broken off; the exit code that says so too."""
     with contextlib.suppress(OSError):
         for name, status in statuses:
             untried = status in (TargetStatus.SKIPPED, TargetStatus.PENDING)
-            typer.echo(f"{name}: {status}{f' ({broken_off})' if broken_off and untried else ''}")
+            typer.echo(f"{name}: {status}{f' ({broken_off})' if broken_off is not None and untried else ''}")
     return EXIT_REACHED if all(status is TargetStatus.REACHED for _, status in statuses) else EXIT_MISSED
 
 

@@ -6,7 +6,7 @@ import contextlib
 import socket
 from collections.abc import Mapping
 
-from companion.operator.reporting import Status
+from companion.operator.notifications import Status
 
 ALIVE_S = 1.0
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Protocol
 
 from companion.core.clock import WallClock
-from companion.executive.fetching import Fetching
+from companion.executive.autopilot_mission import MissionFetcher
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import Signer
@@ -50,7 +50,7 @@ class Source:
         if self._file is not None:
             return load_mission(self._file, simulated=False)
         autopilot = AutopilotLink(self.link(), Codec(settings.link, signer=signer), settings.link)
-        fetching = Fetching(autopilot, WallClock(), settings.link.tick_hz)
+        fetching = MissionFetcher(autopilot, WallClock(), settings.link.tick_hz)
         stop.listener, shown = fetching, ""
 
         def show(text: str) -> None:

@@ -18,6 +18,7 @@ from companion.control.braking import blind_distance_m, braking_distance_m, fart
 from companion.control.point_controller import STOP, ControlCommand, Motion
 from companion.core.frames import NedPoint, Pose
 from companion.core.rover_limits import RoverLimits
+from companion.core.severity import Severity
 from companion.mapping.arc_kernels import BLOCKED, arc_clear, kept_room
 from companion.mapping.evidence_map import EvidenceMap, ground_of, in_cells, look_along
 from companion.mission.bounds import Bounds
@@ -30,9 +31,8 @@ NEARER_M = 0.05
 """The rover's disc may overlap evidence by so much: evidence has an error, and who stands at a wall must get away from it."""
 ARC_PIECES = 8
 """Straight pieces that an arc is made of where borders are concerned."""
-WARNING = 4
 
-Tell = Callable[[str, int], None]
+Tell = Callable[[str, Severity], None]
 """Says a text with its severity to the people."""
 
 
@@ -151,5 +151,5 @@ class SetpointCheck:
         if not fault:
             return guide
         self.refused[fault] += 1
-        self._tell(f"Stopping: {fault}", WARNING)
+        self._tell(f"Stopping: {fault}", Severity.WARNING)
         return ControlCommand(Motion.BRAKE, STOP, 0.0)

@@ -1,8 +1,9 @@
-"""How severe a text for people is: the eight levels of MAVLink (MAV_SEVERITY) and syslog."""
+"""How severe a text for people is (the eight levels of MAV_SEVERITY and syslog), and what takes such texts."""
 
 from __future__ import annotations
 
 from enum import IntEnum
+from typing import Protocol
 
 
 class Severity(IntEnum):
@@ -16,3 +17,11 @@ class Severity(IntEnum):
     NOTICE = 5
     INFO = 6
     DEBUG = 7
+
+
+class TextSink(Protocol):
+    """Takes texts for people: the ``Notifier``, or what stands in for it."""
+
+    def tell(self, text: str, severity: Severity) -> None:
+        """One text."""
+        ...

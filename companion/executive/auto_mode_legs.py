@@ -1,18 +1,18 @@
-"""A mission that the autopilot drives in AUTO: the legs that it hands over (NAV_GUIDED_ENABLE) are driven, the others are its own."""
+"""Legs of AUTO: the autopilot drives the mission and hands single legs over to the companion (NAV_GUIDED_ENABLE)."""
 
 from __future__ import annotations
 
 from companion.control.point_controller import STANDSTILL, ControlCommand, Motion
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
-from companion.executive.mission_executor import MissionExecutor, Tell
-from companion.executive.mission_progress import Leg, TargetStatus, ended_at, parked, sent_to
+from companion.core.severity import Severity, TextSink
+from companion.executive.mission_executor import MissionExecutor
+from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.vehicle.commands import GuidedPosition
 from companion.vehicle.events.targets import GuidedLeg, LegState
 from companion.vehicle.state import VehicleState
 
-INFO, WARNING = 6, 4
 SAME_M = 0.1
-"""A place that is handed over and one of the mission nearer to each other than this are one: both are whole 1e-7 degrees."""
+"""A place that is handed over and a target nearer to it than this are the same: both are whole 1e-7 degrees."""
 WP_RADIUS_M = 2.0
 """ArduRover's default; the autopilot ends a leg when the rover is this near to its place."""
 SLACK_M = 1.0
@@ -20,10 +20,10 @@ SLACK_M = 1.0
 
 
 class AutoModeLegs:
-    """Follows what the autopilot hands over. ``tell`` says a text with its severity to the people."""
+    """Follows what the autopilot hands over."""
 
-    def __init__(self, tell: Tell) -> None:
-        self._tell = tell
+    def __init__(self, notifier: TextSink) -> None:
+        self._notifier = notifier
         self._leg: GuidedLeg | None = None
         self._parked = False
 
@@ -33,7 +33,7 @@ class AutoModeLegs:
             return False
         if not self._parked:
             self._parked = True
-            executor.progress = parked(executor.progress)
+            executor.park()
         leg, before = vehicle.leg, self._leg
         if leg is None:
             return False
@@ -45,22 +45,22 @@ class AutoModeLegs:
             self._begin(leg, executor)
         return self._leg is None and executor.progress.ended
 
-    def guide(self, guide: ControlCommand | None, executor: MissionExecutor, slow_m_s: float) -> ControlCommand | None:
-        """What to do: where the companion is content, the autopilot may want the rover nearer to the place (a small WP_RADIUS)."""
+    def guide(self, wanted: ControlCommand, executor: MissionExecutor, slow_m_s: float) -> ControlCommand:
+        """What to do. Once the target is reached, the autopilot may want the rover nearer (a small WP_RADIUS)."""
         progress = executor.progress
-        if self._leg is None or guide is not STANDSTILL or progress.leg is not Leg.STAY:
-            return guide
+        if self._leg is None or wanted != STANDSTILL or progress.phase is not MissionPhase.STAY:
+            return wanted
         if progress.statuses[progress.index] is not TargetStatus.REACHED:
-            return guide
+            return wanted
         return ControlCommand(Motion.DRIVE, GuidedPosition(progress.goal.point), slow_m_s)
 
     def _begin(self, leg: GuidedLeg, executor: MissionExecutor) -> None:
         index = _index_of(leg.point, executor)
         if index is None:
-            self._tell("AUTO hands over a place that is not in the mission as it was read: not driven", WARNING)
+            text = "AUTO hands over a place that is not in the mission as it was read: not driven"
+            self._notifier.tell(text, Severity.WARNING)
             return
-        executor.progress = sent_to(executor.progress, index)
-        executor.driver.leave()
+        executor.drive_leg(index)
 
     def _end(self, leg: GuidedLeg, vehicle: VehicleState, executor: MissionExecutor) -> None:
         self._leg = None
@@ -68,18 +68,18 @@ class AutoModeLegs:
         progress = executor.progress
         if _index_of(leg.point, executor) is None:
             return
-        if progress.statuses[progress.index] is TargetStatus.REACHED and progress.leg is Leg.STAY:
-            executor.progress = parked(progress)
+        if progress.statuses[progress.index] is TargetStatus.REACHED and progress.phase is MissionPhase.STAY:
+            executor.park()
             return
         name, place = progress.goal.name, progress.goal.point
         here = vehicle.position
         left_m = 0.0 if here is None else place.distance_m(NedPoint(here.north_m, here.east_m))
         if left_m <= vehicle.parameters.get("WP_RADIUS", WP_RADIUS_M) + SLACK_M:
-            self._tell(f"Reached {name}", INFO)
-            executor.progress = ended_at(progress, TargetStatus.REACHED)
+            self._notifier.tell(f"Reached {name}", Severity.INFO)
+            executor.end_leg(TargetStatus.REACHED)
         else:
-            self._tell(f"AUTO has gone on {left_m:.1f} m before {name}", WARNING)
-            executor.progress = ended_at(progress, TargetStatus.SKIPPED)
+            self._notifier.tell(f"AUTO has gone on {left_m:.1f} m before {name}", Severity.WARNING)
+            executor.end_leg(TargetStatus.SKIPPED)
 
 
 def _index_of(point: GeoPoint, executor: MissionExecutor) -> int | None:

@@ -1,90 +1,108 @@
-"""The mission under way: where it lies, what has been mapped, which target is next, and the driver that goes there."""
+"""The mission executor: the mission under way, its map, the next target, and the driver that goes there."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from enum import Enum, auto
+from pathlib import Path
 
 import numpy as np
 
-from companion.control.braking import counted_s, for_link
+from companion.control.braking import for_link
+from companion.control.local_view import LocalView
 from companion.control.point_controller import ControlCommand
 from companion.control.setpoint_check import Surroundings
 from companion.core.frames import GeoPoint, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
+from companion.core.severity import Severity, TextSink
 from companion.executive.goal_driver import GoalDriver
-from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, lay_again
+from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, from_home, lay_again
 from companion.executive.mission_progress import (
-    Leg,
+    MissionPhase,
     MissionProgress,
     TargetStatus,
+    ended_at,
     on_reached,
     on_time,
     on_unreachable,
+    parked,
     returning,
-    with_errand,
+    sent_to,
+    with_requested,
 )
-from companion.executive.refuge import Refuge, refuges
-from companion.executive.trail import Trail
-from companion.mapping.evidence_map import EvidenceMap, forget, integrate, look_again
+from companion.executive.return_path import Refuge, Trail, refuges
+from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again
+from companion.mapping.map_files import save_ros_map
 from companion.mission.fence import AutopilotFence
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
 from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import StepRunner
-from companion.perception.moving_obstacles import Moving, merged
+from companion.perception.moving_obstacles import announced, merged
 from companion.perception.object_tracker import ObjectTracker
 from companion.planning.registry import make_planner
 from companion.recording.recorder import RunLog
-from companion.settings import Settings
+from companion.safety.reasons import RunPhase
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.state import VehicleState
 
-INFO, WARNING = 6, 4
 ORIGIN_MOVED_M = 0.2
 """The autopilot tells its origin in whole 1e-7 degrees (1 cm): more than this is another origin."""
 VERDICT_S = 15.0
-"""After a jump of the position no target is given up for so long: a receiver that errs is mostly right again by then."""
-
+"""After a jump of the position no target is given up for this long: most receivers are right again by then."""
 WATCHED_SCANS = 20
-"""Before another try after waiting, obstacles that are not in the newest scans are forgotten: a door may have opened."""
+"""After a wait, obstacles that are not in this many newest scans are forgotten: a door may have opened."""
 
-Tell = Callable[[str, int], None]
-"""Says a text with its severity to the people."""
+
+class Task(Enum):
+    """What there is to do for the mission in one tick."""
+
+    STAND = auto()
+    """Stand, and make way."""
+    DRIVE = auto()
+    END = auto()
+    """Nothing: the mission has ended."""
 
 
 class MissionExecutor:
-    """Made when the rover may be driven for the first time. ``scan``: any of its sensor, which tells how far and wide it sees."""
+    """Made when the rover may be driven for the first time. It alone writes ``progress``.
+
+    ``scan``: any of its sensor, which tells how far and wide it sees.
+    """
 
     def __init__(
         self,
         mission: Mission,
-        settings: Settings,
+        settings: LiveSettings,
         layout: MissionLayout,
+        progress: MissionProgress,
         scan: RangeScan,
         runner: StepRunner,
         log: RunLog,
-        tell: Tell,
+        notifier: TextSink,
         rng: np.random.Generator,
     ) -> None:
         self.layout = layout
-        self.progress: MissionProgress = layout.progress
-        self.doing = "driving"
+        self.progress = progress
+        self.phase = RunPhase.DRIVING
         self.maps_begun = 0
         """Grows whenever what had been mapped is worth nothing any more."""
         self._mission = mission
-        self._given = self._settings = settings
-        self._link_s = 0.0
+        self._settings = settings
+        self._in_force = settings.current
+        """Those of this tick, with the link's latency counted in."""
         self._runner = runner
         self._log = log
-        self._tell = tell
+        self._notifier = notifier
         self._scans = 0
         self.trail = Trail()
         """The way back to where the mission began."""
         self._refuges: list[Refuge] = []
-        rover = mission.rover
-        margin_m = settings.guidance.narrow_margin_m if scan.is_narrow else 0.0
+        rover, given = mission.rover, settings.current
+        margin_m = given.guidance.narrow_margin_m if scan.is_narrow else 0.0
         self._limits = RoverLimits(
             rover.radius_m + margin_m,
             rover.cruise_speed_m_s,
@@ -93,11 +111,12 @@ class MissionExecutor:
             rover.turning_radius_m,
         )
         if rover.turning_radius_m > 0.0 and scan.is_narrow:
-            tell("Single beams see too little for a rover that turns in arcs: give it a lidar", WARNING)
-        planner = make_planner(settings.navigator.planner, settings.planner)
-        searcher = PathSearcher(planner, settings.navigator, rng)
-        self.driver = GoalDriver(layout.evidence, self._limits, settings, searcher, runner)
-        self._tracker = ObjectTracker(layout.evidence, settings.traffic)
+            text = "Single beams see too little for a rover that turns in arcs: give it a lidar"
+            notifier.tell(text, Severity.WARNING)
+        planner = make_planner(given.navigator.planner, given.planner)
+        searcher = PathSearcher(planner, given.navigator, rng)
+        self.driver = GoalDriver(layout.evidence, self._limits, given, searcher, runner)
+        self._tracker = ObjectTracker(layout.evidence, given.traffic)
 
     @property
     def evidence(self) -> EvidenceMap:
@@ -107,7 +126,7 @@ class MissionExecutor:
     @property
     def surroundings(self) -> Surroundings:
         """What is known of the ground, and the rover on it."""
-        return Surroundings(self.evidence, self._limits, self._settings, self.layout.bounds)
+        return Surroundings(self.evidence, self._limits, self._in_force, self.layout.bounds)
 
     @property
     def reached(self) -> int:
@@ -121,78 +140,91 @@ class MissionExecutor:
 
     @property
     def target_refused(self) -> str:
-        """Why the target that is next must not be driven to; empty when it may, and while the rover is on an errand or on its way back."""
-        on_errand = self.progress.errand is not None or self.progress.leg is not Leg.TRAVEL
-        return "" if on_errand else self.layout.refused.get(self.progress.index, "")
+        """Why the target that is next must not be driven to; empty when it may, and on the way to any other goal."""
+        elsewhere = self.progress.requested is not None or self.progress.phase is not MissionPhase.TRAVEL
+        return "" if elsewhere else self.layout.refused.get(self.progress.index, "")
 
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
         return [(t.name, status) for t, status in zip(self.progress.targets, self.progress.statuses, strict=True)]
 
-    def retune(self, settings: Settings) -> None:
-        """Other settings from the next tick on; those of the map itself and the planner stay."""
-        self._given = settings
-        self._settings = for_link(settings, self._link_s)
-        self._tracker.retune(settings.traffic)
-        self.driver.retune(self._settings)
-
-    def heed_latency(self, link_s: float) -> None:
-        """Drive from now on so that a link that takes so long, there and back, does no harm."""
-        if counted_s(link_s) != self._link_s:
-            self._link_s = counted_s(link_s)
-            self.retune(self._given)
+    # The map and the ground --------------------------------------------------------------------------------------
 
     def map_scan(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
         """Take a scan into the map, unless it is smeared by turning."""
-        if abs(yaw_rate_rad_s) <= np.radians(self._settings.mapping.max_yaw_rate_deg_s):
+        if abs(yaw_rate_rad_s) <= np.radians(self._settings.current.mapping.max_yaw_rate_deg_s):
             self._scans += 1
             self._tracker.take(pose, yaw_rate_rad_s, scan)
             integrate(self.evidence, pose, scan, self._scans)
             self._tracker.remember(pose, scan.max_range_m)
 
     def follow_origin(self, origin: GeoPoint, now_s: float) -> bool:
-        """Whether the autopilot has moved the origin of its frame; the mission is then laid out anew, with an empty map."""
+        """Whether the autopilot has moved the origin of its frame; then the mission is laid out anew, the map empty."""
         moved_m = apart_m(origin, self.layout.origin)
         if moved_m <= ORIGIN_MOVED_M:
             return False
-        self._tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", WARNING)
+        self._notifier.tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", Severity.WARNING)
         self.maps_begun += 1
-        self.layout = lay_again(self.layout, self.progress, self._mission, self._settings.mapping, origin)
-        self.progress = self.layout.progress
+        mapping = self._settings.current.mapping
+        self.layout, self.progress = lay_again(self.layout, self.progress, self._mission, mapping, origin)
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
-        self.driver = GoalDriver(self.evidence, self._limits, self._settings, searcher, self._runner, seed)
+        self.driver = GoalDriver(self.evidence, self._limits, self._in_force, searcher, self._runner, seed)
         self.driver.tally = before.tally
         self.driver.doubt_until(now_s + VERDICT_S)
-        self._tracker = ObjectTracker(self.evidence, self._settings.traffic)
+        self._tracker = ObjectTracker(self.evidence, self._settings.current.traffic)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         return True
 
-    def run_errand(self, errand: ResolvedTarget) -> None:
-        """Drive there first; then the mission goes on."""
-        self.progress = with_errand(self.progress, errand)
+    def forget_map(self, now_s: float) -> None:
+        """What has been seen lies elsewhere now."""
+        forget(self.evidence)
+        self.maps_begun += 1
+        self._tracker = ObjectTracker(self.evidence, self._settings.current.traffic)
         self.driver.leave()
+        self.driver.doubt_until(now_s + VERDICT_S)
 
     def heed_fence(self, fence: AutopilotFence) -> None:
         """The autopilot's fence as it is now; a new one closes and opens ground at once."""
-        if fence is self.layout.fence or fence == self.layout.fence:
+        if fence == self.layout.fence:
             return
-        self.layout = fenced_again(self.layout, self.progress, self._mission, fence)
+        self.layout = fenced_again(self.layout, self._mission, fence)
         self.driver.leave()
-        self._tell(f"The autopilot's fence has changed: {len(self.layout.bounds)} borders now", WARNING)
+        text = f"The autopilot's fence has changed: {len(self.layout.bounds)} borders now"
+        self._notifier.tell(text, Severity.WARNING)
 
-    def outside(self, point: NedPoint) -> str:
-        """In words, that the rover is beyond a border; empty when it is not."""
-        name = self.layout.bounds.outside(point)
-        return f"the rover is beyond the border of {name}" if name else ""
+    def save_map(self, path_without_suffix: Path) -> None:
+        """Write what has been mapped as a ROS map (.yaml and .pgm), its place in metres from home. Raises MapError."""
+        save_ros_map(from_home(self.layout), path_without_suffix, known=known_fields(self.evidence))
+
+    # Other goals than the next target ----------------------------------------------------------------------------
+
+    def request(self, goal: ResolvedTarget) -> None:
+        """Drive to a goal that a person asks for first; then the mission goes on."""
+        self.progress = with_requested(self.progress, goal)
+        self.driver.leave()
+
+    def park(self) -> None:
+        """Nowhere to go until a leg is handed over; the end when every target has had its turn."""
+        self.progress = parked(self.progress)
+
+    def drive_leg(self, index: int) -> None:
+        """AUTO hands over the leg to this target."""
+        self.progress = sent_to(self.progress, index)
+        self.driver.leave()
+
+    def end_leg(self, status: TargetStatus) -> None:
+        """AUTO has ended the leg to the present target; ``status`` is what has become of that."""
+        self.progress = ended_at(self.progress, status)
 
     def go_back(self, reason: str, rally: list[NedPoint], pose: Pose) -> None:
-        """Give the mission up: to the nearest of the rally points, or back the way the rover came. ``reason`` is told."""
-        planner = make_planner("dijkstra", self._settings.planner)
+        """Give the mission up: to the nearest rally point, or back the way the rover came. ``reason`` is told."""
+        planner = make_planner("dijkstra", self._settings.current.planner)
         self._refuges = refuges(self.progress.home, self.trail, rally, pose.point, self.evidence, planner)
         missed = [name for name, status in self.statuses() if status is not TargetStatus.REACHED]
-        self._tell(f"Returning: {reason}. Missed: {', '.join(missed) or 'nothing'}", WARNING)
+        text = f"Returning: {reason}. Missed: {', '.join(missed) or 'nothing'}"
+        self._notifier.tell(text, Severity.WARNING)
         self._seek_refuge()
 
     def _seek_refuge(self) -> None:
@@ -200,55 +232,65 @@ class MissionExecutor:
         refuge = self._refuges[0]
         self.progress = returning(self.progress, refuge.place)
         along = " along the way it came" if refuge.way else ""
-        self._tell(f"Back to {refuge.place.name}, {refuge.length_m:.0f} m{along}", WARNING)
+        self._notifier.tell(f"Back to {refuge.place.name}, {refuge.length_m:.0f} m{along}", Severity.WARNING)
 
-    def forget_map(self, now_s: float) -> None:
-        """What has been seen lies elsewhere now."""
-        forget(self.evidence)
-        self.maps_begun += 1
-        self._tracker = ObjectTracker(self.evidence, self._settings.traffic)
-        self.driver.leave()
-        self.driver.doubt_until(now_s + VERDICT_S)
+    # One tick ----------------------------------------------------------------------------------------------------
 
-    def drive(
-        self, pose: Pose, speed_m_s: float, now_s: float, announced: tuple[Moving, ...] = ()
-    ) -> ControlCommand | None:
-        """What to do for the mission now; None when it has ended. ``announced``: who has told of itself and may come near."""
-        moving = merged(announced, self._tracker.moving(now_s), now_s)
-        self.trail.enter(self.evidence.base.cell_at(pose.point))
-        waited = self.progress.leg is Leg.WAIT
+    def decide(self, vehicle: VehicleState, now_s: float) -> Task:
+        """What to do for the mission now, and where to; the leg to a new goal begins here."""
+        view = self._view(vehicle, now_s)
+        self.trail.enter(self.evidence.base.cell_at(view.pose.point))
+        waited = self.progress.phase is MissionPhase.WAIT
         self.progress = on_time(self.progress, now_s)
-        if waited and self.progress.leg is Leg.TRAVEL:
+        if waited and self.progress.phase is MissionPhase.TRAVEL:
             look_again(self.evidence, self._scans - WATCHED_SCANS)
         if self.progress.ended:
-            return None
-        if self.progress.leg in (Leg.STAY, Leg.WAIT):
-            self.doing = "holding" if self.progress.leg is Leg.STAY else "waiting for the way to clear"
+            return Task.END
+        if self.progress.phase in (MissionPhase.STAY, MissionPhase.WAIT):
+            self.phase = RunPhase.HOLDING if self.progress.phase is MissionPhase.STAY else RunPhase.WAY_BLOCKED
             self.driver.pause()
-            return self.driver.standing(pose, speed_m_s, moving)
-        if self.driver.goal is not self.progress.goal:
+            return Task.STAND
+        if self.driver.goal != self.progress.goal:
             if self._is_refused(now_s):
-                return self.driver.standing(pose, speed_m_s, moving)
-            self._tell(f"Heading for {self.progress.goal.name}", INFO)
-            self.driver.head_for(self.progress.goal, pose, self._way_back(pose))
-        self.doing = "driving"
-        guide, decision = self.driver.update(pose, speed_m_s, moving)
+                return Task.STAND
+            self._notifier.tell(f"Heading for {self.progress.goal.name}", Severity.INFO)
+            self.driver.head_for(self.progress.goal, view.pose, self._way_back(view.pose))
+        self.phase = RunPhase.DRIVING
+        return Task.DRIVE
+
+    def guide(self, task: Task, vehicle: VehicleState, now_s: float) -> ControlCommand:
+        """How to do it now: the setpoint and the speed."""
+        view = self._view(vehicle, now_s)
+        others = announced(vehicle, view.pose, self._mission.rover.radius_m, self._settings.current.traffic)
+        moving = merged(others, self._tracker.moving(now_s), now_s)
+        if task is Task.STAND:
+            return self.driver.standing(view.pose, view.speed_m_s, moving)
+        command, decision = self.driver.update(view.pose, view.speed_m_s, moving)
         if decision is not None:
             self._take_decision(decision, now_s)
-        return guide
+        return command
+
+    def _view(self, vehicle: VehicleState, now_s: float) -> LocalView:
+        """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
+        pose = vehicle.pose_at(now_s)
+        assert pose is not None
+        self._in_force = for_link(self._settings.current, vehicle.latency_s)
+        self.driver.retune(self._in_force)
+        self._tracker.retune(self._settings.current.traffic)
+        return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, self._in_force)
 
     def _is_refused(self, now_s: float) -> bool:
-        """Whether the target that is next lies behind the autopilot's fence: it is not even tried, and the mission goes on after it."""
+        """Whether the next target lies behind the autopilot's fence: then it is not tried, and the next one comes."""
         reason = self.target_refused
         if not reason:
             return False
-        self._tell(f"Refused: {reason}", WARNING)
-        navigator = self._settings.navigator
+        self._notifier.tell(f"Refused: {reason}", Severity.WARNING)
+        navigator = self._settings.current.navigator
         self.progress = on_unreachable(self.progress, now_s, navigator.wait_retry_s, navigator.wait_limit_s)
         return True
 
     def _way_back(self, pose: Pose) -> tuple[Cell, ...]:
-        """The fields to follow to a refuge, where they are known: as long as nothing has taken the rover off that way."""
+        """The fields to follow to a refuge, where they are known and the rover has not left that way."""
         if not self._refuges or not self._refuges[0].way:
             return ()
         way, here = self.trail.back(), self.evidence.base.cell_at(pose.point)
@@ -258,11 +300,11 @@ class MissionExecutor:
         goal = self.progress.goal
         self._log.write_decision(now_s, goal.name, decision)
         if decision.action is Action.REACHED:
-            self._tell(f"Reached {goal.name}", INFO)
+            self._notifier.tell(f"Reached {goal.name}", Severity.INFO)
             self.progress = on_reached(self.progress, now_s)
         elif decision.action is Action.UNREACHABLE:
-            self._tell(f"Unreachable: {goal.name} ({decision.reason})", WARNING)
-            navigator = self._settings.navigator
+            self._notifier.tell(f"Unreachable: {goal.name} ({decision.reason})", Severity.WARNING)
+            navigator = self._settings.current.navigator
             if len(self._refuges) > 1:
                 self._refuges.pop(0)
                 self._seek_refuge()

@@ -1,4 +1,4 @@
-"""The mission laid out on the ground: once when it begins, and again whenever the autopilot moves the origin of its local frame."""
+"""The mission laid out on the ground, and laid out again whenever the autopilot moves the origin of its local frame."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import OBSTACLE, Grid, inflated
-from companion.executive.mission_progress import MissionProgress, plan_progress, relaid
+from companion.executive.mission_progress import MissionProgress, relaid
 from companion.mapping.evidence_map import EvidenceMap, new_map, rebase
 from companion.mission.bounds import Bounds
 from companion.mission.fence import NO_FENCE, AutopilotFence
@@ -18,12 +18,14 @@ from companion.settings import MappingSettings
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MissionLayout:
-    """Where the mission lies. ``home`` is the place its metres and fields count from: home as it was when the mission began."""
+    """Where the mission lies. Its metres and fields count from ``home``, home as it was when the mission began."""
 
     origin: GeoPoint
     home: GeoPoint
+    targets: tuple[ResolvedTarget, ...]
+    start: ResolvedTarget
+    """Where the rover was when the mission began: it returns there when it has to."""
     evidence: EvidenceMap
-    progress: MissionProgress
     fence: AutopilotFence
     bounds: Bounds
     refused: Mapping[int, str]
@@ -43,35 +45,35 @@ def lay(
     resolved = resolve(mission, frame, frame.to_ned(home), fence)
     start = _start(pose.point, resolved.ground)
     evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
-    progress = plan_progress(resolved.targets, start)
-    return MissionLayout(origin, home, evidence, progress, fence, resolved.bounds, resolved.refused)
+    return MissionLayout(origin, home, resolved.targets, start, evidence, fence, resolved.bounds, resolved.refused)
 
 
 def lay_again(
     layout: MissionLayout, progress: MissionProgress, mission: Mission, settings: MappingSettings, origin: GeoPoint
-) -> MissionLayout:
+) -> tuple[MissionLayout, MissionProgress]:
     """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
     frame = LocalFrame(origin)
     resolved = resolve(mission, frame, frame.to_ned(layout.home), layout.fence)
     before = LocalFrame(layout.origin)
-    start = frame.to_ned(before.to_geo(progress.home.point))
-    errand = progress.errand
-    if errand is not None:
-        point = frame.to_ned(before.to_geo(errand.point))
-        errand = replace(errand, point=point, cell=resolved.ground.cell_at(point))
+    back = _start(frame.to_ned(before.to_geo(progress.home.point)), resolved.ground)
+    start = _start(frame.to_ned(before.to_geo(layout.start.point)), resolved.ground)
+    requested = progress.requested
+    if requested is not None:
+        point = frame.to_ned(before.to_geo(requested.point))
+        requested = replace(requested, point=point, cell=resolved.ground.cell_at(point))
     evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
-    progress = relaid(progress, resolved.targets, _start(start, resolved.ground), errand)
-    return MissionLayout(origin, layout.home, evidence, progress, layout.fence, resolved.bounds, resolved.refused)
+    again = MissionLayout(
+        origin, layout.home, resolved.targets, start, evidence, layout.fence, resolved.bounds, resolved.refused
+    )
+    return again, relaid(progress, resolved.targets, back, requested)
 
 
-def fenced_again(
-    layout: MissionLayout, progress: MissionProgress, mission: Mission, fence: AutopilotFence
-) -> MissionLayout:
+def fenced_again(layout: MissionLayout, mission: Mission, fence: AutopilotFence) -> MissionLayout:
     """The same ground and all that has been seen of it, with another fence of the autopilot. Raises MissionError."""
     frame = LocalFrame(layout.origin)
     resolved = resolve(mission, frame, frame.to_ned(layout.home), fence)
     rebase(layout.evidence, _base(mission, resolved))
-    return replace(layout, progress=progress, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
+    return replace(layout, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
 
 
 def from_home(layout: MissionLayout) -> Grid:

@@ -23,7 +23,7 @@ from companion.settings import Settings
 from companion.vehicle.commands import GuidedVelocity
 
 COMPILING = "compiling, once on this machine: about a minute, several on a Raspberry Pi"
-"""For people, before a ``warm_up`` of kernels that are not warm."""
+"""Shown before a ``warm_up`` that has something to compile."""
 
 
 def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
@@ -74,7 +74,7 @@ class _NoCompiler(event.Listener):
 
 
 def kernels_warm(settings: Settings, turning_radius_m: float = 0.0) -> bool:
-    """Whether ``warm_up`` has nothing to compile on this machine: all kernels are loaded, none is compiled; about a second."""
+    """Whether ``warm_up`` has nothing to compile on this machine. Loads all kernels: about a second."""
     try:
         with event.install_listener("numba:compile", _NoCompiler()):
             warm_up(settings, turning_radius_m)

@@ -54,12 +54,12 @@ class ScanWatch:
         self._newest_s = -math.inf
 
     @property
-    def reason(self) -> str:
-        """Why the range data cannot be believed; empty when it can."""
+    def repeating(self) -> str | None:
+        """The sensor that repeats itself, so that it cannot be believed; None when there is none."""
         for (_, source), one in self._last.items():
             if one.stuck and self._newest_s - one.scan.time_s < FORGOTTEN_S:
-                return f"{source} repeats itself"
-        return ""
+                return source
+        return None
 
     def take(self, scan: RangeScan, vehicle: VehicleState) -> bool:
         """Take note of a scan. Returns whether it fits the place where the rover is now."""

@@ -1,4 +1,4 @@
-"""Whether there is power left to go on: thresholds for charge and voltage, each believed only after a while. Pure but for ``Power``."""
+"""The battery monitor: thresholds for charge and voltage, each believed only after a while."""
 
 from __future__ import annotations
 
@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
+from companion.safety.reasons import PowerReason, Reason, WaitReason
 from companion.settings import PowerSettings
 from companion.vehicle.events.event import Event
 from companion.vehicle.events.plan import BatterySeen
+from companion.vehicle.state import VehicleState
 
 STALE_S = 10.0
 """A reading older than this says nothing; SYS_STATUS counts only while no BATTERY_STATUS is younger."""
@@ -17,7 +19,7 @@ LOW, CRITICAL, FAILED = 2, 3, 5
 
 
 class Level(IntEnum):
-    """How far it has come. It never goes back: a battery that recovers at rest is still empty."""
+    """What the batteries allow. It never goes back: a battery that recovers at rest is still empty."""
 
     FINE = 0
     RETURN = 1
@@ -26,12 +28,12 @@ class Level(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class BatteryState:
-    """The newest of each battery, since when it has been below which threshold, and what followed (with the reason in words)."""
+    """The newest of each battery, since when it has been below which threshold, and what followed (and why)."""
 
     batteries: Mapping[int, BatterySeen] = field(default_factory=dict)
     since_s: Mapping[Level, float] = field(default_factory=dict)
     level: Level = Level.FINE
-    reason: str = ""
+    reason: Reason[PowerReason] | None = None
 
 
 def with_battery(state: BatteryState, seen: BatterySeen) -> BatteryState:
@@ -44,7 +46,7 @@ def judged(state: BatteryState, now_s: float, settings: PowerSettings) -> Batter
     if not state.batteries:
         return state
     reasons = {level: _reason(level, _known(state.batteries, now_s), settings) for level in (Level.RETURN, Level.HOLD)}
-    since_s = {level: state.since_s.get(level, now_s) for level, reason in reasons.items() if reason}
+    since_s = {level: state.since_s.get(level, now_s) for level, reason in reasons.items() if reason is not None}
     state = replace(state, since_s=since_s)
     for level, began_s in since_s.items():
         if level > state.level and now_s - began_s >= settings.after_s:
@@ -58,8 +60,8 @@ def _known(batteries: Mapping[int, BatterySeen], now_s: float) -> list[BatterySe
     return [seen for seen in fresh if seen.number >= 0] or fresh
 
 
-def _reason(level: Level, batteries: list[BatterySeen], settings: PowerSettings) -> str:
-    """Why this level is asked for, by the first battery that does; empty if none does."""
+def _reason(level: Level, batteries: list[BatterySeen], settings: PowerSettings) -> Reason[PowerReason] | None:
+    """Why this level is asked for, by the first battery that does; None if none does."""
     percent, volts = settings.return_percent, settings.return_volts
     states = range(LOW, FAILED + 1)
     if level is Level.HOLD:
@@ -68,12 +70,12 @@ def _reason(level: Level, batteries: list[BatterySeen], settings: PowerSettings)
     for seen in batteries:
         name = "battery" if seen.number <= 0 else f"battery {seen.number + 1}"
         if seen.percent is not None and seen.percent < percent:
-            return f"{name} at {seen.percent} %"
+            return Reason(PowerReason.CHARGE, (name, seen.percent))
         if seen.volts is not None and seen.volts < volts:
-            return f"{name} at {seen.volts:.1f} V"
+            return Reason(PowerReason.VOLTAGE, (name, round(seen.volts, 1)))
         if settings.heed_autopilot and seen.charge_state in states:
-            return f"{name} {'low' if seen.charge_state == LOW else 'critical'} for the autopilot"
-    return ""
+            return Reason(PowerReason.LOW if seen.charge_state == LOW else PowerReason.CRITICAL, (name,))
+    return None
 
 
 class BatteryMonitor:
@@ -83,22 +85,22 @@ class BatteryMonitor:
         self.state = BatteryState()
         self._settings = settings
 
-    def take_in(self, event: Event) -> None:
+    def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event."""
         if isinstance(event, BatterySeen):
             self.state = with_battery(self.state, event)
 
     def level(self, now_s: float) -> Level:
-        """How far it has come by now."""
+        """What they allow now."""
         self.state = judged(self.state, now_s, self._settings)
         return self.state.level
 
-    def hindrance(self, now_s: float) -> str:
-        """What a rover that has not begun yet waits for; empty for nothing. Unlike a level this ends when the battery is another one."""
+    def awaited(self, now_s: float) -> Reason[WaitReason] | None:
+        """What a rover that has not begun yet waits for. Unlike a level this ends when the battery is another one."""
         reason = _reason(Level.RETURN, _known(self.state.batteries, now_s), self._settings)
-        return f"a charged battery ({reason})" if reason else ""
+        return None if reason is None else Reason(WaitReason.CHARGED_BATTERY, (reason,))
 
     @property
-    def reason(self) -> str:
-        """Why, in words."""
+    def reason(self) -> Reason[PowerReason] | None:
+        """Why the level was reached."""
         return self.state.reason

@@ -1,38 +1,161 @@
-"""What is watched besides the age of data: each doubt why the rover must not move, in one place."""
+"""Watchdogs: monitors of the sticks, the age of data, the companion's own loop and repeated scans."""
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Iterable
+from typing import Protocol
+
 from companion.perception.scan_watch import ScanWatch
-from companion.safety.loop_watch import LoopWatch
+from companion.safety.reasons import Doubt, Reason
 from companion.settings import SafetySettings
+from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events.event import Event
 from companion.vehicle.events.vehicle import RangeSeen
 from companion.vehicle.state import VehicleState
 
+LATE_S = 0.1
+"""A tick that begins this much after its time is late: two whole ticks at 20 Hz."""
+WINDOW_S = 4.0
+LATE_SHARE = 0.5
+"""Late for more than this share of the window, the computer is too slow, or busy."""
+HICCUP_S = 1.0
+"""One stall counts for no more than this, however long it was: a computer that was suspended is not slow."""
 
-class Watchdogs:
-    """Takes events already folded into the vehicle's state, and says what is in doubt."""
 
-    def __init__(self, settings: SafetySettings) -> None:
-        self._loop = LoopWatch(settings.planner_s)
-        self._scans = ScanWatch()
-        self._fits = True
+class Monitor(Protocol):
+    """Watches one thing that must be well while the rover moves."""
 
-    @property
-    def scan_fits(self) -> bool:
-        """Whether the newest scan belongs where the rover is now, so that it may go on the map."""
-        return self._fits
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event, already folded into ``vehicle``."""
+        ...
 
-    def take_in(self, event: Event, vehicle: VehicleState) -> None:
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """Why the rover must not move now; None when it may."""
+        ...
+
+
+def first_doubt(monitors: Iterable[Monitor], now_s: float) -> Reason[Doubt] | None:
+    """The doubt of the first monitor that has one: their order is the order of precedence."""
+    for monitor in monitors:
+        if (doubt := monitor.doubt(now_s)) is not None:
+            return doubt
+    return None
+
+
+class SticksMonitor:
+    """The pilot's sticks: a person who moves them wants the rover."""
+
+    def __init__(self) -> None:
+        self._moved = False
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event."""
-        if isinstance(event, RangeSeen):
-            self._fits = self._scans.take(event.scan, vehicle)
+        self._moved = vehicle.sticks.moved
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """Whether they were moved since a person set our mode."""
+        return Reason(Doubt.STICKS_MOVED) if self._moved else None
+
+
+class DataMonitor:
+    """What the autopilot and the sensors tell: its age, and whether it agrees with itself."""
+
+    def __init__(self, settings: LiveSettings) -> None:
+        self._settings = settings
+        self._vehicle = VehicleState()
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event."""
+        self._vehicle = vehicle
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """What is missing, old or contradictory. The latter is over when a person sets GUIDED."""
+        if (doubt := data_doubt(self._vehicle, now_s, self._settings.current.safety)) is not None:
+            return doubt
+        if self._vehicle.restarted:
+            return Reason(Doubt.AUTOPILOT_RESTARTED)
+        return Reason(Doubt.POSITION_FROZEN) if self._vehicle.frozen else None
+
+
+def data_doubt(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> Reason[Doubt] | None:
+    """What is missing, old or wrong in the data itself, so that nobody may drive on it; None when it is good."""
+    ages = (
+        ("autopilot heartbeat", vehicle.heartbeat, settings.heartbeat_s),
+        ("position", vehicle.position, settings.stale_s),
+        ("attitude", vehicle.attitude, settings.stale_s),
+        ("range data ahead", vehicle.scan_ahead, settings.stale_s),
+        ("EKF status", vehicle.ekf, settings.stale_s),
+    )
+    for name, event, limit_s in ages:
+        if event is None:
+            return Reason(Doubt.DATA_MISSING, (name,))
+        if now_s - event.time_s > limit_s:
+            return Reason(Doubt.DATA_OLD, (name, limit_s))
+    if vehicle.ekf_lacks:
+        return Reason(Doubt.EKF_INCOMPLETE, (vehicle.ekf_lacks,))
+    if now_s - vehicle.latency.jumped_s < settings.settle_s:
+        return Reason(Doubt.CLOCK_JUMPED)
+    if vehicle.latency.lasting_s > settings.latency_s:
+        return Reason(Doubt.LINK_LATE, (settings.latency_s,))
+    return None
+
+
+class LoopMonitor:
+    """The companion's own work: ticks that are late again and again, and a navigator's step that does not end.
+
+    All times are the companion's clock. ``planner_s``: how long a step may take.
+    """
+
+    def __init__(self, planner_s: float) -> None:
+        self._planner_s = planner_s
+        self._ticks: deque[tuple[float, float]] = deque()
+        self._late_s = 0.0
+        self._before_s: float | None = None
+        self._works_since_s: float | None = None
+        self._planning_long = False
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """Events say nothing of the loop."""
 
     def tick(self, now_s: float, late_s: float, *, planner_works: bool) -> None:
-        """A tick begins, ``late_s`` after its time."""
-        self._loop.tick(now_s, late_s, planner_works=planner_works)
+        """A tick begins now, ``late_s`` after its time; ``planner_works``: a step is being computed beside the loop."""
+        elapsed_s = now_s - (now_s if self._before_s is None else self._before_s)
+        self._before_s = now_s
+        self._note(now_s, min(elapsed_s, HICCUP_S) if late_s > LATE_S else 0.0)
+        since_s = now_s if self._works_since_s is None else self._works_since_s
+        self._works_since_s = since_s if planner_works else None
+        self._planning_long = planner_works and now_s - since_s > self._planner_s
 
-    @property
-    def reason(self) -> str:
-        """Why the rover must not move now; empty when it may."""
-        return self._loop.reason or self._scans.reason
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """As of the last ``tick``."""
+        if self._planning_long:
+            return Reason(Doubt.PLANNING_LONG, (self._planner_s,))
+        return Reason(Doubt.LOOP_LATE) if self._late_s > LATE_SHARE * WINDOW_S else None
+
+    def _note(self, now_s: float, late_s: float) -> None:
+        self._ticks.append((now_s, late_s))
+        self._late_s += late_s
+        while self._ticks[0][0] < now_s - WINDOW_S:
+            self._late_s -= self._ticks.popleft()[1]
+        if len(self._ticks) == 1:
+            self._late_s = late_s  # rounding errors do not add up
+
+
+class ScanMonitor:
+    """The range sensors: whether one repeats itself although the rover moves."""
+
+    def __init__(self) -> None:
+        self._watch = ScanWatch()
+        self.fits = True
+        """Whether the newest scan belongs where the rover is now, so that it may go on the map."""
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event."""
+        if isinstance(event, RangeSeen):
+            self.fits = self._watch.take(event.scan, vehicle)
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """Why the range data cannot be believed."""
+        sensor = self._watch.repeating
+        return Reason(Doubt.SCAN_REPEATED, (sensor,)) if sensor is not None else None

@@ -1,16 +1,17 @@
-"""Keeps up with the autopilot's own fence and its rally points: read before the rover may be driven, and again and again after that."""
+"""The fence monitor: the autopilot's own fence and rally points, read before driving, then regularly."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from companion.core.frames import GeoPoint
+from companion.core.severity import Severity, TextSink
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.download import Downloaded
 from companion.mission.fence import NO_FENCE, PARAMETERS, AutopilotFence, autopilot_fence
 from companion.mission.fence_items import rally_points
 from companion.mission.items import ItemError
+from companion.safety.reasons import Doubt, Reason, WaitReason
 from companion.settings import FenceSettings
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events.event import Event
@@ -18,29 +19,29 @@ from companion.vehicle.events.plan import FenceStatusSeen, PlanChangedSeen, Plan
 from companion.vehicle.events.vehicle import ParameterSeen
 from companion.vehicle.state import VehicleState
 
-WARNING = 4
 PARAMETER_S, PARAMETER_TRIES = 1.0, 8
-"""A parameter of the fence is asked for so often; one that has not been told by then is one that this firmware has not."""
+"""How often a parameter of the fence is asked for; one that has not come by then does not exist in this firmware."""
 FAILED_S = 2.0
-"""A list that could not be fetched is asked for again after so long."""
+"""A list that could not be fetched is asked for again after this long."""
 STATUS_S, ON_S = 5.0, 30.0
-"""FENCE_STATUS comes once a second while a fence is switched on, by whatever means: one older than the first says nothing of a breach, but on
-a bad line the fence counts as on until the second."""
+"""FENCE_STATUS comes once a second while a fence is switched on, by whatever means: one older than the first says
+nothing of a breach, but on a bad line the fence counts as on until the second."""
 TOTALS = {"FENCE_TOTAL": PlanKind.FENCE, "RALLY_TOTAL": PlanKind.RALLY}
 """ArduPilot tells everybody these parameters when a list has got another length."""
 
 
 class FenceMonitor:
-    """``fence`` is None until it is known; ``missing`` says what is awaited. ``tell`` says a text with its severity to the people."""
+    """Keeps up with both lists, and says when the fence is breached."""
 
-    def __init__(self, autopilot: AutopilotLink, settings: FenceSettings, tell: Callable[[str, int], None]) -> None:
-        self.fence: AutopilotFence | None = NO_FENCE if settings.heed == "never" else None
+    def __init__(self, autopilot: AutopilotLink, settings: FenceSettings, notifier: TextSink) -> None:
         self.rally: tuple[GeoPoint, ...] = ()
+        self._fence: AutopilotFence | None = NO_FENCE if settings.heed == "never" else None
         self._autopilot = autopilot
         self._settings = settings
-        self._tell = tell
+        self._notifier = notifier
         self._fault = ""
         self._status: FenceStatusSeen | None = None
+        self._breach_told = False
         self._totals: dict[str, float] = {}
         self._asked_s = dict.fromkeys((PlanKind.FENCE, PlanKind.RALLY), -math.inf)
         self._parameters_s = -math.inf
@@ -49,18 +50,22 @@ class FenceMonitor:
         self._rally: Downloaded | None = None
 
     @property
-    def missing(self) -> str:
-        """What is awaited before the rover may be driven; empty when nothing is."""
-        if self.fence is not None and (self._rally is not None or self._settings.heed == "never"):
-            return ""
-        return f"the autopilot's fence and rally points{f' ({self._fault})' if self._fault else ''}"
+    def fence(self) -> AutopilotFence:
+        """The fence as known now."""
+        return self._fence or NO_FENCE
 
-    def breached(self, now_s: float) -> str:
-        """In words, that the autopilot sees its fence breached; empty when it does not."""
+    def awaited(self) -> Reason[WaitReason] | None:
+        """Before the rover may be driven, fence and rally points must be known."""
+        if self._fence is not None and (self._rally is not None or self._settings.heed == "never"):
+            return None
+        return Reason(WaitReason.FENCE, (f" ({self._fault})" if self._fault else "",))
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """Whether the autopilot sees its fence breached."""
         told = self._told_within(STATUS_S, now_s) and self._status is not None and self._status.breached
-        return "the autopilot's fence is breached" if told else ""
+        return Reason(Doubt.FENCE_BREACHED) if told else None
 
-    def take_in(self, event: Event) -> None:
+    def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event: whatever tells that a list may have changed has it fetched anew."""
         match event:
             case FenceStatusSeen():
@@ -75,14 +80,22 @@ class FenceMonitor:
                 pass
 
     def service(self, vehicle: VehicleState, now_s: float) -> None:
-        """To be called every tick: asks for what is missing or old, and puts together what has come."""
+        """To be called every tick: ask for what is missing or old, put together what has come, tell of a breach."""
+        self._ask_and_take(vehicle, now_s)
+        breach = self.doubt(now_s)
+        if breach is not None and not self._breach_told:
+            text = str(breach)
+            self._notifier.tell(text[0].upper() + text[1:], Severity.WARNING)
+        self._breach_told = breach is not None
+
+    def _ask_and_take(self, vehicle: VehicleState, now_s: float) -> None:
         if vehicle.heartbeat is None or self._settings.heed == "never":
             return
         self._read_parameters(vehicle, now_s)
         for kind in self._asked_s:
             self._fetch(kind, now_s)
         rally = self._autopilot.downloads.last(PlanKind.RALLY)
-        if rally is not None and rally is not self._rally:
+        if rally is not None and rally != self._rally:
             self._take_rally(rally)
         self._put_together(vehicle, now_s)
 
@@ -118,10 +131,10 @@ class FenceMonitor:
         try:
             self.rally = rally_points(rally.items)
         except ItemError as error:
-            self._tell(f"The autopilot's rally points are not used: {error}", WARNING)
+            self._notifier.tell(f"The autopilot's rally points are not used: {error}", Severity.WARNING)
 
     def _put_together(self, vehicle: VehicleState, now_s: float) -> None:
-        """The fence anew when anything of it is; what makes no sense, or could not be fetched, leaves the fence as it was."""
+        """Make the fence anew when a part of it has changed; what makes no sense leaves the fence as it was."""
         stored = self._autopilot.downloads.last(PlanKind.FENCE)
         told = all(name in vehicle.parameters for name in PARAMETERS) or self._tries >= PARAMETER_TRIES
         if stored is None or not told or vehicle.home is None:
@@ -136,8 +149,8 @@ class FenceMonitor:
         if same:
             return
         try:
-            self.fence = autopilot_fence(stored.items, vehicle.parameters, vehicle.home.point, enabled=on)
+            self._fence = autopilot_fence(stored.items, vehicle.parameters, vehicle.home.point, enabled=on)
             self._fault = ""
         except ItemError as error:
             self._fault = str(error)
-            self._tell(f"The autopilot's fence makes no sense: {error}", WARNING)
+            self._notifier.tell(f"The autopilot's fence makes no sense: {error}", Severity.WARNING)

@@ -1,108 +1,108 @@
-"""Doubts about where the rover is: its position jumped, the origin moved, the companion itself stood still."""
+"""The localization monitor: doubts the position when it jumps or wanders, or when the frame's origin moves."""
 
 from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable
 
-from companion.executive.mission_executor import MissionExecutor, Tell
+from companion.core.severity import Severity, TextSink
+from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import apart_m
-from companion.settings import Settings
+from companion.executive.mission_run import MissionRun
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.safety.reasons import Doubt, Reason
+from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events.event import Event
 from companion.vehicle.events.vehicle import HomeSeen, LocalPositionSeen, OriginSeen
 from companion.vehicle.state import VehicleState
 
-WARNING = 4
 HOME_MOVED_M = 2.0
 ASK_PLACES_S = 0.5
 """While it is doubtful where the rover is, the origin is asked for this often,"""
 SETTLED_S = 0.4
-"""and an answer counts that comes so long after the doubt arose: position and origin then speak of the same frame."""
+"""and an answer counts that comes this long after the doubt arose: position and origin are then of one frame."""
 
 WANDERINGS, WANDERINGS_S = 3, 20.0
-"""A position that wanders so often within so long is no position to drive by,"""
+"""A position that wanders this often within this time is no position to drive by,"""
 ONCE_S = 3.0
 """(what lasts no longer than this is once)"""
 CALM_S = 10.0
-"""until it has been calm for so long."""
+"""until it has been calm for this long."""
 
 
 class LocalizationMonitor:
-    """Keeps the doubt that there is, and says when it is settled. The map is worthless from a jump on, and begun anew.
+    """Keeps the doubt until it is settled. From a jump on the map is worthless, and begun anew."""
 
-    ``tell`` says a text with its severity to the people; ``start_afresh`` has the leg begin again where the rover then is.
-    """
-
-    def __init__(self, jump_m: float, tell: Tell, start_afresh: Callable[[], None]) -> None:
-        self._jump_m = jump_m
-        self._tell = tell
-        self._start_afresh = start_afresh
-        self._doubt = ""
+    def __init__(self, run: MissionRun, autopilot: AutopilotLink, settings: LiveSettings, notifier: TextSink) -> None:
+        self._run = run
+        self._autopilot = autopilot
+        self._settings = settings
+        self._notifier = notifier
+        self._doubt: Doubt | None = None
         self._doubt_s = 0.0
         self._asked_s = self._settled_s = -math.inf
         self._home_told = False
         self._wandered_s: deque[float] = deque(maxlen=WANDERINGS)
         self._unsure_until_s = -math.inf
 
-    def retune(self, settings: Settings) -> None:
-        """Other settings from now on."""
-        self._jump_m = settings.safety.jump_m
-
     @property
     def position_doubted(self) -> bool:
         """Whether scans cannot be given a place now."""
-        return bool(self._doubt)
+        return self._doubt is not None
 
-    def reason(self, now_s: float) -> str:
-        """Why the rover must not move now; empty when it may."""
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """Why the rover must not move now; None when it may."""
         if now_s < self._unsure_until_s:
-            return "position wanders"
-        return self._doubt or ("the companion stood still" if now_s < self._settled_s else "")
+            return Reason(Doubt.POSITION_WANDERS)
+        if self._doubt is not None:
+            return Reason(self._doubt)
+        return Reason(Doubt.LOOP_STOOD_STILL) if now_s < self._settled_s else None
 
     def stalled(self, now_s: float) -> None:
         """The companion's own loop stood still: what piled up meanwhile is not believed."""
         self._settled_s = now_s + SETTLED_S
 
-    def must_ask(self, now_s: float) -> bool:
-        """Whether it is time to ask for the origin (again)."""
-        if not self._doubt or now_s - self._asked_s < ASK_PLACES_S:
-            return False
-        self._asked_s = now_s
-        return True
+    def service(self, now_s: float) -> None:
+        """To be called every tick: while there is a doubt, have the origin told again and again."""
+        if self._doubt is not None and now_s - self._asked_s >= ASK_PLACES_S:
+            self._asked_s = now_s
+            self._autopilot.ask_places()
 
-    def take_in(self, event: Event, vehicle: VehicleState, executor: MissionExecutor) -> None:
-        """One more event, already folded into ``vehicle``."""
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event; before the mission has begun there is no map that could be wrong."""
+        if (executor := self._run.executor) is None:
+            return
         match event:
-            case LocalPositionSeen() if vehicle.jump_m > self._jump_m:
-                if not self._doubt:
-                    self._tell(f"Position jumped {vehicle.jump_m:.1f} m: map forgotten", WARNING)
-                self._doubt, self._doubt_s = "position jumped", event.time_s
+            case LocalPositionSeen() if vehicle.jump_m > self._settings.current.safety.jump_m:
+                self._begin(Doubt.POSITION_JUMPED, event.time_s, f"Position jumped {vehicle.jump_m:.1f} m")
             case LocalPositionSeen() if vehicle.wander.noticed:
-                self._note_wandering(vehicle.wander.off_m, event.time_s)
+                self._begin(Doubt.POSITION_WANDERED, event.time_s, f"Position wandered {vehicle.wander.off_m:.1f} m")
+                self._count_wandering(event.time_s)
             case OriginSeen():
                 self._find_ground(event, executor)
             case HomeSeen() if not self._home_told and apart_m(event.point, executor.layout.home) > HOME_MOVED_M:
                 self._home_told = True
-                self._tell("Home has moved; the mission stays where it began", WARNING)
+                self._notifier.tell("Home has moved; the mission stays where it began", Severity.WARNING)
             case _:
                 pass
 
-    def _note_wandering(self, off_m: float, now_s: float) -> None:
+    def _begin(self, doubt: Doubt, now_s: float, text: str) -> None:
+        if self._doubt is None:
+            self._notifier.tell(f"{text}: map forgotten", Severity.WARNING)
+        self._doubt, self._doubt_s = doubt, now_s
+
+    def _count_wandering(self, now_s: float) -> None:
         """Once in a while the map begins anew; again and again, nothing that is mapped is true for long."""
-        if not self._doubt:
-            self._tell(f"Position wandered {off_m:.1f} m: map forgotten", WARNING)
-        self._doubt, self._doubt_s = "position wandered", now_s
         if not self._wandered_s or now_s - self._wandered_s[-1] > ONCE_S:
             self._wandered_s.append(now_s)
         if len(self._wandered_s) == WANDERINGS and now_s - self._wandered_s[0] <= WANDERINGS_S:
             self._unsure_until_s = now_s + CALM_S
 
     def _find_ground(self, event: OriginSeen, executor: MissionExecutor) -> None:
-        """The origin as it is now: after a jump this tells whether the frame has moved or only the rover's place in it."""
+        """The origin as it is now: after a jump it tells whether the frame has moved, or only the rover in it."""
         if executor.follow_origin(event.point, event.time_s):
-            self._doubt, self._doubt_s = "EKF origin moved", event.time_s
-        elif self._doubt and event.time_s - self._doubt_s >= SETTLED_S:
+            self._doubt, self._doubt_s = Doubt.ORIGIN_MOVED, event.time_s
+        elif self._doubt is not None and event.time_s - self._doubt_s >= SETTLED_S:
             executor.forget_map(event.time_s)
-            self._doubt = ""
-            self._start_afresh()
+            self._doubt = None
+            self._run.start_afresh()

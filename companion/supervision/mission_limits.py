@@ -1,92 +1,100 @@
-"""What is known beside the map that ends or bounds a mission: the autopilot's own fence, its batteries, another companion."""
+"""Mission limits: what keeps a mission from beginning and what breaks it off (fence, batteries, borders)."""
 
 from __future__ import annotations
 
-import math
-
-from companion.core.frames import LocalFrame, Pose
-from companion.executive.mission_executor import MissionExecutor, Tell
-from companion.mavlink.autopilot_link import AutopilotLink
-from companion.mission.fence import NO_FENCE, AutopilotFence
+from companion.core.frames import LocalFrame
+from companion.executive.mission_run import MissionRun
+from companion.mission.fence import AutopilotFence
+from companion.operator.notifications import Outcome
 from companion.safety.battery_monitor import BatteryMonitor, Level
-from companion.settings import Settings
+from companion.safety.reasons import Doubt, PowerReason, Reason, WaitReason
+from companion.settings import PowerSettings
 from companion.supervision.fence_monitor import FenceMonitor
+from companion.supervision.rival_monitor import RivalMonitor
 from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState
 
-LISTEN_S = 1.5
-"""Who finds a rover armed in GUIDED listens so long before driving it: another companion's figures come every second."""
+
+class BorderMonitor:
+    """The borders of the mission and of the autopilot's fence: whether the rover is beyond one."""
+
+    def __init__(self, run: MissionRun) -> None:
+        self._run = run
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """Events say nothing of borders."""
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """Where the rover is now."""
+        pose, executor = self._run.vehicle.pose_at(now_s), self._run.executor
+        name = "" if pose is None or executor is None else executor.layout.bounds.outside(pose.point)
+        return Reason(Doubt.BEYOND_BORDER, (name,)) if name else None
 
 
 class MissionLimits:
-    """Listens before and during the mission. ``ended_by``: why it was broken off, in words; empty while it was not."""
+    """Asked before and during the mission. It writes into ``outcome`` why the mission was broken off."""
 
-    def __init__(self, autopilot: AutopilotLink, settings: Settings, tell: Tell) -> None:
-        self.ended_by = ""
-        self._autopilot = autopilot
-        self._fencing = FenceMonitor(autopilot, settings.fence, tell)
-        self._power = BatteryMonitor(settings.power)
-        self._to_rally = settings.power.to_rally
-        self._breached = False
-        self._listens_until_s = math.nan
-        self._tell = tell
-
-    def take_in(self, event: Event) -> None:
-        """One more event."""
-        if isinstance(event, HeartbeatSeen) and math.isnan(self._listens_until_s):
-            driven = event.armed and event.mode == RoverMode.GUIDED
-            self._listens_until_s = event.time_s + (LISTEN_S if driven else 0.0)
-        self._fencing.take_in(event)
-        self._power.take_in(event)
-
-    def service(self, vehicle: VehicleState, now_s: float) -> None:
-        """To be called every tick."""
-        self._fencing.service(vehicle, now_s)
-        breach = self._fencing.breached(now_s)
-        if breach and not self._breached:
-            self._tell(breach[0].upper() + breach[1:], 4)
-        self._breached = bool(breach)
-
-    def before_driving(self, now_s: float, *, out: bool = False) -> tuple[AutopilotFence, str]:
-        """The autopilot's fence as known now, and what is awaited before the rover may be driven at all; empty when nothing is.
-
-        ``out``: an earlier run has left it armed in GUIDED, perhaps far from anybody: nobody else drives it, and a low battery is a reason
-        to go back, not to stay.
-        """
-        if out:
-            return self._fence, self._fencing.missing
-        doubt = "" if now_s >= self._listens_until_s else "signs of another companion (the rover is armed in GUIDED)"
-        return self._fence, self._fencing.missing or doubt or self._power.hindrance(now_s)
-
-    def emptied(self, now_s: float) -> str:
-        """Why the rover must stop for good wherever it is, in words; empty while it need not."""
-        if self._power.level(now_s) is not Level.HOLD:
-            return ""
-        self.ended_by = self._power.reason
-        return self.ended_by
-
-    def doubt(self, executor: MissionExecutor, pose: Pose | None, now_s: float) -> str:
-        """Why the rover must not be driven now; empty when it may. A fence that has changed is in force from here on."""
-        executor.heed_fence(self._fence)
-        if self._autopilot.rival_heard(now_s):
-            return "another companion drives this rover"
-        return self._fencing.breached(now_s) or ("" if pose is None else executor.outside(pose.point))
-
-    def broken_off(self, executor: MissionExecutor, pose: Pose, now_s: float) -> str:
-        """Why the rover must stop for good here, in words; empty to go on, though perhaps only back."""
-        level = self._power.level(now_s)
-        if level is Level.FINE:
-            return ""
-        self.ended_by = self._power.reason
-        if level is Level.HOLD:
-            return self.ended_by
-        if not executor.returning:
-            frame = LocalFrame(executor.layout.origin)
-            rally = [frame.to_ned(point) for point in self._fencing.rally] if self._to_rally else []
-            executor.go_back(self.ended_by, rally, pose)
-        return ""
+    def __init__(
+        self,
+        run: MissionRun,
+        fences: FenceMonitor,
+        batteries: BatteryMonitor,
+        rivals: RivalMonitor,
+        settings: PowerSettings,
+        outcome: Outcome,
+    ) -> None:
+        self._outcome = outcome
+        self._run = run
+        self._fences = fences
+        self._batteries = batteries
+        self._rivals = rivals
+        self._to_rally = settings.to_rally
 
     @property
-    def _fence(self) -> AutopilotFence:
-        return self._fencing.fence or NO_FENCE
+    def fence(self) -> AutopilotFence:
+        """The autopilot's, as known now."""
+        return self._fences.fence
+
+    def service(self, now_s: float) -> None:
+        """To be called every tick: keep up with the autopilot's fence."""
+        self._fences.service(self._run.vehicle, now_s)
+
+    def heed_fence(self) -> None:
+        """A fence that has changed is in force from here on."""
+        if self._run.executor is not None:
+            self._run.executor.heed_fence(self._fences.fence)
+
+    def awaited(self, now_s: float, *, left_driving: bool) -> Reason[WaitReason] | None:
+        """What must come before the rover may be driven at all; None when nothing must.
+
+        ``left_driving``: an earlier run has left it armed in GUIDED, perhaps far from anybody. Then no other companion
+        drives it, and a low battery is a reason to go back, not to stay.
+        """
+        fence = self._fences.awaited()
+        if fence is not None or left_driving:
+            return fence
+        return self._rivals.awaited(now_s) or self._batteries.awaited(now_s)
+
+    def must_stop(self, now_s: float) -> Reason[PowerReason] | None:
+        """Why the rover must stop for good wherever it is; None while it need not."""
+        if self._batteries.level(now_s) is not Level.HOLD:
+            return None
+        self._outcome.broken_off = self._batteries.reason
+        return self._outcome.broken_off
+
+    def enforce(self, now_s: float) -> Reason[PowerReason] | None:
+        """During the mission: why the rover must stop for good here; None to go on, though perhaps only back.
+
+        Within AUTO the battery is left to the autopilot's own failsafe: there is no way back inside a leg.
+        """
+        executor, pose = self._run.executor, self._run.vehicle.pose_at(now_s)
+        if self._run.vehicle.in_auto or executor is None or pose is None:
+            return None
+        if self._batteries.level(now_s) is not Level.RETURN:
+            return self.must_stop(now_s)
+        self._outcome.broken_off = self._batteries.reason
+        if not executor.returning:
+            frame = LocalFrame(executor.layout.origin)
+            rally = [frame.to_ned(point) for point in self._fences.rally] if self._to_rally else []
+            executor.go_back(str(self._outcome.broken_off), rally, pose)
+        return None

@@ -1,66 +1,80 @@
-"""The end of a run: a rover that is ours is stopped and put into HOLD, and there is time to see that it has been."""
+"""Shutdown: at the end of a run a rover that is ours is stopped and put into HOLD, and HOLD is confirmed."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 
 from companion.control.point_controller import STANDSTILL
+from companion.core.clock import Clock
+from companion.core.severity import Severity, TextSink
+from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.mode_latch import Control
-from companion.vehicle.commands import Command, SetMode
+from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.commands import SetMode
 from companion.vehicle.events.vehicle import RoverMode
-from companion.vehicle.state import VehicleState
+from companion.vehicle.state import fold
 
-HAND_OVER_S = 0.7
-"""So long the companion stays, after its last command, to see that the rover is in HOLD: with all else it does, it is gone within a second."""
+CONFIRM_S = 0.7
+"""How long the companion stays after its last command to see the rover in HOLD; it ends within a second in all."""
 AGAIN_S = 0.2
 """HOLD is asked for this often until then."""
 
 
 class Shutdown:
-    """Begun once, by whatever ends the run. ``send`` gives the autopilot a command at a time."""
+    """Begun once, by whatever ends the run."""
 
-    def __init__(self, autopilot: AutopilotLink, send: Callable[[Command, float], None]) -> None:
+    def __init__(self, run: MissionRun, autopilot: AutopilotLink, settings: LiveSettings, notifier: TextSink) -> None:
+        self._run = run
         self._autopilot = autopilot
-        self._send = send
-        self._leave_at_s: float | None = None
+        self._settings = settings
+        self._notifier = notifier
+        self._leave_at_s = math.inf
         self._again_s = math.inf
-        self.ours = False
+        self.stopped_ours = False
         """Whether it is a rover of ours that has been stopped."""
 
-    @property
-    def begun(self) -> bool:
-        """Whether the run is ending."""
-        return self._leave_at_s is not None
-
-    def begin(self, vehicle: VehicleState, control: Control, now_s: float, *, driven: bool) -> bool:
-        """Stop the rover and ask for HOLD; False, and nothing is sent, if the rover is not ours.
-
-        ``driven``: whether this run has driven it at all; if not, it may be another companion's.
-        """
+    def begin(self, why: Reason[EndReason], now_s: float) -> None:
+        """The run ends: stop the rover and ask for HOLD, and say so; nothing is sent if the rover is not ours."""
+        self._run.end = why
+        self._run.activity = Activity(RunPhase.ENDED, why)
         self._leave_at_s = now_s
-        heartbeat = vehicle.heartbeat
-        if heartbeat is None or not vehicle.is_ours or control is not Control.COMPANION:
-            return False
-        if not driven and self._autopilot.twin_heard(now_s):
-            return False
-        self._leave_at_s = now_s + HAND_OVER_S
-        if heartbeat.armed:
-            self._send(STANDSTILL.setpoint, now_s)
-        self._send(SetMode(RoverMode.HOLD), now_s)
+        if not self._is_ours(now_s):
+            return
+        self._leave_at_s = now_s + CONFIRM_S
+        sender, heartbeat = self._run.sender, self._run.vehicle.heartbeat
+        if heartbeat is not None and heartbeat.armed:
+            sender.send(STANDSTILL.setpoint, now_s)
+        sender.send(SetMode(RoverMode.HOLD), now_s)
         self._again_s = now_s + AGAIN_S
-        self.ours = True
-        return True
+        self.stopped_ours = True
+        if why.kind is not EndReason.DONE:
+            self._notifier.tell(f"Companion: {why}, HOLD", Severity.WARNING)
 
-    def is_over(self, vehicle: VehicleState, now_s: float) -> bool:
-        """Whether the rover is no longer ours, or has said that it will, or time is up."""
-        assert self._leave_at_s is not None
-        ack = self._autopilot.last_ack(SetMode(RoverMode.HOLD))
-        answered = ack is not None and ack.result == 0 and ack.time_s > self._leave_at_s - HAND_OVER_S
+    def is_over(self, now_s: float) -> bool:
+        """Whether the rover is no longer ours, or has said that it will be in HOLD, or time is up."""
+        vehicle, ack = self._run.vehicle, self._autopilot.last_ack(SetMode(RoverMode.HOLD))
+        answered = ack is not None and ack.result == 0 and ack.time_s > self._leave_at_s - CONFIRM_S
         left = vehicle.heartbeat is not None and not vehicle.is_ours
         over = answered or left or now_s >= self._leave_at_s
         if not over and now_s >= self._again_s:
             self._again_s = now_s + AGAIN_S
-            self._send(SetMode(RoverMode.HOLD), now_s)
+            self._run.sender.send(SetMode(RoverMode.HOLD), now_s)
         return over
+
+    def wait(self, clock: Clock, now_s: float) -> float:
+        """Nothing else goes on any more: listen and ask for HOLD until it is over. Returns the time."""
+        while not self.is_over(now_s):
+            now_s += 1.0 / self._settings.current.link.tick_hz
+            clock.sleep_until_s(now_s)
+            for event in self._autopilot.poll(now_s):
+                self._run.vehicle = fold(self._run.vehicle, event)
+            self._autopilot.service(now_s)
+        return now_s
+
+    def _is_ours(self, now_s: float) -> bool:
+        """A rover that this run has not driven may be another companion's."""
+        if not self._run.vehicle.is_ours or self._run.latch.control is not Control.COMPANION:
+            return False
+        return self._run.executor is not None or not self._autopilot.twin_heard(now_s)

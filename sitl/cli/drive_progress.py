@@ -15,7 +15,6 @@ from sitl.lockstep import Drive, Report
 LINE_EVERY_S = 60.0
 NOBODY_S = 60.0
 """Nobody is there to do what a companion waits for: after so long the run is ended."""
-WAITS = "waiting for a person"
 
 
 class Unattended:
@@ -29,7 +28,7 @@ class Unattended:
 
     def look(self, status: Status) -> None:
         """To be called often."""
-        if WAITS not in status.doing:
+        if not status.activity.needs_person:
             self._since_s = None
             return
         self._since_s = status.time_s if self._since_s is None else self._since_s

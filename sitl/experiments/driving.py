@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from companion.bench.movingai import ScenarioFileError, read_scenarios, scenario_file, spread
+from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
 from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
@@ -28,7 +29,7 @@ from sitl.experiments.experiment import (
 )
 from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
-from sitl.lockstep import Drive, Report
+from sitl.lockstep import Drive, DriveOutcome, Report
 from sitl.map_mission import mission_on_map
 from sitl.scenario import scenario_from_mission
 
@@ -73,7 +74,8 @@ class Series:
     def missed(self) -> int:
         """Drives in which a target was missed."""
         return sum(
-            report.outcome not in ("reached", "collision") or any(status != "reached" for _, status in report.targets)
+            report.outcome not in (DriveOutcome.REACHED, DriveOutcome.COLLISION)
+            or any(status is not TargetStatus.REACHED for _, status in report.targets)
             for report in self.reports
         )
 

@@ -12,13 +12,16 @@ import traceback
 from collections import Counter
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
+from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
 from joblib import Parallel, delayed
 from rich.table import Table
 
+from companion.executive.mission_progress import TargetStatus
 from companion.recording.recorder import NullRecorder
+from companion.safety.reasons import Activity
 from companion.settings import Settings
 from sitl.autopilot.modes import arm, arming_faults, set_mode
 from sitl.autopilot.state import Mode
@@ -41,20 +44,27 @@ GROWTH_MB = 20.0
 """More than this is growth: what the interpreter keeps for later varies by some megabytes."""
 WARM_UP = 10
 """Memory is compared from this run on: until then caches fill."""
-POLICIES = ("Returning: ", "HOLD: battery")
-"""Texts of the companion after which targets are missed on purpose: see the safety page."""
 HEAD = ("ground", "runs", "faults", "reached", "policy", "left", "coll.", "errors", "person", "metres")
+
+
+class Ended(StrEnum):
+    """How a mission ended."""
+
+    REACHED = "reached"
+    POLICY = "policy"
+    """Targets were missed on purpose: see the safety page."""
+    UNFINISHED = "unfinished"
 
 
 @dataclass(frozen=True, slots=True)
 class Soaked:
-    """One mission. ``ended``: reached, policy (see ``policy``) or unfinished."""
+    """One mission. ``policy``: why targets were missed on purpose."""
 
     seed: int
     ground: str
     suite: str
     faults: tuple[str, ...] = ()
-    ended: str = "unfinished"
+    ended: Ended = Ended.UNFINISHED
     policy: str = ""
     last_text: str = ""
     collisions: int = 0
@@ -77,10 +87,10 @@ class Person:
         self._asked_s: float | None = None
         self._in_vain = 0
 
-    def look(self, drive: Drive, doing: str) -> None:
+    def look(self, drive: Drive, activity: Activity) -> None:
         """To be called often."""
         now_s = drive.simulator.time_s
-        if "waiting for a person" not in doing:
+        if not activity.needs_person:
             self._asked_s = None
             return
         self._asked_s = now_s if self._asked_s is None else self._asked_s
@@ -118,12 +128,13 @@ def soaked(seed: int) -> Soaked:
 
 def _driven(drive: Drive, result: Soaked) -> Soaked:
     person = Person()
-    report = drive.run(lambda status: person.look(drive, status.doing))
-    missed = [name for name, status in report.targets if status != "reached"]
-    policy = next((text for text in report.said if text.startswith(POLICIES)), person.gave_up)
-    ended = "reached" if missed in ([], ["sealed"]) else "policy" if policy else "unfinished"
+    report = drive.run(lambda status: person.look(drive, status.activity))
+    missed = [name for name, status in report.targets if status is not TargetStatus.REACHED]
+    broken_off = drive.companion.outcome.broken_off
+    policy = person.gave_up if broken_off is None else f"Returning: {broken_off}"
+    ended = Ended.REACHED if missed in ([], ["sealed"]) else Ended.POLICY if policy else Ended.UNFINISHED
     if not drive.companion.done:
-        ended, policy = "unfinished", ""
+        ended, policy = Ended.UNFINISHED, ""
     return replace(
         result,
         ended=ended,
@@ -181,7 +192,7 @@ class SoakReport:
         left = Counter({
             "with a contact": sum(run.collisions > 0 for run in self.runs),
             "with an error": sum(run.error != "" for run in self.runs),
-            "left unfinished": sum(run.ended == "unfinished" for run in self.runs),
+            "left unfinished": sum(run.ended is Ended.UNFINISHED for run in self.runs),
         })  # fmt: skip
         found = [f"{count} runs {what}" for what, count in left.items() if count]
         if self.growth_mb is not None and self.growth_mb > GROWTH_MB:
@@ -209,7 +220,7 @@ class SoakReport:
 
     def _section(self) -> str:
         met = Counter(fault for run in self.runs for fault in run.faults)
-        policies = Counter(run.policy.partition(".")[0] for run in self.runs if run.ended == "policy")
+        policies = Counter(run.policy.partition(".")[0] for run in self.runs if run.ended is Ended.POLICY)
         by_policy = "; ".join(f"{text} ({count})" for text, count in sorted(policies.items())) or "none"
         return f"""## Soak
 
@@ -237,7 +248,7 @@ def _trouble(run: Soaked) -> str:
         return run.error
     if run.collisions:
         return f"{run.collisions} collisions"
-    if run.ended == "unfinished":
+    if run.ended is Ended.UNFINISHED:
         return f"unfinished: {run.last_text}"
     return f"{run.refused} setpoints refused" if run.refused else ""
 
@@ -248,7 +259,7 @@ def _row(name: str, runs: Iterable[Soaked]) -> list[str]:
         name,
         f"{len(own)}",
         f"{sum(len(run.faults) for run in own)}",
-        *(f"{sum(run.ended == ended for run in own)}" for ended in ("reached", "policy", "unfinished")),
+        *(f"{sum(run.ended is ended for run in own)}" for ended in Ended),
         f"{sum(run.collisions for run in own)}",
         f"{sum(run.error != '' for run in own)}",
         f"{sum(run.person for run in own)}",

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.executive.goal_requests import GoalRequests
-from companion.operator.parameters import ParameterServer
+from companion.operator.parameter_server import ParameterServer
 from companion.supervision.fence_monitor import FenceMonitor
 from tests.fuzz.finds import FINDS
 from tests.fuzz.targets import REFUSALS, BadRefusalError, refusing, targets
@@ -51,7 +51,7 @@ def test_changed_packets_are_survived_by_a_companion_that_drives(data: st.DataOb
 
 @pytest.mark.parametrize(
     ("example", "part", "method"),
-    [(1, ParameterServer, "_change"), (2, GoalRequests, "_judge"), (3, FenceMonitor, "breached")],
+    [(1, ParameterServer, "_change"), (2, GoalRequests, "_judge"), (3, FenceMonitor, "doubt")],
 )
 def test_packets_reach_whom_they_are_for(
     example: int, part: type, method: str, monkeypatch: pytest.MonkeyPatch
@@ -66,7 +66,7 @@ def test_packets_reach_whom_they_are_for(
 
     monkeypatch.setattr(part, method, watched)
     TARGETS["driving"].read(TARGETS["driving"].examples[example])
-    assert any(reached) if method == "breached" else reached
+    assert any(reached) if method == "doubt" else reached
 
 
 def assert_read_or_refused_in_one_line(name: str, data: bytes) -> None:

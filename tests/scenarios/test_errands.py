@@ -61,10 +61,10 @@ def test_every_form_of_a_guided_target_leads_to_the_same_place(driving: Asker, f
     driving.ask(wanted[form])
     assert driving.answered() == ACCEPTED
     progress = driving.companion.progress
-    assert progress is not None and progress.errand is not None
+    assert progress is not None and progress.requested is not None
     # Floats in degrees are good to a metre here, whole numbers to a centimetre.
     room_m = 1.0 if form in ("long", "old item") else 0.02
-    assert progress.errand.point.distance_m(_local(driving, driving.field(5, 12))) < room_m
+    assert progress.requested.point.distance_m(_local(driving, driving.field(5, 12))) < room_m
 
 
 def _local(rig: Asker, place: tuple[int, int]) -> NedPoint:
@@ -220,8 +220,8 @@ def test_a_speed_is_a_limit_and_never_more_than_the_mission_allows(driving: Aske
         driving.reposition(driving.field(5, 12), speed=speed_m_s)
         assert driving.answered() == ACCEPTED
         progress = driving.companion.progress
-        assert progress is not None and progress.errand is not None
-        assert progress.errand.speed_m_s == (None if taken_m_s is None else pytest.approx(taken_m_s))
+        assert progress is not None and progress.requested is not None
+        assert progress.requested.speed_m_s == (None if taken_m_s is None else pytest.approx(taken_m_s))
 
 
 def test_an_errand_keeps_its_place_when_the_origin_moves(tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from companion.operator.telling import NOT_FOLLOWED_S
+from companion.operator.notifications import NOT_FOLLOWED_S
 from tests.support.rig import GUIDED, HOLD, Rig, yard
 
 ANOTHER = "The autopilot follows another target than the one sent"

@@ -15,8 +15,7 @@ from typer.testing import CliRunner
 
 from companion.cli.commands import app
 from companion.cli.source import refuse_arming
-from companion.executive.fetching import TRIES, Fetching
-from companion.executive.plan_watch import AGAIN_S
+from companion.executive.autopilot_mission import AGAIN_S, TRIES, MissionFetcher
 from companion.mission.mission import Mission, MissionError, RoverSpec
 from companion.mission.stored import mission_of
 from tests.scenarios.test_auto_legs import GUIDED_ENABLE, NONE, ON, WAYPOINT, Row, place_deg
@@ -44,7 +43,7 @@ def holding(folder: Path, rows: list[Row]) -> Asker:
 
 
 def fetched(rig: Asker, show: Callable[[str], None] = lambda text: None) -> Mission:
-    items = Fetching(rig.link, rig, 20.0).fetch(show)
+    items = MissionFetcher(rig.link, rig, 20.0).fetch(show)
     assert items is not None
     return mission_of(items)
 
@@ -90,7 +89,7 @@ def test_it_waits_for_the_autopilot_and_can_be_stopped(tmp_path: Path) -> None:
     rig = holding(tmp_path, ROUND)
     rig.cut, shown = True, []
     rig.restart_companion(yard(tmp_path))
-    fetching = Fetching(rig.link, rig, 20.0)
+    fetching = MissionFetcher(rig.link, rig, 20.0)
 
     def show(text: str) -> None:
         shown.append(text)

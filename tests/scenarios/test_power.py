@@ -86,7 +86,7 @@ def test_a_low_battery_takes_the_rover_back_the_way_it_came(tmp_path: Path, chan
     assert rig.simulator.collisions == ()
     assert rig.said("Missed: gate, pier") and rig.said("along the way it came")
     assert rig.statuses() == [TargetStatus.SKIPPED] * 2
-    assert rig.companion.oversight.ended_by.startswith("battery")
+    assert rig.companion.outcome.broken_off is not None
     # Once it had turned round it went where it had been before.
     before = rig.track[:there]
     assert all(min(math.dist(place, past) for past in before[::5]) < 1.0 for place in rig.track[there + 100 :: 20])
@@ -134,7 +134,7 @@ def test_an_empty_battery_stops_it_where_it_is(tmp_path: Path, change: dict[str,
     assert rig.now_s() - rig.began_s >= AFTER_S
     rig.finish(3.0)
     assert rig.said("Companion: battery ") and rig.statuses() == [TargetStatus.PENDING]
-    assert rig.companion.oversight.ended_by.startswith("battery")
+    assert rig.companion.outcome.broken_off is not None
     rig.sleep_until_s(rig.now_s() + 3.0)
     assert rig.speed_m_s < 0.05
 
@@ -158,7 +158,7 @@ def test_what_is_not_known_or_not_low_is_no_reason(tmp_path: Path, change: dict[
     rig = Draining(yard(tmp_path), 1.0, change)
     rig.finish()
     assert rig.companion.outcome.complete
-    assert rig.companion.oversight.ended_by == ""
+    assert rig.companion.outcome.broken_off is None
 
 
 def test_a_voltage_that_sags_for_a_moment_is_no_reason(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from companion.core.grid import Cell
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.safety.mode_latch import Control
-from companion.supervision.startup import LEFT_S
+from companion.supervision.arming import LEFT_S
 from tests.scenarios.test_safety_pilot import hold_sticks
 from tests.support.rig import ARM, GATE, GUIDED, HOLD, MANUAL, SET_MODE, Rig, Sent, without, yard
 
@@ -108,7 +108,7 @@ def test_map_and_past_path_are_there_again(tmp_path: Path, metres: float) -> Non
     assert (seen_before & seen_now).sum() > 0.8 * seen_before.sum(), "what had been seen, but for the last seconds"
     state = driver.leg[0]
     assert state is not None and state.past[0] == Cell(2, 7), "the way back on this leg"
-    executor = rig.companion._executor
+    executor = rig.companion.executor
     assert executor is not None and executor.trail.back()[-1] == Cell(2, 7), "the way back to the start"
     assert metres < 3.0 or len(executor.trail.back()) > 5
     assert rig.companion.progress is not None and rig.companion.progress.home.cell == Cell(2, 7)
@@ -118,16 +118,16 @@ def test_map_and_past_path_are_there_again(tmp_path: Path, metres: float) -> Non
 def test_an_errand_is_run_to_its_end_and_then_the_mission(tmp_path: Path) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(3.0)
-    executor = rig.companion._executor
+    executor = rig.companion.executor
     assert executor is not None
     centre = executor.evidence.base.centre_of(Cell(5, 12))
-    executor.run_errand(ResolvedTarget("errand 1", centre, Cell(5, 12), 0.0, OnBlocked.SKIP, 1.5))
+    executor.request(ResolvedTarget("errand 1", centre, Cell(5, 12), 0.0, OnBlocked.SKIP, 1.5))
     rig.run_for(0.5)
     kill_and_resume(rig, mission)
     goes_on_after_s(rig, rig.now_s())
     progress = rig.companion.progress
-    assert progress is not None and progress.errand is not None and progress.errand.cell == Cell(5, 12)
-    rig.until(lambda: rig.companion.progress is not None and rig.companion.progress.errand is None)
+    assert progress is not None and progress.requested is not None and progress.requested.cell == Cell(5, 12)
+    rig.until(lambda: rig.companion.progress is not None and rig.companion.progress.requested is None)
     truth = rig.simulator.truth
     assert math.hypot(truth.north_m - 12.5, truth.east_m - 5.5) < 1.5
     rig.finish()
@@ -137,7 +137,7 @@ def test_an_errand_is_run_to_its_end_and_then_the_mission(tmp_path: Path) -> Non
 def test_a_rover_on_its_way_back_goes_on_back(tmp_path: Path) -> None:
     targets = GATE + 'on_blocked = "return"\n'
     rig, mission = rig_of(tmp_path, targets, sealed=True)
-    rig.until(lambda: rig.companion.progress is not None and rig.companion.progress.leg == "home", 200.0)
+    rig.until(lambda: rig.companion.progress is not None and rig.companion.progress.phase == "home", 200.0)
     kill_and_resume(rig, mission)
     rig.finish()
     assert [status for _, status in rig.companion.statuses()] == ["unreachable"]

@@ -33,7 +33,7 @@ def driven(name: str, suite: str | None = None, seed: int = 0, settings: Setting
         mission = replace(mission, sitl=replace(mission.sitl or SitlSpec(), sensors=suite))
     run = Drive(mission, scenario_from_mission(mission), settings or Settings(), seed, NullRecorder())
     report = run.run()
-    assert report.refused == 0, run.companion.output_check.refused
+    assert report.refused == 0, run.companion.mission_run.setpoint_check.refused
     return report
 
 

@@ -59,23 +59,29 @@ def test_settings_are_listed_and_changed_on_the_way(tmp_path: Path) -> None:
     assert rig.companion.outcome.complete
 
 
-def test_everything_that_keeps_settings_hears_of_a_change(tmp_path: Path) -> None:
+def test_a_change_counts_wherever_settings_are_read(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path), late_s=45.0)
     rig.until_driven(0.5)
-    put(rig, "CMP_STALE", 0.7)
-    put(rig, "CMP_JUMP", 3.0)
-    put(rig, "CMP_STUCK", 9.0)
-    put(rig, "CMP_WAIT_RETRY", 7.0)
-    companion: Any = rig.companion
-    assert companion._settings.safety.stale_s == 0.7
-    assert companion._whereabouts._jump_m == 3.0
-    assert companion._executor._given is companion._settings  # as it is; what follows from a late link lies on top
-    assert companion._executor._settings is companion.driver._settings
-    assert companion.driver._settings.guidance.stuck_after_s == 9.0
-    assert companion.driver._recovery._settings.stuck_after_s == 9.0
-    assert companion._outbox._settings is companion._settings.guidance
-    assert companion.driver.searcher.settings.wait_retry_s == 7.0
-    assert companion._executor._tracker._settings is companion._settings.traffic
+    put(rig, "CMP_SPD_MAX", 1.5)
+    executor = rig.companion.executor
+    assert executor is not None
+    assert executor.surroundings.settings.guidance.max_speed_m_s == 1.5
+    put(rig, "CMP_JUMP", 8.0)
+    rig.change = Shifted(3.0)
+    rig.run_for(1.0)
+    assert not any("Position jumped" in text for text in rig.texts()), "3 m is no jump any more"
+
+
+class Shifted:
+    """The position lies somewhere else from now on."""
+
+    def __init__(self, by_m: float) -> None:
+        self._by_m = by_m
+
+    def __call__(self, message: Any) -> Any:
+        if message.get_type() == "LOCAL_POSITION_NED":
+            message.y += self._by_m
+        return message
 
 
 def test_a_watchdog_that_was_shortened_acts_sooner(tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ from companion.checkpoint.state_format import (
     compressed_rows,
     encode_state,
 )
-from companion.executive.mission_progress import Leg, TargetStatus
+from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
 from companion.safety.mode_latch import Control
@@ -45,7 +45,7 @@ def progresses(draw: st.DrawFn) -> SavedProgress:
         start=SavedPlace(north_m=draw(METRES), east_m=draw(METRES)),
         statuses=tuple(statuses),
         index=draw(st.integers(0, len(statuses) - 1)),
-        leg=draw(st.sampled_from(Leg)),
+        leg=draw(st.sampled_from(MissionPhase)),
         left_s=draw(st.floats(0.0, 1e4)),
         give_up_left_s=draw(st.none() | st.floats(0.0, 1e4)),
     )
@@ -138,7 +138,7 @@ def a_state(**changes: Any) -> SavedState:
             start=SavedPlace(north_m=0.0, east_m=0.0),
             statuses=(TargetStatus.PENDING,),
             index=0,
-            leg=Leg.TRAVEL,
+            leg=MissionPhase.TRAVEL,
             left_s=0.0,
             give_up_left_s=None,
         ),

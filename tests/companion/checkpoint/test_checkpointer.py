@@ -27,11 +27,11 @@ from companion.core.round_marks import Mark
 from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, lay
-from companion.executive.mission_progress import Leg, MissionProgress
-from companion.executive.trail import Trail
+from companion.executive.mission_progress import MissionPhase, MissionProgress, plan_progress
+from companion.executive.return_path import Trail
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import Mission
-from companion.navigation.field_step import NavState, initial_state
+from companion.navigation.field_step import NavState, begin
 from companion.recording.recorder import NullRecorder
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
@@ -127,8 +127,9 @@ def mission(tmp_path: Path) -> Mission:
 def bench(mission: Mission) -> Bench:
     home = LocalFrame(HOME).to_ned(HOME)
     layout = lay(mission, MappingSettings(), HOME, HOME, Pose(home.north_m, home.east_m, 0.0, 0.0))
-    driver = Driver(layout.progress.goal, initial_state(Cell(2, 7), layout.progress.goal.cell, 9, 5))
-    executor, writer = Executor(layout, driver, layout.progress), Writer()
+    progress = plan_progress(layout.targets, layout.start)
+    driver = Driver(progress.goal, begin(Cell(2, 7), progress.goal.cell, 9, 5))
+    executor, writer = Executor(layout, driver, progress), Writer()
     executor.trail.enter(Cell(2, 7))
     return Bench(Checkpointer(mission, writer), writer, executor)
 
@@ -162,7 +163,7 @@ def test_it_is_saved_again_after_a_while_if_the_rover_has_moved(
 
 
 def leg_ends(bench: Bench) -> dict[str, Any]:
-    bench.executor.progress = replace(bench.executor.progress, leg=Leg.WAIT)
+    bench.executor.progress = replace(bench.executor.progress, phase=MissionPhase.WAIT)
     return {}
 
 
@@ -195,7 +196,7 @@ def test_at_the_end_the_whole_map_is_saved(bench: Bench) -> None:
 
 def test_the_state_has_what_a_resumed_run_needs(bench: Bench, mission: Mission) -> None:
     bench.until_saved()
-    bench.executor.progress = replace(bench.executor.progress, leg=Leg.STAY, until_s=bench.now_s + 7.0)
+    bench.executor.progress = replace(bench.executor.progress, phase=MissionPhase.STAY, until_s=bench.now_s + 7.0)
     (update,) = bench.update(released=True)
     assert update.snapshot is not None
     state = saved_state(update.snapshot)

@@ -19,7 +19,7 @@ from companion.checkpoint.state_format import SavedGrid, SavedNavState, SavedPla
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.executive.mission_layout import lay
-from companion.executive.mission_progress import Leg, TargetStatus
+from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.mission import Mission
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
@@ -90,7 +90,7 @@ def previous_run(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[PreviousRun, 
             start=SavedPlace(north_m=home.north_m, east_m=home.east_m),
             statuses=(TargetStatus.UNREACHABLE,),
             index=0,
-            leg=Leg.WAIT,
+            leg=MissionPhase.WAIT,
             left_s=2.0,
             give_up_left_s=100.0,
         ),
@@ -111,13 +111,12 @@ def previous_run(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[PreviousRun, 
 
 def test_in_the_same_frame_the_map_is_what_it_was(tmp_path: Path) -> None:
     previous, mission = previous_run(tmp_path)
-    layout, said = resumed_layout(previous, mission, MappingSettings(), ORIGIN, 500.0, same=True)
+    layout, progress, said = resumed_layout(previous, mission, MappingSettings(), ORIGIN, 500.0, same=True)
     assert np.array_equal(layout.evidence.log_odds, previous.rasters["log_odds"])
     assert np.array_equal(layout.evidence.penalty, previous.rasters["penalty"])
     assert layout.evidence.grid.weights[1, 3] >= 1.0, "and the fields know it"
     assert said == "with its map"
-    progress = layout.progress
-    assert (progress.leg, progress.until_s, progress.give_up_s) == (Leg.WAIT, 502.0, 600.0)
+    assert (progress.phase, progress.until_s, progress.give_up_s) == (MissionPhase.WAIT, 502.0, 600.0)
     assert progress.statuses == (TargetStatus.UNREACHABLE,)
     home = LocalFrame(ORIGIN).to_ned(HOME)
     assert progress.home.point.distance_m(home) < 1e-6 and progress.goal.cell == Cell(15, 7)
@@ -129,7 +128,7 @@ def test_in_a_frame_that_may_be_another_only_obstacles_count_and_lie_on_the_same
 ) -> None:
     previous, mission = previous_run(tmp_path)
     origin = LocalFrame(ORIGIN).to_geo(NedPoint(north_m, east_m))
-    layout, said = resumed_layout(previous, mission, MappingSettings(), origin, 0.0, same=same)
+    layout, _, said = resumed_layout(previous, mission, MappingSettings(), origin, 0.0, same=same)
     settings, log_odds = MappingSettings(), layout.evidence.log_odds
     assert (log_odds >= 0.0).all(), "no ground counts as seen"
     assert np.array_equal(log_odds > 0.0, previous.rasters["log_odds"] > 0.0)
@@ -147,7 +146,7 @@ def test_a_grid_that_has_become_a_field_larger_takes_the_map_along(tmp_path: Pat
         update={"east_m": previous.state.ground.east_m + 2.0, "north_m": previous.state.ground.north_m - 1.0}
     )
     moved = PreviousRun(previous.state.model_copy(update={"ground": ground}), previous.rasters)
-    layout, _ = resumed_layout(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
+    layout, _, _ = resumed_layout(moved, mission, MappingSettings(), ORIGIN, 0.0, same=True)
     assert grid_shift(moved.state, layout) == Cell(2, -1)
     s = layout.evidence.subdivisions
     assert np.array_equal(layout.evidence.log_odds[:-s, 2 * s :], previous.rasters["log_odds"][s:, : -2 * s])
@@ -158,6 +157,6 @@ def test_a_grid_that_has_become_a_field_larger_takes_the_map_along(tmp_path: Pat
 
 def test_other_settings_of_the_map_cost_the_map_and_not_the_progress(tmp_path: Path) -> None:
     previous, mission = previous_run(tmp_path)
-    layout, said = resumed_layout(previous, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
+    layout, progress, said = resumed_layout(previous, mission, MappingSettings(evidence_m=0.5), ORIGIN, 0.0, same=True)
     assert not layout.evidence.log_odds.any() and "without its map" in said
-    assert layout.progress.statuses == (TargetStatus.UNREACHABLE,)
+    assert progress.statuses == (TargetStatus.UNREACHABLE,)

@@ -8,11 +8,12 @@ from pathlib import Path
 
 from companion.cli.levels import Reader, levelled, reader_of
 from companion.cli.service import Service
-from companion.operator.reporting import Status
+from companion.operator.notifications import Status
+from companion.safety.reasons import Activity, RunPhase
 
 
-def status(time_s: float, doing: str) -> Status:
-    return Status(time_s, doing, None, None, "", 0, 1, 0)
+def status(time_s: float, phase: RunPhase) -> Status:
+    return Status(time_s, Activity(phase), None, None, "", 0, 1, 0)
 
 
 def test_systemd_is_told_that_it_is_ready_alive_and_ending(tmp_path: Path) -> None:
@@ -22,7 +23,7 @@ def test_systemd_is_told_that_it_is_ready_alive_and_ending(tmp_path: Path) -> No
         service = Service({"NOTIFY_SOCKET": str(tmp_path / "notify")})
         service.ready()
         for tick in range(41):
-            service.show(status(0.05 * tick, "driving" if tick < 30 else "holding"))
+            service.show(status(0.05 * tick, RunPhase.DRIVING if tick < 30 else RunPhase.HOLDING))
         service.stopping()
         told = []
         while not told or told[-1] != "STOPPING=1":
@@ -46,7 +47,7 @@ def test_without_systemd_nothing_happens(tmp_path: Path) -> None:
     for environment in ({}, {"NOTIFY_SOCKET": str(tmp_path / "none")}, {"NOTIFY_SOCKET": "vsock:2:3"}):
         service = Service(environment)
         service.ready()
-        service.show(status(0.0, "driving"))
+        service.show(status(0.0, RunPhase.DRIVING))
         service.stopping()
     assert list(tmp_path.iterdir()) == [], "not even a socket"
 

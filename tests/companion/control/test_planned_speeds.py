@@ -12,7 +12,7 @@ from companion.core.grid import Cell, empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.executive.goal_driver import GoalDriver
-from companion.executive.outbox import Outbox
+from companion.executive.setpoint_sender import SentSetpoints
 from companion.mapping.evidence_map import integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -68,7 +68,7 @@ def test_the_lower_of_planned_speed_and_guidances_limit_reaches_the_autopilot(
 ) -> None:
     guide, _ = driver(Straight(planned_fields_s)).update(at(0.0), 1.0)
     assert guide.motion is Motion.DRIVE
-    commands = Outbox(SETTINGS.guidance).due(guide, 0.0, None)
+    commands = SentSetpoints().due(guide, 0.0, SETTINGS.guidance, confirmed=None)
     assert ChangeSpeed(pytest.approx(told_m_s)) in commands
 
 

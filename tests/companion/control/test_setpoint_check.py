@@ -214,7 +214,7 @@ def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None
     setpoints = [one for one in rig.sent_since(since_s) if one.is_setpoint]
     assert setpoints and all(one.is_standstill for one in setpoints[1:])
     assert rig.speed_m_s < 0.05 and rig.simulator.collisions == ()
-    assert rig.companion.output_check.refused.total() > 100
+    assert rig.companion.mission_run.setpoint_check.refused.total() > 100
     assert "Stopping: target behind something" in rig.texts()
 
 
@@ -280,9 +280,9 @@ def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path
     """The map and its rules out of the way: the shapes alone keep the rover inside the autopilot's fence, and it is said."""
     rig = Rig(yard(tmp_path), prepare=stored(box(KEEP_IN, -6.0, -2.4, 6.5, 20.0), **POLYGONS, FENCE_MARGIN=0.0))
     rig.until_driven(1.0)
-    driver, bounds = rig.companion.driver, rig.companion._executor.layout.bounds  # type: ignore[union-attr]
+    driver, bounds = rig.companion.driver, rig.companion.executor.layout.bounds  # type: ignore[union-attr]
     assert driver is not None and len(bounds) == 1
-    rig.companion.output_check = SetpointCheck(rig.companion._tell, (inside_borders,))
+    rig.companion.mission_run.setpoint_check = SetpointCheck(rig.companion._notifier.tell, (inside_borders,))
     out = ControlCommand(Motion.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
     driver.update = lambda *_: (out, None)  # type: ignore[method-assign]
     rig.run_for(15.0)

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.core.frames import GeoPoint
+from companion.control.point_controller import STANDSTILL, STOP, ControlCommand, Motion
+from companion.core.frames import GeoPoint, LocalFrame
+from companion.core.severity import Severity
+from companion.executive.auto_mode_legs import AutoModeLegs
+from companion.executive.mission_progress import MissionPhase, TargetStatus, on_reached
+from companion.vehicle.commands import GuidedPosition
 from companion.vehicle.events.event import Event
 from companion.vehicle.events.targets import (
     LEG_KEPT_S,
@@ -22,6 +28,8 @@ from companion.vehicle.events.targets import (
 )
 from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState, fold
+from tests.companion.safety.test_mode_latch import PLACE
+from tests.support.desk import Desk
 
 HERE, THERE = GeoPoint(53.0, 23.0), GeoPoint(53.1, 23.0)
 LIVE = GuidedLeg(HERE, 10.0, 3)
@@ -98,3 +106,65 @@ def test_whatever_is_heard_the_rover_is_ours_only_in_our_mode_and_in_auto_only_w
             assert time_s - told_s <= LEG_KEPT_S and event.armed
         # The item of a leg that is live has not been told of as done.
         assert not (in_auto and isinstance(event, ItemReachedSeen) and state.leg and event.index == state.leg.index)
+
+
+# What the executor makes of them --------------------------------------------------------------------------------------
+
+
+class Served(Desk):
+    """AUTO is served: legs are handed over and ended."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self.begin()
+        self.legs = AutoModeLegs(self.notices)
+        self.gate = LocalFrame(PLACE).to_geo(self.executor.progress.targets[0].point)
+
+    def follow(self, leg: GuidedLeg | None) -> bool:
+        self.run.vehicle = replace(self.stand(0.0, 0.0, mode=RoverMode.AUTO), in_auto=True, leg=leg)
+        return self.legs.follow(self.run.vehicle, self.executor)
+
+
+def test_outside_auto_no_leg_is_followed(tmp_path: Path) -> None:
+    served = Served(tmp_path)
+    assert not served.legs.follow(served.run.vehicle, served.executor)
+    assert served.executor.progress.phase is MissionPhase.TRAVEL
+
+
+@pytest.mark.parametrize(
+    ("left_m", "status"), [(0.0, TargetStatus.REACHED), (9.0, TargetStatus.SKIPPED)], ids=["near", "far"]
+)
+def test_a_leg_is_driven_until_auto_ends_it(tmp_path: Path, left_m: float, status: TargetStatus) -> None:
+    served = Served(tmp_path)
+    assert not served.follow(None) and served.executor.progress.phase is MissionPhase.STAY, "parked"
+    live = GuidedLeg(served.gate, 10.0, 3)
+    assert not served.follow(live) and served.executor.progress.phase is MissionPhase.TRAVEL
+    place = served.executor.progress.goal.point
+    served.run.vehicle = replace(
+        served.stand(place.north_m - left_m, place.east_m), in_auto=True, leg=replace(live, state=LegState.OVER)
+    )
+    assert served.legs.follow(served.run.vehicle, served.executor), "the last leg"
+    assert served.executor.progress.statuses == (status,)
+
+
+def test_a_leg_that_was_reached_before_auto_ends_it_stays_reached(tmp_path: Path) -> None:
+    served = Served(tmp_path)
+    live = GuidedLeg(served.gate, 10.0, 3)
+    served.follow(live)
+    progress = served.executor.progress
+    served.executor.progress = on_reached(progress, 10.0)
+    nearer = served.legs.guide(STANDSTILL, served.executor, 0.5)
+    assert nearer.setpoint == GuidedPosition(progress.goal.point) and nearer.speed_m_s == 0.5
+    braking = ControlCommand(Motion.BRAKE, STOP, 0.0)
+    assert served.legs.guide(braking, served.executor, 0.5) == braking, "it makes way"
+    assert served.follow(replace(live, state=LegState.OVER))
+    assert served.executor.progress.statuses == (TargetStatus.REACHED,)
+
+
+def test_a_place_that_is_not_in_the_mission_is_not_driven_to(tmp_path: Path) -> None:
+    served = Served(tmp_path)
+    elsewhere = GuidedLeg(THERE, 10.0)
+    assert not served.follow(elsewhere) and served.executor.progress.phase is MissionPhase.STAY
+    assert [severity for _, severity in served.notices.told] == [Severity.WARNING]
+    assert not served.follow(replace(elsewhere, state=LegState.OVER))
+    assert served.executor.progress.statuses == (TargetStatus.PENDING,)

@@ -8,7 +8,7 @@ import pytest
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.executive.mission_layout import apart_m, from_home, lay, lay_again
-from companion.executive.mission_progress import Leg, on_reached, on_time
+from companion.executive.mission_progress import MissionPhase, on_reached, on_time, plan_progress
 from companion.mission.mission import Mission
 from companion.settings import MappingSettings
 from tests.support.rig import yard
@@ -26,11 +26,11 @@ def mission(tmp_path: Path) -> Mission:
 
 def test_fields_and_metres_count_from_home(mission: Mission) -> None:
     layout = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
-    first, second = layout.progress.targets
+    first, second = layout.targets
     assert first.point.distance_m(NedPoint(3.0, 9.0)) < 1e-3
     assert second.point.distance_m(NedPoint(5.0, 1.0)) < 1e-3
-    assert layout.progress.home.point == POSE.point
-    assert layout.evidence.base.cell_at(POSE.point) == layout.progress.home.cell
+    assert layout.start.point == POSE.point
+    assert layout.evidence.base.cell_at(POSE.point) == layout.start.cell
     saved = from_home(layout)
     assert saved.south_west.north_m == pytest.approx(-7.5, abs=1e-3)
     assert saved.south_west.east_m == pytest.approx(-2.5, abs=1e-3)
@@ -38,17 +38,15 @@ def test_fields_and_metres_count_from_home(mission: Mission) -> None:
 
 def test_laid_again_everything_is_where_it_was_on_earth_and_progress_is_kept(mission: Mission) -> None:
     layout = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
-    progress = on_time(on_reached(layout.progress, 5.0), 5.0)
+    progress = on_time(on_reached(plan_progress(layout.targets, layout.start), 5.0), 5.0)
     moved = LocalFrame(ORIGIN).to_geo(NedPoint(-120.0, 75.0))
-    again = lay_again(layout, progress, mission, MappingSettings(), moved)
-    before, after = LocalFrame(ORIGIN), LocalFrame(moved)
-    for old, new in zip(
-        (*progress.targets, progress.home), (*again.progress.targets, again.progress.home), strict=True
-    ):
-        assert apart_m(before.to_geo(old.point), after.to_geo(new.point)) < 0.01
+    again, after = lay_again(layout, progress, mission, MappingSettings(), moved)
+    old_frame, new_frame = LocalFrame(ORIGIN), LocalFrame(moved)
+    for old, new in zip((*progress.targets, progress.home), (*after.targets, after.home), strict=True):
+        assert apart_m(old_frame.to_geo(old.point), new_frame.to_geo(new.point)) < 0.01
         assert (old.name, old.cell) == (new.name, new.cell)
-    assert (again.progress.statuses, again.progress.index) == (progress.statuses, 1)
-    assert again.progress.leg is Leg.TRAVEL
+    assert (after.statuses, after.index) == (progress.statuses, 1)
+    assert after.phase is MissionPhase.TRAVEL
     assert again.home == HOME and again.origin == moved
     assert not again.evidence.log_odds.any()
 

@@ -9,14 +9,14 @@ import pytest
 from companion.core.frames import NedPoint
 from companion.core.grid import Cell
 from companion.executive.mission_progress import (
-    Leg,
+    MissionPhase,
     MissionProgress,
     TargetStatus,
     on_reached,
     on_time,
     on_unreachable,
     plan_progress,
-    with_errand,
+    with_requested,
 )
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -39,35 +39,35 @@ def blocked(state: MissionProgress, now_s: float = 10.0) -> MissionProgress:
 
 def test_targets_come_in_order_each_with_its_stay():
     state = progress()
-    assert state.goal.name == "a" and state.leg is Leg.TRAVEL
+    assert state.goal.name == "a" and state.phase is MissionPhase.TRAVEL
     state = on_reached(state, 100.0)
-    assert (state.leg, state.until_s, state.statuses) == (Leg.STAY, 103.0, (REACHED, PENDING, PENDING))
+    assert (state.phase, state.until_s, state.statuses) == (MissionPhase.STAY, 103.0, (REACHED, PENDING, PENDING))
     assert on_time(state, 102.9) is state
     state = on_time(state, 103.0)
-    assert state.leg is Leg.TRAVEL and state.goal.name == "b"
+    assert state.phase is MissionPhase.TRAVEL and state.goal.name == "b"
     for now_s in (110.0, 120.0):
         state = on_time(on_reached(state, now_s), now_s)
-    assert state.leg is Leg.DONE and state.statuses == (REACHED,) * 3
+    assert state.phase is MissionPhase.DONE and state.statuses == (REACHED,) * 3
 
 
 @pytest.mark.parametrize(
-    ("on_blocked", "leg", "goal", "statuses"),
+    ("on_blocked", "phase", "goal", "statuses"),
     [
-        (OnBlocked.SKIP, Leg.TRAVEL, "b", (UNREACHABLE, PENDING, PENDING)),
-        (OnBlocked.WAIT, Leg.WAIT, "a", (UNREACHABLE, PENDING, PENDING)),
-        (OnBlocked.RETURN, Leg.HOME, "start", (UNREACHABLE, SKIPPED, SKIPPED)),
-        (OnBlocked.HOLD, Leg.HOLD, "a", (UNREACHABLE, SKIPPED, SKIPPED)),
+        (OnBlocked.SKIP, MissionPhase.TRAVEL, "b", (UNREACHABLE, PENDING, PENDING)),
+        (OnBlocked.WAIT, MissionPhase.WAIT, "a", (UNREACHABLE, PENDING, PENDING)),
+        (OnBlocked.RETURN, MissionPhase.HOME, "start", (UNREACHABLE, SKIPPED, SKIPPED)),
+        (OnBlocked.HOLD, MissionPhase.HOLD, "a", (UNREACHABLE, SKIPPED, SKIPPED)),
     ],
 )
-def test_on_blocked_decides(on_blocked, leg, goal, statuses):
+def test_on_blocked_decides(on_blocked, phase, goal, statuses):
     state = blocked(progress(on_blocked))
-    assert (state.leg, state.goal.name, state.statuses) == (leg, goal, statuses)
+    assert (state.phase, state.goal.name, state.statuses) == (phase, goal, statuses)
 
 
 def test_skipping_the_last_target_ends_the_mission():
     state = replace(progress(), index=2, statuses=(REACHED, REACHED, PENDING))
     state = blocked(state)
-    assert state.leg is Leg.DONE and state.statuses == (REACHED, REACHED, UNREACHABLE)
+    assert state.phase is MissionPhase.DONE and state.statuses == (REACHED, REACHED, UNREACHABLE)
 
 
 def test_waiting_tries_again_and_gives_up_at_its_limit():
@@ -75,12 +75,12 @@ def test_waiting_tries_again_and_gives_up_at_its_limit():
     tries = 1
     for now_s in (12.0, 15.0, 20.0):
         state = on_time(state, now_s)
-        if state.leg is Leg.TRAVEL:
+        if state.phase is MissionPhase.TRAVEL:
             tries += 1
             state = blocked(state, now_s)
-    assert tries == 3 and state.leg is Leg.WAIT, "given up only 12 s after the first time"
+    assert tries == 3 and state.phase is MissionPhase.WAIT, "given up only 12 s after the first time"
     state = blocked(on_time(state, 25.0), 25.0)
-    assert state.leg is Leg.TRAVEL and state.goal.name == "b" and state.give_up_s is None
+    assert state.phase is MissionPhase.TRAVEL and state.goal.name == "b" and state.give_up_s is None
 
 
 def test_a_target_reached_after_waiting_counts_as_reached():
@@ -90,47 +90,47 @@ def test_a_target_reached_after_waiting_counts_as_reached():
 
 def test_home_reached_ends_the_mission_and_home_unreachable_holds():
     state = blocked(progress(OnBlocked.RETURN))
-    assert on_reached(state, 50.0).leg is Leg.DONE
-    assert blocked(state).leg is Leg.HOLD
+    assert on_reached(state, 50.0).phase is MissionPhase.DONE
+    assert blocked(state).phase is MissionPhase.HOLD
     assert on_reached(state, 50.0).statuses == state.statuses, "home is no target"
 
 
-@pytest.mark.parametrize("leg", [Leg.TRAVEL, Leg.HOME, Leg.HOLD, Leg.DONE])
-def test_time_alone_changes_nothing_else(leg):
-    state = replace(progress(), leg=leg)
+@pytest.mark.parametrize("phase", [MissionPhase.TRAVEL, MissionPhase.HOME, MissionPhase.HOLD, MissionPhase.DONE])
+def test_time_alone_changes_nothing_else(phase):
+    state = replace(progress(), phase=phase)
     assert on_time(state, 1e9) is state
 
 
 def test_an_errand_comes_first_and_then_the_same_target():
-    state = with_errand(progress(), target("errand"))
+    state = with_requested(progress(), target("errand"))
     assert state.goal.name == "errand" and not state.ended
     for after in (on_reached(state, 5.0), blocked(state)):
         assert after == progress()
 
 
 def test_a_stay_that_an_errand_interrupts_is_over():
-    state = with_errand(on_reached(progress(), 100.0), target("errand"))
+    state = with_requested(on_reached(progress(), 100.0), target("errand"))
     assert on_time(state, 100.5) is state
     state = on_reached(state, 101.0)
-    assert (state.leg, state.goal.name, state.statuses) == (Leg.TRAVEL, "b", (REACHED, PENDING, PENDING))
+    assert (state.phase, state.goal.name, state.statuses) == (MissionPhase.TRAVEL, "b", (REACHED, PENDING, PENDING))
 
 
 def test_an_errand_while_waiting_at_the_last_target_comes_before_the_end():
     state = progress()
     for now_s in (10.0, 20.0):
         state = on_time(on_reached(state, now_s), now_s + 3.0)
-    state = with_errand(on_reached(state, 30.0), target("errand"))
-    assert state.leg is Leg.DONE and not state.ended
+    state = with_requested(on_reached(state, 30.0), target("errand"))
+    assert state.phase is MissionPhase.DONE and not state.ended
     assert on_reached(state, 40.0).ended
 
 
 def test_a_wait_that_an_errand_interrupts_is_another_try_and_keeps_its_limit():
-    state = with_errand(blocked(progress(OnBlocked.WAIT), 10.0), target("errand"))
+    state = with_requested(blocked(progress(OnBlocked.WAIT), 10.0), target("errand"))
     state = on_reached(state, 20.0)
-    assert (state.leg, state.goal.name, state.give_up_s) == (Leg.TRAVEL, "a", 22.0)
+    assert (state.phase, state.goal.name, state.give_up_s) == (MissionPhase.TRAVEL, "a", 22.0)
     assert blocked(state, 22.0).goal.name == "b"
 
 
 def test_a_newer_errand_takes_the_place_of_one_under_way():
-    state = with_errand(with_errand(progress(), target("first")), target("second"))
+    state = with_requested(with_requested(progress(), target("first")), target("second"))
     assert on_reached(state, 5.0) == progress()

@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 
 from companion.core.frames import NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid, empty_grid
-from companion.executive.refuge import Refuge, refuges
-from companion.executive.trail import Trail
+from companion.executive.return_path import Refuge, Trail, refuges
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget

@@ -9,9 +9,17 @@ import pytest
 
 from companion.control.point_controller import STOP, ControlCommand, Motion
 from companion.core.frames import NedPoint
-from companion.executive.outbox import Outbox
-from companion.settings import GuidanceSettings
-from companion.vehicle.commands import ChangeSpeed, GuidedHeading, GuidedPosition, GuidedVelocity
+from companion.executive.setpoint_sender import SentSetpoints, SetpointSender
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.codec import Codec
+from companion.mavlink.transport import MemoryLink
+from companion.recording.recorder import NullRecorder
+from companion.settings import GuidanceSettings, LinkSettings, Settings
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.commands import ChangeSpeed, GuidedHeading, GuidedPosition, GuidedVelocity, SetMode
+from tests.support.mavlink_vehicle import Station
+from tests.support.notices import Notices
+from tests.support.tlog import messages
 
 SETTINGS = GuidanceSettings()
 
@@ -26,8 +34,10 @@ def look(heading_deg: float) -> ControlCommand:
 
 def times_sent(guides, confirmed: bool | None = True, kind: type = GuidedPosition) -> list[float]:
     """When setpoints of a kind went out; ``guides``: time and guide, tick by tick."""
-    outbox = Outbox(SETTINGS)
-    return [t for t, guide in guides if any(isinstance(c, kind) for c in outbox.due(guide, t, confirmed))]
+    sent = SentSetpoints()
+    return [
+        t for t, guide in guides if any(isinstance(c, kind) for c in sent.due(guide, t, SETTINGS, confirmed=confirmed))
+    ]
 
 
 def ticks(until_s: float, step_s: float = 0.05) -> list[float]:
@@ -35,20 +45,20 @@ def ticks(until_s: float, step_s: float = 0.05) -> list[float]:
 
 
 def test_a_target_that_stays_is_repeated_and_no_more():
-    sent = times_sent([(t, drive(8.0)) for t in ticks(5.0)])
-    assert sent == [0.0, 1.0, 2.0, 3.0, 4.0]
+    times_s = times_sent([(t, drive(8.0)) for t in ticks(5.0)])
+    assert times_s == [0.0, 1.0, 2.0, 3.0, 4.0]
 
 
 def test_a_target_that_rolls_ahead_is_sent_sooner_but_not_at_every_tick():
-    sent = times_sent([(t, drive(8.0 + 2.0 * t)) for t in ticks(4.0)])
-    gaps = [b - a for a, b in pairwise(sent)]
+    times_s = times_sent([(t, drive(8.0 + 2.0 * t)) for t in ticks(4.0)])
+    gaps = [b - a for a, b in pairwise(times_s)]
     assert all(SETTINGS.change_after_s - 1e-9 <= gap <= SETTINGS.resend_s for gap in gaps)
-    assert len(sent) >= 8
+    assert len(times_s) >= 8
 
 
 def test_small_movements_of_a_target_wait_for_the_next_repetition():
-    sent = times_sent([(t, drive(8.0 + 0.1 * t)) for t in ticks(3.0)])
-    assert sent == [0.0, 1.0, 2.0]
+    times_s = times_sent([(t, drive(8.0 + 0.1 * t)) for t in ticks(3.0)])
+    assert times_s == [0.0, 1.0, 2.0]
 
 
 @pytest.mark.parametrize(("confirmed", "count"), [(True, 3), (None, 3), (False, 6)])
@@ -58,19 +68,21 @@ def test_what_the_autopilot_does_not_follow_is_said_again_sooner(confirmed, coun
 
 def test_stopping_goes_out_at_once_and_is_kept_alive():
     """The autopilot stops by itself 3 s after the last velocity."""
-    sent = times_sent([(t, ControlCommand(Motion.BRAKE, STOP, 0.0)) for t in ticks(2.0)], kind=GuidedVelocity)
-    assert sent[0] == 0.0 and max(b - a for a, b in pairwise(sent)) < 1.0
-    outbox = Outbox(SETTINGS)
-    outbox.due(drive(8.0), 0.0, True)
-    assert outbox.due(ControlCommand(Motion.BRAKE, STOP, 0.0), 0.05, True) == [STOP]
-    assert GuidedPosition(NedPoint(8.0, 0.0)) in outbox.due(drive(8.0), 0.1, True), "and so does driving on"
+    times_s = times_sent([(t, ControlCommand(Motion.BRAKE, STOP, 0.0)) for t in ticks(2.0)], kind=GuidedVelocity)
+    assert times_s[0] == 0.0 and max(b - a for a, b in pairwise(times_s)) < 1.0
+    sent = SentSetpoints()
+    sent.due(drive(8.0), 0.0, SETTINGS, confirmed=True)
+    assert sent.due(ControlCommand(Motion.BRAKE, STOP, 0.0), 0.05, SETTINGS, confirmed=True) == [STOP]
+    assert GuidedPosition(NedPoint(8.0, 0.0)) in sent.due(drive(8.0), 0.1, SETTINGS, confirmed=True), (
+        "and so does driving on"
+    )
 
 
 def test_a_changed_velocity_goes_out_at_once():
-    outbox = Outbox(SETTINGS)
-    outbox.due(ControlCommand(Motion.BRAKE, STOP, 0.0), 0.0, None)
+    sent = SentSetpoints()
+    sent.due(ControlCommand(Motion.BRAKE, STOP, 0.0), 0.0, SETTINGS, confirmed=None)
     back = GuidedVelocity(-0.4, 0.0)
-    assert outbox.due(ControlCommand(Motion.DRIVE, back, 0.0), 0.05, None) == [back]
+    assert sent.due(ControlCommand(Motion.DRIVE, back, 0.0), 0.05, SETTINGS, confirmed=None) == [back]
 
 
 def test_headings_are_repeated_slowly_and_followed_when_they_turn():
@@ -82,9 +94,12 @@ def test_headings_are_repeated_slowly_and_followed_when_they_turn():
 
 def test_speed_goes_with_positions_when_it_changes_and_now_and_then():
     def speeds(guides):
-        outbox = Outbox(SETTINGS)
+        sent = SentSetpoints()
         return [
-            (t, c.speed_m_s) for t, guide in guides for c in outbox.due(guide, t, True) if isinstance(c, ChangeSpeed)
+            (t, c.speed_m_s)
+            for t, guide in guides
+            for c in sent.due(guide, t, SETTINGS, confirmed=True)
+            if isinstance(c, ChangeSpeed)
         ]
 
     steady = speeds([(t, drive(8.0, 2.0)) for t in ticks(7.0)])
@@ -97,8 +112,34 @@ def test_speed_goes_with_positions_when_it_changes_and_now_and_then():
 
 
 def test_after_a_reset_everything_is_new():
-    outbox = Outbox(SETTINGS)
-    outbox.due(drive(8.0), 0.0, True)
-    assert outbox.due(drive(8.0), 0.1, True) == []
-    outbox.reset()
-    assert outbox.due(drive(8.0), 0.2, True) == [GuidedPosition(NedPoint(8.0, 0.0)), ChangeSpeed(2.0)]
+    sent = SentSetpoints()
+    sent.due(drive(8.0), 0.0, SETTINGS, confirmed=True)
+    assert sent.due(drive(8.0), 0.1, SETTINGS, confirmed=True) == []
+    sent.reset()
+    assert sent.due(drive(8.0), 0.2, SETTINGS, confirmed=True) == [GuidedPosition(NedPoint(8.0, 0.0)), ChangeSpeed(2.0)]
+
+
+AHEAD = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(8.0, 0.0)), 2.0)
+
+
+@pytest.mark.parametrize("origin", [True, False])
+def test_a_place_in_degrees_needs_the_origin(origin: bool) -> None:
+    near, far = MemoryLink.pair()
+    settings, rover, notices = LinkSettings(setpoint="global"), Station(), Notices()
+    autopilot = AutopilotLink(near, Codec(settings), settings, NullRecorder())
+    far.write(rover.heartbeat(15) + (rover.origin() if origin else b""))
+    list(autopilot.poll(0.0))
+    sender = SetpointSender(autopilot, LiveSettings(Settings()), notices)
+    sender.speak(AHEAD, 0.1)
+    sent = messages(far.read())
+    place = "SET_POSITION_TARGET_GLOBAL_INT" if origin else "SET_POSITION_TARGET_LOCAL_NED"
+    assert [message.get_type() for message in sent] == [place, "COMMAND_LONG"]
+    assert [text[:9] for text in notices.texts] == ([] if origin else ["Stopping:"])
+    if not origin:
+        assert (sent[0].vx, sent[0].vy, sent[0].yaw_rate) == (0.0, 0.0, 0.0), "a standstill"
+    sender.speak(AHEAD, 0.2)
+    assert messages(far.read()) == [], "nothing is due again yet"
+    sender.speak(None, 0.3)
+    assert messages(far.read()) == [], "nothing to say"
+    sender.speak(SetMode(4), 0.4)
+    assert [message.command for message in messages(far.read())] == [176]

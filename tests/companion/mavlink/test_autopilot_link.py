@@ -11,7 +11,7 @@ from companion.core.round_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
-from companion.operator.reporting import FAULT_AFTER_S, Reporter
+from companion.operator.notifications import FAULT_AFTER_S, Notifier
 from companion.settings import LinkSettings
 from companion.vehicle.commands import (
     Arm,
@@ -25,6 +25,7 @@ from companion.vehicle.commands import (
 )
 from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen
 from tests.support.mavlink_vehicle import Station
+from tests.support.notices import HandClock
 from tests.support.tlog import messages
 
 
@@ -176,8 +177,8 @@ def test_that_the_sticks_are_never_seen_is_told_but_not_that_they_are_seen_seldo
     feed_rates(bench, 10.0, 20.0, steady)
     (fault,) = bench.link.rate_faults
     assert (fault.name, fault.means) == ("RC_CHANNELS", "the pilot's sticks are not seen")
-    reporter = Reporter([])
-    assert [reporter.faults((fault,), "", time_s) for time_s in (0.0, FAULT_AFTER_S, 100.0)] == [
+    notifier = Notifier(bench.link, HandClock(), [])
+    assert [notifier.lasting_faults((fault,), "", time_s) for time_s in (0.0, FAULT_AFTER_S, 100.0)] == [
         [],
         ["RC_CHANNELS: 0.0 Hz instead of 5, asking again: the pilot's sticks are not seen"],
         [],

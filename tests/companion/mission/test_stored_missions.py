@@ -7,15 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from companion.executive.plan_watch import PlanWatch
-from companion.mavlink.download import Downloaded, Downloads
 from companion.mission.items import Item
 from companion.mission.load import load_mission
 from companion.mission.mission import HomePoint, MissionError
 from companion.mission.stored import digest, mission_of
-from companion.vehicle.events.plan import PlanChangedSeen, PlanItemSeen, PlanKind
-from companion.vehicle.events.targets import ItemCurrentSeen
-from companion.vehicle.events.vehicle import TextSeen
 from tests.companion.mission.test_qgc_missions import do, waypoint, wpl
 
 HOME = Item(0, 16, 0, (0.0, 0.0, 0.0, 0.0), 53.1, 23.1)
@@ -76,55 +71,3 @@ def test_the_digest_knows_items_and_not_home() -> None:
     moved = Item(0, 16, 0, (0.0, 0.0, 0.0, 0.0), 53.15, 23.1)
     assert digest([moved, *GOING[1:]]) == digest(GOING)
     assert digest([HOME, item(1, 16, 6.0, lat=53.2, lon=23.2), *GOING[2:]]) != digest(GOING)
-
-
-class Shelf(Downloads):
-    """Downloads that are over at once."""
-
-    def __init__(self, items: list[Item]) -> None:
-        super().__init__()
-        self.items, self.asked, self.time_s = items, 0, 0.0
-
-    def ask(self, kind: PlanKind) -> None:
-        assert kind is PlanKind.MISSION
-        self.asked, self.time_s = self.asked + 1, self.time_s + 1.0
-
-    def last(self, kind: PlanKind) -> Downloaded | None:
-        return Downloaded(kind, self.time_s, tuple(self.items)) if self.asked else None
-
-
-SIGNS = {
-    "an upload that came by": [PlanChangedSeen(5.0, 0)],
-    "the autopilot's word": [TextSeen(5.0, 6, "Flight plan received")],
-    "another number of items": [ItemCurrentSeen(4.0, 1, 5), ItemCurrentSeen(5.0, 1, 6)],
-}
-LATER = PlanItemSeen(6.0, 0, 1, 16, 3, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, True)
-
-
-@pytest.mark.parametrize("signs", SIGNS.values(), ids=SIGNS)
-def test_a_mission_that_changes_is_fetched_again_and_told_once(signs: list[object]) -> None:
-    said: list[str] = []
-    shelf = Shelf(GOING[:3])
-    watch = PlanWatch(digest(GOING), shelf, lambda text, severity: said.append(text))
-    for event in (*signs, LATER, LATER, *signs[-1:], LATER):
-        watch.take_in(event)  # type: ignore[arg-type]
-    assert shelf.asked >= 1
-    assert len(said) == 1 and said[0].startswith("The autopilot's mission has changed")
-
-
-@pytest.mark.parametrize("signs", SIGNS.values(), ids=SIGNS)
-def test_the_same_mission_again_is_not_worth_a_word(signs: list[object]) -> None:
-    said: list[str] = []
-    watch = PlanWatch(digest(GOING), Shelf(GOING), lambda text, severity: said.append(text))
-    for event in (*signs, LATER):
-        watch.take_in(event)  # type: ignore[arg-type]
-    assert said == []
-
-
-def test_a_mission_from_a_file_is_compared_with_nothing() -> None:
-    shelf = Shelf(GOING)
-    watch = PlanWatch("", shelf, lambda text, severity: pytest.fail(text))
-    for signs in SIGNS.values():
-        for event in signs:
-            watch.take_in(event)  # type: ignore[arg-type]
-    assert shelf.asked == 0

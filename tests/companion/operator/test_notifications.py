@@ -1,4 +1,4 @@
-"""What is said, and how often."""
+"""What is told, and how often; the status as a terminal or a log file shows it."""
 
 from __future__ import annotations
 
@@ -7,43 +7,73 @@ import io
 from rich.console import Console
 
 from companion.cli.live import Live
+from companion.core.severity import Severity
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.codec import Codec
 from companion.mavlink.rates import RateFault
-from companion.operator.reporting import FAULT_AFTER_S, News, Reporter, Status
+from companion.mavlink.transport import MemoryLink
+from companion.operator.notifications import FAULT_AFTER_S, SAID_KEPT, News, Notifier, Status
+from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, WaitReason
+from companion.settings import LinkSettings
+from tests.support.notices import HandClock
+from tests.support.tlog import messages
 
 SLOW = RateFault(32, 10.0, 1.0)
+WAITING = Activity(RunPhase.WAITING, awaited=Reason(WaitReason.GUIDED))
+DRIVING = Activity(RunPhase.DRIVING)
 
 
-def test_nothing_is_said_twice_in_a_row() -> None:
-    reporter = Reporter([])
-    assert [reporter.say(text, 6) for text in ("a", "a", "b", "a")] == [True, False, True, True]
-    assert reporter.said == [news.text for news in reporter.news] == ["a", "b", "a"]
+def notifier() -> tuple[Notifier, MemoryLink]:
+    near, far = MemoryLink.pair()
+    return Notifier(AutopilotLink(near, Codec(LinkSettings()), LinkSettings()), HandClock(), []), far
+
+
+def test_nothing_is_told_twice_in_a_row_and_what_stays_so_once() -> None:
+    one, far = notifier()
+    for text in ("a", "a", "b", "a"):
+        one.tell(text, Severity.INFO)
+    assert one.said == [news.text for news in one.news] == ["a", "b", "a"]
+    assert [(m.severity, m.text) for m in messages(far.read())] == [(6, "a"), (6, "b"), (6, "a")]
+    one.once("b")
+    one.once("c")
+    assert one.said[3:] == ["c"] and one.news[-1] == News(Severity.WARNING, "c")
+    one.note("autopilot: d", Severity.ERROR)
+    assert one.said[4:] == [] and one.news[-1] == News(Severity.ERROR, "autopilot: d")
+
+
+def test_only_the_newest_texts_are_kept() -> None:
+    one, _ = notifier()
+    for number in range(SAID_KEPT + 5):
+        one.tell(f"{number}", Severity.INFO)
+    assert (len(one.said), one.said[0]) == (SAID_KEPT, "5")
 
 
 def test_a_low_rate_is_told_once_and_only_when_it_lasts() -> None:
-    reporter = Reporter([])
-    assert reporter.faults((SLOW,), "", 0.0) == []
-    assert reporter.faults((), "", 3.0) == []
-    assert reporter.faults((SLOW,), "", 4.0) == []
-    assert reporter.faults((SLOW,), "", 4.0 + FAULT_AFTER_S) == [
+    one, _ = notifier()
+    assert one.lasting_faults((SLOW,), "", 0.0) == []
+    assert one.lasting_faults((), "", 3.0) == []
+    assert one.lasting_faults((SLOW,), "", 4.0) == []
+    assert one.lasting_faults((SLOW,), "", 4.0 + FAULT_AFTER_S) == [
         "LOCAL_POSITION_NED: 1.0 Hz instead of 10, asking again"
     ]
-    assert reporter.faults((RateFault(32, 10.0, 2.0),), "", 30.0) == []
-    assert reporter.faults((), "the record has ended", 31.0) == ["the record has ended"]
-    assert reporter.faults((), "the record has ended", 32.0) == []
+    assert one.lasting_faults((RateFault(32, 10.0, 2.0),), "", 30.0) == []
+    assert one.lasting_faults((), "the record has ended", 31.0) == ["the record has ended"]
+    assert one.lasting_faults((), "the record has ended", 32.0) == []
 
 
-def status(doing: str, *news: str, target: str = "", time_s: float = 0.0) -> Status:
-    return Status(time_s, doing, None, None, target, 1, 2, 7, tuple(News(6, text) for text in news))
+def status(activity: Activity, *news: str, target: str = "", time_s: float = 0.0) -> Status:
+    told = tuple(News(Severity.INFO, text) for text in news)
+    return Status(time_s, activity, None, None, target, 1, 2, 7, told)
 
 
 def test_without_a_terminal_every_change_is_a_line() -> None:
     out = io.StringIO()
     with Live(Console(file=out), "Yard") as live:
         for seen in (
-            status("waiting for GUIDED"),
-            status("waiting for GUIDED"),
-            status("driving", "Heading for [gate]", target="gate"),
-            status("driving", target="gate"),
+            status(WAITING),
+            status(WAITING),
+            status(DRIVING, "Heading for [gate]", target="gate"),
+            status(DRIVING, target="gate"),
         ):
             live.show(seen)
     assert out.getvalue().splitlines() == [
@@ -56,8 +86,8 @@ def test_without_a_terminal_every_change_is_a_line() -> None:
 def test_on_a_terminal_one_line_changes_and_news_stay() -> None:
     out = io.StringIO()
     with Live(Console(file=out, force_terminal=True, width=100), "Yard") as live:
-        live.show(status("driving", "Heading for gate", target="gate", time_s=1.0))
-        live.show(status("driving", target="[b]", time_s=2.0))
+        live.show(status(DRIVING, "Heading for gate", target="gate", time_s=1.0))
+        live.show(status(DRIVING, target="[b]", time_s=2.0))
         assert live._spinner is not None
         shown = live._spinner.renderable.text
     assert "Yard: Heading for gate" in out.getvalue()
@@ -76,6 +106,6 @@ class FullDisk(io.StringIO):
 def test_a_full_disk_ends_the_show_and_not_the_run() -> None:
     out = FullDisk()
     with Live(Console(file=out), "Yard") as live:
-        for doing in ("connecting", "driving", "done"):
-            live.show(status(doing))
+        for activity in (Activity(RunPhase.CONNECTING), DRIVING, Activity(RunPhase.ENDED, Reason(EndReason.DONE))):
+            live.show(status(activity))
     assert out.getvalue() == "Yard: connecting\n"

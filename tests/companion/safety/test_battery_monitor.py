@@ -7,8 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.safety.battery_monitor import STALE_S, BatteryMonitor, BatteryState, Level, judged, with_battery
+from companion.safety.reasons import PowerReason, Reason, WaitReason
 from companion.settings import PowerSettings
 from companion.vehicle.events.plan import BatterySeen
+from companion.vehicle.state import VehicleState
 
 SETTINGS = PowerSettings(return_percent=20.0, hold_percent=10.0, return_volts=11.0, hold_volts=10.0, after_s=5.0)
 
@@ -30,19 +32,19 @@ def steady(
 @pytest.mark.parametrize(
     ("percent", "volts", "level", "reason"),
     [
-        (20, 11.0, Level.FINE, ""),
-        (19, 12.0, Level.RETURN, "battery at 19 %"),
-        (50, 10.9, Level.RETURN, "battery at 10.9 V"),
-        (10, 12.0, Level.RETURN, "battery at 10 %"),
-        (9, 12.0, Level.HOLD, "battery at 9 %"),
-        (None, 9.9, Level.HOLD, "battery at 9.9 V"),
-        (0, 12.0, Level.HOLD, "battery at 0 %"),
-        (None, None, Level.FINE, ""),
+        (20, 11.0, Level.FINE, None),
+        (19, 12.0, Level.RETURN, PowerReason.CHARGE),
+        (50, 10.9, Level.RETURN, PowerReason.VOLTAGE),
+        (10, 12.0, Level.RETURN, PowerReason.CHARGE),
+        (9, 12.0, Level.HOLD, PowerReason.CHARGE),
+        (None, 9.9, Level.HOLD, PowerReason.VOLTAGE),
+        (0, 12.0, Level.HOLD, PowerReason.CHARGE),
+        (None, None, Level.FINE, None),
     ],
 )
-def test_levels(percent: int | None, volts: float | None, level: Level, reason: str) -> None:
+def test_levels(percent: int | None, volts: float | None, level: Level, reason: PowerReason | None) -> None:
     state = fed(steady(percent, volts))
-    assert (state.level, state.reason) == (level, reason)
+    assert (state.level, None if state.reason is None else state.reason.kind) == (level, reason)
 
 
 def test_it_takes_a_while_without_a_break() -> None:
@@ -55,11 +57,12 @@ def test_it_takes_a_while_without_a_break() -> None:
 def test_a_level_never_goes_back_but_a_rover_that_has_not_begun_may() -> None:
     power = BatteryMonitor(SETTINGS)
     for i in range(12):
-        power.take_in(BatterySeen(0.5 * i, 0, 12.0, 15))
+        power.take(BatterySeen(0.5 * i, 0, 12.0, 15), VehicleState())
         power.level(0.5 * i)
-    power.take_in(BatterySeen(7.0, 0, 12.6, 100))
-    assert power.level(7.0) is Level.RETURN and power.reason == "battery at 15 %"
-    assert power.hindrance(7.0) == ""
+    assert power.awaited(6.0) == Reason(WaitReason.CHARGED_BATTERY, (power.reason,))
+    power.take(BatterySeen(7.0, 0, 12.6, 100), VehicleState())
+    assert power.level(7.0) is Level.RETURN and power.reason == Reason(PowerReason.CHARGE, ("battery", 15))
+    assert power.awaited(7.0) is None
 
 
 def test_a_reading_that_has_grown_old_says_nothing() -> None:
@@ -79,7 +82,7 @@ def test_the_short_form_counts_only_where_there_is_no_other() -> None:
 def test_any_of_several_batteries_counts_and_is_named() -> None:
     state = with_battery(with_battery(BatteryState(), BatterySeen(0.0, 0, 12.0, 80)), BatterySeen(0.0, 1, 12.0, 12))
     state = judged(judged(state, 0.0, SETTINGS), 5.0, SETTINGS)
-    assert (state.level, state.reason) == (Level.RETURN, "battery 2 at 12 %")
+    assert (state.level, state.reason) == (Level.RETURN, Reason(PowerReason.CHARGE, ("battery 2", 12)))
 
 
 @pytest.mark.parametrize(
@@ -106,4 +109,4 @@ def test_whatever_comes_the_level_only_rises_and_has_a_reason(readings: list[tup
         before = state.level
         state = judged(with_battery(state, BatterySeen(float(i), 0, volts, percent)), float(i), SETTINGS)
         assert state.level >= before
-        assert bool(state.reason) == (state.level > Level.FINE)
+        assert (state.reason is not None) == (state.level > Level.FINE)

@@ -12,15 +12,13 @@ from hypothesis import strategies as st
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
-from companion.safety.mode_latch import unsafe_reason
-from companion.settings import LinkSettings, SafetySettings
+from companion.safety.reasons import Doubt
+from companion.settings import LinkSettings
 from companion.vehicle.commands import AskTime
 from companion.vehicle.events.vehicle import HeartbeatSeen, LocalPositionSeen, RoverMode
 from companion.vehicle.link_latency import Latency, TimeAnswered, answered, reported
 from companion.vehicle.state import fold
-from tests.companion.safety.test_mode_latch import vehicle
-
-SETTINGS = SafetySettings()
+from tests.companion.safety.test_mode_latch import doubt_of, vehicle
 
 
 def run(down_s: float, up_s: float, seconds: float, latency: Latency, start_s: float, drift: float = 0.0) -> Latency:
@@ -88,35 +86,35 @@ def test_a_clock_that_jumps_ahead_is_a_jump_and_no_delay():
 
 
 def test_a_clock_that_jumps_ahead_stops_the_rover_for_a_moment_and_moves_nothing():
-    state, reasons = vehicle(10.0), []
+    state, doubts = vehicle(10.0), []
     for i in range(1, 40):
         now_s = 10.0 + 0.1 * i
         boot_s = now_s + (30.0 if i >= 20 else 0.0)
         state = fold(state, LocalPositionSeen(now_s, boot_s, 0.1 * i, 0.0, 1.0, 0.0))
         assert state.jump_m < 0.2 and not state.frozen
         fresh = replace(vehicle(now_s), position=state.position, latency=state.latency)
-        reasons.append(unsafe_reason(fresh, now_s, SETTINGS))
-    assert set(reasons[:19]) == set(reasons[24:]) == {""}
-    assert set(reasons[19:24]) == {"the autopilot's clock has jumped"}
+        doubts.append(doubt_of(fresh, now_s))
+    assert set(doubts[:19]) == set(doubts[24:]) == {None}
+    assert set(doubts[19:24]) == {Doubt.CLOCK_JUMPED}
 
 
 def test_a_clock_that_runs_back_stops_the_rover_until_a_person_sets_guided():
     state = fold(vehicle(10.0), LocalPositionSeen(10.1, 2.0, 0.0, 0.0, 0.0, 0.0))
-    assert unsafe_reason(state, 10.1, SETTINGS) == "the autopilot's clock has run back"
+    assert doubt_of(state, 10.1) is Doubt.AUTOPILOT_RESTARTED
     state = fold(state, HeartbeatSeen(10.2, RoverMode.GUIDED, True, 1))
     assert state.restarted
     state = fold(state, HeartbeatSeen(10.3, RoverMode.HOLD, True, 1))
     state = fold(state, HeartbeatSeen(10.4, RoverMode.GUIDED, True, 1))
-    assert unsafe_reason(state, 10.4, SETTINGS) == ""
+    assert doubt_of(state, 10.4) is None
 
 
 @pytest.mark.parametrize(("round_trip_s", "safe"), [(0.9, True), (1.1, False)])
 def test_a_link_later_than_the_limit_is_unsafe(round_trip_s: float, safe: bool):
     state = vehicle(10.0)
     for _ in range(3):
-        assert unsafe_reason(state, 10.0, SETTINGS) == "", "two late answers are chance"
+        assert doubt_of(state, 10.0) is None, "two late answers are chance"
         state = fold(state, TimeAnswered(10.0, round((10.0 - round_trip_s) * 1e9)))
-    assert (unsafe_reason(state, 10.0, SETTINGS) == "") is safe
+    assert doubt_of(state, 10.0) is (None if safe else Doubt.LINK_LATE)
     assert state.latency_s == pytest.approx(round_trip_s)
 
 

@@ -1,4 +1,4 @@
-"""Who may drive: the pilot-wins latch and the watchdogs as a table, and the way to the first metre."""
+"""Who may drive: the mode latch as a table."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from hypothesis import strategies as st
 
 from companion.core.frames import GeoPoint
 from companion.core.scan import RangeScan
-from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, check, latched, unsafe_reason
-from companion.settings import SafetySettings
-from companion.supervision.startup import start_step
-from companion.vehicle.commands import Arm, SetMode
+from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched, other_mode
+from companion.safety.reasons import Doubt, LatchReason, Reason, WaitReason
+from companion.safety.watchdogs import DataMonitor, SticksMonitor, first_doubt
+from companion.settings import SafetySettings, Settings
+from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events.vehicle import (
     AttitudeSeen,
     EkfStatusSeen,
@@ -48,10 +49,26 @@ def vehicle(now_s: float = 10.0, mode: int = GUIDED, *, armed: bool = True, ekf:
     )
 
 
+def doubt_of(seen: VehicleState, now_s: float) -> Doubt | None:
+    """What the sticks and the data give reason to doubt."""
+    monitors = (SticksMonitor(), DataMonitor(LiveSettings(Settings())))
+    for monitor in monitors:
+        monitor.take(EkfStatusSeen(now_s, 0), seen)
+    found = first_doubt(monitors, now_s)
+    return None if found is None else found.kind
+
+
+def checked(watch: LatchState, seen: VehicleState, now_s: float) -> tuple[LatchState, Verdict]:
+    """The latch, told of that."""
+    found = doubt_of(seen, now_s)
+    return check(watch, seen, now_s, SETTINGS, None if found is None else Reason(found))
+
+
 UNSAFE = vehicle(ekf=0)
 NOBODY, OURS, THEIRS = LatchState(), LatchState(Control.COMPANION), LatchState(Control.PERSON)
 STOPPED = LatchState(Control.COMPANION, unsafe_since_s=9.0)
 LONG_STOPPED = LatchState(Control.COMPANION, unsafe_since_s=8.0)
+JUMPED = Reason(Doubt.POSITION_JUMPED)
 HELD = LatchState(Control.PERSON, 7.0, hold_sent=True)
 
 
@@ -86,13 +103,13 @@ HELD = LatchState(Control.PERSON, 7.0, hold_sent=True)
     ],
 )
 def test_latch_and_watchdogs(watch, seen, reaction, control):
-    after, verdict = check(watch, seen, 10.0, SETTINGS)
+    after, verdict = checked(watch, seen, 10.0)
     assert (verdict.reaction, after.control) == (reaction, control)
-    assert bool(verdict.reason) == (reaction in (Reaction.STOP, Reaction.HOLD)) or reaction is Reaction.SILENT
+    assert (verdict.reason is not None) == (reaction in (Reaction.STOP, Reaction.HOLD)) or reaction is Reaction.SILENT
 
 
 def test_after_our_own_hold_a_person_gives_the_rover_back():
-    watch, verdict = check(LONG_STOPPED, UNSAFE, 10.0, SETTINGS)
+    watch, verdict = checked(LONG_STOPPED, UNSAFE, 10.0)
     assert verdict.reaction is Reaction.HOLD
     for seen, reaction in (
         (vehicle(10.1), Reaction.SILENT),  # the heartbeat of before
@@ -100,30 +117,36 @@ def test_after_our_own_hold_a_person_gives_the_rover_back():
         (vehicle(12.0, HOLD), Reaction.SILENT),
         (vehicle(13.0, GUIDED), Reaction.DRIVE),
     ):
-        watch, verdict = check(watch, seen, seen.heartbeat.time_s, SETTINGS)
+        watch, verdict = checked(watch, seen, seen.heartbeat.time_s)
         assert verdict.reaction is reaction
 
 
 def test_a_hold_that_was_lost_is_sent_again_when_the_vehicle_is_heard_again():
-    watch, _ = check(LONG_STOPPED, UNSAFE, 10.0, SETTINGS)
+    watch, _ = checked(LONG_STOPPED, UNSAFE, 10.0)
     silent = vehicle(10.0)
     for now_s in (11.0, 15.0, 30.0):
-        watch, verdict = check(watch, silent, now_s, SETTINGS)
+        watch, verdict = checked(watch, silent, now_s)
         assert verdict.reaction is Reaction.SILENT, "nobody there"
-    watch, verdict = check(watch, vehicle(31.0), 31.0, SETTINGS)
+    watch, verdict = checked(watch, vehicle(31.0), 31.0)
     assert verdict.reaction is Reaction.HOLD
-    watch, verdict = check(watch, vehicle(31.1), 31.1, SETTINGS)
+    watch, verdict = checked(watch, vehicle(31.1), 31.1)
     assert verdict.reaction is Reaction.SILENT
-    watch, verdict = check(watch, vehicle(32.0, HOLD), 32.0, SETTINGS)
+    watch, verdict = checked(watch, vehicle(32.0, HOLD), 32.0)
     assert (watch, verdict.reaction) == (THEIRS, Reaction.SILENT)
 
 
-def test_a_doubt_of_the_callers_own_stops_and_holds():
-    watch, verdict = check(OURS, vehicle(), 10.0, SETTINGS, "position jumped")
-    assert verdict == Verdict(Reaction.STOP, "position jumped")
-    assert check(watch, vehicle(11.0), 11.0, SETTINGS)[1].reaction is Reaction.DRIVE
-    watch, verdict = check(watch, vehicle(12.0), 12.0, SETTINGS, "position jumped")
-    assert verdict == Verdict(Reaction.HOLD, "position jumped")
+def test_any_doubt_stops_and_holds():
+    watch, verdict = check(OURS, vehicle(), 10.0, SETTINGS, JUMPED)
+    assert verdict == Verdict(Reaction.STOP, JUMPED)
+    assert check(watch, vehicle(11.0), 11.0, SETTINGS, None)[1].reaction is Reaction.DRIVE
+    watch, verdict = check(watch, vehicle(12.0), 12.0, SETTINGS, JUMPED)
+    assert verdict == Verdict(Reaction.HOLD, JUMPED)
+
+
+def test_sticks_that_were_moved_are_a_hold_at_once():
+    sticks = Reason(Doubt.STICKS_MOVED)
+    watch, verdict = check(OURS, vehicle(), 10.0, SETTINGS, sticks)
+    assert verdict == Verdict(Reaction.HOLD, sticks) and watch.control is Control.PERSON
 
 
 @pytest.mark.parametrize("control", list(Control))
@@ -131,14 +154,6 @@ def test_the_latch_follows_the_mode(control):
     assert latched(control, VehicleState()) is (Control.NOBODY if control is Control.NOBODY else Control.PERSON)
     assert latched(control, vehicle()) is Control.COMPANION
     assert latched(control, vehicle(mode=HOLD)) is (Control.NOBODY if control is Control.NOBODY else Control.PERSON)
-
-
-@pytest.mark.parametrize("mode", [MANUAL, HOLD])
-@pytest.mark.parametrize("armed", [True, False])
-def test_a_rover_that_a_person_took_out_of_guided_is_not_put_back(mode, armed):
-    seen = vehicle(mode=mode, armed=armed)
-    step = start_step(seen, 10.0, SETTINGS, arm=True, control=Control.PERSON)
-    assert step.command is None and "a person to set GUIDED" in step.missing
 
 
 def test_a_short_gap_stops_and_does_not_hold():
@@ -151,7 +166,7 @@ def test_a_short_gap_stops_and_does_not_hold():
         (14.9, replace(vehicle(14.9), ekf=EkfStatusSeen(14.9, 0)), Reaction.STOP),
         (15.0, replace(vehicle(15.0), ekf=EkfStatusSeen(15.0, 0)), Reaction.HOLD),
     ):
-        watch, verdict = check(watch, seen, now_s, SETTINGS)
+        watch, verdict = checked(watch, seen, now_s)
         assert verdict.reaction is reaction, now_s
 
 
@@ -160,52 +175,36 @@ def test_whatever_happens_setpoints_go_out_only_while_guided_and_armed(story):
     watch = LatchState()
     for i, (mode, armed, good) in enumerate(story):
         now_s = 0.7 * i
-        watch, verdict = check(watch, vehicle(now_s, mode, armed=armed, ekf=EKF_GOOD if good else 0), now_s, SETTINGS)
+        watch, verdict = checked(watch, vehicle(now_s, mode, armed=armed, ekf=EKF_GOOD if good else 0), now_s)
         if verdict.reaction is not Reaction.SILENT:
             assert mode == GUIDED and armed
         if verdict.reaction is Reaction.DRIVE:
             assert good
 
 
-@pytest.mark.parametrize("name", ["heartbeat", "position", "attitude", "scan_ahead", "ekf"])
-def test_what_is_missing_or_stale_is_unsafe(name):
-    good = vehicle(10.0)
-    assert unsafe_reason(good, 10.9, SETTINGS) == ""
-    assert unsafe_reason(replace(good, **{name: None}), 10.0, SETTINGS).startswith("no ")
-    limit_s = SETTINGS.heartbeat_s if name == "heartbeat" else SETTINGS.stale_s
-    fresh = vehicle(20.0)
-    old = replace(fresh, **{name: getattr(vehicle(20.0 - limit_s - 0.1), name)})
-    assert "silent for" in unsafe_reason(old, 20.0, SETTINGS)
-    assert unsafe_reason(replace(fresh, **{name: getattr(vehicle(20.0 - limit_s), name)}), 20.0, SETTINGS) == ""
-
-
 @pytest.mark.parametrize(
-    ("flags", "ok"), [(831, True), (3 | 8, True), (3 | 16, True), (7, False), (831 | 128, False), (0, False)]
-)
-def test_the_ekf_must_have_a_position(flags, ok):
-    assert (unsafe_reason(vehicle(ekf=flags), 10.0, SETTINGS) == "") is ok
-
-
-@pytest.mark.parametrize(
-    ("seen", "arm", "missing", "command"),
+    ("seen", "now_s", "awaited_kind"),
     [
-        (VehicleState(), True, "heartbeat", None),
-        (replace(vehicle(), origin=None), True, "origin and home", None),
-        (replace(vehicle(), home=None), True, "origin and home", None),
-        (vehicle(ekf=0), True, "good data (EKF", None),
-        (replace(vehicle(), scan_ahead=None), True, "range data", None),
-        (vehicle(mode=MANUAL, armed=False), False, "GUIDED", SetMode(GUIDED)),
-        (vehicle(mode=HOLD, armed=False), False, "GUIDED", SetMode(GUIDED)),
-        (vehicle(mode=HOLD), False, "GUIDED", SetMode(GUIDED)),
-        (vehicle(mode=MANUAL), True, "a person to set GUIDED", None),
-        (vehicle(mode=RoverMode.AUTO), True, "a person to set GUIDED", None),
-        (vehicle(armed=False), True, "arming", Arm()),
-        (vehicle(armed=False), False, "a person to arm", None),
-        (vehicle(), False, "", None),
-        (vehicle(), True, "", None),
+        (vehicle(), 10.0, None),
+        (vehicle(), 10.0 + SETTINGS.heartbeat_s + 0.1, WaitReason.AUTOPILOT_HEARD),
+        (vehicle(mode=HOLD), 10.0, WaitReason.PERSON_SETS_MODE),
+        (vehicle(armed=False), 10.0, WaitReason.PERSON_ARMS_AGAIN),
+        (vehicle(mode=HOLD, armed=False), 10.0, WaitReason.PERSON_SETS_MODE_AND_ARMS),
+        (vehicle(mode=HOLD, ekf=0), 10.0, WaitReason.GOOD_DATA_AND),
     ],
 )
-def test_the_way_to_the_first_metre(seen, arm, missing, command):
-    step = start_step(seen, 10.0, SETTINGS, arm=arm)
-    assert missing in step.missing and bool(missing) == bool(step.missing)
-    assert step.command == command
+def test_what_a_silent_companion_waits_for(seen, now_s, awaited_kind):
+    found = awaited(seen, now_s, SETTINGS)
+    assert (None if found is None else found.kind) is awaited_kind
+
+
+@pytest.mark.parametrize(
+    ("in_auto", "mode", "kind"),
+    [
+        (False, HOLD, LatchReason.OTHER_MODE),
+        (True, HOLD, LatchReason.OTHER_MODE),
+        (True, RoverMode.AUTO, LatchReason.BETWEEN_LEGS),
+    ],
+)
+def test_a_mode_that_is_not_ours_is_named(in_auto, mode, kind):
+    assert other_mode(replace(vehicle(mode=mode), in_auto=in_auto)).kind is kind

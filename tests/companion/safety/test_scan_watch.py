@@ -35,7 +35,7 @@ def noticed_s(readings: list[float], motion: str, bearing_rad: list[float] | Non
     watch = ScanWatch()
     for i in range(50):
         watch.take(scan(0.1 * i, readings, bearing_rad, name), vehicle(0.1 * i, *MOTION[motion]))
-        if watch.reason:
+        if watch.repeating:
             return 0.1 * i
     return math.inf
 
@@ -79,7 +79,7 @@ def test_a_sensor_that_measures_three_times_a_second_and_is_sent_thirty_times_is
     for i in range(300):
         measured = [one + 0.02 * (i // 10) for one in MANY]
         fits += watch.take(scan(i / 30.0, measured), vehicle(i / 30.0, *MOTION["driving"]))
-        assert not watch.reason
+        assert watch.repeating is None
     assert 30 <= fits <= 90, "what is repeated while the rover drives is not put on the map again"
 
 
@@ -88,12 +88,12 @@ def test_it_is_believed_again_when_it_says_something_else_and_another_sensor_doe
     for i in range(20):
         watch.take(scan(0.1 * i, MANY), vehicle(0.1 * i, *MOTION["driving"]))
         watch.take(scan(0.1 * i, [2.0 + 0.01 * i] * 8, name="other"), vehicle(0.1 * i, *MOTION["driving"]))
-    assert watch.reason == "lidar repeats itself"
+    assert watch.repeating == "lidar"
     for i in range(20, 40):
         assert not watch.take(scan(0.1 * i, MANY), vehicle(0.1 * i, *MOTION["standing"])), "standing heals nothing"
-    assert watch.reason
+    assert watch.repeating
     assert watch.take(scan(4.0, [one + 0.01 for one in MANY]), vehicle(4.0, *MOTION["standing"]))
-    assert not watch.reason
+    assert watch.repeating is None
 
 
 def test_a_stuck_sensor_does_not_hide_behind_another_component_with_the_same_message():
@@ -102,7 +102,7 @@ def test_a_stuck_sensor_does_not_hide_behind_another_component_with_the_same_mes
         watch.take(scan(0.1 * i, MANY), vehicle(0.1 * i, *MOTION["driving"]))
         another = replace(scan(0.1 * i, [2.0 + 0.01 * i] * 72), sender=158)
         watch.take(another, vehicle(0.1 * i, *MOTION["driving"]))
-    assert watch.reason == "lidar repeats itself"
+    assert watch.repeating == "lidar"
 
 
 @needs_shared
@@ -122,7 +122,7 @@ def test_a_real_lidar_on_a_real_rover_raises_no_alarm(max_m: float) -> None:
             scan(row[0] / 1e6, range_m.tolist(), np.radians(np.linspace(-120, 120, 72)).tolist()),
             vehicle(row[0] / 1e6, *motion),
         )
-        assert not watch.reason
+        assert watch.repeating is None
         driving += motion[0] > 2 * STUCK_M
         before = row
     assert driving > 100

@@ -5,14 +5,14 @@ from __future__ import annotations
 import pytest
 
 from companion.mavlink.acks import AckKeeper
-from companion.safety.mode_latch import Control, LatchState, Reaction, check
-from companion.settings import SafetySettings
-from companion.supervision.startup import overruled
+from companion.safety.mode_latch import Control, LatchState, Reaction
+from companion.safety.reasons import Doubt, Reason
+from companion.supervision.arming import overruled
 from companion.vehicle.commands import ChangeSpeed, SetMode
 from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen
 from companion.vehicle.rc_input import Sticks, SticksSeen, followed
 from companion.vehicle.state import fold
-from tests.companion.safety.test_mode_latch import HOLD, vehicle
+from tests.companion.safety.test_mode_latch import HOLD, checked, vehicle
 
 
 def after(*places_us: tuple[int, int]) -> Sticks:
@@ -50,13 +50,13 @@ def test_moved_sticks_are_a_hold_at_once_and_then_silence_until_guided_is_set_an
     state = vehicle(10.0)
     for steering_us in (1500, 1900, 1900):
         state = fold(state, SticksSeen(10.0, steering_us, 1500))
-    watch, verdict = check(LatchState(Control.COMPANION), state, 10.0, SafetySettings())
-    assert (verdict.reaction, verdict.reason) == (Reaction.HOLD, "the sticks were moved")
-    assert check(watch, state, 10.1, SafetySettings())[1].reaction is Reaction.SILENT
+    watch, verdict = checked(LatchState(Control.COMPANION), state, 10.0)
+    assert (verdict.reaction, verdict.reason) == (Reaction.HOLD, Reason(Doubt.STICKS_MOVED))
+    assert checked(watch, state, 10.1)[1].reaction is Reaction.SILENT
     for seen, reaction in ((vehicle(11.0, HOLD), Reaction.SILENT), (vehicle(12.0), Reaction.DRIVE)):
         state = fold(state, seen.heartbeat)
         fresh = fold(seen, seen.heartbeat)
-        watch, verdict = check(watch, fresh, seen.heartbeat.time_s, SafetySettings())
+        watch, verdict = checked(watch, fresh, seen.heartbeat.time_s)
         assert verdict.reaction is reaction
     assert not state.sticks.moved
 

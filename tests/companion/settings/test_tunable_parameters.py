@@ -15,8 +15,9 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.mavlink.codec import Codec
-from companion.operator.parameters import ANSWER_S, MOST_OPEN, ParameterServer
+from companion.operator.parameter_server import ANSWER_S, MOST_OPEN, ParameterServer
 from companion.settings import Settings, SettingsError, load_settings
+from companion.settings.live_settings import LiveSettings
 from companion.settings.tunable_parameters import (
     BY_NAME,
     LONGEST_NAME,
@@ -32,7 +33,9 @@ from companion.storage.disk import OsDisk
 from companion.storage.saving import Saver
 from companion.vehicle.commands import TellParameter
 from companion.vehicle.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
+from companion.vehicle.state import VehicleState
 from tests.support.mavlink_vehicle import Station
+from tests.support.notices import Notices
 
 HORIZON = BY_NAME["CMP_HORIZON"]
 
@@ -41,16 +44,15 @@ class Ground:
     """A server with a list of what it says and keeps, and a clock."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[str, int]] = []
+        self.notices = Notices()
+        self.settings = LiveSettings(Settings())
         self.kept: list[Settings] = []
-        self.server = ParameterServer(
-            Settings(), lambda text, severity: self.told.append((text, severity)), self.kept.append
-        )
+        self.server = ParameterServer(self.settings, self.notices, self.kept.append)
         self.now_s = 100.0
 
     def ask(self, *events: object, ticks: int = 1) -> list[TellParameter]:
         for event in events:
-            self.server.take(event)
+            self.server.take(event, VehicleState())
         answers = []
         for _ in range(ticks):
             self.now_s += 0.05
@@ -225,28 +227,28 @@ def test_one_is_read_by_name_or_index_and_others_names_are_not_answered() -> Non
 def test_a_value_is_set_answered_told_and_kept() -> None:
     ground = Ground()
     assert [(a.name, a.value) for a in ground.set("CMP_HORIZON", 6.0)] == [("CMP_HORIZON", 6.0)]
-    assert ground.server.settings.guidance.horizon_m == 6.0
-    assert ground.kept == [ground.server.settings]
-    assert ground.told == [("CMP_HORIZON 8 -> 6", 6)]
+    assert ground.settings.current.guidance.horizon_m == 6.0
+    assert ground.kept == [ground.settings.current]
+    assert ground.notices.told == [("CMP_HORIZON 8 -> 6", 6)]
     ground.set("CMP_HORIZON", 6.0)
-    assert len(ground.kept) == len(ground.told) == 1  # nothing new
+    assert len(ground.kept) == len(ground.notices.told) == 1  # nothing new
     ground.set("CMP_DOUBTS", 1.0)
-    assert ground.told[-1][0] == "CMP_DOUBTS 3 -> 1, from the next leg on"
+    assert ground.notices.told[-1][0] == "CMP_DOUBTS 3 -> 1, from the next leg on"
 
 
 def test_a_wrong_value_is_answered_with_the_old_one_and_the_reason() -> None:
     ground = Ground()
     assert [(a.name, a.value) for a in ground.set("CMP_HORIZON", 600.0)] == [("CMP_HORIZON", 8.0)]
-    assert ground.told == [("CMP_HORIZON stays 8: 600 not in 2..30", 4)]
-    assert ground.kept == [] and ground.server.settings == Settings()
+    assert ground.notices.told == [("CMP_HORIZON stays 8: 600 not in 2..30", 4)]
+    assert ground.kept == [] and ground.settings.current == Settings()
 
 
 def test_the_autopilots_names_are_not_ours_unless_said_to_us() -> None:
     ground = Ground()
     ground.set("WP_SPEED", 2.0, to_us=False)
-    assert ground.told == []
+    assert ground.notices.told == []
     ground.set("WP_SPEED", 2.0)
-    assert ground.told == [("The companion has no parameter WP_SPEED", 4)]
+    assert ground.notices.told == [("The companion has no parameter WP_SPEED", 4)]
 
 
 def test_a_flood_of_changes_is_taken_in_slowly_and_in_bounded_room() -> None:
@@ -254,9 +256,9 @@ def test_a_flood_of_changes_is_taken_in_slowly_and_in_bounded_room() -> None:
     flood = [ParameterChangeAsked(0.0, f"N{i}", 1.0, to_us=True) for i in range(1000)]
     flood += [ParameterChangeAsked(0.0, "CMP_HORIZON", 2.0 + 0.01 * i, to_us=True) for i in range(1000)]
     ground.ask(*flood, ticks=20)
-    assert len(ground.told) <= 6
+    assert len(ground.notices.told) <= 6
     ground.ask(ticks=1000)
-    assert len(ground.told) <= MOST_OPEN
+    assert len(ground.notices.told) <= MOST_OPEN
 
 
 def test_texts_fit_one_statustext() -> None:
@@ -264,8 +266,8 @@ def test_texts_fit_one_statustext() -> None:
         ground = Ground()
         ground.set(parameter.name, 123456.78)
         ground.set(parameter.name, parameter.high if parameter.value(Settings()) != parameter.high else parameter.low)
-        assert len(ground.told) == 2
-        for text, _ in ground.told:
+        assert len(ground.notices.told) == 2
+        for text, _ in ground.notices.told:
             assert len(text) <= 50, text
 
 
@@ -304,7 +306,7 @@ def test_any_name_index_and_value_are_survived(name: bytes, index: int, value: f
     ):
         for event in known.decode(station.pack(message), 1.0):
             ground.ask(event, ticks=10)
-    for text, _ in ground.told:
+    for text, _ in ground.notices.told:
         assert text.isascii() and text.isprintable()
 
 

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from companion.executive.mission_progress import TargetStatus
 from sitl.cli.commands import app
 from sitl.experiments import navigation
 from sitl.experiments.driving import Series, shortfalls
-from sitl.lockstep import Report
+from sitl.lockstep import DriveOutcome, Report
 
 MAP = """type octile
 height 6
@@ -64,7 +65,9 @@ def test_a_map_without_scenarios_is_one_line(tmp_path: Path) -> None:
     assert result.exit_code == 2 and "bare.map.scen" in result.stderr and len(result.stderr.splitlines()) == 1
 
 
-def driven(planner: str, mission: str, time_s: float, steps: int, outcome: str = "reached") -> Series:
+def driven(
+    planner: str, mission: str, time_s: float, steps: int, outcome: DriveOutcome = DriveOutcome.REACHED
+) -> Series:
     return Series(planner, mission, (Report(0, outcome, steps=steps, driving_time_s=time_s),))
 
 
@@ -73,7 +76,7 @@ def test_every_shortfall_of_driving_is_said() -> None:
     text = shortfalls((*good, driven("dstar-lite", "a", 8.0, 100)))
     assert text.count("reached") == 3 and "not reached" not in text
     bad = (
-        driven("hybrid", "b", 11.0, 120, "time limit"),
+        driven("hybrid", "b", 11.0, 120, DriveOutcome.TIME_LIMIT),
         driven("theta-star", "b", 10.0, 90),
         driven("dstar-lite", "b", 8.0, 100),
     )
@@ -83,9 +86,16 @@ def test_every_shortfall_of_driving_is_said() -> None:
 
 
 def test_a_target_missed_counts_in_a_drive_with_a_collision_too() -> None:
-    report = Report(0, "collision", [("gate", "reached"), ("home", "unreachable")], collisions=1)
+    report = Report(
+        0, DriveOutcome.COLLISION, [("gate", TargetStatus.REACHED), ("home", TargetStatus.UNREACHABLE)], collisions=1
+    )
     assert Series("hybrid", "a", (report,)).missed == 1
-    assert Series("hybrid", "a", (Report(0, "collision", [("gate", "reached")], collisions=1),)).missed == 0
+    assert (
+        Series(
+            "hybrid", "a", (Report(0, DriveOutcome.COLLISION, [("gate", TargetStatus.REACHED)], collisions=1),)
+        ).missed
+        == 0
+    )
 
 
 def test_every_shortfall_of_navigation_is_said() -> None:

@@ -7,10 +7,11 @@ import pytest
 
 from companion.core.grid import OBSTACLE, inflated
 from companion.mission.check import check_mission
+from companion.safety.reasons import Activity, Reason, RunPhase, WaitReason
 from sitl.autopilot.state import Mode
 from sitl.experiments import soak, soak_faults
 from sitl.experiments.experiment import Options
-from sitl.experiments.soak import Person, Soaked, SoakReport, soaked
+from sitl.experiments.soak import Ended, Person, Soaked, SoakReport, soaked
 from sitl.experiments.soak_worlds import FINE_M, ROOM_M, drawn, mission_on
 
 
@@ -54,6 +55,9 @@ def test_faults_are_of_every_kind_and_come_while_it_drives() -> None:
     assert plans[7] == soak_faults.plan_of(np.random.default_rng(7))
 
 
+DISARMED = Activity(RunPhase.STOPPED_AND_WAITING, awaited=Reason(WaitReason.PERSON_ARMS_AGAIN))
+
+
 class Vehicle:
     """What the person sees of a run."""
 
@@ -69,19 +73,19 @@ def test_the_person_helps_when_asked_for_long_enough(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(soak, "arm", lambda vehicle: armed.append(vehicle) or True)
     person, run = Person(), Vehicle()
     for run.time_s in np.arange(0.0, 7.5, 0.5):
-        person.look(run, "stopped: disarmed, waiting for a person to arm")  # type: ignore[arg-type]
-    person.look(run, "driving")  # type: ignore[arg-type]
+        person.look(run, DISARMED)  # type: ignore[arg-type]
+    person.look(run, Activity(RunPhase.DRIVING))  # type: ignore[arg-type]
     for run.time_s in np.arange(8.0, 15.5, 0.5):
-        person.look(run, "stopped: disarmed, waiting for a person to arm")  # type: ignore[arg-type]
+        person.look(run, DISARMED)  # type: ignore[arg-type]
     assert (person.helped, modes, armed) == (0, [], [])
     run.time_s = 16.0
-    person.look(run, "stopped: disarmed, waiting for a person to arm")  # type: ignore[arg-type]
+    person.look(run, DISARMED)  # type: ignore[arg-type]
     assert (person.helped, modes, armed) == (1, [Mode.GUIDED], ["the vehicle"])
 
 
 def test_a_run_is_driven_and_repeats() -> None:
     first, again = soaked(0), soaked(0)
-    assert (first.ended, first.collisions, first.error) == ("reached", 0, "")
+    assert (first.ended, first.collisions, first.error) == (Ended.REACHED, 0, "")
     assert first.driven_m > 20.0
     assert (first.driven_m, first.time_s, first.person) == (again.driven_m, again.time_s, again.person)
 
@@ -92,7 +96,7 @@ def test_an_error_is_a_finding_and_not_the_end(monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_the_page_shows_what_was_counted(tmp_path: Path) -> None:
-    runs = [Soaked(seed, "posts", "lidar-90", ("Reboot",), "reached", memory_mb=300.0 + seed) for seed in range(39)]
+    runs = [Soaked(seed, "posts", "lidar-90", ("Reboot",), Ended.REACHED, memory_mb=300.0 + seed) for seed in range(39)]
     runs.append(Soaked(39, "rooms", "lidar-90", collisions=2, error="ValueError: x", memory_mb=340.0))
     report = SoakReport(Options(40), tuple(runs))
     assert report.growth_mb == pytest.approx(20.0, abs=1.0)

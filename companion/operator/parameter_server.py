@@ -1,41 +1,44 @@
-"""The companion's own MAVLink parameters: ground stations list, read and set them."""
+"""The parameter server: ground stations list, read and set the companion's own MAVLink parameters."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 
+from companion.core.severity import Severity, TextSink
 from companion.settings import Settings
-from companion.settings.tunable_parameters import BY_NAME, TABLE, Parameter, RefusedError, changed
+from companion.settings.live_settings import LiveSettings
+from companion.settings.tunable_parameters import BY_NAME, TABLE, RefusedError, changed
 from companion.vehicle.commands import Command, TellParameter
+from companion.vehicle.events.event import Event
 from companion.vehicle.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
+from companion.vehicle.state import VehicleState
 
-INFO, WARNING = 6, 4
 ANSWER_S = 0.05
-"""One PARAM_VALUE of some 37 bytes in so long, however many are asked for: under a kilobyte a second."""
+"""Time for one PARAM_VALUE of some 37 bytes, however many are asked for: under a kilobyte a second."""
 CHANGE_S = 0.2
-"""So often one change is taken in: of a flood for one parameter the newest, so that nobody is flooded with texts."""
+"""One change is taken in this often; of a flood for one parameter the newest, so that no flood of texts follows."""
 MOST_OPEN = 64
 """Changes not taken in yet, those of unknown names among them."""
 
 
 class ParameterServer:
-    """Takes requests at any rate, answers at its own. ``settings`` are the ones in force.
+    """Takes requests at any rate, answers at its own, and replaces the settings in force.
 
-    ``tell`` says a text with its severity; ``keep`` takes the new settings after every change, and must not wait.
+    ``keep`` takes the new settings after every change, and must not wait.
     """
 
     def __init__(
-        self, settings: Settings, tell: Callable[[str, int], None], keep: Callable[[Settings], None] | None = None
+        self, settings: LiveSettings, notifier: TextSink, keep: Callable[[Settings], None] | None = None
     ) -> None:
-        self.settings = settings
-        self._tell = tell
+        self._settings = settings
+        self._notifier = notifier
         self._keep = keep
         self._answers: dict[int, None] = {}
         self._changes: dict[str, ParameterChangeAsked] = {}
         self._answer_s = self._change_s = -math.inf
 
-    def take(self, event: object) -> None:
+    def take(self, event: Event, vehicle: VehicleState) -> None:
         """Note what is asked; anything else is ignored."""
         match event:
             case ParametersAsked():
@@ -61,30 +64,28 @@ class ParameterServer:
         self._answer_s = now_s
         index = next(iter(self._answers))
         del self._answers[index]
-        parameter = TABLE[index]
+        parameter, settings = TABLE[index], self._settings.current
         return [
-            TellParameter(
-                parameter.name, parameter.value(self.settings), index, len(TABLE), whole_number=parameter.whole
-            )
+            TellParameter(parameter.name, parameter.value(settings), index, len(TABLE), whole_number=parameter.whole)
         ]
 
     def _change(self, asked: ParameterChangeAsked) -> None:
         parameter = BY_NAME.get(asked.name)
         if parameter is None:
-            self._tell(f"The companion has no parameter {asked.name:.16}", WARNING)
+            self._notifier.tell(f"The companion has no parameter {asked.name:.16}", Severity.WARNING)
             return
         self._answers[TABLE.index(parameter)] = None
-        before = parameter.value(self.settings)
+        before = parameter.value(self._settings.current)
         try:
-            self.settings = changed(self.settings, parameter, asked.value)
+            settings = changed(self._settings.current, parameter, asked.value)
         except RefusedError as reason:
-            self._tell(f"{parameter.name} stays {before:g}: {reason}", WARNING)
+            self._notifier.tell(f"{parameter.name} stays {before:g}: {reason}", Severity.WARNING)
             return
-        if parameter.value(self.settings) != before:
-            if self._keep is not None:
-                self._keep(self.settings)
-            self._tell(self._news(parameter, before), INFO)
-
-    def _news(self, parameter: Parameter, before: float) -> str:
-        now = parameter.value(self.settings)
-        return f"{parameter.name} {before:g} -> {now:g}{', from the next leg on' if parameter.next_leg else ''}"
+        self._settings.replace(settings)
+        now = parameter.value(settings)
+        if now == before:
+            return
+        if self._keep is not None:
+            self._keep(settings)
+        when = ", from the next leg on" if parameter.next_leg else ""
+        self._notifier.tell(f"{parameter.name} {before:g} -> {now:g}{when}", Severity.INFO)

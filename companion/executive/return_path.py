@@ -1,23 +1,67 @@
-"""Where to go when the battery runs low: back the way the rover came, or to a rally point if the way there is shorter. Pure."""
+"""The return path: the trail that the rover has left, and where to go when the battery runs low.
+
+It goes back the way it came, or to a rally point if the way there is shorter.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from companion.core.frames import NedPoint
 from companion.core.grid import OBSTACLE, Cell
-from companion.executive.trail import Trail
 from companion.mapping.evidence_map import EvidenceMap
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
+from companion.navigation.field_step import fields_between
 from companion.planning.planner import Planner
 from companion.planning.problem import Budget, PlanningProblem
 
 MOST_TRIED = 3
-"""So many rally points, the nearest as the crow flies, are looked at."""
+"""This many rally points, the nearest in a straight line, are looked at."""
+
+
+class Trail:
+    """The way that the rover has come since the mission began, without its loops.
+
+    Fields from the first to the one the rover is in, each 8-adjacent to the one before, none of them twice.
+    """
+
+    def __init__(self) -> None:
+        self._cells: list[Cell] = []
+        self._places: dict[Cell, int] = {}
+
+    def enter(self, cell: Cell) -> None:
+        """The rover is in this field now. Entering a field anew cuts off all that came after it."""
+        if self._cells and self._cells[-1] == cell:
+            return
+        if self._cells:
+            for between in fields_between(self._cells[-1], cell):
+                self._append(between)
+        self._append(cell)
+
+    def back(self) -> tuple[Cell, ...]:
+        """From the field the rover is in to the first one."""
+        return tuple(reversed(self._cells))
+
+    @property
+    def length_fields(self) -> float:
+        """Length in fields; a diagonal step is sqrt 2."""
+        return sum(math.hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(self._cells))
+
+    def _append(self, cell: Cell) -> None:
+        place = self._places.get(cell)
+        if place is None:
+            self._places[cell] = len(self._cells)
+            self._cells.append(cell)
+            return
+        for gone in self._cells[place + 1 :]:
+            del self._places[gone]
+        del self._cells[place + 1 :]
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,10 +81,11 @@ def refuges(
     evidence: EvidenceMap,
     planner: Planner,
 ) -> list[Refuge]:
-    """The places to try, one after the other: rally points with a way there that is shorter than the way back, then the start.
+    """The places to try, in order: rally points with a way there that is shorter than the way back, then the start.
 
-    The way back is the rover's own trail; where it does not lead to the start (the map was begun anew on the way), its length is taken
-    for that of the straight line. The way to a rally point is the shortest on the map as known; one behind a border is none.
+    The way back is the rover's own trail; where it does not lead to the start (the map was begun anew on the way), the
+    length of the straight line stands for it. The way to a rally point is the shortest on the known map; one behind a
+    border is left out.
     """
     base = evidence.base
     way = trail.back()

@@ -1,0 +1,138 @@
+"""One run of a mission: the vehicle's state, the mode latch, what the run does now, and the mission executor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import Enum, auto
+
+from companion.control.point_controller import STANDSTILL, ControlCommand
+from companion.control.setpoint_check import SetpointCheck
+from companion.core.frames import Pose
+from companion.core.scan import RangeScan
+from companion.core.severity import TextSink
+from companion.executive.auto_mode_legs import AutoModeLegs
+from companion.executive.mission_executor import MissionExecutor, Task
+from companion.executive.mission_layout import MissionLayout
+from companion.executive.mission_progress import MissionProgress, TargetStatus
+from companion.executive.setpoint_sender import SetpointSender
+from companion.mission.mission import Mission
+from companion.safety.mode_latch import LatchState, Reaction, Verdict
+from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.commands import Command, SetMode
+from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.state import VehicleState
+
+MakeExecutor = Callable[[MissionLayout, MissionProgress, RangeScan], MissionExecutor]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LocatedScan:
+    """A scan, and the pose and turn rate of the rover when it came."""
+
+    pose: Pose
+    yaw_rate_rad_s: float
+    scan: RangeScan
+
+
+class Order(Enum):
+    """What to send in one tick where the mission has nothing to say."""
+
+    NOTHING = auto()
+    STOP = auto()
+    HOLD = auto()
+
+
+ORDERS = {Reaction.SILENT: Order.NOTHING, Reaction.STOP: Order.STOP, Reaction.HOLD: Order.HOLD}
+COMMANDS: dict[Order, ControlCommand | Command | None] = {
+    Order.NOTHING: None,
+    Order.STOP: STANDSTILL,
+    Order.HOLD: SetMode(RoverMode.HOLD),
+}
+
+
+class MissionRun:
+    """What all parts of the companion share of a run.
+
+    The listener writes ``vehicle``, the judge ``latch`` and ``stopped``, the supervisor ``end``.
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        vehicle: VehicleState,
+        sender: SetpointSender,
+        settings: LiveSettings,
+        notifier: TextSink,
+        make_executor: MakeExecutor,
+    ) -> None:
+        self.mission = mission
+        self.vehicle = vehicle
+        self.sender = sender
+        self.latch = LatchState()
+        self.executor: MissionExecutor | None = None
+        """None until the mission has begun."""
+        self.activity = Activity(RunPhase.CONNECTING)
+        self.stopped = False
+        """Whether the rover was not to be driven in the last tick."""
+        self.end: Reason[EndReason] | None = None
+        """Why the run ends; None while it goes on."""
+        self.setpoint_check = SetpointCheck(notifier.tell)
+        self.legs = AutoModeLegs(notifier)
+        self._settings = settings
+        self._make_executor = make_executor
+
+    @property
+    def is_driving(self) -> bool:
+        """Whether the mission has begun and the rover is being driven."""
+        return self.executor is not None and not self.stopped and self.end is None
+
+    def statuses(self) -> list[tuple[str, TargetStatus]]:
+        """Every target's name and what has become of it so far."""
+        if self.executor is None:
+            return [(target.name, TargetStatus.PENDING) for target in self.mission.targets]
+        return self.executor.statuses()
+
+    def begin(self, layout: MissionLayout, progress: MissionProgress) -> MissionExecutor:
+        """The rover may be driven for the first time."""
+        seen = self.vehicle.scan_ahead or self.vehicle.scan
+        assert seen is not None
+        self.executor = self._make_executor(layout, progress, seen.scan)
+        return self.executor
+
+    def start_afresh(self) -> None:
+        """Forget what was sent; the rover may have been moved, so the leg begins again where it then is."""
+        self.sender.reset()
+        if self.executor is not None:
+            self.executor.driver.leave()
+
+    def map(self, scans: Iterable[LocatedScan]) -> None:
+        """Take scans into the map."""
+        if self.executor is not None:
+            for seen in scans:
+                self.executor.map_scan(seen.pose, seen.yaw_rate_rad_s, seen.scan)
+
+    def decide(self, verdict: Verdict, now_s: float) -> Task | Order:
+        """What to do in this tick: what the verdict demands, or, if the rover may be driven, what the mission does."""
+        if verdict.reaction is not Reaction.DRIVE or self.executor is None:
+            return ORDERS.get(verdict.reaction, Order.NOTHING)
+        task = self.executor.decide(self.vehicle, now_s)
+        self.activity = Activity(self.executor.phase)
+        return task
+
+    def guide(self, task: Task | Order, now_s: float) -> ControlCommand | Command | None:
+        """The command for that. What the mission wants passes the check of setpoints before it is sent."""
+        if isinstance(task, Order):
+            return COMMANDS[task]
+        if task is Task.END or self.executor is None:
+            return None
+        executor, pose = self.executor, self.vehicle.pose_at(now_s)
+        assert pose is not None
+        wanted = executor.guide(task, self.vehicle, now_s)
+        wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)
+        return self.setpoint_check.passed(wanted, pose, self.vehicle.speed_m_s, executor.surroundings)
+
+    def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:
+        """Send it, if it is new or due again."""
+        self.sender.speak(command, now_s)

@@ -1,0 +1,154 @@
+"""The notifier: texts for the ground station and the terminal; the run's status and outcome as people see them."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from companion.core.clock import Clock
+from companion.core.frames import Pose
+from companion.core.severity import Severity
+from companion.executive.mission_progress import TargetStatus
+from companion.executive.mission_run import MissionRun
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.mavlink.rates import RateFault
+from companion.navigation.field_step import Decision
+from companion.safety.mode_latch import Control
+from companion.safety.reasons import Activity, PowerReason, Reason
+from companion.vehicle.commands import Say
+
+NOT_FOLLOWED_S = 5.0
+"""People are told when the autopilot's read-back has shown another target for this long."""
+FAULT_AFTER_S = 5.0
+"""A message rate that is too low for a moment is not told."""
+STEPS_KEPT = 100_000
+"""The times of this many of the newest rounds are kept."""
+SAID_KEPT = 1000
+"""This many texts are remembered as said."""
+
+
+@dataclass(frozen=True, slots=True)
+class News:
+    """A text and how severe it is."""
+
+    severity: Severity
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """What a person wants to see while it drives. ``news``: what was said, by the autopilot as well, in this tick."""
+
+    time_s: float
+    activity: Activity
+    pose: Pose | None
+    decision: Decision | None
+    target: str
+    targets_reached: int
+    targets: int
+    steps: int
+    news: tuple[News, ...] = ()
+
+    @property
+    def doing(self) -> str:
+        """The activity in words."""
+        return str(self.activity)
+
+
+@dataclass
+class Outcome:
+    """What the run came to. ``step_seconds``: how long the newest ticks took; ``said``: the newest texts."""
+
+    targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
+    step_seconds: deque[float] = field(default_factory=lambda: deque(maxlen=STEPS_KEPT))
+    said: list[str] = field(default_factory=list)
+    broken_off: Reason[PowerReason] | None = None
+    """Why the mission was broken off; None if it was not."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether every target has been reached."""
+        return bool(self.targets) and all(status is TargetStatus.REACHED for _, status in self.targets)
+
+
+class Notifier:
+    """Tells texts to the ground station, none twice in a row, and keeps them in the list ``said``."""
+
+    def __init__(self, autopilot: AutopilotLink, clock: Clock, said: list[str]) -> None:
+        self.said = said
+        self.news: list[News] = []
+        """What was said in this tick, by the autopilot as well."""
+        self._autopilot = autopilot
+        self._clock = clock
+        self._followed_s = clock.now_s()
+        self._slow_since_s: dict[int, float] = {}
+        self._faults_told: set[str] = set()
+
+    def tell(self, text: str, severity: Severity) -> None:
+        """Say it, unless it is what was said last."""
+        if self.said and self.said[-1] == text:
+            return
+        self.said.append(text)
+        del self.said[:-SAID_KEPT]
+        self.note(text, severity)
+        self._autopilot.send(Say(severity, text), self._clock.now_s())
+
+    def once(self, text: str) -> None:
+        """Warn of what stays so, the first time only."""
+        if text not in self.said:
+            self.tell(text, Severity.WARNING)
+
+    def note(self, text: str, severity: Severity) -> None:
+        """Keep a text for the terminal only."""
+        self.news.append(News(severity, text))
+
+    def tell_faults(self, run: MissionRun, now_s: float, problem: str) -> None:
+        """Faults that stop nothing, each told once. ``problem``: of the record or the state file."""
+        if run.vehicle.heartbeat is not None and self._autopilot.signing_trouble:
+            self.once(self._autopilot.signing_trouble)
+        if run.executor is None:
+            return
+        if intruder := self._autopilot.intruder(now_s):
+            self.once(intruder)
+        if run.latch.control is not Control.COMPANION or self._autopilot.target_confirmed is not False:
+            self._followed_s = now_s
+        elif now_s - self._followed_s > NOT_FOLLOWED_S:
+            self.once("The autopilot follows another target than the one sent")
+        for text in self.lasting_faults(self._autopilot.rate_faults, problem, now_s):
+            self.once(text)
+
+    def lasting_faults(self, rates: tuple[RateFault, ...], problem: str, now_s: float) -> list[str]:
+        """The texts for messages that have come too seldom for some time, and for ``problem``; each is given once."""
+        slow = {fault.message_id: self._slow_since_s.get(fault.message_id, now_s) for fault in rates}
+        self._slow_since_s = slow
+        texts = {
+            f"{fault.name} too seldom": _rate_text(fault)
+            for fault in rates
+            if now_s - slow[fault.message_id] >= FAULT_AFTER_S
+        }
+        if problem:
+            texts[problem] = problem
+        new = [text for what, text in texts.items() if what not in self._faults_told]
+        self._faults_told.update(texts)
+        return new
+
+
+def _rate_text(fault: RateFault) -> str:
+    means = f": {fault.means}" if fault.means else ""
+    return f"{fault.name}: {fault.measured_hz:.1f} Hz instead of {fault.wanted_hz:g}, asking again{means}"
+
+
+def status_of(run: MissionRun, notifier: Notifier, now_s: float) -> Status:
+    """A picture of this moment."""
+    executor = run.executor
+    return Status(
+        time_s=now_s,
+        activity=run.activity,
+        pose=run.vehicle.pose_at(now_s),
+        decision=executor.driver.decision if executor else None,
+        target=executor.progress.goal.name if executor and not executor.progress.ended else "",
+        targets_reached=executor.reached if executor else 0,
+        targets=len(run.mission.targets),
+        steps=executor.driver.tally.steps if executor else 0,
+        news=tuple(notifier.news),
+    )

@@ -1,0 +1,167 @@
+"""Reasons and run phases as enums: why the rover must not move, what is awaited, what the run does, why it ended.
+
+The program compares the enums; people, records and the autopilot get the texts, which are made here and nowhere else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, TypeVar
+
+ARM_AGAIN = "arm (or end this run, and start it again with --arm)"
+
+
+class Doubt(Enum):
+    """Why the rover must not move now."""
+
+    STICKS_MOVED = "the sticks were moved"
+    DATA_MISSING = "no {}"
+    DATA_OLD = "{} silent for over {:g} s"
+    EKF_INCOMPLETE = "EKF has no {}"
+    CLOCK_JUMPED = "the autopilot's clock has jumped"
+    LINK_LATE = "link later than {:g} s"
+    AUTOPILOT_RESTARTED = "the autopilot's clock has run back"
+    POSITION_FROZEN = "position stands still while the velocity says otherwise"
+    POSITION_WANDERS = "position wanders"
+    POSITION_WANDERED = "position wandered"
+    POSITION_JUMPED = "position jumped"
+    ORIGIN_MOVED = "EKF origin moved"
+    LOOP_STOOD_STILL = "the companion stood still"
+    LOOP_LATE = "the companion is too slow"
+    PLANNING_LONG = "planning has taken over {:g} s"
+    SCAN_REPEATED = "{} repeats itself"
+    OTHER_COMPANION = "another companion drives this rover"
+    FENCE_BREACHED = "the autopilot's fence is breached"
+    BEYOND_BORDER = "the rover is beyond the border of {}"
+    WAITED_TOO_LONG = "waited too long for {}"
+    """Of a rover that an earlier run left armed in GUIDED."""
+
+
+class LatchReason(Enum):
+    """Why the mode latch keeps the companion from driving."""
+
+    OTHER_MODE = "mode is not {}"
+    BETWEEN_LEGS = "AUTO goes on by itself"
+    DISARMED = "disarmed"
+    HOLD_SENT = "HOLD was asked for"
+    HOLD_LOST = "the first HOLD was not taken"
+
+
+class WaitReason(Enum):
+    """What is awaited before the companion drives, or drives again."""
+
+    HEARTBEAT = "the autopilot's heartbeat{}"
+    """The figure says where was listened."""
+    ORIGIN_AND_HOME = "the autopilot's origin and home"
+    GOOD_DATA = "good data ({})"
+    FENCE = "the autopilot's fence and rally points{}"
+    OTHER_COMPANION_SILENT = "another companion with the same component id to fall silent"
+    OTHER_COMPANION_SIGNS = "signs of another companion (the rover is armed in GUIDED)"
+    CHARGED_BATTERY = "a charged battery ({})"
+    ROOM_TO_BORDER = "the rover to stand {}"
+    ON_THE_GRID = "the rover to stand on the mission's grid"
+    GUIDED = "GUIDED"
+    ARMING = "arming"
+    PERSON_STARTS_AUTO = "a person to arm and to set AUTO (the autopilot drives this mission)"
+    PERSON_SETS_GUIDED = "a person to set GUIDED (somebody is driving)"
+    PERSON_SETS_GUIDED_AGAIN = "a person to set GUIDED (a person has had the rover)"
+    PERSON_ARMS = "a person to arm (or run with --arm)"
+    AUTOPILOT_HEARD = "the autopilot to be heard again"
+    PERSON_SETS_MODE = "a person to set {}"
+    PERSON_ARMS_AGAIN = f"a person to {ARM_AGAIN}"
+    PERSON_SETS_MODE_AND_ARMS = f"a person to set {{}} and {ARM_AGAIN}"
+    GOOD_DATA_AND = "good data ({}) and {}"
+
+
+FOR_A_PERSON = frozenset((
+    WaitReason.PERSON_STARTS_AUTO,
+    WaitReason.PERSON_SETS_GUIDED,
+    WaitReason.PERSON_SETS_GUIDED_AGAIN,
+    WaitReason.PERSON_ARMS,
+    WaitReason.PERSON_SETS_MODE,
+    WaitReason.PERSON_ARMS_AGAIN,
+    WaitReason.PERSON_SETS_MODE_AND_ARMS,
+))  # fmt: skip
+
+
+class PowerReason(Enum):
+    """Why a battery is too low; the first figure names the battery."""
+
+    CHARGE = "{} at {} %"
+    VOLTAGE = "{} at {:.1f} V"
+    LOW = "{} low for the autopilot"
+    CRITICAL = "{} critical for the autopilot"
+
+
+class EndReason(Enum):
+    """Why the run ends."""
+
+    DONE = "done"
+    STOPPED_BY_USER = "stopped by the user"
+    ERROR = "error"
+    BATTERY = "{}"
+
+
+class Refusal(Enum):
+    """Why a place that a person asks for is not driven to."""
+
+    MALFORMED = "{}"
+    """The request itself is wrong; the figure says how."""
+    NOT_DRIVING = "not driving ({})"
+    NO_POSITION = "no position"
+    RETURNING = "the rover is on its way back"
+    ENDED = "the mission is over"
+    TOO_FAR = "{} m away, farther than {:g} m"
+    OFF_THE_GRID = "outside the mission's grid"
+    BEYOND_BORDER = "beyond {}"
+    NEAR_BORDER = "it must be {}"
+    CLOSED = "in or too near a fence or a known obstacle"
+    OBSTACLE_SEEN = "an obstacle was seen there"
+
+
+Kind_co = TypeVar("Kind_co", bound=Enum, covariant=True)
+
+
+@dataclass(frozen=True, slots=True)
+class Reason(Generic[Kind_co]):
+    """A reason and the figures (numbers, names, other reasons) of its text."""
+
+    kind: Kind_co
+    figures: tuple[object, ...] = ()
+
+    def __str__(self) -> str:
+        """The reason in words."""
+        return str(self.kind.value).format(*self.figures)
+
+
+class RunPhase(Enum):
+    """What the run does now. ``{reason}`` and ``{awaited}`` are those of the ``Activity``."""
+
+    CONNECTING = "connecting"
+    WAITING = "waiting for {awaited}"
+    DRIVING = "driving"
+    HOLDING = "holding"
+    WAY_BLOCKED = "waiting for the way to clear"
+    STOPPED = "stopped: {reason}"
+    STOPPED_AND_WAITING = "stopped: {reason}, waiting for {awaited}"
+    ENDED = "{reason}"
+
+
+@dataclass(frozen=True, slots=True)
+class Activity:
+    """What the run does at one moment, and why."""
+
+    phase: RunPhase
+    reason: Reason[Enum] | None = None
+    """Why it is stopped or has ended; None while nobody has had the rover."""
+    awaited: Reason[WaitReason] | None = None
+
+    def __str__(self) -> str:
+        """For people."""
+        return self.phase.value.format(reason=self.reason or "", awaited=self.awaited or "")
+
+    @property
+    def needs_person(self) -> bool:
+        """Whether it goes on only when a person does something, and nothing else is awaited."""
+        return self.awaited is not None and self.awaited.kind in FOR_A_PERSON

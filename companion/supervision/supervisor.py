@@ -1,0 +1,144 @@
+"""The supervisor: decides in each tick whether mission, arming or shutdown goes on; begins the mission and ends the run."""
+
+from __future__ import annotations
+
+from companion.core.clock import Clock
+from companion.core.round_marks import Mark
+from companion.core.severity import Severity, TextSink
+from companion.executive.mission_executor import Task
+from companion.executive.mission_run import MissionRun, Order
+from companion.navigation.step_runner import StepRunner
+from companion.operator.notifications import Outcome
+from companion.recording.recorder import RunLog
+from companion.safety.mode_latch import Reaction, Verdict
+from companion.safety.reasons import EndReason, Reason
+from companion.safety.watchdogs import LoopMonitor
+from companion.supervision.arming import Arming
+from companion.supervision.judge import Judge
+from companion.supervision.keeper import Keeper
+from companion.supervision.localization_monitor import LocalizationMonitor
+from companion.supervision.mission_limits import MissionLimits
+from companion.supervision.pace import Pace
+from companion.supervision.shutdown import Shutdown
+
+SILENT = Verdict(Reaction.SILENT)
+
+
+class LoopWatch:
+    """Tells the loop's monitor how late each round is, and whether the navigator works beside it."""
+
+    def __init__(self, monitor: LoopMonitor, pace: Pace, runner: StepRunner) -> None:
+        self._monitor = monitor
+        self._pace = pace
+        self._runner = runner
+
+    def tick(self, now_s: float) -> None:
+        """A round has begun."""
+        self._monitor.tick(now_s, self._pace.late_s, planner_works=self._runner.working)
+
+
+class Supervisor:
+    """``done`` when the run is over."""
+
+    def __init__(
+        self,
+        run: MissionRun,
+        judge: Judge,
+        arming: Arming,
+        limits: MissionLimits,
+        shutdown: Shutdown,
+        *,
+        loop: LoopWatch,
+        localization: LocalizationMonitor,
+        keeper: Keeper,
+        log: RunLog,
+        notifier: TextSink,
+        outcome: Outcome,
+    ) -> None:
+        self.done = False
+        self._run = run
+        self._judge = judge
+        self._arming = arming
+        self._limits = limits
+        self._shutdown = shutdown
+        self._loop = loop
+        self._localization = localization
+        self._keeper = keeper
+        self._log = log
+        self._notifier = notifier
+        self._outcome = outcome
+        self._stop_asked = False
+
+    def stop(self) -> None:
+        """Ask for an orderly end at the next tick. Safe in a signal handler."""
+        self._stop_asked = True
+
+    def judge(self, now_s: float) -> Verdict:
+        """What the rover may do in this tick. Silent before the mission has begun and while the run ends."""
+        self._loop.tick(now_s)
+        self._limits.service(now_s)
+        if self._stop_asked and self._run.end is None:
+            self._log.mark(Mark.STOP)
+            self._shutdown.begin(Reason(EndReason.STOPPED_BY_USER), now_s)
+        if self._run.end is not None:
+            self.done = self.done or self._shutdown.is_over(now_s)
+            return SILENT
+        if self._run.executor is None:
+            self._try_to_begin(now_s)
+        if self._run.executor is None:
+            return SILENT
+        if self._run.legs.follow(self._run.vehicle, self._run.executor):
+            self._conclude(now_s)
+            return SILENT
+        return self._judge_mission(now_s)
+
+    def record(self, task: Task | Order, now_s: float) -> None:
+        """End the run if the mission has ended; keep what it would need to go on after a crash, and tell of faults."""
+        if task is Task.END:
+            self._conclude(now_s)
+        self._keeper.note(now_s, done=self.done)
+        self._keeper.tell_faults(now_s)
+
+    def close(self, clock: Clock) -> None:
+        """The way out after an error: a rover that is ours is stopped and put into HOLD before this returns."""
+        if self.done or self._run.end is not None:
+            return
+        now_s = clock.now_s()
+        self._log.begin(now_s, Mark.CLOSE)
+        self._shutdown.begin(Reason(EndReason.ERROR), now_s)
+        now_s = self._shutdown.wait(clock, now_s)
+        self.done = True
+        self._keeper.note(now_s, done=True)
+
+    def _judge_mission(self, now_s: float) -> Verdict:
+        self._localization.service(now_s)
+        self._limits.heed_fence()
+        verdict = self._judge.judge(now_s)
+        if verdict.reaction is Reaction.DRIVE and (reason := self._limits.enforce(now_s)) is not None:
+            self._shutdown.begin(Reason(EndReason.BATTERY, (reason,)), now_s)
+            return SILENT
+        return verdict
+
+    def _try_to_begin(self, now_s: float) -> None:
+        """Once the rover may be driven, begin the mission; until then do whatever brings it there."""
+        if (reason := self._arming.must_end(now_s)) is not None:
+            self._shutdown.begin(Reason(EndReason.BATTERY, (reason,)), now_s)
+            return
+        cleared = self._arming.step(now_s)
+        if cleared is None:
+            return
+        text = f"Companion: {self._run.mission.name}, {len(cleared.progress.targets)} targets"
+        self._notifier.tell(text, Severity.INFO)
+        executor = self._run.begin(cleared.layout, cleared.progress)
+        if self._keeper.take_up(executor, now_s):
+            text = f"Resumed {cleared.found}, {executor.reached} targets reached before"
+            self._notifier.tell(text, Severity.INFO)
+
+    def _conclude(self, now_s: float) -> None:
+        """The mission has ended, one way or another: say so, and end the run."""
+        executor = self._run.executor
+        assert executor is not None
+        self._outcome.targets = executor.statuses()
+        text = f"Mission ended: {executor.reached} of {len(executor.progress.targets)} targets reached"
+        self._notifier.tell(text, Severity.INFO)
+        self._shutdown.begin(Reason(EndReason.DONE), now_s)

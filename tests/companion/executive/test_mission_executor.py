@@ -1,0 +1,122 @@
+"""The mission executor: what there is to do in a tick, and that it alone writes the progress."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.core.frames import LocalFrame, NedPoint
+from companion.core.grid import Cell
+from companion.executive.mission_executor import Task
+from companion.executive.mission_progress import MissionPhase, TargetStatus
+from companion.mission.fence import AutopilotFence
+from companion.mission.mission import OnBlocked
+from companion.mission.resolve import ResolvedTarget
+from companion.safety.reasons import RunPhase
+from companion.settings import Settings
+from tests.companion.safety.test_mode_latch import PLACE
+from tests.support.desk import Desk
+from tests.support.rig import GATE
+
+STAYING = GATE + "hold_s = 5.0\n"
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    desk = Desk(tmp_path, STAYING)
+    desk.begin()
+    return desk
+
+
+def step(desk: Desk, after_s: float = 0.05) -> Task:
+    """One tick later, the vehicle where it is."""
+    desk.clock.time_s += after_s
+    position = desk.run.vehicle.position
+    assert position is not None
+    desk.stand(position.north_m, position.east_m)
+    task = desk.executor.decide(desk.run.vehicle, desk.now_s)
+    if task is not Task.END:
+        desk.executor.guide(task, desk.run.vehicle, desk.now_s)
+    return task
+
+
+def test_a_leg_begins_once_and_a_stay_and_the_end_follow(desk: Desk) -> None:
+    assert [step(desk), step(desk)] == [Task.DRIVE] * 2 and desk.executor.phase is RunPhase.DRIVING
+    assert desk.notices.texts == ["Heading for gate"]
+    desk.at(desk.executor.progress.goal.point)
+    assert step(desk) is Task.DRIVE, "it is reached in this tick"
+    assert desk.notices.texts[1:] == ["Reached gate"] and desk.executor.reached == 1
+    assert step(desk) is Task.STAND and desk.executor.phase is RunPhase.HOLDING
+    assert step(desk, 5.0) is Task.END and desk.executor.progress.ended
+
+
+def test_a_requested_goal_comes_first(desk: Desk) -> None:
+    step(desk)
+    goal = ResolvedTarget("errand 1", NedPoint(3.0, 0.0), Cell(2, 10), 0.0, OnBlocked.SKIP, None)
+    desk.executor.request(goal)
+    assert desk.executor.driver.goal is None, "the leg under way is left"
+    step(desk)
+    assert desk.executor.driver.goal == goal
+    desk.at(goal.point)
+    step(desk)
+    step(desk)
+    assert desk.executor.driver.goal == desk.executor.progress.targets[0]
+
+
+def test_a_target_behind_the_fence_is_not_tried(desk: Desk) -> None:
+    desk.executor.layout = replace(desk.executor.layout, refused={0: "gate lies behind the fence"})
+    assert step(desk) is Task.STAND
+    assert desk.notices.texts == ["Refused: gate lies behind the fence"]
+    assert desk.executor.progress.statuses == (TargetStatus.UNREACHABLE,)
+
+
+def test_a_fence_that_changes_is_heeded_once(desk: Desk) -> None:
+    desk.executor.heed_fence(AutopilotFence())
+    assert desk.notices.told == []
+    fence = AutopilotFence(circle_m=30.0, home=PLACE)
+    desk.executor.heed_fence(fence)
+    desk.executor.heed_fence(AutopilotFence(circle_m=30.0, home=PLACE))
+    assert len(desk.notices.told) == 1 and desk.executor.layout.fence == fence
+    assert len(desk.executor.layout.bounds) == 1
+
+
+def test_a_low_battery_leads_back_the_way_it_came(desk: Desk) -> None:
+    step(desk)
+    desk.stand(2.0, 0.0)
+    step(desk)
+    pose = desk.run.vehicle.pose_at(desk.now_s)
+    assert pose is not None
+    desk.executor.go_back("battery at 12 %", [], pose)
+    assert desk.executor.returning and desk.executor.progress.phase is MissionPhase.HOME
+    step(desk)
+    assert desk.notices.texts[-1] == "Heading for start"
+    desk.stand(0.0, 0.0)
+    step(desk)
+    assert step(desk) is Task.END and desk.executor.progress.statuses == (TargetStatus.SKIPPED,)
+
+
+def test_a_map_is_forgotten_and_laid_out_anew_when_the_frame_moves(desk: Desk) -> None:
+    executor, seen = desk.executor, desk.stand(0.0, 0.0)
+    pose = seen.pose_at(desk.now_s)
+    assert pose is not None and seen.scan is not None
+    executor.map_scan(pose, 0.0, seen.scan.scan)
+    assert executor.evidence.log_odds.any()
+    executor.map_scan(pose, np.pi, replace(seen.scan.scan, range_m=np.full(90, 1.0)))
+    assert not (executor.evidence.log_odds > 0.0).any(), "smeared by turning"
+    executor.forget_map(desk.now_s)
+    assert not executor.evidence.log_odds.any() and executor.maps_begun == 1
+    before = executor.progress.goal.point
+    assert not executor.follow_origin(PLACE, desk.now_s)
+    moved = LocalFrame(PLACE).to_geo(NedPoint(10.0, 0.0))
+    assert executor.follow_origin(moved, desk.now_s) and executor.maps_begun == 2
+    assert executor.progress.goal.point.distance_m(NedPoint(before.north_m - 10.0, before.east_m)) < 0.02
+
+
+def test_settings_count_from_the_tick_after_they_were_replaced(desk: Desk) -> None:
+    step(desk)
+    desk.settings.replace(Settings.model_validate({"guidance": {"max_speed_m_s": 0.7}}))
+    step(desk)
+    assert desk.executor.surroundings.settings.guidance.max_speed_m_s == 0.7

@@ -1,0 +1,90 @@
+"""One run: what a verdict makes of a tick, and what is sent for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from companion.control.point_controller import STANDSTILL, ControlCommand
+from companion.executive.mission_executor import Task
+from companion.executive.mission_progress import TargetStatus
+from companion.executive.mission_run import LocatedScan, MissionRun, Order
+from companion.safety.mode_latch import Reaction, Verdict
+from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.vehicle.commands import SetMode
+from companion.vehicle.events.vehicle import RoverMode
+from tests.support.desk import Desk
+
+DRIVE = Verdict(Reaction.DRIVE)
+
+
+@pytest.mark.parametrize(
+    ("reaction", "order", "command"),
+    [
+        (Reaction.SILENT, Order.NOTHING, None),
+        (Reaction.STOP, Order.STOP, STANDSTILL),
+        (Reaction.HOLD, Order.HOLD, SetMode(RoverMode.HOLD)),
+    ],
+)
+@pytest.mark.parametrize("begun", [True, False])
+def test_a_verdict_that_is_not_to_drive_decides_alone(
+    tmp_path: Path, reaction: Reaction, order: Order, command: object, begun: bool
+) -> None:
+    desk = Desk(tmp_path)
+    if begun:
+        desk.begin()
+    task = desk.run.decide(Verdict(reaction), desk.now_s)
+    assert task is order and desk.run.guide(task, desk.now_s) == command
+
+
+def test_before_the_mission_has_begun_nothing_is_driven(tmp_path: Path) -> None:
+    run = Desk(tmp_path).run
+    assert run.decide(DRIVE, 10.0) is Order.NOTHING and run.guide(Task.DRIVE, 10.0) is None
+    assert run.statuses() == [("gate", TargetStatus.PENDING)] and not run.is_driving
+    run.map([])
+    run.start_afresh()
+
+
+def test_a_mission_that_drives_speaks_setpoints_that_were_checked(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    desk.begin()
+    seen = desk.stand(0.0, 0.0)
+    pose = seen.pose_at(desk.now_s)
+    assert pose is not None and seen.scan is not None
+    desk.run.map([LocatedScan(pose, 0.0, seen.scan.scan)] * 3)
+    task = desk.run.decide(DRIVE, desk.now_s)
+    assert task is Task.DRIVE and desk.run.activity == Activity(RunPhase.DRIVING) and desk.run.is_driving
+    command = desk.run.guide(task, desk.now_s)
+    assert isinstance(command, ControlCommand)
+    desk.run.speak(command, desk.now_s)
+    assert desk.autopilot.taken()[0] == command.setpoint
+    assert desk.run.setpoint_check.refused.total() == 0
+
+
+@pytest.mark.parametrize("stands", ["stopped", "ending"])
+def test_a_run_that_is_stopped_or_ends_is_not_driving(tmp_path: Path, stands: str) -> None:
+    desk = Desk(tmp_path)
+    desk.begin()
+    run: MissionRun = desk.run
+    run.stopped, run.end = stands == "stopped", Reason(EndReason.DONE) if stands == "ending" else None
+    assert not run.is_driving
+
+
+def test_starting_afresh_leaves_the_leg_and_says_all_again(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    desk.begin()
+    desk.run.speak(STANDSTILL, 10.0)
+    desk.run.decide(DRIVE, desk.now_s)
+    desk.run.speak(STANDSTILL, 10.05)
+    assert len(desk.autopilot.taken()) == 1
+    desk.run.start_afresh()
+    assert desk.executor.driver.goal is None
+    desk.run.speak(STANDSTILL, 10.1)
+    assert len(desk.autopilot.taken()) == 1
+
+
+def test_an_ended_mission_sends_nothing(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    desk.begin()
+    assert desk.run.guide(Task.END, desk.now_s) is None

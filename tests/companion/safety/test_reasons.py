@@ -1,0 +1,143 @@
+"""The texts of reasons and run phases, each once: records, ground stations and documents quote them."""
+
+from __future__ import annotations
+
+from enum import Enum
+from string import Formatter
+
+import pytest
+
+from companion.safety.reasons import (
+    FOR_A_PERSON,
+    Activity,
+    Doubt,
+    EndReason,
+    LatchReason,
+    PowerReason,
+    Reason,
+    Refusal,
+    RunPhase,
+    WaitReason,
+)
+
+AGAIN = "arm (or end this run, and start it again with --arm)"
+OLD = Reason(Doubt.DATA_OLD, ("position", 1.0))
+LOW = Reason(PowerReason.CHARGE, ("battery", 12))
+
+TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
+    (Doubt.STICKS_MOVED, (), "the sticks were moved"),
+    (Doubt.DATA_MISSING, ("position",), "no position"),
+    (Doubt.DATA_OLD, ("position", 1.0), "position silent for over 1 s"),
+    (Doubt.EKF_INCOMPLETE, ("velocity",), "EKF has no velocity"),
+    (Doubt.CLOCK_JUMPED, (), "the autopilot's clock has jumped"),
+    (Doubt.LINK_LATE, (1.5,), "link later than 1.5 s"),
+    (Doubt.AUTOPILOT_RESTARTED, (), "the autopilot's clock has run back"),
+    (Doubt.POSITION_FROZEN, (), "position stands still while the velocity says otherwise"),
+    (Doubt.POSITION_WANDERS, (), "position wanders"),
+    (Doubt.POSITION_WANDERED, (), "position wandered"),
+    (Doubt.POSITION_JUMPED, (), "position jumped"),
+    (Doubt.ORIGIN_MOVED, (), "EKF origin moved"),
+    (Doubt.LOOP_STOOD_STILL, (), "the companion stood still"),
+    (Doubt.LOOP_LATE, (), "the companion is too slow"),
+    (Doubt.PLANNING_LONG, (30.0,), "planning has taken over 30 s"),
+    (Doubt.SCAN_REPEATED, ("lidar",), "lidar repeats itself"),
+    (Doubt.OTHER_COMPANION, (), "another companion drives this rover"),
+    (Doubt.FENCE_BREACHED, (), "the autopilot's fence is breached"),
+    (Doubt.BEYOND_BORDER, ("the yard",), "the rover is beyond the border of the yard"),
+    (Doubt.WAITED_TOO_LONG, (Reason(WaitReason.ARMING),), "waited too long for arming"),
+    (LatchReason.OTHER_MODE, ("GUIDED",), "mode is not GUIDED"),
+    (LatchReason.BETWEEN_LEGS, (), "AUTO goes on by itself"),
+    (LatchReason.DISARMED, (), "disarmed"),
+    (LatchReason.HOLD_SENT, (), "HOLD was asked for"),
+    (LatchReason.HOLD_LOST, (), "the first HOLD was not taken"),
+    (WaitReason.HEARTBEAT, (" on udpin:0.0.0.0:14550",), "the autopilot's heartbeat on udpin:0.0.0.0:14550"),
+    (WaitReason.ORIGIN_AND_HOME, (), "the autopilot's origin and home"),
+    (WaitReason.GOOD_DATA, (OLD,), "good data (position silent for over 1 s)"),
+    (WaitReason.FENCE, ("",), "the autopilot's fence and rally points"),
+    (
+        WaitReason.OTHER_COMPANION_SILENT,
+        (),
+        "another companion with the same component id to fall silent",
+    ),
+    (WaitReason.OTHER_COMPANION_SIGNS, (), "signs of another companion (the rover is armed in GUIDED)"),
+    (WaitReason.CHARGED_BATTERY, (LOW,), "a charged battery (battery at 12 %)"),
+    (WaitReason.ROOM_TO_BORDER, ("2 m away",), "the rover to stand 2 m away"),
+    (WaitReason.ON_THE_GRID, (), "the rover to stand on the mission's grid"),
+    (WaitReason.GUIDED, (), "GUIDED"),
+    (WaitReason.ARMING, (), "arming"),
+    (WaitReason.PERSON_STARTS_AUTO, (), "a person to arm and to set AUTO (the autopilot drives this mission)"),
+    (WaitReason.PERSON_SETS_GUIDED, (), "a person to set GUIDED (somebody is driving)"),
+    (WaitReason.PERSON_SETS_GUIDED_AGAIN, (), "a person to set GUIDED (a person has had the rover)"),
+    (WaitReason.PERSON_ARMS, (), "a person to arm (or run with --arm)"),
+    (WaitReason.AUTOPILOT_HEARD, (), "the autopilot to be heard again"),
+    (WaitReason.PERSON_SETS_MODE, ("AUTO",), "a person to set AUTO"),
+    (WaitReason.PERSON_ARMS_AGAIN, (), f"a person to {AGAIN}"),
+    (WaitReason.PERSON_SETS_MODE_AND_ARMS, ("GUIDED",), f"a person to set GUIDED and {AGAIN}"),
+    (
+        WaitReason.GOOD_DATA_AND,
+        (OLD, Reason(WaitReason.PERSON_SETS_MODE, ("AUTO",))),
+        "good data (position silent for over 1 s) and a person to set AUTO",
+    ),
+    (PowerReason.CHARGE, ("battery", 12), "battery at 12 %"),
+    (PowerReason.VOLTAGE, ("battery 2", 10.9), "battery 2 at 10.9 V"),
+    (PowerReason.LOW, ("battery",), "battery low for the autopilot"),
+    (PowerReason.CRITICAL, ("battery",), "battery critical for the autopilot"),
+    (EndReason.DONE, (), "done"),
+    (EndReason.STOPPED_BY_USER, (), "stopped by the user"),
+    (EndReason.ERROR, (), "error"),
+    (EndReason.BATTERY, (LOW,), "battery at 12 %"),
+    (Refusal.MALFORMED, ("no place in it",), "no place in it"),
+    (Refusal.NOT_DRIVING, (Activity(RunPhase.CONNECTING),), "not driving (connecting)"),
+    (Refusal.NO_POSITION, (), "no position"),
+    (Refusal.RETURNING, (), "the rover is on its way back"),
+    (Refusal.ENDED, (), "the mission is over"),
+    (Refusal.TOO_FAR, (612, 500.0), "612 m away, farther than 500 m"),
+    (Refusal.OFF_THE_GRID, (), "outside the mission's grid"),
+    (Refusal.BEYOND_BORDER, ("the yard",), "beyond the yard"),
+    (Refusal.NEAR_BORDER, ("2 m away",), "it must be 2 m away"),
+    (Refusal.CLOSED, (), "in or too near a fence or a known obstacle"),
+    (Refusal.OBSTACLE_SEEN, (), "an obstacle was seen there"),
+]
+
+
+@pytest.mark.parametrize(("kind", "figures", "text"), TEXTS)
+def test_the_text_of_a_reason(kind: Enum, figures: tuple[object, ...], text: str) -> None:
+    assert str(Reason(kind, figures)) == text
+    fields = [part for part in Formatter().parse(str(kind.value)) if part[1] is not None]
+    assert len(fields) == len(figures), "no figure is left over"
+
+
+def test_every_reason_has_its_line_here() -> None:
+    kinds = (Doubt, LatchReason, WaitReason, PowerReason, EndReason, Refusal)
+    assert {kind for kind, _, _ in TEXTS} == {member for enum in kinds for member in enum}
+
+
+SETS_MODE = Reason(WaitReason.PERSON_SETS_MODE, ("GUIDED",))
+
+
+@pytest.mark.parametrize(
+    ("activity", "text"),
+    [
+        (Activity(RunPhase.CONNECTING), "connecting"),
+        (Activity(RunPhase.WAITING, awaited=Reason(WaitReason.ARMING)), "waiting for arming"),
+        (Activity(RunPhase.DRIVING), "driving"),
+        (Activity(RunPhase.HOLDING), "holding"),
+        (Activity(RunPhase.WAY_BLOCKED), "waiting for the way to clear"),
+        (Activity(RunPhase.STOPPED, OLD), "stopped: position silent for over 1 s"),
+        (Activity(RunPhase.STOPPED), "stopped: "),
+        (
+            Activity(RunPhase.STOPPED_AND_WAITING, Reason(LatchReason.DISARMED), SETS_MODE),
+            "stopped: disarmed, waiting for a person to set GUIDED",
+        ),
+        (Activity(RunPhase.ENDED, Reason(EndReason.DONE)), "done"),
+    ],
+)
+def test_the_text_of_an_activity(activity: Activity, text: str) -> None:
+    assert str(activity) == text
+
+
+@pytest.mark.parametrize("kind", list(WaitReason))
+def test_a_person_is_needed_where_the_text_says_so(kind: WaitReason) -> None:
+    activity = Activity(RunPhase.WAITING, awaited=Reason(kind))
+    assert activity.needs_person == (kind in FOR_A_PERSON) == kind.value.startswith("a person to ")
+    assert not Activity(RunPhase.DRIVING).needs_person

@@ -1,0 +1,178 @@
+"""The watchdogs: the companion's own loop, the age of data, repeated scans, and who is heard first."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from companion.core.scan import RangeScan
+from companion.navigation.step_runner import ThreadRunner
+from companion.safety.reasons import Doubt, Reason
+from companion.safety.watchdogs import (
+    LATE_S,
+    LATE_SHARE,
+    WINDOW_S,
+    DataMonitor,
+    LoopMonitor,
+    ScanMonitor,
+    first_doubt,
+)
+from companion.settings import SafetySettings, Settings
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.events.event import Event
+from companion.vehicle.events.vehicle import EkfStatusSeen, LocalPositionSeen, RangeSeen
+from companion.vehicle.state import VehicleState
+from tests.companion.safety.test_mode_latch import doubt_of, vehicle
+
+TICK_S = 0.05
+
+
+def noticed_s(took_s: Callable[[int], float], ticks: int = 2000) -> float:
+    """When a loop is noticed whose ``i``-th tick takes ``took_s(i)``; inf: never. What is a second late is given up."""
+    watch, now_s, next_s = LoopMonitor(30.0), 0.0, 0.0
+    for i in range(ticks):
+        next_s += TICK_S
+        now_s = max(now_s, next_s)
+        watch.tick(now_s, now_s - next_s, planner_works=False)
+        if watch.doubt(now_s) is not None:
+            return now_s
+        if now_s - next_s > 1.0:
+            next_s = now_s
+        now_s += took_s(i)
+    return math.inf
+
+
+@pytest.mark.parametrize(
+    ("took_s", "noticed"),
+    [
+        (lambda i: 0.001, False),
+        (lambda i: 0.049, False),
+        (lambda i: 0.9 if i == 500 else 0.001, False),
+        (lambda i: 0.9 if i in (500, 510) else 0.001, False),
+        (lambda i: 0.3 if i % 40 == 0 else 0.001, False),
+        (lambda i: 0.9 if i % 20 == 0 else 0.001, True),
+        (lambda i: 0.06, True),
+        (lambda i: 0.15, True),
+        (lambda i: 0.8, True),
+    ],
+)
+def test_late_again_and_again_is_told_from_a_hiccup(took_s: Callable[[int], float], noticed: bool):
+    assert math.isfinite(noticed_s(took_s)) is noticed
+
+
+@pytest.mark.parametrize("took_s", [0.15, 0.3, 0.8])
+def test_a_loop_that_is_three_times_too_slow_is_noticed_within_the_window(took_s: float):
+    assert noticed_s(lambda _: took_s) <= LATE_SHARE * WINDOW_S + LATE_S + 3 * took_s
+
+
+def test_a_loop_that_is_in_time_again_is_believed_again():
+    watch = LoopMonitor(30.0)
+    for i in range(40):
+        watch.tick(0.1 * i, 0.15, planner_works=False)
+    assert watch.doubt(4.0) == Reason(Doubt.LOOP_LATE)
+    for i in range(60):
+        watch.tick(4.0 + TICK_S * i, 0.0, planner_works=False)
+    assert watch.doubt(7.0) is None
+
+
+def test_a_step_that_does_not_end_is_noticed_and_ends():
+    watch = LoopMonitor(3.0)
+    doubts = []
+    for i in range(200):
+        watch.tick(TICK_S * i, 0.0, planner_works=20 <= i < 100 or i >= 190)
+        doubts.append(watch.doubt(TICK_S * i))
+    told = [i for i, doubt in enumerate(doubts) if doubt is not None]
+    assert told == list(range(81, 100)) and doubts[81] == Reason(Doubt.PLANNING_LONG, (3.0,))
+
+
+def test_the_thread_says_whether_it_works():
+    runner, go_on = ThreadRunner(), threading.Event()
+    try:
+        assert not runner.working
+        runner.start(lambda: (go_on.wait(10.0), None))  # type: ignore[arg-type, return-value]
+        assert runner.working and runner.busy
+        go_on.set()
+        result = None
+        while result is None:
+            result = runner.take()
+        assert not runner.working and not runner.busy
+    finally:
+        go_on.set()
+        runner.close()
+
+
+# The order of precedence, and the data ------------------------------------------------------------------------------
+
+SETTINGS = SafetySettings()
+
+
+class Always:
+    """A monitor with one doubt."""
+
+    def __init__(self, doubt: Doubt | None) -> None:
+        self._doubt = doubt
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """Ignored."""
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        return None if self._doubt is None else Reason(self._doubt)
+
+
+def test_the_first_monitor_that_doubts_is_heard():
+    quiet, jumped, late = Always(None), Always(Doubt.POSITION_JUMPED), Always(Doubt.LOOP_LATE)
+    assert first_doubt((), 0.0) is None and first_doubt((quiet,), 0.0) is None
+    assert first_doubt((quiet, jumped, late), 0.0) == Reason(Doubt.POSITION_JUMPED)
+    assert first_doubt((late, jumped), 0.0) == Reason(Doubt.LOOP_LATE)
+
+
+@pytest.mark.parametrize("name", ["heartbeat", "position", "attitude", "scan_ahead", "ekf"])
+def test_what_is_missing_or_old_is_doubted(name: str):
+    good = vehicle(10.0)
+    assert doubt_of(good, 10.9) is None
+    assert doubt_of(replace(good, **{name: None}), 10.0) is Doubt.DATA_MISSING
+    limit_s = SETTINGS.heartbeat_s if name == "heartbeat" else SETTINGS.stale_s
+    fresh = vehicle(20.0)
+    old = replace(fresh, **{name: getattr(vehicle(20.0 - limit_s - 0.1), name)})
+    assert doubt_of(old, 20.0) is Doubt.DATA_OLD
+    assert doubt_of(replace(fresh, **{name: getattr(vehicle(20.0 - limit_s), name)}), 20.0) is None
+
+
+@pytest.mark.parametrize(
+    ("flags", "ok"), [(831, True), (3 | 8, True), (3 | 16, True), (7, False), (831 | 128, False), (0, False)]
+)
+def test_the_ekf_must_have_a_position(flags: int, ok: bool):
+    assert doubt_of(vehicle(ekf=flags), 10.0) is (None if ok else Doubt.EKF_INCOMPLETE)
+
+
+def test_contradictions_are_doubted_after_the_age_of_the_data():
+    assert doubt_of(replace(vehicle(), restarted=True, frozen=True), 10.0) is Doubt.AUTOPILOT_RESTARTED
+    assert doubt_of(replace(vehicle(), frozen=True), 10.0) is Doubt.POSITION_FROZEN
+    assert doubt_of(replace(vehicle(), frozen=True), 20.0) is Doubt.DATA_OLD
+
+
+def test_settings_that_are_replaced_count_at_once():
+    live = LiveSettings(Settings())
+    monitor = DataMonitor(live)
+    monitor.take(EkfStatusSeen(10.0, 0), vehicle(10.0))
+    assert monitor.doubt(10.9) is None
+    live.replace(Settings.model_validate({"safety": {"stale_s": 0.5}}))
+    assert monitor.doubt(10.9) == Reason(Doubt.DATA_OLD, ("position", 0.5))
+
+
+def test_scans_are_doubted_by_the_name_of_their_sensor():
+    scans, moving = ScanMonitor(), replace(vehicle(), position=LocalPositionSeen(0.0, 0.0, 0.0, 0.0, 1.0, 0.0))
+    seen = RangeScan(0.0, np.linspace(-0.5, 0.5, 9), np.linspace(2.0, 5.0, 9), 0.1, 8.0, 0.1, "lidar")
+    fits = []
+    for tick in range(20):
+        scans.take(RangeSeen(0.1 * tick, replace(seen, time_s=0.1 * tick)), moving)
+        fits.append(scans.fits)
+    assert fits[0] and not fits[-1]
+    assert scans.doubt(2.0) == Reason(Doubt.SCAN_REPEATED, ("lidar",))
+    scans.take(EkfStatusSeen(2.0, 0), moving)
+    assert not scans.fits, "only a scan changes that"

@@ -1,0 +1,82 @@
+"""The end of a run: whose rover it is, what is sent, and how long is waited."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from companion.control.point_controller import STOP
+from companion.core.severity import Severity
+from companion.safety.mode_latch import Control, LatchState
+from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.supervision.shutdown import AGAIN_S, CONFIRM_S, Shutdown
+from companion.vehicle.commands import SetMode
+from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen, RoverMode
+from tests.companion.safety.test_mode_latch import HOLD
+from tests.support.desk import Desk
+
+DONE, ERROR = Reason(EndReason.DONE), Reason(EndReason.ERROR)
+TO_HOLD = SetMode(RoverMode.HOLD)
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Desk:
+    desk = Desk(tmp_path)
+    desk.begin()
+    desk.run.latch = LatchState(Control.COMPANION)
+    return desk
+
+
+def ending(desk: Desk) -> Shutdown:
+    link: Any = desk.autopilot
+    return Shutdown(desk.run, link, desk.settings, desk.notices)
+
+
+@pytest.mark.parametrize(("why", "told"), [(DONE, []), (ERROR, [("Companion: error, HOLD", Severity.WARNING)])])
+def test_a_rover_of_ours_is_stopped_and_put_into_hold(desk: Desk, why: Reason[EndReason], told: list[Any]) -> None:
+    shutdown = ending(desk)
+    shutdown.begin(why, 10.0)
+    assert desk.autopilot.taken() == [STOP, TO_HOLD] and shutdown.stopped_ours
+    assert desk.run.end == why and desk.run.activity == Activity(RunPhase.ENDED, why) and desk.notices.told == told
+    assert not shutdown.is_over(10.0 + AGAIN_S / 2.0) and desk.autopilot.taken() == []
+    assert not shutdown.is_over(10.0 + AGAIN_S) and desk.autopilot.taken() == [TO_HOLD], "asked again"
+    assert shutdown.is_over(10.0 + CONFIRM_S), "time is up"
+
+
+@pytest.mark.parametrize("how", ["answered", "left"])
+def test_it_is_over_as_soon_as_the_rover_will_be_in_hold(desk: Desk, how: str) -> None:
+    shutdown = ending(desk)
+    shutdown.begin(DONE, 10.0)
+    desk.autopilot.ack = AckSeen(9.9, 176, 0)
+    assert not shutdown.is_over(10.05), "an answer of before"
+    if how == "answered":
+        desk.autopilot.ack = AckSeen(10.1, 176, 0)
+    else:
+        desk.stand(0.0, 0.0, mode=HOLD)
+    assert shutdown.is_over(10.1)
+
+
+@pytest.mark.parametrize("whose", ["a person's", "another companion's", "in another mode", "disarmed"])
+def test_a_rover_that_is_not_ours_is_left_alone(tmp_path: Path, whose: str) -> None:
+    desk = Desk(tmp_path)
+    desk.run.latch = LatchState(Control.PERSON if whose == "a person's" else Control.COMPANION)
+    desk.autopilot.twin = whose == "another companion's"
+    if whose == "in another mode":
+        desk.stand(0.0, 0.0, mode=HOLD)
+    if whose == "disarmed":
+        desk.stand(0.0, 0.0, armed=False)
+    shutdown = ending(desk)
+    shutdown.begin(ERROR, 10.0)
+    expected = [TO_HOLD] if whose == "disarmed" else []
+    assert desk.autopilot.taken() == expected and shutdown.stopped_ours == bool(expected)
+    assert shutdown.is_over(10.0) == (not expected)
+
+
+def test_after_an_error_it_listens_until_it_is_over(desk: Desk) -> None:
+    shutdown = ending(desk)
+    shutdown.begin(ERROR, 10.0)
+    desk.autopilot.events = [HeartbeatSeen(10.05, HOLD, True, 1)]
+    assert shutdown.wait(desk.clock, 10.0) == pytest.approx(10.05)
+    assert desk.autopilot.served == 1 and desk.clock.time_s == pytest.approx(10.05)

@@ -1,0 +1,34 @@
+"""Stands in for the notifier and for a clock."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from companion.core.severity import Severity
+
+
+@dataclass
+class Notices:
+    """Keeps what people would be told."""
+
+    told: list[tuple[str, Severity]] = field(default_factory=list)
+
+    def tell(self, text: str, severity: Severity) -> None:
+        self.told.append((text, severity))
+
+    @property
+    def texts(self) -> list[str]:
+        return [text for text, _ in self.told]
+
+
+@dataclass
+class HandClock:
+    """Shows what it is set to; sleeping sets it."""
+
+    time_s: float = 0.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def sleep_until_s(self, time_s: float) -> None:
+        self.time_s = time_s
