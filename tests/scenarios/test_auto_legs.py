@@ -8,8 +8,11 @@ from typing import Any
 
 import pytest
 
+from companion.executive.mission_progress import TargetStatus
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
+from companion.navigation.field_step import Action
+from companion.safety.reasons import LatchReason, RunPhase, WaitReason
 from tests.clients.scene import HOME_DEG
 from tests.scenarios.test_errands import low_battery
 from tests.support.asker import Asker
@@ -46,7 +49,7 @@ def in_auto(folder: Path, rows: list[Row], *, sealed: bool = False) -> Asker:
     rig = Asker(yard(folder, sealed=sealed), arm=False, late_s=46.0, state=folder / "state")
     rig.restart_companion(as_file(folder, rows))
     rig.run_for(3.0)
-    assert "a person to arm and to set AUTO" in rig.companion.status().doing
+    assert rig.awaits(WaitReason.PERSON_STARTS_AUTO)
     uploaded = [tuple(round(value * 1e7) for value in place_deg(field)) for _, _, field in rows]
     rig.upload([(command, params, place) for (command, params, _), place in zip(rows, uploaded, strict=True)])
     rig.pilot(ARM, 1)
@@ -73,10 +76,9 @@ def test_the_leg_that_is_handed_over_is_driven_round_the_wall(tmp_path: Path) ->
     rig.until(lambda: item(rig) == 3, 60.0)
     over_s = rig.now_s()
     assert rig.passed_m(15, 7) < 2.5
-    assert "Heading for guided item 2" in rig.texts()
     rig.until(lambda: rig.companion.done, 5.0)
     assert [one for one in rig.sent_since(over_s + 0.2) if one.moves_or_changes] == []
-    assert rig.companion.outcome.complete and "Reached guided item 2" in rig.texts()
+    assert rig.companion.outcome.complete and rig.has_reached("guided item 2")
     rig.simulator.advance_to_s(rig.simulator.time_s + 10.0)
     assert rig.passed_m(20, 7) < 1.0, "the autopilot drives the rest by itself"
     assert_steered_only_in_the_leg(rig)
@@ -86,7 +88,7 @@ def test_the_leg_that_is_handed_over_is_driven_round_the_wall(tmp_path: Path) ->
 def in_leg(folder: Path, rows: list[Row] = ROUND_THE_WALL, metres: float = 4.0, **more: Any) -> Asker:
     """So far driven in all, and in the leg."""
     rig = in_auto(folder, rows, **more)
-    rig.until(lambda: "Heading for guided item 2" in rig.texts(), 60.0)
+    rig.until(lambda: "guided item 2" in rig.goals and rig.does(RunPhase.DRIVING), 60.0)
     rig.until_driven(metres)
     return rig
 
@@ -105,8 +107,7 @@ def test_a_person_who_takes_the_rover_in_a_leg_has_it(tmp_path: Path, mode: int,
     since_s = rig.now_s()
     rig.run_for(6.0)
     assert_silent_since(rig, since_s)
-    assert "a person to set AUTO" in rig.companion.status().doing
-    assert any("mode is not AUTO" in text for text in rig.texts())
+    assert rig.awaits(WaitReason.PERSON_SETS_MODE) and rig.gave(LatchReason.OTHER_MODE, "AUTO")
     rig.pilot_mode(AUTO)
     rig.finish(120.0)
     assert rig.companion.outcome.complete
@@ -134,14 +135,13 @@ def test_the_limits_of_a_leg_are_the_autopilots(tmp_path: Path, limits: tuple[fl
     over_s = rig.now_s()
     rig.until(lambda: rig.companion.done, 5.0)
     assert_silent_since(rig, over_s + 0.2)
-    assert any("AUTO has gone on" in text and "before guided item 2" in text for text in rig.texts())
-    assert [str(status) for _, status in rig.companion.statuses()] == ["skipped"]
+    assert [status for _, status in rig.companion.statuses()] == [TargetStatus.SKIPPED]
 
 
 def test_a_place_that_cannot_be_reached_is_stood_before_until_the_limit(tmp_path: Path) -> None:
     rows: list[Row] = [(LIMITS, (150.0, 0, 0, 0), None), (GUIDED_ENABLE, ON, (15, 7)), (WAYPOINT, NONE, (3, 7))]
     rig = in_auto(tmp_path, rows, sealed=True)
-    rig.until(lambda: any(text.startswith("Unreachable: guided item 2") for text in rig.texts()), 149.0)
+    rig.until(lambda: rig.times_decided(Action.UNREACHABLE, "guided item 2") > 0, 149.0)
     rig.run_for(2.0)
     assert item(rig) == 2 and rig.speed_m_s < 0.05
     rig.until(lambda: item(rig) == 3, 150.0)
@@ -202,7 +202,7 @@ class Shutdown:
 def test_a_leg_may_be_said_in_any_frame_with_a_latitude(tmp_path: Path, frame: int) -> None:
     rig = in_auto(tmp_path, ROUND_THE_WALL)
     rig.change = Shutdown(rig, coordinate_frame=frame)
-    rig.until(lambda: "Heading for guided item 2" in rig.texts(), 60.0)
+    rig.until(lambda: "guided item 2" in rig.goals and rig.does(RunPhase.DRIVING), 60.0)
     assert rig.companion.status().target == "guided item 2"
 
 
@@ -261,12 +261,8 @@ def test_two_legs_with_a_way_of_the_autopilots_between(tmp_path: Path) -> None:
     second: list[Row] = [(DELAY, (2.0, -1.0, -1.0, -1.0), None), (GUIDED_ENABLE, ON, (5, 2)), (WAYPOINT, NONE, (3, 7))]
     rig = in_auto(tmp_path, [*ROUND_THE_WALL[:2], *second])
     rig.finish(200.0)
-    said = rig.texts()
-    assert (
-        said.index("Reached guided item 2")
-        < said.index("Heading for guided item 4")
-        < said.index("Reached guided item 4")
-    )
+    reached = [target for target, action in rig.log.decided if action is Action.REACHED]
+    assert list(dict.fromkeys(reached)) == ["guided item 2", "guided item 4"]
     assert rig.companion.outcome.complete and rig.simulator.collisions == ()
     assert_steered_only_in_the_leg(rig)
 
@@ -291,7 +287,7 @@ def test_a_battery_that_runs_low_in_a_leg_is_the_autopilots_affair(tmp_path: Pat
     rig.change = low_battery
     rig.finish(120.0)
     assert rig.companion.outcome.complete
-    assert not any(text.startswith("Returning") for text in rig.texts())
+    assert rig.companion.outcome.broken_off is None
 
 
 def test_a_run_of_auto_that_is_taken_up_leaves_a_rover_in_guided_to_its_person(tmp_path: Path) -> None:
@@ -302,4 +298,4 @@ def test_a_run_of_auto_that_is_taken_up_leaves_a_rover_in_guided_to_its_person(t
     since_s = rig.now_s()
     rig.run_for(15.0)
     assert_silent_since(rig, since_s)
-    assert "a person to arm and to set AUTO" in rig.companion.status().doing
+    assert rig.awaits(WaitReason.PERSON_STARTS_AUTO)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from companion.mission.load import load_mission
+from companion.safety.reasons import Doubt, WaitReason
 from tests.support.rig import GUIDED, HOLD, Rig, yard
 
 
@@ -97,7 +98,7 @@ def test_a_rover_beside_the_grid_is_not_driven(tmp_path: Path) -> None:
         return message
 
     rig.change = elsewhere
-    rig.until(lambda: "stand on the mission's grid" in rig.companion.status().doing, 60.0)
+    rig.until(lambda: rig.awaits(WaitReason.ON_THE_GRID), 60.0)
     rig.run_for(10.0)
     assert not [one for one in rig.sent if one.is_setpoint]
     rig.change = None
@@ -123,7 +124,7 @@ def test_a_computer_that_stands_still_for_a_while(tmp_path: Path, stall_s: float
     rig.stall_s = stall_s
     rig.companion.tick()
     since_s = rig.now_s()
-    assert any("stood still" in text for text in rig.texts())
+    assert rig.gave(Doubt.LOOP_STOOD_STILL)
     rig.run_for(0.3)
     setpoints = [one for one in rig.sent_since(since_s) if one.is_setpoint]
     assert setpoints and all(one.is_standstill for one in setpoints)

@@ -10,8 +10,11 @@ import pytest
 import shapely
 from PIL import Image
 
+from companion.executive.mission_progress import TargetStatus
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from companion.navigation.field_step import Action
+from companion.safety.reasons import Doubt, LatchReason, WaitReason
 from companion.settings import Settings, parse_settings
 from tests.support.asker import Asker
 from tests.support.rig import ARM, GUIDED, HOLD, SET_MODE, Rig, yard
@@ -83,7 +86,7 @@ def test_who_cannot_turn_on_the_spot_keeps_inside_a_narrow_strip_by_itself(tmp_p
         if pose is not None:
             inside_m.append(min(3.0 - abs(pose.north_m), pose.east_m + 1.5, 16.0 - pose.east_m))
         assert rig.now_s() < 400.0
-    assert rig.companion.outcome.complete and rig.companion.output_check.refused == {}
+    assert rig.companion.outcome.complete and rig.companion.mission_run.setpoint_check.refused == {}
     assert min(inside_m) >= 0.35, "by the position that it is told: the whole body"
     assert min(min(3.0 - abs(north_m), 16.0 - east_m) for north_m, east_m in rig.track) > 0.0
     assert rig.companion.driver is not None and rig.companion.driver.tally.stuck > 0
@@ -144,8 +147,7 @@ def test_outside_the_circle_round_home_is_refused_too(tmp_path: Path) -> None:
 def test_a_rover_that_starts_outside_is_told_so_and_not_even_armed(tmp_path: Path) -> None:
     rig = driven(tmp_path, stored(box(KEEP_IN, -6.0, 4.0, 7.0, 20.0), **POLYGONS, FENCE_MARGIN=1.0))
     rig.run_for(50.0)
-    doing = rig.companion.status().doing
-    assert doing == "waiting for the rover to stand 1 m or more inside the autopilot's fence (inclusion area 1)"
+    assert rig.awaits(WaitReason.ROOM_TO_BORDER)
     assert changes(rig) == []
     person = Person(rig)
     person.upload([*ALL, *NORTH])
@@ -159,9 +161,10 @@ def test_a_fence_that_changes_on_the_way_is_heeded_at_once(tmp_path: Path, seed:
     rig.until_driven(0.5)
     # Across the end of the wall that the rover is making for, as the run without a fence shows.
     across = (1.0, 6.0, 7.0, 9.0)
+    before = rig.executor.layout.fence
     Person(rig).upload([*ALL, *box(KEEP_OUT, *across)])
     changed_s = rig.now_s()
-    rig.until(lambda: any("fence has changed" in text for text in rig.texts()), 1.0)
+    rig.until(lambda: rig.executor.layout.fence != before, 1.0)
     assert rig.now_s() - changed_s < 1.0, "the longer list is told by FENCE_TOTAL"
     rig.finish()
     assert rig.companion.outcome.complete
@@ -172,8 +175,9 @@ def test_a_fence_that_changes_on_the_way_is_heeded_at_once(tmp_path: Path, seed:
 def test_a_fence_of_the_same_length_is_noticed_when_it_is_read_again(tmp_path: Path) -> None:
     rig = driven(tmp_path, stored(ALL, **POLYGONS), parse_settings({"fence": {"again_s": 3.0}}, "test"))
     rig.until_driven(1.0)
+    before = rig.executor.layout.fence
     Person(rig).upload(box(KEEP_IN, -6.5, -2.4, 7.0, 20.0))
-    rig.until(lambda: any("fence has changed" in text for text in rig.texts()), 4.0)
+    rig.until(lambda: rig.executor.layout.fence != before, 4.0)
     rig.run_for(4.0)
     assert sum("fence has changed" in text for text in rig.texts()) == 1
 
@@ -186,8 +190,8 @@ def test_a_target_that_comes_to_lie_outside_is_given_up_and_the_next_one_driven(
     rig.until_driven(2.0)
     Person(rig).upload([*box(KEEP_IN, -6.0, -2.4, 7.0, 12.0), (CIRCLE_IN, 0.0, 0.0, 90.0)])
     rig.finish()
-    assert [str(status) for _, status in rig.companion.statuses()] == ["unreachable", "reached"]
-    assert any(text.startswith("Refused: target 1 'far': lies outside") for text in rig.texts())
+    assert [status for _, status in rig.companion.statuses()] == [TargetStatus.UNREACHABLE, TargetStatus.REACHED]
+    assert rig.times_decided(Action.UNREACHABLE, "far") == 0, "it is not even tried"
     assert max(east for _, east in rig.track) < 12.0 and rig.breaches == 0
 
 
@@ -204,8 +208,8 @@ def test_a_target_that_comes_to_lie_outside_while_nobody_listens_is_given_up_too
     rig._now_s = rig.simulator.time_s
     rig.restart_companion(mission, resume=True)
     rig.finish()
-    assert [str(status) for _, status in rig.companion.statuses()] == ["unreachable", "reached"]
-    assert any(text.startswith("Refused: target 1 'far': lies outside") for text in rig.texts())
+    assert [status for _, status in rig.companion.statuses()] == [TargetStatus.UNREACHABLE, TargetStatus.REACHED]
+    assert rig.times_decided(Action.UNREACHABLE, "far") == 0, "it is not even tried"
     assert max(east for _, east in rig.track) < 12.0 and rig.breaches == 0
 
 
@@ -219,16 +223,16 @@ def test_an_errand_is_driven_though_the_target_after_it_is_refused(tmp_path: Pat
     smaller = [*box(KEEP_IN, -6.0, -2.4, 7.0, 12.0), (CIRCLE_IN, 0.0, 0.0, 90.0)]
     if when == "before the errand":
         Person(rig).upload(smaller)
-        rig.until(lambda: any(text.startswith("Refused: ") for text in rig.texts()), 3.0)
+        rig.until(lambda: rig.executor.statuses()[0][1] is TargetStatus.UNREACHABLE, 3.0)
         rig.reposition(rig.field(4, 3))
     else:
         rig.reposition(rig.field(4, 3))
         rig.run_for(0.5)
         Person(rig).upload(smaller)
-    rig.until(lambda: "Reached errand 1" in rig.texts(), 30.0)
+    rig.until(lambda: rig.has_reached("errand 1"), 30.0)
     assert rig.passed_m(4, 3) < 0.7
     rig.finish()
-    assert [str(status) for _, status in rig.companion.statuses()] == ["unreachable"]
+    assert [status for _, status in rig.companion.statuses()] == [TargetStatus.UNREACHABLE]
 
 
 def test_a_fence_that_leaves_the_rover_outside_stops_it(tmp_path: Path) -> None:
@@ -237,7 +241,7 @@ def test_a_fence_that_leaves_the_rover_outside_stops_it(tmp_path: Path) -> None:
     Person(rig).upload([*ALL, (CIRCLE_OUT, 0.0, 5.0, 6.0)])
     at_s = rig.now_s()
     rig.until(lambda: rig.mode == HOLD, 5.0)
-    assert any("HOLD: the " in text for text in rig.texts())
+    assert rig.gave(Doubt.BEYOND_BORDER) or rig.gave(Doubt.FENCE_BREACHED)
     setpoints = [one for one in rig.sent_since(at_s + 0.5) if one.is_setpoint]
     assert setpoints and all(one.is_standstill for one in setpoints)
     assert rig.speed_m_s == pytest.approx(0.0, abs=0.05)
@@ -255,8 +259,8 @@ def test_a_breach_that_the_autopilot_acts_on_silences_the_companion(tmp_path: Pa
     since_s = rig.now_s()
     rig.run_for(3.0)
     assert [one for one in rig.sent_since(since_s) if one.moves_or_changes] == []
-    assert any(text == "The autopilot's fence is breached" for text in rig.texts())
-    assert any(text.startswith("Companion silent: mode is not GUIDED") for text in rig.texts())
+    assert "The autopilot's fence is breached" in rig.texts()
+    assert rig.gave(LatchReason.OTHER_MODE)
 
 
 def _tail(item: object) -> tuple[object, ...]:
@@ -286,7 +290,6 @@ def test_an_autopilot_that_does_not_tell_its_fence_is_waited_for(tmp_path: Path)
     rig = driven(tmp_path, stored(ALL, **POLYGONS))
     rig.change = lambda message: None if message.get_type() in ("MISSION_COUNT", "MISSION_ACK") else message
     rig.run_for(50.0)
-    doing = rig.companion.status().doing
-    assert doing == "waiting for the autopilot's fence and rally points (no answer to 5 requests)"
+    assert rig.awaits(WaitReason.FENCE)
     assert changes(rig) == []
     assert math.isclose(rig.simulator.driven_m, 0.0)

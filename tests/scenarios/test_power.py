@@ -10,6 +10,7 @@ import pytest
 
 from companion.executive.mission_progress import TargetStatus
 from companion.mission.mission import Mission
+from companion.safety.reasons import EndReason, PowerReason, WaitReason
 from companion.settings import Settings, parse_settings
 from tests.support.rig import ARM, HOLD, SET_MODE, Change, Rig, yard
 from tests.support.stored import POLYGONS, box, stored
@@ -64,8 +65,11 @@ class Draining(Rig):
         truth, start = self.simulator.truth, self.simulator._start
         return truth.north_m - start.north_m, truth.east_m - start.east_m
 
-    def said(self, words: str) -> bool:
-        return any(words in text for text in self.texts())
+    @property
+    def reason(self) -> PowerReason | None:
+        """Why the mission was broken off."""
+        reason = self.companion.outcome.broken_off
+        return None if reason is None else reason.kind
 
     def statuses(self) -> list[TargetStatus]:
         return [status for _, status in self.companion.statuses()]
@@ -77,16 +81,16 @@ LOW = [{"percent": 19}, {"percent": 19, "volts": 11.0}, {"percent": -1, "volts":
 @pytest.mark.parametrize("change", LOW, ids=["charge", "charge and voltage", "the autopilot's own failsafe"])
 def test_a_low_battery_takes_the_rover_back_the_way_it_came(tmp_path: Path, change: dict[str, Any]) -> None:
     rig = Draining(yard(tmp_path, FAR), 9.0, change)
-    rig.until(lambda: rig.said("Returning: battery"), AFTER_S + 1.5)
+    rig.until(lambda: rig.reason is not None, AFTER_S + 1.5)
     assert rig.now_s() - rig.began_s >= AFTER_S
     there = len(rig.track)
     rig.finish()
     assert math.hypot(*rig.place) < 1.0
     assert rig.mode == HOLD
     assert rig.simulator.collisions == ()
-    assert rig.said("Missed: gate, pier") and rig.said("along the way it came")
+    returning = next(text for text in rig.texts() if text.startswith("Returning: battery "))
+    assert returning.endswith(". Missed: gate, pier")
     assert rig.statuses() == [TargetStatus.SKIPPED] * 2
-    assert rig.companion.outcome.broken_off is not None
     # Once it had turned round it went where it had been before.
     before = rig.track[:there]
     assert all(min(math.dist(place, past) for past in before[::5]) < 1.0 for place in rig.track[there + 100 :: 20])
@@ -94,11 +98,10 @@ def test_a_low_battery_takes_the_rover_back_the_way_it_came(tmp_path: Path, chan
 
 def test_what_was_reached_stays_reached(tmp_path: Path) -> None:
     rig = Draining(yard(tmp_path, FAR), 0.5, {"percent": 100})
-    rig.until(lambda: rig.said("Reached gate"))
+    rig.until(lambda: rig.has_reached("gate"))
     rig.change = battery(percent=15)
     rig.finish()
     assert rig.statuses() == [TargetStatus.REACHED, TargetStatus.SKIPPED]
-    assert rig.said("Missed: pier")
 
 
 def test_a_rally_point_that_is_nearer_is_where_it_goes(tmp_path: Path) -> None:
@@ -106,8 +109,7 @@ def test_a_rally_point_that_is_nearer_is_where_it_goes(tmp_path: Path) -> None:
         yard(tmp_path), 9.0, {"percent": 19}, prepare=stored(rally=[(4.0, 13.0), (5.0, 8.0)], FENCE_ENABLE=0.0)
     )
     rig.finish()
-    name = next(text for text in rig.texts() if text.startswith("Back to rally point"))
-    point = (4.0, 13.0) if "point 1" in name else (5.0, 8.0)
+    point = {"rally point 1": (4.0, 13.0), "rally point 2": (5.0, 8.0)}[rig.goals[-1]]
     assert math.dist(rig.place, point) < 1.0
     assert rig.statuses() == [TargetStatus.SKIPPED] and rig.mode == HOLD
 
@@ -123,7 +125,7 @@ def test_a_rally_point_that_will_not_do_is_passed_over(tmp_path: Path, why: str)
     prepare = stored(fence, rally=[place], **(POLYGONS if fence else {"FENCE_ENABLE": 0.0}), FENCE_MARGIN=0.0)
     rig = Draining(yard(tmp_path), metres, {"percent": 19}, options, prepare=prepare)
     rig.finish()
-    assert rig.said("Back to start") and not rig.said("Back to rally")
+    assert rig.goals == ["gate", "start"]
     assert math.hypot(*rig.place) < 1.0
 
 
@@ -133,23 +135,23 @@ def test_an_empty_battery_stops_it_where_it_is(tmp_path: Path, change: dict[str,
     rig.until(lambda: rig.mode == HOLD, AFTER_S + 3.0)
     assert rig.now_s() - rig.began_s >= AFTER_S
     rig.finish(3.0)
-    assert rig.said("Companion: battery ") and rig.statuses() == [TargetStatus.PENDING]
-    assert rig.companion.outcome.broken_off is not None
+    assert rig.gave(EndReason.BATTERY) and rig.statuses() == [TargetStatus.PENDING]
+    assert rig.reason is not None
     rig.sleep_until_s(rig.now_s() + 3.0)
     assert rig.speed_m_s < 0.05
 
 
 def test_it_empties_on_the_way_back(tmp_path: Path) -> None:
     rig = Draining(yard(tmp_path), 9.0, {"percent": 15})
-    rig.until(lambda: rig.said("Returning: battery at 15 %"), 5.0)
+    rig.until(lambda: rig.reason is PowerReason.CHARGE, 5.0)
     rig.change = battery(percent=5)
     rig.finish()
-    assert rig.said("Companion: battery at 5 %, HOLD") and math.hypot(*rig.place) > 2.0
+    assert rig.gave(EndReason.BATTERY) and math.hypot(*rig.place) > 2.0
 
 
 def test_thresholds_in_volts(tmp_path: Path) -> None:
     rig = Draining(yard(tmp_path), 5.0, {"volts": 11.4}, settings(return_volts=11.5))
-    rig.until(lambda: rig.said("Returning: battery at 11.4 V"), AFTER_S + 1.5)
+    rig.until(lambda: rig.reason is PowerReason.VOLTAGE, AFTER_S + 1.5)
     assert rig.now_s() - rig.began_s >= AFTER_S
 
 
@@ -158,7 +160,7 @@ def test_what_is_not_known_or_not_low_is_no_reason(tmp_path: Path, change: dict[
     rig = Draining(yard(tmp_path), 1.0, change)
     rig.finish()
     assert rig.companion.outcome.complete
-    assert rig.companion.outcome.broken_off is None
+    assert rig.reason is None
 
 
 def test_a_voltage_that_sags_for_a_moment_is_no_reason(tmp_path: Path) -> None:
@@ -174,7 +176,7 @@ def test_with_a_low_battery_it_does_not_even_begin(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path))
     rig.change = battery(percent=12)
     rig.run_for(50.0)
-    assert rig.companion.status().doing == "waiting for a charged battery (battery at 12 %)"
+    assert rig.awaits(WaitReason.CHARGED_BATTERY)
     assert not any(one.command in (SET_MODE, ARM) for one in rig.sent)
     rig.change = None
     rig.finish()
@@ -196,9 +198,9 @@ def test_a_run_that_is_taken_up_out_there_with_a_low_battery_goes_back(tmp_path:
     mission = yard(tmp_path)
     rig = Draining(mission, 9.0, {"percent": 19}, state=tmp_path / "state", late_s=45.0)
     if returning:
-        rig.until(lambda: rig.said("Returning: battery"), AFTER_S + 1.5)
+        rig.until(lambda: rig.reason is not None, AFTER_S + 1.5)
     resumed(rig, mission)
-    rig.until(lambda: rig.said("Returning: battery at 19 %"), AFTER_S + 1.5)
+    rig.until(lambda: rig.reason is PowerReason.CHARGE, AFTER_S + 1.5)
     rig.finish(60.0)
     assert rig.mode == HOLD and math.hypot(*rig.place) < 1.0
     assert rig.simulator.collisions == ()
@@ -210,4 +212,4 @@ def test_a_run_that_is_taken_up_out_there_with_an_empty_battery_ends_in_hold(tmp
     resumed(rig, mission)
     assert rig.companion.driver is None, "it could not begin"
     rig.until(lambda: rig.companion.done, 3.0)
-    assert rig.said("Companion: battery at 9 %, HOLD") and rig.mode == HOLD
+    assert rig.gave(EndReason.BATTERY) and rig.mode == HOLD

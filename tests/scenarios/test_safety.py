@@ -11,12 +11,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from companion.executive.mission_progress import TargetStatus
 from companion.mission.load import load_mission
+from companion.navigation.field_step import Action
+from companion.safety.reasons import Doubt, EndReason, LatchReason, RunPhase, WaitReason
 from companion.settings import Settings, parse_settings
 from tests.support.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, REBOOT, RTL, SET_MODE, Rig, Sent, without, yard
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 TICK_S = 0.05
+REACHED, UNREACHABLE, SKIPPED = TargetStatus.REACHED, TargetStatus.UNREACHABLE, TargetStatus.SKIPPED
 
 
 @pytest.fixture
@@ -63,7 +67,7 @@ def test_a_mode_change_silences_the_companion_until_guided_returns(tmp_path: Pat
     rig.run_for(4.0 if mode == RTL else 8.0)
     assert_silent(rig, since_s)
     assert rig.mode == mode
-    assert any("mode is not GUIDED" in text for text in rig.texts())
+    assert rig.gave(LatchReason.OTHER_MODE)
     rig.pilot_mode(GUIDED)
     assert_reached(rig)
 
@@ -77,7 +81,7 @@ def test_a_person_who_takes_the_rover_before_it_is_armed_is_not_overruled(tmp_pa
     since_s = rig.now_s()
     rig.run_for(10.0)
     assert_silent(rig, since_s)
-    assert "a person to set GUIDED" in rig.companion.status().doing
+    assert rig.awaits(WaitReason.PERSON_SETS_GUIDED_AGAIN)
     rig.pilot_mode(GUIDED)
     rig.pilot(ARM, 1)
     assert_reached(rig)
@@ -118,8 +122,7 @@ def test_disarming_silences_it_and_it_never_arms_again(rig: Rig) -> None:
     since_s = rig.now_s()
     rig.run_for(10.0)
     assert_silent(rig, since_s)
-    assert any("disarmed" in text for text in rig.texts())
-    assert "stopped: disarmed, waiting for a person to arm (or end this run," in rig.companion.status().doing
+    assert rig.gave(LatchReason.DISARMED) and rig.awaits(WaitReason.PERSON_ARMS_AGAIN)
     rig.pilot(ARM, 1)
     assert_reached(rig)
 
@@ -140,7 +143,7 @@ def test_disarmed_without_arm_it_waits_for_a_person(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path), arm=False, late_s=50.0)
     rig.run_for(30.0)
     assert all(one.command != ARM and not one.is_setpoint for one in rig.sent)
-    assert "a person to arm" in rig.companion.status().doing
+    assert rig.awaits(WaitReason.PERSON_ARMS)
     rig.pilot(ARM, 1)
     assert_reached(rig)
 
@@ -152,7 +155,7 @@ def test_armed_in_manual_at_connection_it_waits_for_a_person(tmp_path: Path) -> 
     rig.until(lambda: rig.armed, 2.0)
     rig.run_for(20.0)
     assert not [one for one in rig.sent if one.moves_or_changes]
-    assert "somebody is driving" in rig.companion.status().doing
+    assert rig.awaits(WaitReason.PERSON_SETS_GUIDED)
     rig.pilot_mode(GUIDED)
     assert_reached(rig)
 
@@ -164,7 +167,7 @@ def test_a_person_who_drives_and_stops_before_the_first_metre_keeps_the_rover(
 ) -> None:
     rig = Rig(yard(tmp_path), late_s=50.0, arm=arm)
     rig.pilot(ARM, 1)
-    rig.until(lambda: "somebody is driving" in rig.companion.status().doing, 3.0)
+    rig.until(lambda: rig.awaits(WaitReason.PERSON_SETS_GUIDED), 3.0)
     since_s = rig.now_s()
     if ends == "HOLD":
         rig.pilot_mode(HOLD)
@@ -174,7 +177,7 @@ def test_a_person_who_drives_and_stops_before_the_first_metre_keeps_the_rover(
         rig.pilot(ARM, 1)
     rig.run_for(10.0)
     assert not [one for one in rig.sent_since(since_s) if one.moves_or_changes]
-    assert "a person to set GUIDED" in rig.companion.status().doing
+    assert rig.awaits_guided
     rig.pilot_mode(GUIDED)
     assert_reached(rig)
 
@@ -208,27 +211,29 @@ def ekf_flags(clear: int = 0, set_too: int = 0) -> Callable[[Any], Any]:
     return changed
 
 
-FAULTS = {
-    "range data": without("OBSTACLE_DISTANCE", "DISTANCE_SENSOR", "RANGEFINDER"),
-    "position": without("LOCAL_POSITION_NED"),
-    "attitude": without("ATTITUDE"),
-    "EKF status": without("EKF_STATUS_REPORT"),
-    "EKF has no position": ekf_flags(clear=8 | 16, set_too=128),
-    "EKF has no attitude": ekf_flags(clear=1),
-    "EKF has no velocity": ekf_flags(clear=2),
+OLD, INCOMPLETE = Doubt.DATA_OLD, Doubt.EKF_INCOMPLETE
+FAULTS: dict[str, tuple[Callable[[Any], Any], Doubt, str]] = {
+    "range data": (without("OBSTACLE_DISTANCE", "DISTANCE_SENSOR", "RANGEFINDER"), OLD, "range data ahead"),
+    "position": (without("LOCAL_POSITION_NED"), OLD, "position"),
+    "attitude": (without("ATTITUDE"), OLD, "attitude"),
+    "EKF status": (without("EKF_STATUS_REPORT"), OLD, "EKF status"),
+    "EKF has no position": (ekf_flags(clear=8 | 16, set_too=128), INCOMPLETE, "position"),
+    "EKF has no attitude": (ekf_flags(clear=1), INCOMPLETE, "attitude"),
+    "EKF has no velocity": (ekf_flags(clear=2), INCOMPLETE, "velocity"),
 }
 
 
 def test_the_flag_of_a_gps_glitch_alone_does_not_stop_it_as_it_does_not_stop_ardurover(rig: Rig) -> None:
     rig.change = ekf_flags(set_too=32768)
     rig.finish()
-    assert rig.companion.outcome.complete and not any(text.startswith("Stopping") for text in rig.texts())
+    assert rig.companion.outcome.complete and not rig.was_stopped
 
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_lost_data_stops_the_rover_and_then_holds(rig: Rig, name: str) -> None:
-    rig.change, broken_s = FAULTS[name], rig.now_s()
-    rig.until(lambda: any(name in text for text in rig.texts()), 2.0)
+    change, doubt, figure = FAULTS[name]
+    rig.change, broken_s = change, rig.now_s()
+    rig.until(lambda: rig.gave(doubt, figure), 2.0)
     stop_s = rig.now_s()
     # A message that comes twice a second may be half a second old when the line breaks: its age counts, so it is sooner.
     assert stop_s - broken_s <= 1.0 + 2 * TICK_S
@@ -240,8 +245,6 @@ def test_lost_data_stops_the_rover_and_then_holds(rig: Rig, name: str) -> None:
     before = [one for one in after if one.is_setpoint and one.time_s <= holds[0].time_s]
     assert before and all(one.is_standstill for one in before)
     assert max(b.time_s - a.time_s for a, b in pairwise(before)) < 0.5
-    assert any(text.startswith("Stopping: ") and name in text for text in rig.texts())
-    assert any(text.startswith("HOLD: ") and name in text for text in rig.texts())
     assert rig.speed_m_s < 0.05
     assert rig.simulator.collisions == ()
     held_s = rig.now_s()
@@ -256,8 +259,9 @@ def test_lost_data_stops_the_rover_and_then_holds(rig: Rig, name: str) -> None:
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_data_that_comes_back_in_time_lets_it_go_on(rig: Rig, name: str) -> None:
-    rig.change = FAULTS[name]
-    rig.until(lambda: any(name in text for text in rig.texts()), 2.0)
+    change, doubt, figure = FAULTS[name]
+    rig.change = change
+    rig.until(lambda: rig.gave(doubt, figure), 2.0)
     stop_s = rig.now_s()
     rig.run_for(1.2)
     rig.change = None
@@ -267,10 +271,12 @@ def test_data_that_comes_back_in_time_lets_it_go_on(rig: Rig, name: str) -> None
     assert modes == [HOLD], "only the one at the end"
 
 
-def test_texts_are_said_once_not_at_every_tick(rig: Rig) -> None:
-    rig.change, since_s = FAULTS["range data"], rig.now_s()
+def test_stop_and_hold_are_said_once_with_their_reason_and_not_at_every_tick(rig: Rig) -> None:
+    rig.change, since_s = FAULTS["range data"][0], rig.now_s()
     rig.run_for(10.0)
-    assert sum(one.kind == "STATUSTEXT" for one in rig.sent_since(since_s)) <= 6
+    said = [one.message.text for one in rig.sent_since(since_s) if one.kind == "STATUSTEXT"]
+    reason = "range data ahead silent for over 1 s"
+    assert said[:2] == [f"Stopping: {reason}", f"HOLD: {reason}"] and len(said) <= 6
 
 
 def test_a_rover_whose_link_fails_stops_on_ground_it_has_seen(tmp_path: Path) -> None:
@@ -294,7 +300,7 @@ def test_two_thirds_of_a_second_lost_are_nothing(rig: Rig) -> None:
     rig.run_for(0.7)
     rig.cut = False
     assert_reached(rig)
-    assert not any("Stopping" in text for text in rig.texts())
+    assert not rig.was_stopped
 
 
 # --- where is it? ---------------------------------------------------------------------------------------------------
@@ -318,7 +324,7 @@ def test_a_position_jump_is_noticed_and_the_map_forgotten(rig: Rig) -> None:
     assert evidence is not None
     before = int((evidence.log_odds != 0.0).sum())
     rig.change, jump_s = shifted(0.0, -3.0), rig.now_s()
-    rig.until(lambda: any("jumped 3" in text for text in rig.texts()), 1.0)
+    rig.until(lambda: rig.gave(Doubt.POSITION_JUMPED), 1.0)
     said_s = rig.now_s()
     assert int((evidence.log_odds != 0.0).sum()) <= 1.05 * before  # one scan may have come before the jump
     rig.until(lambda: int((evidence.log_odds != 0.0).sum()) < before / 2, 2.0)
@@ -335,11 +341,11 @@ def test_no_target_is_given_up_while_a_position_that_jumped_may_jump_back(tmp_pa
     rig.until_driven(1.0)
     rig.change = shifted(0.0, 6.0)
     rig.run_for(8.0)
-    assert any("jumped" in text for text in rig.texts())
+    assert rig.gave(Doubt.POSITION_JUMPED)
     rig.change = None
     rig.finish()
     assert rig.companion.outcome.complete, rig.texts()
-    assert not [text for text in rig.texts() if "Unreachable" in text]
+    assert rig.times_decided(Action.UNREACHABLE, "gate") == 0
 
 
 def test_a_position_that_freezes_stops_the_rover(rig: Rig) -> None:
@@ -354,7 +360,7 @@ def test_a_position_that_freezes_stops_the_rover(rig: Rig) -> None:
         return message
 
     rig.change, since_s = frozen, rig.now_s()
-    rig.until(lambda: any("stands still" in text for text in rig.texts()), 3.0)
+    rig.until(lambda: rig.gave(Doubt.POSITION_FROZEN), 3.0)
     assert rig.now_s() - since_s < 2.0
     rig.until(lambda: rig.mode == HOLD, 4.0)
     assert rig.simulator.collisions == ()
@@ -382,8 +388,9 @@ def test_an_origin_that_moves_takes_the_mission_with_it(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path), parse_settings({"link": {"setpoint": "global"}}, "test"))
     rig.until_driven(5.0)
     rig.change, moved_s = Frame(20.0, -35.0), rig.now_s()
-    rig.until(lambda: any("origin moved" in text for text in rig.texts()), 3.0)
-    rig.until(lambda: rig.companion.status().doing == "driving", 3.0)
+    origin = rig.companion.origin
+    rig.until(lambda: rig.companion.origin != origin, 3.0)
+    rig.until(lambda: rig.does(RunPhase.DRIVING), 3.0)
     positions = [one for one in rig.sent_since(moved_s + 0.2) if one.is_setpoint and one.time_s < rig.now_s() - TICK_S]
     assert positions and all(one.is_standstill for one in positions)
     assert_reached(rig)
@@ -408,17 +415,18 @@ def test_an_autopilot_that_restarts_on_the_way(tmp_path: Path, form: str) -> Non
     """It comes back disarmed, in MANUAL, with another origin: the companion waits for a person, then finds its target."""
     rig = Rig(yard(tmp_path), parse_settings({"link": {"setpoint": form}}, "test"))
     rig.until_driven(6.0)
+    origin = rig.companion.origin
     rig.pilot(ARM, 0)
     rig.run_for(3.0)
     rig.pilot(REBOOT, 1)
     rig.until(lambda: rig.mode == MANUAL, 5.0)
     since_s = rig.now_s()
     rig.run_for(5.0)
-    assert "mode is not GUIDED, waiting for good data (" in rig.companion.status().doing
+    assert rig.gave(LatchReason.OTHER_MODE) and rig.awaits(WaitReason.GOOD_DATA_AND)
     rig.run_for(45.0)
-    assert "waiting for a person to set GUIDED and arm (or end this run," in rig.companion.status().doing
+    assert rig.awaits(WaitReason.PERSON_SETS_MODE_AND_ARMS)
     assert_silent(rig, since_s)
-    assert any("origin moved" in text for text in rig.texts())
+    assert rig.companion.origin != origin
     rig.pilot_mode(GUIDED)
     rig.pilot(ARM, 1)
     assert_reached(rig)
@@ -484,23 +492,25 @@ def targets(on_blocked: str) -> str:
 @pytest.mark.parametrize(
     ("on_blocked", "statuses", "end"),
     [
-        ("skip", ["unreachable", "reached"], (1.5, 20.5)),
-        ("wait", ["unreachable", "reached"], (1.5, 20.5)),
-        ("return", ["unreachable", "skipped"], (7.5, 2.5)),
-        ("hold", ["unreachable", "skipped"], (7.5, 2.5)),
+        ("skip", [UNREACHABLE, REACHED], (1.5, 20.5)),
+        ("wait", [UNREACHABLE, REACHED], (1.5, 20.5)),
+        ("return", [UNREACHABLE, SKIPPED], (7.5, 2.5)),
+        ("hold", [UNREACHABLE, SKIPPED], (7.5, 2.5)),
     ],
 )
-def test_a_sealed_target(tmp_path: Path, on_blocked: str, statuses: list[str], end: tuple[float, float]) -> None:
+def test_a_sealed_target(
+    tmp_path: Path, on_blocked: str, statuses: list[TargetStatus], end: tuple[float, float]
+) -> None:
     """Unreachable is said where the leg began; then the mission's own word counts."""
     settings = parse_settings({"navigator": {"wait_limit_s": 20.0, "wait_retry_s": 3.0}}, "test")
     rig = Rig(yard(tmp_path, targets(on_blocked), sealed=True), settings)
     waited: list[float] = []
-    rig.until(lambda: "Unreachable" in " ".join(rig.texts()), 400.0)
+    rig.until(lambda: rig.times_decided(Action.UNREACHABLE, "sealed") > 0, 400.0)
     while not rig.companion.done:
         rig.companion.tick()
-        if rig.companion.status().doing == "waiting for the way to clear":
+        if rig.does(RunPhase.WAY_BLOCKED):
             waited.append(rig.now_s())
-    assert [str(status) for _, status in rig.companion.statuses()] == statuses
+    assert [status for _, status in rig.companion.statuses()] == statuses
     assert rig.simulator.collisions == ()
     truth = rig.simulator.truth
     assert math.hypot(truth.north_m - end[0], truth.east_m - end[1]) < 1.5
@@ -508,8 +518,7 @@ def test_a_sealed_target(tmp_path: Path, on_blocked: str, statuses: list[str], e
     if waited:
         pauses = [b - a for a, b in pairwise(waited) if b - a > 1.5 * TICK_S]
         assert len(waited) == pytest.approx((len(pauses) + 1) * 3.0 / TICK_S, abs=2 * len(pauses) + 2), "3 s each"
-        unreachable = sum("Unreachable" in text for text in rig.texts())
-        assert unreachable >= 2, "tried again, then given up"
+        assert rig.times_decided(Action.UNREACHABLE, "sealed") >= 2, "tried again, then given up"
     rig.simulator.advance_to_s(rig.now_s() + 2.0)
     assert rig.speed_m_s < 0.05
 
@@ -521,7 +530,7 @@ def test_stop_leaves_the_rover_standing_in_hold(rig: Rig) -> None:
     commands = [one for one in rig.sent_since(since_s) if one.moves_or_changes]
     assert commands[0].is_standstill and commands[1].command == SET_MODE
     assert rig.now_s() - since_s < 1.0
-    assert "Companion: stopped by the user, HOLD" in rig.texts()
+    assert rig.gave(EndReason.STOPPED_BY_USER)
     driven_m = rig.simulator.driven_m
     rig.simulator.advance_to_s(rig.now_s() + 3.0)
     assert rig.speed_m_s < 0.05 and rig.simulator.driven_m - driven_m < 1.2

@@ -10,6 +10,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.navigation.field_step import Part
+from companion.safety.reasons import Doubt, RunPhase, WaitReason
 from tests.support.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, Rig, without, yard
 
 HEADING_ONLY, POSITION_ONLY = 2559, 3580
@@ -33,17 +34,13 @@ def last_mask(rig: Rig) -> int:
     return int(setpoints[-1].message.type_mask) if setpoints else 0
 
 
-def doing(rig: Rig, words: str) -> bool:
-    return words in rig.companion.status().doing
-
-
 def asking_for_guided(rig: Rig) -> None:
     """The mode change is on its way and not answered."""
     rig.until(lambda: any(one.command == SET_MODE for one in rig.sent), 60.0)
 
 
 def waiting_for_arming(rig: Rig) -> None:
-    rig.until(lambda: doing(rig, "waiting for arming"), 60.0)
+    rig.until(lambda: rig.awaits(WaitReason.ARMING), 60.0)
 
 
 def turning(rig: Rig) -> None:
@@ -63,11 +60,11 @@ def searching(rig: Rig) -> None:
 
 
 def holding_at_a_target(rig: Rig) -> None:
-    rig.until(lambda: doing(rig, "holding"), 100.0)
+    rig.until(lambda: rig.does(RunPhase.HOLDING), 100.0)
 
 
 def waiting_for_the_way_to_clear(rig: Rig) -> None:
-    rig.until(lambda: doing(rig, "waiting for the way to clear"), 200.0)
+    rig.until(lambda: rig.does(RunPhase.WAY_BLOCKED), 200.0)
 
 
 def backing_out(rig: Rig) -> None:
@@ -81,13 +78,13 @@ def backing_out(rig: Rig) -> None:
 def stopped_by_a_watchdog(rig: Rig) -> None:
     driving(rig)
     rig.change = without("OBSTACLE_DISTANCE")
-    rig.until(lambda: doing(rig, "stopped: range data"), 3.0)
+    rig.until(lambda: rig.gave(Doubt.DATA_OLD, "range data ahead"), 3.0)
 
 
 def asking_for_hold(rig: Rig) -> None:
     """The watchdog's HOLD has just gone out, and is not answered."""
     stopped_by_a_watchdog(rig)
-    rig.until(lambda: any(text.startswith("HOLD") for text in rig.texts()), 3.0)
+    rig.until(lambda: rig.companion.mission_run.latch.hold_sent, 3.0)
 
 
 def handing_over(rig: Rig) -> None:
@@ -174,7 +171,7 @@ def test_sticks_that_are_moved_in_guided_take_the_rover_away(
     after = [one for one in rig.sent_since(hold.time_s) if one.moves_or_changes]
     assert [one.command for one in after if one.command] == [SET_MODE]
     assert not [one for one in after if one.is_setpoint and one.time_s > hold.time_s]
-    assert "HOLD: the sticks were moved" in rig.texts() and rig.speed_m_s < 0.05
+    assert rig.gave(Doubt.STICKS_MOVED) and rig.speed_m_s < 0.05
 
 
 def test_sticks_that_tremble_or_are_let_go_take_nothing(tmp_path: Path) -> None:
@@ -210,7 +207,7 @@ def test_a_person_who_changes_the_mode_in_the_tick_in_which_the_companion_does_i
     rig.run_for(20.0)
     assert [one.message.param2 for one in rig.sent if one.command == SET_MODE] == [GUIDED]
     assert rig.mode == mode and rig.simulator.driven_m < 0.1
-    assert doing(rig, "a person to set GUIDED")
+    assert rig.awaits_guided
 
 
 def test_a_speed_whose_answer_was_lost_is_not_said_again_to_a_rover_that_a_person_drives(tmp_path: Path) -> None:

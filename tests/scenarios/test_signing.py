@@ -15,6 +15,7 @@ from companion.mission.mission import Mission
 from companion.recording.reader import load_record
 from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
+from companion.safety.reasons import RunPhase, WaitReason
 from tests.support.party import KEY, TIME, Party
 from tests.support.rig import GUIDED, Rig, yard
 from tests.support.served import mission_path
@@ -130,8 +131,7 @@ def test_a_signed_and_tuned_run_is_replayed_without_the_key(tmp_path: Path) -> N
 def test_keys_that_differ_are_told_of(tmp_path: Path) -> None:
     rig = signing_rig(tmp_path, our_key=b"k" * 32)
     rig.run_for(5.0)
-    doing = rig.companion.status().doing
-    assert doing.startswith("waiting for the autopilot's heartbeat") and "another key" in doing
+    assert rig.awaits(WaitReason.HEARTBEAT) and "another key" in str(rig.activity)
     assert rig.mode != GUIDED
     assert not any(sent.moves_or_changes for sent in rig.sent)
 
@@ -139,14 +139,14 @@ def test_keys_that_differ_are_told_of(tmp_path: Path) -> None:
 def test_an_autopilot_without_a_key_is_told_of(tmp_path: Path) -> None:
     rig = signing_rig(tmp_path, vehicle_key=None)
     rig.run_for(5.0)
-    assert "has the autopilot been given the key?" in rig.companion.status().doing
+    assert rig.awaits(WaitReason.HEARTBEAT) and "has the autopilot been given the key?" in str(rig.activity)
 
 
 def test_a_companion_without_a_key_is_told_of(tmp_path: Path) -> None:
     rig = signing_rig(tmp_path, our_key=None)
     rig.run_for(10.0)
     assert rig.texts().count("The autopilot signs: without --signing-key it ignores us, but on its first port") == 1
-    assert rig.companion.status().doing.startswith("waiting for")
+    assert rig.does(RunPhase.WAITING)
     assert rig.mode != GUIDED  # it has indeed been ignored
 
 

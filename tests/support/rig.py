@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from companion.app import Companion
 from companion.checkpoint.checkpointer import Checkpointer
 from companion.checkpoint.state_directory import StateDirectory
 from companion.checkpoint.state_writer import InlineStateWriter, StateFile
+from companion.executive.mission_executor import MissionExecutor
 from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -26,8 +28,10 @@ from companion.mavlink.signing import Signer
 from companion.mavlink.transport import MemoryLink
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
+from companion.navigation.field_step import Action, Decision
 from companion.navigation.step_runner import InlineRunner
-from companion.recording.recorder import NullRecorder
+from companion.recording.recorder import NullRecorder, Recorder
+from companion.safety.reasons import Activity, Doubt, RunPhase, WaitReason
 from companion.settings import Settings
 from companion.storage.disk import OsDisk
 from companion.vehicle.commands import GuidedPosition
@@ -100,6 +104,16 @@ class Sent:
         return self.kind == "SET_POSITION_TARGET_LOCAL_NED" and m.type_mask == 1511 and m.vx == m.yaw_rate == 0.0
 
 
+class Log(NullRecorder):
+    """Keeps what the navigator decided, by target."""
+
+    def __init__(self) -> None:
+        self.decided: list[tuple[str, Action]] = []
+
+    def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
+        self.decided.append((target, decision.action))
+
+
 Change = Callable[[Any], Any]
 """Takes a message of the vehicle; gives it back, perhaps changed in place, or None to lose it."""
 
@@ -136,6 +150,10 @@ class Rig:
         self.stall_s = 0.0
         """The companion's computer stands still for so long, once."""
         self.sent: list[Sent] = []
+        self.activities: list[Activity] = []
+        """What the companion did, one after the other."""
+        self.goals: list[str] = []
+        """Where it was heading for, one after the other."""
         self.beyond_m: list[float] = []
         """How far each guided position reached beyond the ground seen free, in metres."""
         self._now_s = self.simulator.time_s
@@ -146,7 +164,8 @@ class Rig:
         self._pilot = self.simulator.connect()
         self._pilot_mav = mavlink.MAVLink(None, 255, 190)
         self._up, self._down = mavlink.MAVLink(None), mavlink.MAVLink(None)
-        self.recorder = NullRecorder()
+        self.log = Log()
+        self.recorder: NullRecorder | Recorder = self.log
         self._arm, self._seed, self._state = arm, seed, state
         self.state_file = None if state is None else state / "mission.state"
         self.restart_companion(mission)
@@ -177,6 +196,7 @@ class Rig:
         return self._now_s
 
     def sleep_until_s(self, time_s: float) -> None:
+        self._watch_activity()
         time_s, self.stall_s = time_s + self.stall_s, 0.0
         said = self._far.read()
         for message in self._up.parse_buffer(said) or []:
@@ -258,6 +278,62 @@ class Rig:
 
     def sent_since(self, time_s: float) -> list[Sent]:
         return [sent for sent in self.sent if sent.time_s >= time_s]
+
+    @property
+    def activity(self) -> Activity:
+        """What the companion does now."""
+        return self.companion.status().activity
+
+    @property
+    def executor(self) -> MissionExecutor:
+        """The mission under way."""
+        assert self.companion.executor is not None
+        return self.companion.executor
+
+    def does(self, phase: RunPhase) -> bool:
+        return self.activity.phase is phase
+
+    def awaits(self, *kinds: WaitReason) -> bool:
+        """Whether it says that it waits for one of these."""
+        return self.activity.awaited is not None and self.activity.awaited.kind in kinds
+
+    @property
+    def awaits_guided(self) -> bool:
+        """Whether it says that it waits for a person to set GUIDED."""
+        kinds = (WaitReason.PERSON_SETS_GUIDED, WaitReason.PERSON_SETS_GUIDED_AGAIN, WaitReason.PERSON_SETS_MODE)
+        return self.awaits(*kinds)
+
+    def gave(self, kind: Enum, *figures: object) -> bool:
+        """Whether this was ever its reason not to drive; ``figures``: the first of the reason's."""
+        self._watch_activity()
+        reasons = (activity.reason for activity in self.activities)
+        return any(
+            reason is not None and reason.kind is kind and reason.figures[: len(figures)] == figures
+            for reason in reasons
+        )
+
+    @property
+    def was_stopped(self) -> bool:
+        """Whether it ever doubted that the rover may move."""
+        self._watch_activity()
+        return any(one.reason is not None and isinstance(one.reason.kind, Doubt) for one in self.activities)
+
+    def times_decided(self, action: Action, target: str) -> int:
+        """How often the navigator decided so on the way to a target."""
+        return self.log.decided.count((target, action))
+
+    def has_reached(self, target: str) -> bool:
+        return self.times_decided(Action.REACHED, target) > 0
+
+    def _watch_activity(self) -> None:
+        """Once a tick."""
+        if not hasattr(self, "companion"):
+            return
+        status = self.companion.status()
+        if not self.activities or self.activities[-1] != status.activity:
+            self.activities.append(status.activity)
+        if status.target and (not self.goals or self.goals[-1] != status.target):
+            self.goals.append(status.target)
 
     def texts(self) -> list[str]:
         return self.companion.outcome.said
