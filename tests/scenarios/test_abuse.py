@@ -1,4 +1,4 @@
-"""Hostile sizes, floods and borrowed names: refused or limited, in one clear line; and no file is written where none belongs."""
+"""Hostile sizes, floods, borrowed ids: refused or limited in one clear line; and no file is written elsewhere."""
 
 from __future__ import annotations
 
@@ -290,8 +290,9 @@ WATCHER = """
 import os, sys
 allowed = tuple(os.path.realpath(place) + os.sep for place in sys.argv[1].split(':')) + ('/dev/', '/proc/')
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
-NAMED = {'os.mkdir': (0,), 'os.remove': (0,), 'os.rmdir': (0,), 'os.rename': (0, 1), 'os.link': (0, 1), 'os.symlink': (0, 1),
-         'os.truncate': (0,), 'os.chmod': (0,), 'shutil.copyfile': (1,), 'tempfile.mkstemp': (0,), 'tempfile.mkdtemp': (0,)}
+NAMED = {'os.mkdir': (0,), 'os.remove': (0,), 'os.rmdir': (0,), 'os.rename': (0, 1), 'os.link': (0, 1),
+         'os.symlink': (0, 1), 'os.truncate': (0,), 'os.chmod': (0,), 'shutil.copyfile': (1,),
+         'tempfile.mkstemp': (0,), 'tempfile.mkdtemp': (0,)}
 def hook(event, arguments):
     if event in ('open', 'os.mkdir') and os.path.isdir(arguments[0]):
         return  # no file, or one without a name: with that the compiler's cache tries whether it could be written
@@ -324,7 +325,7 @@ def tree(folder: Path) -> dict[str, tuple[int, int]]:
 
 
 def watched(place: Path, allowed: list[Path], *arguments: object) -> subprocess.CompletedProcess[str]:
-    """A command in a directory that may not be written, told of by its own interpreter when it writes elsewhere than allowed."""
+    """A command in a read-only directory; its interpreter ends it when it writes elsewhere than allowed."""
     command = [sys.executable, "-B", "-c", WATCHER, ":".join(map(str, allowed)), *map(str, arguments)]
     home = place / "home"
     environment = {**os.environ, "HOME": str(home), "XDG_STATE_HOME": str(allowed[-1])}

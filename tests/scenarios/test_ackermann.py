@@ -1,4 +1,4 @@
-"""A rover with steered wheels, driven by the whole system over MAVLink bytes: through a world with a bay too narrow for a circle."""
+"""A rover with steered wheels, in lock-step, through a world with a bay that is too narrow for a circle."""
 
 from dataclasses import replace
 from pathlib import Path

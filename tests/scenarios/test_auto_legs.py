@@ -115,7 +115,7 @@ def test_a_person_who_takes_the_rover_in_a_leg_has_it(tmp_path: Path, mode: int,
 
 
 def test_a_mission_of_the_companions_own_is_never_driven_in_auto(tmp_path: Path) -> None:
-    """The autopilot hands a leg over to a companion that drives in GUIDED: a person has chosen AUTO, so it is silent."""
+    """A leg is handed over to a companion that drives in GUIDED: a person has chosen AUTO, so it is silent."""
     rig = Asker(yard(tmp_path))
     rig.until_driven(1.0)
     rig.upload([(GUIDED_ENABLE, ON, rig.field(15, 7)), (WAYPOINT, NONE, rig.field(4, 7))])
@@ -206,8 +206,14 @@ def test_a_leg_may_be_said_in_any_frame_with_a_latitude(tmp_path: Path, frame: i
     assert rig.companion.status().target == "guided item 2"
 
 
-OTHERS = {"component": {"target_component": 195}, "everybody": {"target_component": 0}, "system": {"target_system": 2},
-          "local": {"coordinate_frame": 1}, "velocity": {"type_mask": 3527}, "elsewhere": {"lat_int": 531_335_000}}  # fmt: skip
+OTHERS = {
+    "component": {"target_component": 195},
+    "everybody": {"target_component": 0},
+    "system": {"target_system": 2},
+    "local": {"coordinate_frame": 1},
+    "velocity": {"type_mask": 3527},
+    "elsewhere": {"lat_int": 531_335_000},
+}
 
 
 @pytest.mark.parametrize("fields", OTHERS.values(), ids=OTHERS)

@@ -1,4 +1,4 @@
-"""The depot: doors, ice, gravel, a forklift, and surfaces that no lidar sees; driven by the whole system in lock-step."""
+"""The depot: doors, ice, gravel, a forklift, and surfaces that no lidar sees; driven in lock-step."""
 
 from pathlib import Path
 

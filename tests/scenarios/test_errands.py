@@ -200,7 +200,7 @@ def test_a_place_that_cannot_be_reached_is_given_up_and_the_mission_goes_on(tmp_
 
 
 def test_what_is_meant_for_others_is_left_alone(driving: Asker) -> None:
-    """The autopilot's own target (which the companion overrules), everybody's, another vehicle's, an upload, another command."""
+    """Targets for the autopilot itself, for everybody and for another vehicle; an upload; another command."""
     place = driving.field(5, 12)
     for to in ((1, 1), (1, 0), (0, 0), (2, COMPANION), (1, 190)):
         driving.reposition(place, to=to)

@@ -1,4 +1,4 @@
-"""A shipped mission driven in lock-step under each kind of fault: nothing is touched, and a rover that stops says why."""
+"""A shipped mission under each kind of fault: nothing is touched, and a rover that stops says why."""
 
 from __future__ import annotations
 

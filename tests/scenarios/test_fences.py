@@ -1,4 +1,4 @@
-"""The autopilot's own fence, over MAVLink's mission protocol in lock-step: planned round, heeded at once when it changes, never crossed."""
+"""The autopilot's fence, in lock-step: planned around, obeyed as soon as it changes, never crossed."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from tests.support.rig import ARM, GUIDED, HOLD, SET_MODE, Rig, yard
 from tests.support.stored import CIRCLE_IN, CIRCLE_OUT, KEEP_IN, KEEP_OUT, POLYGONS, Person, box, stored
 
 ALL = box(KEEP_IN, -6.0, -2.4, 7.0, 20.0)
-"""Round the whole yard: the rover begins at 0, 0, a wall stands across its way at 6 m east, the target is at 13 m east."""
+"""Around the whole yard: the start is at 0, 0, a wall across the way at 6 m east, the target at 13 m east."""
 NORTH = box(KEEP_OUT, 1.5, 3.0, 7.0, 10.0)
-"""Nobody goes round the wall on this side."""
+"""Closes the way around the wall on this side."""
 FENCE_ENABLE = 207
 
 
 class Watched(Rig):
-    """Keeps where the rover really was, metres north and east of where it began, and how often the autopilot saw a breach."""
+    """Keeps where the rover really was, in metres north and east of its start, and the breaches the autopilot saw."""
 
     track: list[tuple[float, float]]
 
@@ -74,7 +74,7 @@ CORNERS = ((2.2, 15.3), (-2.3, 15.2), (-2.3, 0.5), (2.3, 14.0))
 
 
 def test_who_cannot_turn_on_the_spot_keeps_inside_a_narrow_strip_by_itself(tmp_path: Path) -> None:
-    """Targets in the corners: it has to back out again and again. Guidance itself asks for nothing that the last look refuses."""
+    """Targets in the corners: it must back out again and again. The check of setpoints has nothing to refuse."""
     Image.new("L", (30, 20), 255).save(tmp_path / "strip.png")
     targets = "".join(f"[[target]]\nnorth_m = {north_m}\neast_m = {east_m}\n" for north_m, east_m in CORNERS)
     (tmp_path / "strip.toml").write_text(STRIP + targets)

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from companion.executive.fetching import TRIES, Fetching
+from companion.executive.plan_watch import AGAIN_S
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
@@ -178,7 +180,7 @@ def test_the_command_itself(tmp_path: Path) -> None:
 
 
 def test_the_command_drives_what_auto_hands_over(tmp_path: Path) -> None:
-    """Real processes: the mission is fetched, a person arms and sets AUTO, the companion drives the leg and ends by itself."""
+    """Real processes: a person arms and sets AUTO, the companion drives the leg and ends by itself."""
     with served(yard(tmp_path)) as world:
         upload(world.url, stored([(GUIDED_ENABLE, ON, (6, 9)), (WAYPOINT, NONE, (3, 9))]))
         with process("companion", "run", "--from-autopilot", "--connect", world.url) as run:

@@ -1,4 +1,4 @@
-"""Files that cannot be written after the work is done: a full disk, a path that names no file. /dev/full is a disk that is always full."""
+"""Output files that cannot be written after the work is done: a full disk (/dev/full), or a path of no file."""
 
 from __future__ import annotations
 

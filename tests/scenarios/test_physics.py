@@ -1,4 +1,4 @@
-"""``rover-sitl physics`` as a process, asked over UDP by a stand-in for the firmware, its lidar on a line of its own."""
+"""``rover-sitl physics`` as a process: a stand-in for the firmware asks it over UDP; the lidar has its own line."""
 
 from __future__ import annotations
 

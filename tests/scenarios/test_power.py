@@ -1,4 +1,4 @@
-"""A battery that runs low, in lock-step: back the way it came, or to a rally point; empty: stop and HOLD where it is."""
+"""A battery that runs low: back the way the rover came, or to a rally point; empty: stop and HOLD on the spot."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def settings(**power: Any) -> Settings:
 
 
 def battery(percent: int = -1, volts: float = 0.0, state: int = 0, *, since: list[float] | None = None) -> Change:
-    """What the vehicle says of its battery; with ``since`` (a list that is filled later) only while something is in it."""
+    """What the vehicle says of its battery; with ``since`` (a list) only after something was put into that."""
 
     def change(message: Any) -> Any:
         if since is not None and not since:

@@ -1,4 +1,4 @@
-"""Records are run again: nothing differs, whatever happened in the run; and a record that is not whole is named in one line."""
+"""Recorded runs are replayed without a difference, whatever happened in the run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A companion that is killed at any moment, and one that takes up what it has left: in lock-step, over MAVLink bytes."""
+"""A companion is killed at any moment, and another one resumes its run: in lock-step, over MAVLink bytes."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def state_in(folder: Path) -> SavedState:
 
 
 def kill_and_resume(rig: Rig, mission: Mission) -> None:
-    """The companion is gone between two ticks; what it said last is still on its way, what it was about to write is lost."""
+    """The companion is gone between two ticks: its last packets still arrive, its unfinished file is lost."""
     beside = Path(str(rig.state_file) + ".new")
     beside.write_bytes(b"half a sta")
     rig.restart_companion(mission, resume=True)

@@ -1,4 +1,4 @@
-"""``rover-companion run --resume`` as a process of its own, killed and stopped while it drives a rover on a TCP port."""
+"""``rover-companion run --resume`` as a process, killed and stopped while it drives a rover on a TCP port."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two who steer one rover, each on a link of his own, in lock-step: neither hears a heartbeat of the other, both the figures that it tells."""
+"""Two companions for one rover, each on its own link: neither hears the other's heartbeat, both its figures."""
 
 from __future__ import annotations
 

@@ -18,7 +18,15 @@ from companion.replay.replay import replay
 from tests.support.rig import ARM, GUIDED, HOLD, MANUAL, SET_MODE, yard
 from tests.support.served import finished, mission_path, process, served, wait_until
 
-SIMULATED = '[[target]]\nnorth_m = 3.0\neast_m = 0.0\n[sitl]\nworld = "none.png"\nsensors = "none.toml"\nparameters = "none.param"\n'
+SIMULATED = """
+[[target]]
+north_m = 3.0
+east_m = 0.0
+[sitl]
+world = "none.png"
+sensors = "none.toml"
+parameters = "none.param"
+"""
 """A mission that has come to a rover without the simulator's files."""
 
 

@@ -1,4 +1,4 @@
-"""Faults on purpose, in lock-step over MAVLink bytes: whatever happens, the rover stands, the pilot wins, and people are told."""
+"""Faults on purpose, in lock-step over MAVLink bytes: the rover stops, the pilot wins, and people are told why."""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ def test_lost_data_stops_the_rover_and_then_holds(rig: Rig, name: str) -> None:
     rig.change, broken_s = change, rig.now_s()
     rig.until(lambda: rig.gave(doubt, figure), 2.0)
     stop_s = rig.now_s()
-    # A message that comes twice a second may be half a second old when the line breaks: its age counts, so it is sooner.
+    # A message that comes twice a second may be half a second old already when the line breaks.
     assert stop_s - broken_s <= 1.0 + 2 * TICK_S
     rig.run_for(3.0)
     after = rig.sent_since(stop_s)
@@ -412,7 +412,7 @@ def test_home_that_moves_leaves_the_mission_where_it_began(rig: Rig) -> None:
 
 @pytest.mark.parametrize("form", ["local", "global"])
 def test_an_autopilot_that_restarts_on_the_way(tmp_path: Path, form: str) -> None:
-    """It comes back disarmed, in MANUAL, with another origin: the companion waits for a person, then finds its target."""
+    """It comes back disarmed, in MANUAL, with another origin: the companion waits for a person."""
     rig = Rig(yard(tmp_path), parse_settings({"link": {"setpoint": form}}, "test"))
     rig.until_driven(6.0)
     origin = rig.companion.origin

@@ -1,4 +1,4 @@
-"""The pilot wins, whatever the companion is doing: from the heartbeat on that shows it, not one setpoint, and no way back by itself."""
+"""The pilot wins at any moment: after the heartbeat that shows it no setpoint is sent, and no mode is changed back."""
 
 from __future__ import annotations
 
@@ -94,8 +94,8 @@ def handing_over(rig: Rig) -> None:
 
 
 PHASES = {phase.__name__.replace("_", " "): phase for phase in (
-    asking_for_guided, waiting_for_arming, turning, driving, searching, holding_at_a_target, waiting_for_the_way_to_clear,
-    backing_out, stopped_by_a_watchdog, asking_for_hold, handing_over,
+    asking_for_guided, waiting_for_arming, turning, driving, searching, holding_at_a_target,
+    waiting_for_the_way_to_clear, backing_out, stopped_by_a_watchdog, asking_for_hold, handing_over,
 )}  # fmt: skip
 
 
@@ -138,7 +138,7 @@ def test_disarming_at_any_phase_silences_it_for_good(tmp_path: Path, phase: str)
 
 
 def hold_sticks(rig: Rig, steering_us: int, throttle_us: int, seconds: float) -> None:
-    """A ground station's joystick; ArduRover shows it in RC_CHANNELS like a transmitter's sticks, and in GUIDED obeys neither."""
+    """A ground station's joystick. ArduRover shows it in RC_CHANNELS, and in GUIDED it obeys no sticks."""
     until_s = rig.now_s() + seconds
     while rig.now_s() < until_s - 1e-9 and not rig.companion.done:
         rest = [65535] * 4

@@ -1,4 +1,4 @@
-"""Faults that leave the data fresh, in lock-step: readings that repeat, a link that is late, clocks that jump, work that takes too long."""
+"""Faults that leave the data fresh: repeated readings, a late link, clocks that jump, work that takes too long."""
 
 from __future__ import annotations
 

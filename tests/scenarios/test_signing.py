@@ -1,4 +1,4 @@
-"""Signing between companion and the simulated autopilot, which was given its key with SETUP_SIGNING; in lock-step, real bytes."""
+"""Signed MAVLink between companion and simulated autopilot, which got its key with SETUP_SIGNING."""
 
 from __future__ import annotations
 

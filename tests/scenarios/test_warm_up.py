@@ -1,4 +1,4 @@
-"""After the warm-up nothing is compiled any more: a compiler at work in the middle of a drive would be a stall of seconds."""
+"""After the warm-up no kernel is compiled: a compiler in the middle of a drive would stall it for seconds."""
 
 import json
 import os
@@ -23,7 +23,8 @@ from sitl.scenario import scenario_from_mission
 
 def compiled():
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("companion.")]
-    things = {id(thing): thing for module in modules for thing in vars(module).values() if isinstance(thing, Dispatcher)}
+    values = (value for module in modules for value in vars(module).values())
+    things = {id(value): value for value in values if isinstance(value, Dispatcher)}
     return {f"{thing.__module__}.{thing.__name__}": len(thing.signatures) for thing in things.values()}
 
 mission = load_mission(Path(sys.argv[1]))
@@ -55,7 +56,7 @@ def test_a_drive_compiles_nothing(mission: str, planner: str) -> None:
     assert found["new"] == []
 
 
-# Every kind of drive, by way of a link: guided places, speeds and headings, then a mission with legs, a circle and the way home.
+# Every kind of drive over a link: guided positions, speeds and headings, a mission with a circle, the way home.
 SERVED = """
 import json, sys
 from pathlib import Path
@@ -66,7 +67,8 @@ from sitl.scenario import scenario_from_mission, with_sensors
 
 def compiled():
     modules = [module for name, module in list(sys.modules.items()) if name.startswith("sitl.")]
-    things = {id(thing): thing for module in modules for thing in vars(module).values() if isinstance(thing, Dispatcher)}
+    values = (value for module in modules for value in vars(module).values())
+    things = {id(value): value for value in values if isinstance(value, Dispatcher)}
     return {f"{thing.__module__}.{thing.__name__}": len(thing.signatures) for thing in things.values()}
 
 scenario = scenario_from_mission(with_sensors(load_mission(Path(sys.argv[1])), sys.argv[2]))
@@ -96,12 +98,14 @@ lat, lon = (round(degrees * 1e7) for degrees in (scenario.start.home.lat_deg, sc
 places = ((16, 0, 0, 0), (16, 100, 100, 0), (16, 200, 100, 0), (16, 200, 300, 1), (18, 200, 300, 1), (20, 0, 0, 0))
 say(mavlink.MAVLink_mission_count_message(1, 1, len(places), 0), 0.1)
 for seq, (command, north, east, first) in enumerate(places):
-    say(mavlink.MAVLink_mission_item_int_message(1, 1, seq, 3, command, 0, 1, first, 0, 1, 0, lat + north, lon + east, 0, 0), 0.1)
+    head = (1, 1, seq, 3, command, 0, 1, first, 0, 1, 0)
+    say(mavlink.MAVLink_mission_item_int_message(*head, lat + north, lon + east, 0, 0), 0.1)
 order(176, 1, 10, seconds=90.0)
 order(176, 1, 12, seconds=2.0)
 after = compiled()
 said = [m.text for m in mavlink.MAVLink(None).parse_buffer(link.take()) if m.get_type() == "STATUSTEXT"]
-print(json.dumps({"said": said, "kernels": sum(before.values()), "new": [n for n in after if after[n] > before.get(n, 0)]}))
+new = [name for name in after if after[name] > before.get(name, 0)]
+print(json.dumps({"said": said, "kernels": sum(before.values()), "new": new}))
 """
 
 
@@ -109,7 +113,7 @@ print(json.dumps({"said": said, "kernels": sum(before.values()), "new": [n for n
     ("mission", "sensors"), [("open.toml", "beams"), ("ackermann.toml", "lidar-360"), ("crossing.toml", "none")]
 )
 def test_a_vehicle_that_is_served_compiles_nothing(mission: str, sensors: str) -> None:
-    """A client that starts the first mission would wait for a compiler, and the vehicle's heart would not beat meanwhile."""
+    """A client that starts the first mission would wait for a compiler, without heartbeats of the vehicle."""
     command = [sys.executable, "-c", SERVED, str(MISSIONS / mission), sensors]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr

@@ -119,8 +119,11 @@ Change = Callable[[Any], Any]
 
 
 class Rig:
-    """One run. ``change`` is the line from the vehicle to the companion, message by message, ``garble`` the same in bytes;
-    ``lose`` says whether a packet of the companion is lost; ``cut`` cuts the line both ways."""
+    """One run.
+
+    ``change``: the line from the vehicle to the companion, message by message; ``garble``: the same in bytes.
+    ``lose``: whether a packet of the companion is lost. ``cut``: no line in either direction.
+    """
 
     def __init__(
         self,
@@ -135,8 +138,11 @@ class Rig:
         signer: Signer | None = None,
         prepare: Callable[[Simulator], None] = lambda simulator: None,
     ) -> None:
-        """``late_s``: how long the vehicle has been switched on when the companion comes; ``state``: the directory where it keeps its
-        state; ``port``: the vehicle's serial port it is on; ``prepare``: what others did with the vehicle by then."""
+        """``late_s``: how long the vehicle has been switched on when the companion starts.
+
+        ``state``: the companion's state directory. ``port``: the vehicle's serial port that the companion is on.
+        ``prepare``: what others did with the vehicle before.
+        """
         settings = settings or Settings()
         warm_up(settings, mission.rover.turning_radius_m)
         self.settings = settings
@@ -148,7 +154,7 @@ class Rig:
         self.lose: Callable[[], bool] | None = None
         self.cut = False
         self.stall_s = 0.0
-        """The companion's computer stands still for so long, once."""
+        """The companion's computer stands still for this long, once."""
         self.sent: list[Sent] = []
         self.activities: list[Activity] = []
         """What the companion did, one after the other."""
@@ -171,7 +177,7 @@ class Rig:
         self.restart_companion(mission)
 
     def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
-        """A companion that knows nothing yet takes the place of the one before, or with ``resume`` one that takes up what that has left."""
+        """A new companion takes the place of the one before; with ``resume`` it resumes that run."""
         checkpointer = None if self._state is None else kept_in(self._state, mission, resume=resume)
         near, self._far = MemoryLink.pair()
         self.link = AutopilotLink(

@@ -1,4 +1,4 @@
-"""A person who plans at the ground station while a ``Rig`` runs: uploads fences and rally points, sets parameters. Real bytes."""
+"""A person who plans at the ground station: uploads fences and rally points, sets parameters, in real bytes."""
 
 from __future__ import annotations
 
