@@ -76,9 +76,9 @@ def _local(rig: Asker, place: tuple[int, int]) -> NedPoint:
 
 UNSAFE = {
     "fence": ((9, 7), "beyond keep_out 1"),
-    "edge of a fence": ((10, 8), "in or too near a fence or a known obstacle"),
+    "edge of a fence": ((10, 8), "too near a fence"),
     "beyond the grid": ((40, 7), "outside the mission's grid"),
-    "far": ((902, 7), "900 m away, farther than 300 m"),
+    "far": ((902, 7), "farther than 300 m"),
 }
 
 
@@ -90,7 +90,7 @@ def test_a_place_that_is_not_safe_is_refused_with_the_reason(
     rig.until_driven(1.5)
     rig.reposition(rig.field(*field))
     assert rig.answered() == DENIED
-    assert any(reason in text for text in rig.said), "the ground station hears why"
+    assert reason in rig.texts()[-1] and rig.said, "the ground station hears why"
     assert rig.goals == ["gate"]
     rig.finish()
     assert rig.companion.outcome.complete
