@@ -9,8 +9,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from companion.executive.fetching import TRIES, Fetching
-from companion.executive.plan_watch import AGAIN_S
 from pymavlink import mavutil
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner

@@ -4,7 +4,6 @@ from itertools import pairwise
 from typing import Any
 
 import pytest
-from companion.operator.reporting import FAULT_AFTER_S, Reporter
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
