@@ -57,12 +57,6 @@ def test_a_line_that_garbles(tmp_path: Path, seed: int) -> None:
     assert rig.link.codec.counters.bad_bytes > 100
 
 
-def test_every_packet_twice(tmp_path: Path) -> None:
-    rig = Rig(yard(tmp_path))
-    rig.garble = lambda data: data + data
-    assert_reached(rig)
-
-
 def test_a_record_that_ends_is_said_once_and_the_rover_drives_on(tmp_path: Path) -> None:
     rig = Rig(yard(tmp_path))
     rig.until_driven(1.0)

@@ -12,7 +12,6 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from PIL import Image
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.app import Companion
@@ -21,7 +20,6 @@ from companion.cli.why_image import FREE_COLOUR
 from companion.core.round_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
-from companion.mavlink.signing import Signer
 from companion.mavlink.transport import MemoryLink
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
@@ -37,7 +35,7 @@ from sitl.faults.fault_file import load_faults
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
 from tests.support.records import unclosed, with_meta
-from tests.support.rig import Rig, kept_in, repacked, yard
+from tests.support.rig import Rig, kept_in, yard
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 FILES = ("link.tlog", "rounds.bin", "decisions.jsonl")
@@ -124,9 +122,8 @@ class LateRunner(InlineRunner):
 class Recorded(Rig):
     """A run of the rig with a record and answers that come late."""
 
-    def __init__(self, folder: Path, mission: Mission, signer: Signer | None = None) -> None:
+    def __init__(self, folder: Path, mission: Mission) -> None:
         self.place = folder / "record"
-        self._signer = signer
         super().__init__(mission, state=folder / "state")
 
     def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
@@ -135,9 +132,7 @@ class Recorded(Rig):
         files = {"state": self.state_file if resume else None}
         self.recorder = Recorder(self.place, mission, self.settings, 0, arm=True, files=files)
         near, self._far = MemoryLink.pair()
-        self.link = AutopilotLink(
-            near, Codec(self.settings.link, signer=self._signer), self.settings.link, self.recorder
-        )
+        self.link = AutopilotLink(near, Codec(self.settings.link), self.settings.link, self.recorder)
         self.companion = Companion(
             self.link,
             self,
@@ -165,35 +160,6 @@ def test_answers_of_a_thread_are_handed_over_when_the_run_had_them(tmp_path: Pat
     result = replay(load_record(rig.place))
     assert result.decisions <= 1, "nothing but: we are there"
     assert any("recorded decisions are missing" in line for line in result.differences)
-
-
-def test_a_run_with_signed_packets_is_replayed_without_the_key(tmp_path: Path) -> None:
-    key, now = bytes(range(32)), 10**9
-    rig = Recorded(tmp_path, yard(tmp_path), Signer(key, lambda: now + round(1e5 * rig.now_s())))
-    mav = mavlink.MAVLink(None)
-
-    def signed(data: bytes) -> bytes:
-        nonlocal now
-        packets = []
-        for message in rig._down.parse_buffer(data) or []:
-            mav.srcSystem, mav.srcComponent, mav.seq = (
-                message.get_srcSystem(),
-                message.get_srcComponent(),
-                message.get_seq(),
-            )
-            mav.signing.secret_key, mav.signing.sign_outgoing = key, True
-            now, mav.signing.timestamp = now + 1, now + round(1e5 * rig.now_s())
-            packets.append(bytes(message.pack(mav)))
-        stranger = repacked(mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3)) if rig.now_s() > 50.0 else b""
-        return b"".join(packets) + stranger
-
-    rig.garble = signed
-    rig.finish()
-    rig.recorder.close()
-    assert "Ignoring unsigned packets" in rig.texts()
-    assert_same(rig.place)
-    for file in rig.place.rglob("*"):
-        assert file.is_dir() or key not in file.read_bytes()
 
 
 def test_a_run_that_took_up_another_is_replayed_from_the_copy_of_its_state(tmp_path: Path) -> None:
