@@ -31,7 +31,7 @@ from companion.executive.mission_progress import MissionPhase, MissionProgress, 
 from companion.executive.return_path import Trail
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import Mission
-from companion.navigation.field_step import NavState, begin
+from companion.navigation.field_step import NavState, initial_state
 from companion.recording.recorder import NullRecorder
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
@@ -128,7 +128,7 @@ def bench(mission: Mission) -> Bench:
     home = LocalFrame(HOME).to_ned(HOME)
     layout = lay(mission, MappingSettings(), HOME, HOME, Pose(home.north_m, home.east_m, 0.0, 0.0))
     progress = plan_progress(layout.targets, layout.start)
-    driver = Driver(progress.goal, begin(Cell(2, 7), progress.goal.cell, 9, 5))
+    driver = Driver(progress.goal, initial_state(Cell(2, 7), progress.goal.cell, 9, 5))
     executor, writer = Executor(layout, driver, progress), Writer()
     executor.trail.enter(Cell(2, 7))
     return Bench(Checkpointer(mission, writer), writer, executor)
