@@ -71,7 +71,7 @@ class TrackPoint:
     part: str
 
 
-class Outcome(StrEnum):
+class DriveOutcome(StrEnum):
     """How a run ended; the values are those of ``--json``."""
 
     REACHED = "reached"
@@ -85,7 +85,7 @@ class Report:
     """Result of a lock-step run; ``as_json`` gives the documented keys."""
 
     seed: int
-    outcome: Outcome = Outcome.TIME_LIMIT
+    outcome: DriveOutcome = DriveOutcome.TIME_LIMIT
     targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
     steps: int = 0
     return_steps: int = 0
@@ -109,7 +109,7 @@ class Report:
         """0 all targets reached without a collision, 3 a target missed, 4 a collision."""
         if self.collisions:
             return 4
-        return 0 if self.outcome is Outcome.REACHED else 3
+        return 0 if self.outcome is DriveOutcome.REACHED else 3
 
     def as_json(self) -> dict[str, object]:
         """The figures for ``--json``: everything except track and texts."""
@@ -188,6 +188,6 @@ class Drive:
         seconds = sorted(companion.outcome.step_seconds)
         report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0
         if report.collisions:
-            report.outcome = Outcome.COLLISION
+            report.outcome = DriveOutcome.COLLISION
         elif companion.done:
-            report.outcome = Outcome.REACHED if companion.outcome.complete else Outcome.INCOMPLETE
+            report.outcome = DriveOutcome.REACHED if companion.outcome.complete else DriveOutcome.INCOMPLETE

@@ -29,7 +29,7 @@ from sitl.experiments.experiment import (
 )
 from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
 from sitl.experiments.results_page import markdown_table, terminal_table, write_section
-from sitl.lockstep import Drive, Outcome, Report
+from sitl.lockstep import Drive, DriveOutcome, Report
 from sitl.map_mission import mission_on_map
 from sitl.scenario import scenario_from_mission
 
