@@ -1,7 +1,7 @@
 """Marks of one round of the program's loop: what happened in it besides the packets that it received and sent.
 
-A run follows from its inputs. Most of them are in other files of its record; these marks are what remains: when a thread's
-answer was taken, when a person ended the run, which packets were refused.
+A run follows from its inputs. Most of them are in other files of its record; these marks are what remains: when a
+thread's answer was taken, when a person ended the run, which packets were refused.
 """
 
 from __future__ import annotations

@@ -104,7 +104,8 @@ class Person:
             return
         self._in_vain += 1
         if self._in_vain == PATIENCE:
-            self.gave_up = f"The autopilot does not let it be armed: {'; '.join(fault.text for fault in arming_faults(vehicle)) or 'GUIDED refused'}"
+            faults = "; ".join(fault.text for fault in arming_faults(vehicle))
+            self.gave_up = f"The autopilot does not let it be armed: {faults or 'GUIDED refused'}"
             drive.companion.stop()
 
 
