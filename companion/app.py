@@ -43,9 +43,13 @@ from companion.supervision.setting_out import SettingOut
 from companion.supervision.shutdown import Shutdown
 from companion.supervision.startup import StartUp
 from companion.vehicle.commands import SetMode
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.targets import TargetAsked
-from companion.vehicle.events.vehicle import RangeSeen, RoverMode, TextSeen
+from companion.vehicle.events import (
+    Event,
+    RangeSeen,
+    RoverMode,
+    TargetAsked,
+    TextSeen,
+)
 from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState, fold
 

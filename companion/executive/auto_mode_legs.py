@@ -6,8 +6,8 @@ from companion.control.point_controller import STANDSTILL, ControlCommand, Motio
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.executive.mission_executor import MissionExecutor, Tell
 from companion.executive.mission_progress import Leg, TargetStatus, ended_at, parked, sent_to
+from companion.vehicle.auto_leg import GuidedLeg, LegState
 from companion.vehicle.commands import GuidedPosition
-from companion.vehicle.events.targets import GuidedLeg, LegState
 from companion.vehicle.state import VehicleState
 
 INFO, WARNING = 6, 4

@@ -8,8 +8,8 @@ from companion.core.clock import Clock
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.items import Item
 from companion.mission.mission import MissionError
-from companion.mission.stored import NAME
-from companion.vehicle.events.plan import PlanKind
+from companion.mission.stored_mission import NAME
+from companion.vehicle.events import PlanKind
 
 TRIES = 3
 PAUSE_S = 2.0

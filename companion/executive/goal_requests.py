@@ -15,7 +15,7 @@ from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.settings import SafetySettings
 from companion.vehicle.commands import AnswerTarget, Command
-from companion.vehicle.events.targets import TargetAnswer, TargetAsked
+from companion.vehicle.events import TargetAnswer, TargetAsked
 from companion.vehicle.state import VehicleState
 
 INFO, WARNING = 6, 4

@@ -29,7 +29,7 @@ from companion.executive.mission_progress import (
 from companion.executive.refuge import Refuge, refuges
 from companion.executive.trail import Trail
 from companion.mapping.evidence_map import EvidenceMap, forget, integrate, look_again
-from companion.mission.fence import AutopilotFence
+from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision

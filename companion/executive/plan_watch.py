@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from companion.executive.mission_executor import Tell
 from companion.mavlink.download import Downloads
-from companion.mission.stored import digest
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import PlanChangedSeen, PlanKind
-from companion.vehicle.events.targets import ItemCurrentSeen
-from companion.vehicle.events.vehicle import TextSeen
+from companion.mission.stored_mission import digest
+from companion.vehicle.events import (
+    Event,
+    ItemCurrentSeen,
+    PlanChangedSeen,
+    PlanKind,
+    TextSeen,
+)
 
 WARNING = 4
 RECEIVED = "Flight plan received"

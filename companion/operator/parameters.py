@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 from companion.settings import Settings
 from companion.settings.tunable_parameters import BY_NAME, TABLE, Parameter, RefusedError, changed
-from companion.vehicle.commands import Command, TellParameter
-from companion.vehicle.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
+from companion.vehicle.commands import Command, ParameterValue
+from companion.vehicle.events import ParameterAsked, ParameterChangeAsked, ParametersAsked
 
 INFO, WARNING = 6, 4
 ANSWER_S = 0.05
@@ -63,7 +63,7 @@ class ParameterServer:
         del self._answers[index]
         parameter = TABLE[index]
         return [
-            TellParameter(
+            ParameterValue(
                 parameter.name, parameter.value(self.settings), index, len(TABLE), whole_number=parameter.whole
             )
         ]

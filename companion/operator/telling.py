@@ -5,7 +5,7 @@ from __future__ import annotations
 from companion.core.clock import Clock
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.reporting import Reporter
-from companion.vehicle.commands import Say
+from companion.vehicle.commands import StatusText
 
 WARNING = 4
 NOT_FOLLOWED_S = 5.0
@@ -24,7 +24,7 @@ class Teller:
     def tell(self, text: str, severity: int) -> None:
         """Say it, not twice in a row."""
         if self._reporter.say(text, severity):
-            self._autopilot.send(Say(severity, text), self._clock.now_s())
+            self._autopilot.send(StatusText(severity, text), self._clock.now_s())
 
     def once(self, text: str) -> None:
         """Say what goes on being so only the first time."""

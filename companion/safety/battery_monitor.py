@@ -7,8 +7,10 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 from companion.settings import PowerSettings
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import BatterySeen
+from companion.vehicle.events import (
+    BatterySeen,
+    Event,
+)
 
 STALE_S = 10.0
 """A reading older than this says nothing; SYS_STATUS counts only while no BATTERY_STATUS is younger."""

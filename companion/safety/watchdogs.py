@@ -5,8 +5,10 @@ from __future__ import annotations
 from companion.perception.scan_watch import ScanWatch
 from companion.safety.loop_watch import LoopWatch
 from companion.settings import SafetySettings
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import RangeSeen
+from companion.vehicle.events import (
+    Event,
+    RangeSeen,
+)
 from companion.vehicle.state import VehicleState
 
 

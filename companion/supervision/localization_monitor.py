@@ -9,8 +9,12 @@ from collections.abc import Callable
 from companion.executive.mission_executor import MissionExecutor, Tell
 from companion.executive.mission_layout import apart_m
 from companion.settings import Settings
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import HomeSeen, LocalPositionSeen, OriginSeen
+from companion.vehicle.events import (
+    Event,
+    HomeSeen,
+    LocalPositionSeen,
+    OriginSeen,
+)
 from companion.vehicle.state import VehicleState
 
 WARNING = 4

@@ -7,12 +7,15 @@ import math
 from companion.core.frames import LocalFrame, Pose
 from companion.executive.mission_executor import MissionExecutor, Tell
 from companion.mavlink.autopilot_link import AutopilotLink
-from companion.mission.fence import NO_FENCE, AutopilotFence
+from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.safety.battery_monitor import BatteryMonitor, Level
 from companion.settings import Settings
 from companion.supervision.fence_monitor import FenceMonitor
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
+from companion.vehicle.events import (
+    Event,
+    HeartbeatSeen,
+    RoverMode,
+)
 from companion.vehicle.state import VehicleState
 
 LISTEN_S = 1.5

@@ -12,7 +12,7 @@ from companion.safety.mode_latch import Control
 from companion.supervision.mission_limits import MissionLimits
 from companion.supervision.startup import StartUp, overruled
 from companion.vehicle.commands import Arm, Command, SetMode
-from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
 
 WARNING = 4

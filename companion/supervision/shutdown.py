@@ -9,7 +9,7 @@ from companion.control.point_controller import STANDSTILL
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.mode_latch import Control
 from companion.vehicle.commands import Command, SetMode
-from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
 
 HAND_OVER_S = 0.7

@@ -9,13 +9,13 @@ from companion.checkpoint.resume import PreviousRun, ResumePermission, resume_pe
 from companion.control.point_controller import STANDSTILL
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import TargetStatus
+from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bounds
-from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, MissionError
 from companion.safety.mode_latch import Control, data_reason
 from companion.settings import SafetySettings, Settings
 from companion.vehicle.commands import Arm, Command, SetMode
-from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen, RoverMode
+from companion.vehicle.events import AckSeen, HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState
 
 ASK_AGAIN_S = 3.0

@@ -29,7 +29,7 @@ from companion.mission.mission import Mission
 from companion.navigation.step_runner import InlineRunner
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
-from companion.storage.disk import OsDisk
+from companion.storage.files import OsDisk
 from companion.vehicle.commands import GuidedPosition
 from sitl.scenario import scenario_from_mission
 from sitl.simulator import Simulator

@@ -9,18 +9,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.core.frames import GeoPoint
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.targets import (
-    LEG_KEPT_S,
-    GuidedLeg,
+from companion.vehicle.auto_leg import LEG_KEPT_S, GuidedLeg, LegState, leg_after, leg_at_heartbeat
+from companion.vehicle.events import (
+    Event,
+    HeartbeatSeen,
     ItemCurrentSeen,
     ItemReachedSeen,
     LegSeen,
-    LegState,
-    leg_after,
-    leg_at_heartbeat,
+    RoverMode,
 )
-from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState, fold
 
 HERE, THERE = GeoPoint(53.0, 23.0), GeoPoint(53.1, 23.0)

@@ -15,7 +15,7 @@ from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, 
 from companion.settings import SafetySettings
 from companion.supervision.startup import start_step
 from companion.vehicle.commands import Arm, SetMode
-from companion.vehicle.events.vehicle import (
+from companion.vehicle.events import (
     AttitudeSeen,
     EkfStatusSeen,
     HeartbeatSeen,
