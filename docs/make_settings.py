@@ -25,7 +25,7 @@ UNITS = {
     "deg": "deg",
     "fields": "fields",
 }
-"""By the end of a setting's name."""
+"""Units by the end of a setting's name."""
 
 INTRODUCTION = """# Settings
 
@@ -83,14 +83,14 @@ def _row(name: str, field: FieldInfo) -> str:
 
 
 def _value(value: object) -> str:
-    """As it is written in TOML."""
+    """The value as in TOML."""
     if isinstance(value, tuple):
         return f"`{_plain(value)}`"
     return f'`"{value}"`' if isinstance(value, str) else f"`{value}`"
 
 
 def _plain(value: object) -> str:
-    return f"[{', '.join(_plain(part) for part in value)}]" if isinstance(value, tuple) else str(value)
+    return f"[{', '.join(_plain(item) for item in value)}]" if isinstance(value, tuple) else str(value)
 
 
 def _unit(name: str) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.core.grid import Cell
-from companion.storage.reading import read_at_most
+from companion.storage.files import read_at_most
 
 MOST_BYTES = 100_000_000
 

@@ -12,7 +12,7 @@ from companion.bench.cases import PAPER_MAPS, Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import Entry, Limits
 from companion.bench.report import head, rows, runs_explained, where
-from companion.storage.reading import refuse_pipe
+from companion.storage.files import refuse_pipe
 
 PICTURE = "benchmarks.png"
 

@@ -36,7 +36,7 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import NavState
 from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Control
-from companion.vehicle.events.vehicle import LocalPositionSeen
+from companion.vehicle.events import LocalPositionSeen
 from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 

@@ -19,13 +19,13 @@ from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
 from companion.executive.mission_progress import MissionPhase, MissionProgress
 from companion.mapping.evidence_map import restore
-from companion.mission.fence import NO_FENCE, AutopilotFence
+from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import NavState
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
-from companion.vehicle.events.vehicle import LocalPositionSeen, RoverMode
+from companion.vehicle.events import LocalPositionSeen, RoverMode
 from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 

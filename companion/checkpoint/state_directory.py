@@ -11,8 +11,7 @@ from companion.checkpoint.resume import PreviousRun
 from companion.checkpoint.state_format import MAX_FILE_BYTES, DamagedStateError, StateError, decode_state
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
-from companion.storage.disk import BESIDE, OsDisk, set_aside
-from companion.storage.reading import open_file
+from companion.storage.files import NEW_SUFFIX, OsDisk, open_file, set_aside
 
 NAME = "mission.state"
 LOCK = "lock"
@@ -45,7 +44,7 @@ class StateDirectory:
             directory.mkdir(mode=0o700, parents=True, exist_ok=True)
             self._lock = os.open(directory / LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self.file.with_name(NAME + BESIDE).unlink(missing_ok=True)  # an earlier run was killed while writing
+            self.file.with_name(NAME + NEW_SUFFIX).unlink(missing_ok=True)  # an earlier run was killed while writing
         except BlockingIOError:
             self.close()
             raise StateDirectoryError(

@@ -10,8 +10,8 @@ from pathlib import Path
 
 from companion.checkpoint.checkpointer import Snapshot, StateUpdate, saved_state
 from companion.checkpoint.state_format import RowBand, compressed_rows, encode_state
-from companion.storage.beside import Beside, Patience
-from companion.storage.disk import Disk, replace_file
+from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
+from companion.storage.files import Disk, replace_file
 
 
 class StateFile:
@@ -70,10 +70,10 @@ class InlineStateWriter:
 class ThreadStateWriter:
     """Writes in a thread."""
 
-    def __init__(self, file: StateFile, patience: Patience | None = None) -> None:
+    def __init__(self, file: StateFile, patience: ShutdownBudget | None = None) -> None:
         self._file = file
         self._newest: Snapshot | None = None
-        self._beside = Beside("state", patience)
+        self._beside = BackgroundWorker("state", patience)
         self._is_late = False
 
     @property

@@ -29,7 +29,7 @@ EXIT_BAD_INPUT = 2
 
 
 class BenchError(ValueError):
-    """An option that makes no sense; the text is one line."""
+    """An option that cannot be used; the text is one line."""
 
 
 def bench(
@@ -43,8 +43,8 @@ def bench(
     peers: Annotated[bool, typer.Option(help="Other libraries too, those that are installed.")] = True,
     seeds: Annotated[int, typer.Option(min=1, help="Searches on each map of planners that draw random numbers.")] = 100,
     seed: Annotated[int, typer.Option(min=0, help="The first seed.")] = 0,
-    problems: Annotated[int, typer.Option(min=1, help="So many problems of each MAP's scenario file.")] = 20,
-    cell_s: Annotated[float, typer.Option(min=0.1, help="At most so many seconds for one planner on one map.")] = 10.0,
+    problems: Annotated[int, typer.Option(min=1, help="Number of problems of each MAP's scenario file.")] = 20,
+    cell_s: Annotated[float, typer.Option(min=0.1, help="Time limit in seconds for one planner on one map.")] = 10.0,
     maps: Annotated[Path | None, typer.Option(help="Folder with the four maps; default: missions/maps.")] = None,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
@@ -108,7 +108,7 @@ def _cases(files: list[Path], sizes: str, maps: Path | None, problems: int) -> l
 
 def _contestants(planners: str, settings: Settings, console: Console, *, peers: bool) -> list[Contestant]:
     names = [name.strip() for name in planners.split(",") if name.strip()] or list(PLANNERS)
-    # As the paper stops: with the first path, not after a number of epochs that makes a path better.
+    # As in the paper: stop at the first path, without further epochs that improve it.
     budget = replace(budget_of(settings.navigator.thorough), min_epochs=1)
     contestants = [our_planner(name, settings.planner, budget) for name in names]
     if peers:

@@ -1,4 +1,4 @@
-"""The commands of ``rover-companion``."""
+"""The commands of ``rover-companion``, put together with typer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""``rover-companion doctor``: what would stop a mission. It moves nothing."""
+"""``rover-companion doctor``: finds what would stop a mission, without moving anything."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ from rich.table import Table
 from companion.cli.inputs import OutputError, usable_settings
 from companion.cli.state import StateFiles
 from companion.core.clock import WallClock
-from companion.diagnosis.diagnose import diagnose, kernels
+from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
-from companion.diagnosis.parameters import PARAMETERS
 from companion.executive.warm_up import kernels_warm
-from companion.mavlink.examination import Examination
 from companion.mavlink.signing import SigningKeyError
+from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import LinkError, open_link
 from companion.settings import SettingsError
-from companion.vehicle.survey import Examined
+from companion.vehicle.survey import Survey
 
 STEP_S = 0.05
 EXIT_FINE, EXIT_BAD_INPUT, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 2, 3, 4
@@ -49,7 +48,7 @@ def doctor(
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     clock = WallClock()
-    examination = Examination(link, settings.link, PARAMETERS, signer)
+    examination = Surveyor(link, settings.link, PARAMETERS, signer)
     now_s = began_s = clock.now_s()
     try:
         while not examination.done and now_s - began_s < seconds:
@@ -70,8 +69,8 @@ def doctor(
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
 
 
-def _summary(seen: Examined) -> dict[str, object]:
-    """Who was heard, for programs."""
+def _summary(seen: Survey) -> dict[str, object]:
+    """The survey as JSON values."""
     return {
         "place": seen.place,
         "rover": seen.rover_heard,
@@ -83,14 +82,14 @@ def _summary(seen: Examined) -> dict[str, object]:
     }
 
 
-def _show(seen: Examined, findings: list[Finding]) -> None:
+def _show(seen: Survey, findings: list[Finding]) -> None:
     console = Console()
     if seen.rover_heard:
         version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"
         console.print(f"rover: system {seen.system}{version}, on {seen.place}", soft_wrap=True, markup=False)
     elif seen.unbelieved is not None:
-        what = f"rover: system {seen.unbelieved}, on {seen.place}, heard but not believed"
-        console.print(what, soft_wrap=True, markup=False)
+        line = f"rover: system {seen.unbelieved}, on {seen.place}, heard but not believed"
+        console.print(line, soft_wrap=True, markup=False)
     table = Table("", "finding", "what to do", show_lines=True)
     for one in findings:
         value = "" if one.value is None or not one.parameter else f" ({one.parameter} is {one.value:g})"
@@ -102,5 +101,5 @@ def _show(seen: Examined, findings: list[Finding]) -> None:
 
 
 def _plain(text: str) -> str:
-    """Texts of others may hold what rich takes for markup."""
+    """Escape markup of rich in texts of others."""
     return text.replace("[", "\\[")

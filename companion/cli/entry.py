@@ -1,4 +1,4 @@
-"""How a script begins and ends, whatever its commands: interrupts and wrong usage in one line."""
+"""Start and end of both scripts: interrupts, wrong usage and a full output in one line."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ HERE = Path(__file__).parents[1]
 
 
 class StoppedError(Exception):
-    """Ctrl-C or SIGTERM has ended a command that has more to say about it; the text is one line, without which of the two it was."""
+    """Ctrl-C or SIGTERM has ended a command that adds a line about it; the text does not name the signal."""
 
 
 def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
-    """Load the commands and run one; the exit code.
+    """Load the commands and run one; returns the exit code.
 
     Loading them imports the compiler and takes most of a second, in which an interrupt must not end in a traceback.
     """
@@ -51,7 +51,7 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
 
 
 class _Terminated:
-    """SIGTERM ends a command like Ctrl-C, from its first moment on; a process that it has started simply ends."""
+    """SIGTERM ends a command like Ctrl-C, from its start on; a process that it has started ends at once."""
 
     def __init__(self) -> None:
         self.asked = False
@@ -59,7 +59,7 @@ class _Terminated:
 
     @property
     def what(self) -> str:
-        """What has interrupted."""
+        """The signal that has interrupted."""
         return "SIGTERM" if self.asked else "Ctrl-C"
 
     def __call__(self, number: int, frame: FrameType | None) -> None:
@@ -71,7 +71,7 @@ class _Terminated:
 
 
 def unsuitable(greatest_int: int) -> str:
-    """Why this machine will not do, in words; empty if it will. ``greatest_int`` is ``sys.maxsize``."""
+    """Why this machine is unsuitable, in words; empty if it is not. ``greatest_int`` is ``sys.maxsize``."""
     if greatest_int < 2**32:
         return (
             "needs a 64-bit system, and this Python is a 32-bit one; on a Raspberry Pi install Raspberry Pi OS (64-bit)"
@@ -82,33 +82,33 @@ def unsuitable(greatest_int: int) -> str:
 def _run(name: str, commands: Callable[..., object]) -> int:
     import typer
 
-    # typer brings a click of its own and does not name the class that all wrong usage has in common.
+    # typer contains its own click and does not export the base class of usage errors.
     usage_error = cast(type[typer.BadParameter], typer.BadParameter.__base__)
     try:
         code = commands(prog_name=name, standalone_mode=False)
-        _let_go_of_output()  # a command that goes on when nobody reads has its own exit code
-    except typer.Abort:  # what older typers make of an interrupt
+        _let_go_of_output()  # a command that goes on without a reader has its own exit code
+    except typer.Abort:  # raised by older versions of typer on an interrupt
         raise KeyboardInterrupt from None
     except usage_error as error:
         where = error.ctx.command_path if error.ctx is not None else name
         print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)
         return EXIT_USAGE
-    except BrokenPipeError:  # the reader has what it wanted (`... | head`)
+    except BrokenPipeError:  # the reader has closed its end (`... | head`)
         _let_go_of_output()
         return 1
     except OSError as error:
-        if error.errno not in FULL or error.filename is not None:  # the commands tell of their own files themselves
+        if error.errno not in FULL or error.filename is not None:  # commands report errors of their own files
             raise
         _let_go_of_output()
         print(f"{name}: standard output cannot be written: {error.strerror}", file=sys.stderr)
         return EXIT_USAGE
-    if code == EXIT_STOPPED:  # what newer ones make of it, without a word
+    if code == EXIT_STOPPED:  # returned by newer versions on an interrupt, without a message
         raise KeyboardInterrupt
     return code if isinstance(code, int) else 0
 
 
 def _let_go_of_output() -> None:
-    """What standard output does not take any more is thrown away: Python would complain once more when it flushes at the end."""
+    """Discard output that cannot be written: Python would report it again when it flushes at the end."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()

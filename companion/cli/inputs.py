@@ -1,4 +1,4 @@
-"""What several commands check before anything moves: settings that can be used, files that can be written."""
+"""Checks of options that commands share: usable settings, writable files."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pathlib import Path
 
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import Settings, SettingsError, load_settings
-from companion.storage.reading import refuse_pipe
+from companion.storage.files import refuse_pipe
 
 
 class OutputError(Exception):
@@ -29,14 +29,14 @@ PICTURES = (".png", ".jpg", ".jpeg")
 
 
 def picture(path: Path | None) -> None:
-    """Like ``writable``, for a picture, whose suffix tells its format. Raises OutputError."""
+    """Like ``writable``, for an image, whose suffix decides its format. Raises OutputError."""
     if path is not None and path.suffix.lower() not in PICTURES:
         raise OutputError(f"{path}: suffix '{path.suffix}' is no picture format; known: {', '.join(PICTURES)}")
     writable(path)
 
 
 def writable(path: Path | None, suffix: str = "") -> None:
-    """Make the directory of an output file and try the file itself, before hours are driven. Raises OutputError."""
+    """Create the directory of an output file and try to write the file, before the work. Raises OutputError."""
     if path is None:
         return
     if path.name in ("", ".."):
@@ -54,7 +54,7 @@ def writable(path: Path | None, suffix: str = "") -> None:
 
 @contextlib.contextmanager
 def written(path: Path) -> Iterator[None]:
-    """Whatever goes wrong in here went wrong while ``path`` (a file, or the folder of several) was written: raises OutputError."""
+    """A context in which ``path`` (a file or folder) is written; an OSError in it becomes OutputError."""
     try:
         refuse_pipe(path)
         yield

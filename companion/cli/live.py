@@ -1,9 +1,11 @@
-"""What a run shows while it goes on: one line that changes on a terminal, a new line for every change elsewhere."""
+"""Output of a run while it drives: one changing line on a terminal, lines with levels for log files and systemd."""
 
 from __future__ import annotations
 
 import contextlib
 import os
+from collections.abc import Mapping
+from enum import Enum
 from types import TracebackType
 
 from rich.console import Console
@@ -11,16 +13,50 @@ from rich.markup import escape
 from rich.status import Status as Spinner
 
 from companion.app import Status
-from companion.cli.levels import INFO, Reader, levelled
+from companion.core.severity import Severity
+
+WORDS = ("error", "error", "error", "error", "warning", "notice", "info", "debug")
+
+
+class Reader(Enum):
+    """What reads the output."""
+
+    PERSON = "terminal"
+    LOG = "file or pipe"
+    JOURNAL = "journal"
+
+
+def reader_of(descriptor: int, environment: Mapping[str, str]) -> Reader:
+    """What reads a descriptor. systemd names its journal's stream in ``JOURNAL_STREAM``, by device and inode."""
+    try:
+        status = os.fstat(descriptor)
+    except OSError:
+        return Reader.LOG
+    if environment.get("JOURNAL_STREAM") == f"{status.st_dev}:{status.st_ino}":
+        return Reader.JOURNAL
+    return Reader.PERSON if os.isatty(descriptor) else Reader.LOG
+
+
+def levelled(text: str, severity: int, reader: Reader) -> str:
+    """The line: ``<4>text`` for the journal, ``warning: text`` in a log, the text alone for a person."""
+    severity = min(max(severity, 0), 7)
+    match reader:
+        case Reader.JOURNAL:
+            return f"<{severity}>{text}"
+        case Reader.LOG:
+            return f"{WORDS[severity]}: {text}"
+        case _:
+            return text
+
 
 UPDATE_S = 0.25
 
 
 class LiveConsole(Console):
-    """Standard error, for as long as somebody reads it."""
+    """Standard error, which may lose its reader."""
 
     def on_broken_pipe(self) -> None:
-        """The reader has gone (rich itself would end the program here): the rover is driven on unseen."""
+        """Called when the reader has gone. rich would end the program; here the rover drives on."""
         self.quiet = True
         nowhere = os.open(os.devnull, os.O_WRONLY)
         os.dup2(nowhere, self.file.fileno())
@@ -28,7 +64,7 @@ class LiveConsole(Console):
 
 
 class Live:
-    """A context manager; ``show`` takes the companion's status after every tick."""
+    """A context manager that shows the companion's status; call ``show`` after every tick."""
 
     def __init__(self, console: Console, name: str, reader: Reader = Reader.PERSON) -> None:
         self._console = console
@@ -40,7 +76,7 @@ class Live:
         self._broken = False
 
     def __enter__(self) -> Live:
-        """Begin to show."""
+        """Start the changing line."""
         if self._spinner is not None:
             self._spinner.start()
         return self
@@ -48,13 +84,13 @@ class Live:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Leave the terminal as it was."""
+        """Restore the terminal."""
         if self._spinner is not None:
             with contextlib.suppress(OSError):
                 self._spinner.stop()
 
     def show(self, status: Status) -> None:
-        """Show what is new. A terminal that has gone, or a full disk under a log file, does not end the run."""
+        """Show what is new. A lost terminal or a full disk does not end the run."""
         if self._broken:
             return
         try:
@@ -69,7 +105,7 @@ class Live:
             line = f"{status.doing}{f': {status.target}' if status.target else ''}"
             if line != self._shown:
                 self._shown = line
-                self._print(line, INFO)
+                self._print(line, Severity.INFO)
         elif status.time_s - self._updated_s >= UPDATE_S:
             self._updated_s = status.time_s
             self._spinner.update(_line(status))
@@ -80,11 +116,11 @@ class Live:
 
 
 def _line(status: Status) -> str:
-    parts = [f"{status.doing}"]
+    columns = [f"{status.doing}"]
     if status.target:
-        parts.append(escape(f"{status.target} [{status.targets_reached}/{status.targets}]"))
+        columns.append(escape(f"{status.target} [{status.targets_reached}/{status.targets}]"))
     if status.pose is not None:
-        parts.append(f"north {status.pose.north_m:.1f} m, east {status.pose.east_m:.1f} m")
+        columns.append(f"north {status.pose.north_m:.1f} m, east {status.pose.east_m:.1f} m")
     if status.decision is not None:
-        parts.append(f"part {status.decision.part}")
-    return "  ".join([*parts, f"steps {status.steps}"])
+        columns.append(f"part {status.decision.part}")
+    return "  ".join([*columns, f"steps {status.steps}"])

@@ -1,4 +1,4 @@
-"""``rover-companion``: the script. Nothing heavy is imported before it has begun."""
+"""Entry point of ``rover-companion``; imports nothing slow before it handles interrupts."""
 
 from __future__ import annotations
 

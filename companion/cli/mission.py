@@ -1,4 +1,4 @@
-"""``rover-companion mission check``: say what was understood of a mission file."""
+"""``rover-companion mission check``: prints how a mission file is understood."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from companion.mapping.map_files import MapError, load_map
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, Mission, MissionError, MoverSpec, Place
 from companion.mission.resolve import resolve
-from companion.mission.tables import read_toml
+from companion.storage.toml_file import read_toml
 
 EXIT_BAD_INPUT = 2
 
@@ -36,18 +36,18 @@ def check(
     try:
         mission = load_mission(mission_file)
         maps = _maps(mission)
-        _lay_out(mission)
+        _try_resolve(mission)
     except (MissionError, MapError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     show(mission, maps, Console(highlight=False))
 
 
-def _lay_out(mission: Mission) -> None:
-    """Lay the mission on the ground as at the start of a run, where the file alone says where home is.
+def _try_resolve(mission: Mission) -> None:
+    """Resolve the mission as at the start of a run, if the file alone says where home is.
 
-    Targets inside a fence, or a grid too large, are found now. A rover's own home may differ from the one that a
-    ground station planned with, so of a mission in degrees only what is in the file can be said. Raises MissionError.
+    This finds targets inside a fence, and a grid that is too large. A rover's home may differ from the planned home, so
+    a mission in degrees cannot be resolved here. Raises MissionError.
     """
     degrees = any(isinstance(place, GeoPoint) for place in _all_places(mission))
     if not degrees:
@@ -92,7 +92,7 @@ def _ground(mission: Mission) -> list[str]:
 
 
 def _maps(mission: Mission) -> list[str]:
-    """The maps that the mission names, opened: a bad one is found now, not when the rover stands in the field."""
+    """Loads the maps that the mission names, to find a bad one before the drive; returns a line for each."""
     lines = []
     sitl = mission.sitl
     resolution_m = mission.grid.resolution_m
@@ -133,7 +133,7 @@ def _vehicle(mission: Mission) -> list[str]:
 
 
 def place_text(place: Place) -> str:
-    """A place as people read it."""
+    """A place in words."""
     if isinstance(place, Cell):
         return f"field {place.x}, {place.y}"
     if isinstance(place, GeoPoint):
@@ -145,7 +145,7 @@ def place_text(place: Place) -> str:
 
 
 def mover_text(mover: MoverSpec) -> str:
-    """A moving obstacle as people read it."""
+    """A moving obstacle in words."""
     route = f"through {len(mover.route)} places from {place_text(mover.route[0])}"
     again = " and round again" if mover.repeat else ""
     tells = f"announces itself ({mover.announce})" if mover.announce else "announces nothing"
@@ -153,7 +153,7 @@ def mover_text(mover: MoverSpec) -> str:
 
 
 def area_text(area: Area) -> str:
-    """An area as people read it."""
+    """An area in words."""
     first = place_text(area.places[0])
     if area.radius_m is not None:
         return f"a circle of {area.radius_m:g} m round {first}"

@@ -2,34 +2,183 @@
 
 from __future__ import annotations
 
+import json
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
+from numpy.typing import NDArray
 from rich.console import Console
+from rich.table import Table
 
+from companion.cli.images import save_plan
 from companion.cli.inputs import OutputError, picture, usable_settings
-from companion.cli.plan_answer import Answer, as_table, as_text, flipped
-from companion.cli.plan_image import save_image
 from companion.core.clock import stopwatch_s
 from companion.core.grid import Cell, Grid
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
-from companion.planning.problem import PlanningProblem, PlanStatus, VehicleMotion
+from companion.planning.problem import Path as GridPath
+from companion.planning.problem import PlanningProblem, PlanResult, PlanStatus, VehicleMotion
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
 from companion.settings import Settings, SettingsError
+from companion.settings.versions import made_with
+
+EFFORT = {
+    "sedighi": ("generations", "chromosomes"),
+    "hermanu": ("generations", "chromosomes"),
+    "geisler": ("generations", "chromosomes"),
+    "vertex": ("generations", "chromosomes"),
+    "vertex++": ("generations", "chromosomes"),
+    "achour": ("iterations", "segments weighed"),
+    "prm": ("queries of the roadmap", "lines looked at"),
+}
+"""What a planner's epochs and evaluations count, if not those of the paper's genetic algorithm."""
+
+AHEAD_DEG = 10.0
+"""A line that starts this near to the rover's heading can be driven: its first step is a chord of an arc."""
+
+STATUS_WORDS = {
+    PlanStatus.FOUND: "found",
+    PlanStatus.NO_PATH: "no path: proved that there is none",
+    PlanStatus.BUDGET_SPENT: "budget spent: none found, which proves nothing",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The result of a search, and its input. ``motion``: how the rover turns."""
+
+    result: PlanResult
+    seconds: float
+    seed: int
+    top_left: bool
+    grid: Grid
+    motion: VehicleMotion
+    settings: Settings
+
+    def place(self, cell: Cell) -> tuple[int, int]:
+        """A field in the coordinates that the user chose."""
+        return flipped(cell, self.grid.height, self.top_left)
+
+
+def flipped(cell: Cell, height: int, top_left: bool) -> tuple[int, int]:
+    """A field in the user's coordinates, or back."""
+    return (cell.x, height - 1 - cell.y) if top_left else (cell.x, cell.y)
+
+
+def line_of(path: GridPath) -> NDArray[np.float64]:
+    """The line to drive: the path's curve, or else the line through the middles of its fields.
+
+    Shape (n, 2), in fields.
+    """
+    return path.cell_array.astype(np.float64) if path.curve is None else path.curve
+
+
+def length_of(line: NDArray[np.float64]) -> float:
+    """The length of a line, in its own unit."""
+    return float(np.hypot(*np.diff(line, axis=0).T).sum())
+
+
+def tightest_radius(line: NDArray[np.float64]) -> float:
+    """The radius of a line's sharpest bend (mean of the two steps there / change of direction); inf if straight."""
+    steps = np.diff(line, axis=0)
+    lengths = np.hypot(*steps.T)
+    steps, lengths = steps[lengths > 0.0], lengths[lengths > 0.0]
+    turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
+    bends = turns > 1e-9
+    return float((0.5 * (lengths[1:] + lengths[:-1])[bends] / turns[bends]).min()) if bends.any() else np.inf
+
+
+def bearing_of(line: NDArray[np.float64]) -> float:
+    """The direction in which a line starts: 0 along +x, growing towards +y."""
+    x, y = next(step for step in line - line[0] if step.any())
+    return math.atan2(y, x)
+
+
+def as_text(answer: Answer) -> str:
+    """The answer as one JSON object; the path is a list of [x, y] in the user's coordinates."""
+    result, path = answer.result, answer.result.path
+    curve = path.curve if path else None
+    return json.dumps(
+        {
+            "status": result.status.value,
+            "planner": result.planner,
+            "cost": path.cost if path else None,
+            "length_fields": path.length_fields if path else None,
+            "length_m": path.length_fields * answer.grid.resolution_m if path else None,
+            "curve_length_fields": None if curve is None else length_of(curve),
+            "curve_length_m": None if curve is None else length_of(curve) * answer.grid.resolution_m,
+            "sharpest_bend_m": _bend_m(answer, path) if path else None,
+            "time_s": answer.seconds,
+            "epochs": result.epochs,
+            "evaluations": result.evaluations,
+            "control_points": result.control_points,
+            "seed": answer.seed,
+            "path": [answer.place(cell) for cell in path.cells] if path else None,
+            **made_with(answer.settings),
+        }
+    )
+
+
+def as_table(answer: Answer) -> Table:
+    """The answer as a table."""
+    result, path = answer.result, answer.result.path
+    table = Table(show_header=False)
+    table.add_row("status", STATUS_WORDS[result.status])
+    table.add_row("planner", result.planner)
+    if path is not None:
+        for name, text in _lengths(answer, path).items():
+            table.add_row(name, text)
+    table.add_row("time", f"{answer.seconds * 1000.0:.3f} ms")
+    if result.epochs:
+        rounds, tries = EFFORT.get(result.planner, ("epochs", "chromosomes"))
+        table.add_row("search", f"{result.epochs} {rounds}, {result.evaluations} {tries}")
+    return table
+
+
+def _lengths(answer: Answer, path: GridPath) -> dict[str, str]:
+    """Cost and length of the path, from field to field and along the line to drive."""
+    resolution_m = answer.grid.resolution_m
+
+    def both(fields: float) -> str:
+        return f"{fields:.2f} fields, {fields * resolution_m:.2f} m"
+
+    line = line_of(path)
+    rows = {"cost": f"{path.cost:.3f}", "from field to field": both(path.length_fields)}
+    rows["line to drive"] = both(length_of(line)) if path.curve is not None else "the same: through the fields' middles"
+    bend_m = _bend_m(answer, path)
+    radius_m = answer.motion.turning_radius_fields * resolution_m
+    if radius_m > 0.0:
+        # The line is sampled, so its radius is only exact to some per cent.
+        fits = bend_m is None or bend_m >= 0.95 * radius_m
+        bend = "none" if bend_m is None else f"{bend_m:.2f} m radius"
+        rows["sharpest bend"] = bend if fits else f"{bend}: too tight, the rover would manoeuvre there"
+    heading_rad = answer.motion.heading_rad
+    if heading_rad is not None and len(line) > 1:
+        off_deg = math.degrees(abs(math.remainder(bearing_of(line) - heading_rad, 2.0 * math.pi)))
+        ahead = off_deg <= AHEAD_DEG
+        rows["sets out"] = "ahead" if ahead else f"{off_deg:.0f} deg off its heading: the rover would manoeuvre first"
+    return rows
+
+
+def _bend_m(answer: Answer, path: GridPath) -> float | None:
+    """The radius of the sharpest bend of the line to drive; None for a straight line."""
+    radius = tightest_radius(line_of(path))
+    return radius * answer.grid.resolution_m if math.isfinite(radius) else None
+
 
 EXIT_FOUND, EXIT_BAD_INPUT, EXIT_NO_PATH = 0, 2, 3
 
 
 class PlaceError(ValueError):
-    """A start or target that cannot be one; the text is one line."""
+    """A start or target that cannot be used; the text is one line."""
 
 
 class TurningError(ValueError):
-    """A turning radius or a heading that would not count; the text is one line."""
+    """A turning radius or heading that would have no effect; the text is one line."""
 
 
 def plan(
@@ -67,7 +216,7 @@ def plan(
         picture(image)
         answer = search(grid, problem, name, settings, seed, top_left)
         if image is not None:
-            save_image(image, grid, problem.start, problem.target, answer.result.path)
+            save_plan(image, grid, problem.start, problem.target, answer.result.path)
     except (SettingsError, MapError, PlaceError, TurningError, UnknownPlannerError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -76,7 +225,7 @@ def plan(
 
 
 def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, seed: int, top_left: bool) -> Answer:
-    """Plan with the budget of a thorough search. The time is without compiling. Raises UnknownPlannerError."""
+    """Plan with the budget of a thorough search; the time excludes compiling. Raises UnknownPlannerError."""
     chosen = make_planner(name, settings.planner)
     with Console(stderr=True).status("compiling (once a machine) ..."):
         warm_up((name,), settings.planner)
@@ -86,7 +235,7 @@ def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, 
 
 
 def motion_of(name: str, settings: Settings, radius_m: float, heading_deg: float | None, grid: Grid) -> VehicleMotion:
-    """How the rover turns, for a planner that heeds it. Raises TurningError for one that does not, and UnknownPlannerError."""
+    """How the rover turns. Raises TurningError for a planner that ignores it, and UnknownPlannerError."""
     if radius_m == 0.0:
         if heading_deg is not None:
             raise TurningError(f"--heading-deg {heading_deg:g}: counts only with --turning-radius-m")
@@ -101,9 +250,9 @@ def motion_of(name: str, settings: Settings, radius_m: float, heading_deg: float
 
 
 def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:
-    """The field meant by ``X,Y``. Raises PlaceError if it is none, outside the map or on an obstacle."""
+    """The field of ``X,Y``. Raises PlaceError if it is none, outside the map or on an obstacle."""
     try:
-        x, y = (int(part) for part in text.split(","))
+        x, y = (int(word) for word in text.split(","))
     except ValueError:
         raise PlaceError(f"{option} {text}: two whole numbers are needed, as in {option} 3,24") from None
     cell = Cell(*flipped(Cell(x, y), grid.height, top_left))

@@ -1,4 +1,4 @@
-"""``rover-companion replay``: run a recorded companion again, and compare."""
+"""``rover-companion replay``: runs a recorded companion again and compares; explains a decision with ``--why``."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from typing import Annotated
 
 import typer
 
+from companion.cli.images import save_decision
 from companion.cli.inputs import OutputError, picture
-from companion.cli.why_image import save_why
 from companion.mapping.map_files import MapError
 from companion.recording.reader import Record, load_record
 from companion.recording.record_format import RecordError
@@ -29,7 +29,10 @@ def replay(
         Path | None, typer.Option(help="With --why: where the picture goes; default: why-STEP.png in DIR.")
     ] = None,
 ) -> None:
-    """Run the decisions of a record again and print the differences. Exit code 0: none; 1: some; 2: not to be replayed."""
+    """Run the decisions of a record again and print the differences.
+
+    Exit code 0: none; 1: some; 2: not to be replayed.
+    """
     try:
         record = load_record(directory)
         if image is not None and why is None:
@@ -53,10 +56,10 @@ def replay(
 
 def _explain(explainer: DecisionExplainer, image: Path) -> None:
     if explainer.explanation is None:
-        return  # the replay did not come so far, and says so
+        return  # the replay ended before this decision, and reports that
     for line in explanation_lines(explainer.explanation):
         typer.echo(line)
-    save_why(image, explainer.explanation)
+    save_decision(image, explainer.explanation)
     typer.echo(f"picture: {image}")
 
 

@@ -1,4 +1,4 @@
-"""``rover-companion run``: drive a mission on a real rover, or on a simulator that stands in for one."""
+"""``rover-companion run``: drives a mission on a real rover or a simulated one."""
 
 from __future__ import annotations
 
@@ -15,13 +15,12 @@ import typer
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
 from companion.cli.inputs import OutputError, usable_settings
-from companion.cli.keeping import Keeping
-from companion.cli.levels import ERROR, INFO, Reader, levelled, reader_of
-from companion.cli.live import Live, LiveConsole
+from companion.cli.live import Live, LiveConsole, Reader, levelled, reader_of
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
-from companion.cli.state import StateFiles
+from companion.cli.state import RunState, StateFiles
 from companion.core.clock import WallClock
+from companion.core.severity import Severity
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm, settle, warm_up
 from companion.mapping.map_files import MapError
@@ -35,7 +34,7 @@ from companion.recording.record_format import STATE, RecordError
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.safety.reasons import PowerReason, Reason
 from companion.settings import Settings, SettingsError
-from companion.storage.beside import Beside, Patience
+from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 STDERR = 2
@@ -50,7 +49,7 @@ BAD_INPUT = (
     SigningKeyError,
 )
 UNHURRIED_S = 10.0
-"""A run that ends by itself waits so long for a slow disk."""
+"""A run that ends by itself waits this long for a slow disk."""
 EXIT_REACHED, EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED = 0, 2, 3, 130
 
 
@@ -58,7 +57,8 @@ def run(
     connect: Annotated[
         str,
         typer.Option(
-            help="The autopilot: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT or serial:DEVICE:BAUD."
+            help="The autopilot: udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, tcpin:HOST:PORT "
+            "or serial:DEVICE:BAUD."
         ),
     ],
     mission_file: Annotated[
@@ -79,18 +79,22 @@ def run(
         Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
     ] = None,
 ) -> None:
-    """Drive MISSION. Exit code 0: every target reached; 3: a target missed; 2: bad input; 1: error in the program; 130: stopped by a signal."""
+    """Drive MISSION.
+
+    Exit code 0: every target reached; 3: a target missed; 2: bad input; 1: error in the program; 130: stopped by a
+    signal.
+    """
     console = LiveConsole(stderr=True)
 
     reader = reader_of(STDERR, os.environ)
 
     def say(text: str) -> None:
-        console.print(levelled(text, INFO, reader), soft_wrap=True, markup=False, highlight=False)
+        console.print(levelled(text, Severity.INFO, reader), soft_wrap=True, markup=False, highlight=False)
 
     try:
         with _StopSignals() as stop, contextlib.ExitStack() as ends:
-            patience = Patience()
-            files = StateFiles(state, patience)
+            budget = ShutdownBudget()
+            files = StateFiles(state, budget)
             ends.callback(files.close)
             settings = files.settings(usable_settings(settings_file), say)
             signer = files.signer(signing_key)
@@ -99,13 +103,15 @@ def run(
             if mission is None:
                 raise SystemExit(EXIT_STOPPED)
             refuse_arming(mission, arm=arm)
-            keeping = Keeping(mission, state, resume=resume, say=say)
+            keeping = RunState(mission, state, resume=resume, say=say)
             ends.callback(keeping.close)
             if keeping.ended:
-                raise typer.Exit(_told(keeping.statuses))
+                raise typer.Exit(_print_statuses(keeping.statuses))
             given = {"settings": settings_file, STATE: keeping.file if keeping.previous else None}
             recorder = (
-                Recorder(record, mission, settings, seed, arm=arm, files=given, beside=Beside("record", patience))
+                Recorder(
+                    record, mission, settings, seed, arm=arm, files=given, beside=BackgroundWorker("record", budget)
+                )
                 if record
                 else NullRecorder()
             )
@@ -115,26 +121,26 @@ def run(
                     say(COMPILING)
                     warm_up(settings, mission.rover.turning_radius_m)
                 settle()
-            link.read()  # what piled up meanwhile is old
+            link.read()  # drop what has piled up meanwhile
             place = recorder.directory if isinstance(recorder, Recorder) else None
             if place != record:
                 say(f"{record} has a record already; this one goes to {place}")
-            keeping.start(patience)
+            keeping.start(budget)
             autopilot = AutopilotLink(link, Codec(settings.link, signer=signer), settings.link, recorder)
             live = Live(console, mission.name, reader)
-            outfit = _Outfit(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, patience)
-            code = _drive(outfit, seed=seed, arm=arm)
+            rig = _Rig(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget)
+            code = _drive(rig, seed=seed, arm=arm)
     except BAD_INPUT as error:
-        typer.echo(levelled(str(error), ERROR, reader) if reader is Reader.JOURNAL else str(error), err=True)
+        typer.echo(levelled(str(error), Severity.ERROR, reader) if reader is Reader.JOURNAL else str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     if stop.asked:
-        raise SystemExit(EXIT_STOPPED)  # it has said so itself
+        raise SystemExit(EXIT_STOPPED)  # it has reported that itself
     raise typer.Exit(code)
 
 
 @dataclass(frozen=True, slots=True)
-class _Outfit:
-    """What a run is driven with. ``place``: where its record really goes; None without one."""
+class _Rig:
+    """The objects of a run. ``place``: the folder of its record; None without one."""
 
     mission: Mission
     settings: Settings
@@ -142,67 +148,67 @@ class _Outfit:
     autopilot: AutopilotLink
     recorder: Recorder | NullRecorder
     place: Path | None
-    keeping: Keeping
+    keeping: RunState
     files: StateFiles
     live: Live
     stop: _StopSignals
-    patience: Patience
+    budget: ShutdownBudget
 
 
-def _drive(outfit: _Outfit, *, seed: int, arm: bool) -> int:
-    """Drive to the end, close everything, and say what came of it. Returns the exit code."""
+def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
+    """Drive to the end, close everything and print the result. Returns the exit code."""
     runner = ThreadRunner()
     companion = Companion(
-        outfit.autopilot,
+        rig.autopilot,
         WallClock(),
-        outfit.mission,
-        outfit.settings,
+        rig.mission,
+        rig.settings,
         runner,
-        outfit.recorder,
+        rig.recorder,
         seed=seed,
         arm=arm,
-        checkpointer=outfit.keeping.checkpointer,
-        keep_settings=outfit.files.keep,
+        checkpointer=rig.keeping.checkpointer,
+        keep_settings=rig.files.keep,
     )
-    outfit.stop.listener = companion
+    rig.stop.listener = companion
     service = Service(os.environ)
 
     def show(status: Status) -> None:
-        outfit.live.show(status)
+        rig.live.show(status)
         service.show(status)
 
     service.ready()
     try:
-        with outfit.live:
+        with rig.live:
             companion.run(show)
-        if not outfit.stop.asked:
-            outfit.patience.extend(UNHURRIED_S)
+        if not rig.stop.asked:
+            rig.budget.extend(UNHURRIED_S)
     finally:
         service.stopping()
         companion.close()
-        outfit.keeping.close()
+        rig.keeping.close()
         runner.close()
-        outfit.link.close()
-        outfit.recorder.close()
-    return _ended(companion, outfit)
+        rig.link.close()
+        rig.recorder.close()
+    return _ended(companion, rig)
 
 
-def _ended(companion: Companion, outfit: _Outfit) -> int:
-    """Say what came of it, and what could not be kept; the exit code."""
-    code = _told(companion.statuses(), companion.outcome.broken_off)
-    with contextlib.suppress(OSError):  # nobody reads on: the exit code still tells
-        for line in (outfit.files.close(), outfit.keeping.problem, str(outfit.autopilot.codec.counters.refused)):
+def _ended(companion: Companion, rig: _Rig) -> int:
+    """Print the result, and what could not be saved; returns the exit code."""
+    code = _print_statuses(companion.statuses(), companion.outcome.broken_off)
+    with contextlib.suppress(OSError):  # no reader: the exit code remains
+        for line in (rig.files.close(), rig.keeping.problem, str(rig.autopilot.codec.counters.refused)):
             if line:
                 typer.echo(line, err=True)
-        if outfit.place is not None:
-            _save_map(companion, outfit.place, outfit.patience)
-            if outfit.recorder.problem:
-                typer.echo(outfit.recorder.problem, err=True)
+        if rig.place is not None:
+            _save_map(companion, rig.place, rig.budget)
+            if rig.recorder.problem:
+                typer.echo(rig.recorder.problem, err=True)
     return code
 
 
-def _told(statuses: list[tuple[str, TargetStatus]], broken_off: Reason[PowerReason] | None = None) -> int:
-    """Print what became of each target, and why it was not even tried if the mission was broken off; the exit code that says so too."""
+def _print_statuses(statuses: list[tuple[str, TargetStatus]], broken_off: Reason[PowerReason] | None = None) -> int:
+    """Print the status of each target, with the reason if the mission was broken off; returns the exit code."""
     with contextlib.suppress(OSError):
         for name, status in statuses:
             untried = status in (TargetStatus.SKIPPED, TargetStatus.PENDING)
@@ -210,8 +216,8 @@ def _told(statuses: list[tuple[str, TargetStatus]], broken_off: Reason[PowerReas
     return EXIT_REACHED if all(status is TargetStatus.REACHED for _, status in statuses) else EXIT_MISSED
 
 
-def _save_map(companion: Companion, directory: Path, patience: Patience) -> None:
-    """What was mapped, as ``map.yaml`` and ``map.pgm``; a full disk, or one that hangs, does not spoil the run's own result."""
+def _save_map(companion: Companion, directory: Path, budget: ShutdownBudget) -> None:
+    """Write the map as ``map.yaml`` and ``map.pgm``; a disk that is full or hangs does not change the run's result."""
     place = directory / "map.yaml"
     told: list[tuple[str, bool]] = []
 
@@ -222,18 +228,18 @@ def _save_map(companion: Companion, directory: Path, patience: Patience) -> None
         except MapError as error:
             told.append((str(error), True))
 
-    beside = Beside("map", patience)
-    beside.put(save)
-    if not beside.close():
+    worker = BackgroundWorker("map", budget)
+    worker.put(save)
+    if not worker.close():
         told.append((f"{place}: not written: the disk does not answer", True))
     for line, err in told:
         typer.echo(line, err=err)
 
 
 class _StopSignals:
-    """SIGINT, SIGTERM and a closed terminal end the run in good order: the rover is stopped first.
+    """SIGINT, SIGTERM and a closed terminal stop the rover, then end the run.
 
-    Before it has begun they end it at once.
+    Before the drive they end the program at once.
     """
 
     def __init__(self) -> None:
@@ -241,12 +247,12 @@ class _StopSignals:
         self.listener: Stoppable | None = None
 
     def __enter__(self) -> _StopSignals:
-        """Take the signals over."""
+        """Install the handlers."""
         self._before = {number: signal.signal(number, self._stop) for number in STOPPING}
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Give them back."""
+        """Restore the former handlers."""
         for number, handler in self._before.items():
             signal.signal(number, handler)
 

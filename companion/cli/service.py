@@ -1,4 +1,4 @@
-"""What systemd is told of a service of ``Type=notify``: that it is ready, that it is alive, what it does, that it ends."""
+"""Notifications to systemd for a service of ``Type=notify``: ready, watchdog, status, stopping."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ ALIVE_S = 1.0
 
 
 class Service:
-    """Talks to systemd's socket; says nothing where there is none. The protocol is that of sd_notify(3)."""
+    """Sends sd_notify(3) messages to systemd's socket; does nothing without one."""
 
     def __init__(self, environment: Mapping[str, str]) -> None:
         self._socket: socket.socket | None = None
-        self._told_s: float | None = None
+        self._sent_s: float | None = None
         self._doing = ""
         address = environment.get("NOTIFY_SOCKET", "")
         if address[:1] in ("/", "@"):
@@ -25,23 +25,23 @@ class Service:
                 self._socket.connect("\0" + address[1:] if address[0] == "@" else address)
 
     def ready(self) -> None:
-        """The start is over: all is compiled, the link is open."""
-        self._say("READY=1")
+        """Call when the start is over: all compiled, the link open."""
+        self._send("READY=1")
 
     def show(self, status: Status) -> None:
-        """A tick is over: once a second, and whenever it does something else, that it is alive and what it does."""
-        due = self._told_s is None or status.time_s - self._told_s >= ALIVE_S
+        """Call after every tick. Sends watchdog and status once a second and on each change."""
+        due = self._sent_s is None or status.time_s - self._sent_s >= ALIVE_S
         if due or status.doing != self._doing:
-            self._told_s, self._doing = status.time_s, status.doing
-            self._say(f"WATCHDOG=1\nSTATUS={status.doing}")
+            self._sent_s, self._doing = status.time_s, status.doing
+            self._send(f"WATCHDOG=1\nSTATUS={status.doing}")
 
     def stopping(self) -> None:
-        """It ends: the last that is told."""
-        self._say("STOPPING=1")
+        """Call at the end."""
+        self._send("STOPPING=1")
         if self._socket is not None:
             self._socket.close()
 
-    def _say(self, text: str) -> None:
+    def _send(self, text: str) -> None:
         if self._socket is not None:
-            with contextlib.suppress(OSError):  # nobody listens, or not fast enough
+            with contextlib.suppress(OSError):  # systemd does not listen, or not fast enough
                 self._socket.send(text.encode())

@@ -1,4 +1,4 @@
-"""Where the mission of a run comes from: a file, or the autopilot itself."""
+"""The mission of a run: from a file, or downloaded from the autopilot."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from companion.mavlink.signing import Signer
 from companion.mavlink.transport import ByteLink, open_link
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
-from companion.mission.stored import mission_of
+from companion.mission.stored_mission import mission_of
 from companion.settings import Settings
 
 
 class Stoppable(Protocol):
-    """What a signal ends."""
+    """Something that a signal stops."""
 
     def stop(self) -> None:
         """Safe in a signal handler."""
@@ -27,13 +27,13 @@ class Stoppable(Protocol):
 
 
 class Stopper(Protocol):
-    """Who passes signals on."""
+    """Passes signals on to its listener."""
 
     listener: Stoppable | None
 
 
 class Source:
-    """One of the two, and the link, which is opened once. Raises MissionError when neither was given, or both."""
+    """Loads the mission and opens the link once. Raises MissionError unless either a file or the autopilot is given."""
 
     def __init__(self, mission_file: Path | None, connect: str, *, from_autopilot: bool) -> None:
         if (mission_file is not None) == from_autopilot:
@@ -46,7 +46,7 @@ class Source:
     def mission(
         self, settings: Settings, signer: Signer | None, stop: Stopper, say: Callable[[str], None]
     ) -> Mission | None:
-        """The mission; None when a signal came while it was being fetched. Raises MissionError, LinkError."""
+        """The mission; None if a signal came during the download. Raises MissionError, LinkError."""
         if self._file is not None:
             return load_mission(self._file, simulated=False)
         autopilot = AutopilotLink(self.link(), Codec(settings.link, signer=signer), settings.link)
@@ -66,16 +66,16 @@ class Source:
         return None if items is None else mission_of(items)
 
     def link(self) -> ByteLink:
-        """The line to the autopilot. Raises LinkError."""
+        """The link to the autopilot, opened at the first call. Raises LinkError."""
         if self._link is None:
             self._link = open_link(self._connect)
         return self._link
 
 
 def refuse_arming(mission: Mission, *, arm: bool) -> None:
-    """A mission of which the autopilot hands over legs is not begun by the companion. Raises MissionError."""
+    """Refuse --arm for a mission that the autopilot drives in AUTO. Raises MissionError."""
     if mission.in_auto and arm:
         raise MissionError(
-            f"{mission.source or mission.name}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE), so a person arms; "
-            "leave out --arm"
+            f"{mission.source or mission.name}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE), "
+            "so a person arms; leave out --arm"
         )

@@ -1,4 +1,4 @@
-"""What ``rover-companion run`` keeps beyond its end, in the directory that ``--state`` names, and the signing that needs it."""
+"""The state directory of ``run`` (``--state``, ``--resume``): mission state, tuned settings, signing timestamp."""
 
 from __future__ import annotations
 
@@ -6,28 +6,33 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
-from companion.checkpoint.state_directory import default_directory
+from companion.checkpoint.checkpointer import Checkpointer
+from companion.checkpoint.resume import PreviousRun
+from companion.checkpoint.state_directory import StateDirectory, StateDirectoryError, default_directory
+from companion.checkpoint.state_writer import StateFile, ThreadStateWriter
 from companion.cli.inputs import OutputError, writable
+from companion.executive.mission_progress import TargetStatus
 from companion.mavlink.signing import Signer, load_key
 from companion.mavlink.signing_time import TimeFile
+from companion.mission.mission import Mission
 from companion.settings import Settings
 from companion.settings.tunable_parameters import as_toml, differences, with_tuned
-from companion.storage.beside import Patience
-from companion.storage.saving import Saver
+from companion.storage.background_writer import BackgroundWriter, ShutdownBudget
+from companion.storage.files import OsDisk
 
 TUNED = "tuned.toml"
-"""Settings that a ground station has changed."""
+"""The file of settings changed by a ground station."""
 SIGNING_TIME = "signing-time"
-"""The signing timestamp, saved ahead."""
+"""The file of the signing timestamp."""
 
 
 class StateFiles:
-    """The small files of a state directory; the default one, if none is named."""
+    """Tuned settings and signing timestamp in a state directory; default: the user's."""
 
-    def __init__(self, named: Path | None, patience: Patience | None = None) -> None:
-        """Raises OutputError if nothing can be written in a directory that was named."""
+    def __init__(self, named: Path | None, budget: ShutdownBudget | None = None) -> None:
+        """Raises OutputError if a named directory cannot be written."""
         self._directory = named or default_directory(os.environ)
-        self._saver = Saver(patience=patience)
+        self._saver = BackgroundWriter(budget=budget)
         self._base = Settings()
         if named is not None and named.exists() and not named.is_dir():
             raise OutputError(f"{named}: is a file; --state takes a directory")
@@ -35,7 +40,7 @@ class StateFiles:
             writable(named / TUNED)
 
     def settings(self, base: Settings, tell: Callable[[str], None]) -> Settings:
-        """The settings with what ground stations have changed in earlier runs. Raises SettingsError."""
+        """The settings with changes by ground stations in earlier runs. Raises SettingsError."""
         self._base = base
         settings = with_tuned(base, self._directory / TUNED)
         if tuned := differences(base, settings):
@@ -43,16 +48,93 @@ class StateFiles:
         return settings
 
     def keep(self, tuned: Settings) -> None:
-        """Keep them for the next run; returns at once."""
+        """Save tuned settings for the next run; returns at once."""
         self._saver.save(self._directory / TUNED, as_toml(self._base, tuned).encode())
 
     def signer(self, key_file: Path | None) -> Signer | None:
-        """Signs with the key of a file, None without one. Raises SigningKeyError."""
+        """A signer with the key of a file; None without one. Raises SigningKeyError."""
         if key_file is None:
             return None
         return Signer(load_key(key_file), saved=TimeFile(self._directory / SIGNING_TIME, self._saver))
 
     def close(self) -> str:
-        """Write what is left; why something could not be written, or nothing."""
+        """Write what is left; returns why something could not be written, or an empty text."""
         self._saver.close()
         return self._saver.problem
+
+
+class RunState:
+    """The mission state that a run resumes and writes.
+
+    Raises StateDirectoryError if a directory was named or --resume given and it cannot be used; otherwise ``say`` reports
+    that.
+    """
+
+    def __init__(self, mission: Mission, directory: Path | None, *, resume: bool, say: Callable[[str], None]) -> None:
+        self.checkpointer: Checkpointer | None = None
+        self.previous: PreviousRun | None = None
+        self._mission = mission
+        self._resume = resume
+        self._place: StateDirectory | None = None
+        try:
+            self._place = StateDirectory(directory or default_directory(os.environ))
+            self._load(say)
+        except StateDirectoryError as error:
+            self.close()
+            if directory is not None or resume:
+                raise
+            say(f"{error}; this run cannot be resumed")
+
+    @property
+    def ended(self) -> bool:
+        """Whether the resumed mission has been driven to its end already."""
+        return self.previous is not None and self.previous.state.ended
+
+    @property
+    def file(self) -> Path | None:
+        """The state file; None without one."""
+        return None if self._place is None else self._place.file
+
+    @property
+    def problem(self) -> str:
+        """Why the state is older than the end of the run, with remedy; empty if it is not."""
+        if self.checkpointer is None or not self.checkpointer.problem or self.file is None:
+            return ""
+        stale = f", and do not --resume: {self.file.name} is older than this run" if self.file.exists() else ""
+        return f"{self.checkpointer.problem}; make room there or name another place with --state DIR{stale}"
+
+    @property
+    def statuses(self) -> list[tuple[str, TargetStatus]]:
+        """The status of each target of a mission that has ended."""
+        if self.previous is None:
+            return []
+        names = (target.name for target in self._mission.targets)
+        return list(zip(names, self.previous.state.progress.statuses, strict=True))
+
+    def start(self, budget: ShutdownBudget | None = None) -> None:
+        """Start writing the state."""
+        if self._place is not None:
+            writer = ThreadStateWriter(StateFile(self._place.file, OsDisk()), budget)
+            self.checkpointer = Checkpointer(self._mission, writer, self.previous)
+
+    def close(self) -> None:
+        """Write what is left."""
+        if self.checkpointer is not None:
+            self.checkpointer.close()
+        if self._place is not None:
+            self._place.close()
+
+    def _load(self, say: Callable[[str], None]) -> None:
+        assert self._place is not None
+        if not self._resume:
+            self._place.set_aside()
+            return
+        self.previous = self._place.load(self._mission)
+        if self.previous is None:
+            say(f"no state in {self._place.directory}: the mission begins at its first target")
+            return
+        state = self.previous.state
+        what = "was driven to its end" if state.ended else "goes on"
+        say(f"{self._mission.name} {what}: {state.reached} of {len(state.progress.statuses)} targets reached")
+        if state.ended:
+            say("to drive it again, start without --resume")

@@ -1,4 +1,4 @@
-"""One thing that is worth saying of an autopilot: how grave it is, and what to do about it."""
+"""A finding of the doctor: what is wrong with an autopilot, how grave it is, and what to do about it."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from enum import StrEnum
 
 
 class Level(StrEnum):
-    """How grave."""
+    """How grave a finding is."""
 
     STOP = "stop"
-    """A mission would not begin, or not end well."""
+    """A mission would not begin, or would fail."""
     WARN = "warn"
-    """It may go wrong, or badly."""
+    """A mission may fail or drive badly."""
     NOTE = "note"
     """Good to know."""
 
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """``parameter``, ``value`` (as it is) and ``wanted`` where there is one to be set."""
+    """A finding. ``parameter``, its ``value`` and the ``wanted`` value, if one is to be set."""
 
     name: str
     level: Level

@@ -10,8 +10,8 @@ from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_progress import MissionPhase, TargetStatus
+from companion.vehicle.auto_leg import GuidedLeg, LegState
 from companion.vehicle.commands import GuidedPosition
-from companion.vehicle.events.targets import GuidedLeg, LegState
 from companion.vehicle.state import VehicleState
 
 SAME_M = 0.1

@@ -13,12 +13,15 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.download import Downloads
 from companion.mission.items import Item
 from companion.mission.mission import MissionError
-from companion.mission.stored import NAME, digest
+from companion.mission.stored_mission import NAME, digest
 from companion.safety.reasons import Activity, Reason, RunPhase, WaitReason
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import PlanChangedSeen, PlanKind
-from companion.vehicle.events.targets import ItemCurrentSeen
-from companion.vehicle.events.vehicle import TextSeen
+from companion.vehicle.events import (
+    Event,
+    ItemCurrentSeen,
+    PlanChangedSeen,
+    PlanKind,
+    TextSeen,
+)
 from companion.vehicle.state import VehicleState
 
 TRIES = 3

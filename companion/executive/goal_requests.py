@@ -20,9 +20,12 @@ from companion.mission.resolve import ResolvedTarget
 from companion.safety.reasons import LatchReason, Reason, Refusal
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import AnswerTarget
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.targets import TargetAnswer, TargetAsked
-from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.events import (
+    Event,
+    RoverMode,
+    TargetAnswer,
+    TargetAsked,
+)
 from companion.vehicle.state import VehicleState
 
 REPEAT_S = 5.0

@@ -38,7 +38,7 @@ from companion.executive.mission_progress import (
 from companion.executive.return_path import Refuge, Trail, refuges
 from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again
 from companion.mapping.map_files import save_ros_map
-from companion.mission.fence import AutopilotFence
+from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision

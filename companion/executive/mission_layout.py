@@ -12,8 +12,8 @@ from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import OBSTACLE, Grid, inflated
 from companion.executive.mission_progress import MissionProgress, relaid
 from companion.mapping.evidence_map import EvidenceMap, new_map, rebase
+from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bounds
-from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedMission, ResolvedTarget, resolve
 from companion.settings import MappingSettings

@@ -24,7 +24,7 @@ from companion.safety.mode_latch import LatchState, Reaction, Verdict
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import Command, SetMode
-from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
 
 MakeExecutor = Callable[[MissionLayout, MissionProgress, RangeScan], MissionExecutor]

@@ -21,8 +21,7 @@ from PIL import Image, UnidentifiedImageError
 
 from companion.core.frames import NedPoint
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Grid, Weights
-from companion.storage.disk import write_whole
-from companion.storage.reading import open_file, why_no_file
+from companion.storage.files import open_file, why_no_file, write_whole
 
 MAX_FIELDS = 25_000_000
 """Larger maps are refused before memory is asked for (5000 x 5000 fields are 200 MB of weights)."""

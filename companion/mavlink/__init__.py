@@ -1,1 +1,1 @@
-"""Bytes in, bytes out: transports, the codec, and the autopilot at the other end."""
+"""MAVLink: transports, codec, and the conversation with the autopilot."""

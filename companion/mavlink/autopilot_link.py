@@ -1,4 +1,4 @@
-"""The conversation with the autopilot: who we are, what we need, what we said and what came of it."""
+"""The link to the autopilot: heartbeat, requests, commands and their confirmation, and incoming events."""
 
 from __future__ import annotations
 
@@ -9,63 +9,64 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.round_marks import Mark
-from companion.mavlink.acks import AckKeeper
 from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec, Packet
+from companion.mavlink.confirmation import CommandTracker, TargetReadBack
 from companion.mavlink.download import Downloads
-from companion.mavlink.rates import RateFault, RateKeeper, wanted_rates
-from companion.mavlink.readback import ReadBack
+from companion.mavlink.rates import RateFault, RateMonitor, wanted_rates
 from companion.settings import LinkSettings
-from companion.vehicle.commands import AskTime, Command, Heartbeat, RequestMessage, TellFigure
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen, HomeSeen, TargetSeen
+from companion.vehicle.commands import Command, Heartbeat, NamedValue, RequestMessage, TimeSync
+from companion.vehicle.events import AckSeen, Event, HeartbeatSeen, HomeSeen, TargetSeen
 from companion.vehicle.link_latency import TimeAnswered
 
 HEARTBEAT_S = 1.0
 PLACES_S = 2.0
-"""Origin and home are asked for this often until known,"""
+"""Origin and home are requested this often until known,"""
 PLACES_AGAIN_S = 30.0
-"""and then this often, for the autopilot says only once when it has moved them."""
+"""and then this often: the autopilot reports a change only once."""
 TIME_S = 0.5
-"""The autopilot's time is asked for this often: how long the answer takes is how late the link is."""
+"""The autopilot's time is requested this often: the time until the answer is the latency of the link."""
 TWIN_S = 3.5
-"""What another companion has said counts for so long."""
+"""A message of another companion counts for this long."""
 REMEMBERED = 64
-"""Packets of our own that a network may send back to us."""
+"""Own packets that are remembered, because a network may send them back."""
 
 
 class PacketLog(Protocol):
-    """Takes every packet of both directions; ``time_s`` is the companion's clock."""
+    """Receives every packet of both directions; ``time_s`` is by the companion's clock."""
 
     def heard(self, time_s: float, packets: list[bytes], mark: Mark) -> None:
-        """The companion has listened; what came, packet by packet."""
+        """The packets received in one poll."""
         ...
 
     def said(self, time_s: float, raw: bytes) -> None:
-        """One whole packet of the companion."""
+        """One packet sent by the companion."""
         ...
 
 
 class _NoLog:
     def heard(self, time_s: float, packets: list[bytes], mark: Mark) -> None:
-        """Nobody listens."""
+        """Nothing to log."""
 
     def said(self, time_s: float, raw: bytes) -> None:
-        """Nobody listens."""
+        """Nothing to log."""
 
 
 class AutopilotLink:
-    """Polls, speaks and looks after the link. It never waits and reads no clock: the time is handed in."""
+    """Polls the link, sends commands and keeps the link up.
+
+    It never waits and reads no clock: callers pass the time.
+    """
 
     def __init__(self, link: ByteLink, codec: Codec, settings: LinkSettings, log: PacketLog | None = None) -> None:
         self._link = link
         self._codec = codec
         self._log = log or _NoLog()
-        self._rates = RateKeeper(wanted_rates(settings))
-        self._acks = AckKeeper()
-        self._read_back = ReadBack()
+        self._rates = RateMonitor(wanted_rates(settings))
+        self._acks = CommandTracker()
+        self._read_back = TargetReadBack()
         self.downloads = Downloads()
-        """The lists that the autopilot has stored: mission, fence, rally points."""
+        """Downloads of the autopilot's stored lists: mission, fence, rally points."""
         self._heartbeat_s = -math.inf
         self._places_s = -math.inf
         self._home_known = False
@@ -81,7 +82,7 @@ class AutopilotLink:
 
     @property
     def trouble(self) -> str:
-        """While no rover has been heard: where was listened, and who spoke instead."""
+        """For the message that no rover is heard: the link, and what was heard instead."""
         refused = self._codec.refused_type
         other = "" if refused is None else f" (heard a vehicle of type {refused}, which is no ArduPilot rover)"
         signing = self._codec.signing_trouble
@@ -94,30 +95,32 @@ class AutopilotLink:
 
     @property
     def codec(self) -> Codec:
-        """For its counters."""
+        """The codec, for its counters."""
         return self._codec
 
     @property
     def target_confirmed(self) -> bool | None:
-        """Whether the autopilot follows the position sent last: None while nothing can be said, False 2 s after it should have."""
+        """Whether the autopilot follows the last position sent; None while unknown, False after 2 s without."""
         return self._read_back.confirmed
 
     @property
     def rate_faults(self) -> tuple[RateFault, ...]:
-        """Messages that come at less than half the rate asked for."""
+        """Messages whose rate is too low."""
         return self._rates.faults
 
     def twin_heard(self, now_s: float) -> bool:
-        """Whether somebody else has just spoken as this very component: two companions would steer one rover."""
+        """Whether another companion uses this component id: two would steer one rover."""
         return now_s - max(self._twin_s, self._rival_s) < TWIN_S
 
     def rival_heard(self, now_s: float) -> bool:
-        """Whether that other companion is driving, for only then it tells its figures. The autopilot passes those on between links,
-        but no heartbeat of a component that it hears on both of them."""
+        """Whether another companion is driving: only then it sends figures.
+
+        The autopilot forwards those between links, but not the heartbeat of a component that it hears on both.
+        """
         return now_s - self._rival_s < TWIN_S
 
     def intruder(self, now_s: float) -> str:
-        """Who speaks under ids that are not his, in words; empty when nobody does."""
+        """A warning about another sender with the companion's or the rover's ids; empty if there is none."""
         if self.twin_heard(now_s):
             return "Another companion speaks as this component: stop one of them"
         kind = self._codec.impostor_type
@@ -129,12 +132,12 @@ class AutopilotLink:
         return self._acks.last(command)
 
     def poll(self, now_s: float) -> list[Event]:
-        """What has come in since the last call."""
+        """The events since the last call."""
         events: list[Event] = []
         packets = [packet for packet in self._codec.packets(self._link.read()) if self._codec.accepts(packet)]
         self._log.heard(now_s, [packet.raw for packet in packets], self._codec.marks)
         for packet in packets:
-            self._look_for_twin(packet, now_s)
+            self._note_twin(packet, now_s)
             for event in self._codec.decode_packet(packet, now_s):
                 if isinstance(event, TimeAnswered) and not self._is_ours(event):
                     continue
@@ -143,18 +146,18 @@ class AutopilotLink:
         return events
 
     def send(self, command: Command, now_s: float) -> None:
-        """Say something; commands that are answered are repeated up to twice if no answer comes within a second.
+        """Send a command. Mode, arming and speed are repeated up to twice if no answer comes within a second.
 
-        Raises EncodeError when the command cannot be said yet (a position in degrees without an origin).
+        Raises EncodeError if the command cannot be encoded yet (a position in degrees without an origin).
         """
         self._write(command, now_s)
         self._acks.sent(command, now_s)
         self._read_back.sent(command, now_s)
 
     def service(self, now_s: float) -> None:
-        """To be called every tick: heartbeat, requests, repetitions.
+        """Call every tick: sends heartbeat, requests and repetitions.
 
-        The heartbeat goes out from the first tick on: the autopilot learns the way to us from our own packets.
+        The heartbeat is sent from the first tick on: the autopilot learns the route to the companion from its packets.
         """
         if now_s - self._heartbeat_s >= HEARTBEAT_S - 1e-6:
             self._heartbeat_s = now_s
@@ -170,11 +173,11 @@ class AutopilotLink:
             self._write(command, now_s, repetition)
 
     def ask_places(self) -> None:
-        """Have origin and home told again at the next ``service``."""
+        """Request origin and home again at the next ``service``."""
         self._places_s = -math.inf
 
     def close(self) -> None:
-        """Let go of the line."""
+        """Close the link."""
         self._link.close()
 
     def _ask_places(self, now_s: float) -> None:
@@ -189,10 +192,10 @@ class AutopilotLink:
         if now_s - self._time_s >= TIME_S - 1e-6:
             self._time_s = now_s
             self._asked_ns.append(round(now_s * 1e9))
-            self._write(AskTime(self._asked_ns[-1]), now_s)
+            self._write(TimeSync(self._asked_ns[-1]), now_s)
 
-    def _look_for_twin(self, packet: Packet, now_s: float) -> None:
-        if not self._codec.is_own(packet) or packet.raw in self._own:  # some networks send all back
+    def _note_twin(self, packet: Packet, now_s: float) -> None:
+        if not self._codec.is_own(packet) or packet.raw in self._own:  # some networks send packets back
             return
         if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             self._twin_s = now_s
@@ -200,7 +203,7 @@ class AutopilotLink:
             self._rival_s = now_s
 
     def _is_ours(self, answer: TimeAnswered) -> bool:
-        """Whether it answers our own question, for the first time: others ask as well, and answers are sent to everybody."""
+        """Whether it answers a TIMESYNC of this companion, for the first time: answers are sent to all who ask."""
         if answer.asked_ns not in self._asked_ns:
             return False
         self._asked_ns.remove(answer.asked_ns)
@@ -222,5 +225,5 @@ class AutopilotLink:
         for raw in self._codec.encode_packets(command, repetition):
             self._log.said(now_s, raw)
             self._link.write(raw)
-            if isinstance(command, Heartbeat | TellFigure):
+            if isinstance(command, Heartbeat | NamedValue):
                 self._own.append(raw)

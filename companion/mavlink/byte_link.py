@@ -1,4 +1,4 @@
-"""What every link can do, and the link within one process."""
+"""The protocol of all byte links, a link within the process, and helpers for links."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections import deque
 from typing import Protocol
 
 MAX_READ_BYTES = 65536
-"""A read hands over about this much at most, so that a flood cannot hold up a tick."""
+"""A read returns at most about this much, so that a flood cannot delay a tick."""
 
 
 class LinkError(Exception):
@@ -14,28 +14,28 @@ class LinkError(Exception):
 
 
 class ByteLink(Protocol):
-    """Bytes in, bytes out. Neither call ever waits; a broken line mends itself or stays silent, it does not raise."""
+    """Reads and writes bytes without waiting. A broken link reconnects or stays silent; it does not raise."""
 
     @property
     def description(self) -> str:
-        """The link in words for people, with its present state."""
+        """The link and its present state, in words."""
         ...
 
     def read(self) -> bytes:
-        """What has arrived; empty when nothing has."""
+        """The bytes that have arrived; may be empty."""
         ...
 
     def write(self, data: bytes) -> None:
-        """Send these bytes (whole packets); dropped when the line is down or full."""
+        """Send whole packets; they are dropped while the link is down or full."""
         ...
 
     def close(self) -> None:
-        """Let go of the line; more than once is fine."""
+        """Close the link. May be called again."""
         ...
 
 
 class MemoryLink:
-    """One end of a line within the process: what one end writes the other reads, in order, at once and without loss."""
+    """One end of a link within the process: the other end reads what it writes, at once and without loss."""
 
     def __init__(self, incoming: deque[bytes], outgoing: deque[bytes]) -> None:
         self._incoming = incoming
@@ -43,7 +43,7 @@ class MemoryLink:
 
     @classmethod
     def pair(cls) -> tuple[MemoryLink, MemoryLink]:
-        """The two ends of a new line."""
+        """The two ends of a new link."""
         there: deque[bytes] = deque()
         back: deque[bytes] = deque()
         return cls(there, back), cls(back, there)
@@ -54,22 +54,22 @@ class MemoryLink:
         return "memory"
 
     def read(self) -> bytes:
-        """All that the other end has written since the last read."""
+        """All bytes that the other end has written since the last read."""
         data = b"".join(self._incoming)
         self._incoming.clear()
         return data
 
     def write(self, data: bytes) -> None:
-        """Hand bytes to the other end."""
+        """Send bytes to the other end."""
         if data:
             self._outgoing.append(bytes(data))
 
     def close(self) -> None:
-        """Nothing to let go of."""
+        """Nothing to close."""
 
 
 class OutBuffer:
-    """Bytes that a stream has not taken yet. When it is full, whole packets are dropped, never part of one."""
+    """Bytes that a stream has not accepted yet. When it is full, whole packets are dropped."""
 
     LIMIT_BYTES = 65536
 
@@ -78,23 +78,23 @@ class OutBuffer:
         self.dropped = 0
 
     def add(self, data: bytes) -> None:
-        """Queue a packet, or drop and count it when the stream has stood still for too long."""
+        """Queue a packet, or drop and count it if the buffer is full."""
         if len(self.waiting) + len(data) > self.LIMIT_BYTES:
             self.dropped += 1
         else:
             self.waiting += data
 
     def taken(self, count: int) -> None:
-        """The stream has taken so many bytes."""
+        """Remove bytes that the stream has accepted."""
         del self.waiting[:count]
 
     def clear(self) -> None:
-        """Forget everything: the line has been cut, and its other end waits for the start of a packet."""
+        """Drop all bytes: the link was cut, and the peer waits for the start of a packet."""
         self.waiting.clear()
 
 
 class BackOff:
-    """When to try again: at once, then after twice the last wait each time, up to a limit; seconds of any clock."""
+    """Exponential back-off: the first try at once, then with doubling waits up to a limit, in seconds of any clock."""
 
     def __init__(self, first_s: float = 0.25, limit_s: float = 5.0) -> None:
         self._first_s = first_s
@@ -102,12 +102,12 @@ class BackOff:
         self.reset()
 
     def reset(self) -> None:
-        """It worked: the next failure waits the shortest time."""
+        """Call after success: the next wait is the shortest."""
         self._wait_s = self._first_s
         self._next_s = -float("inf")
 
     def due(self, now_s: float) -> bool:
-        """Whether to try now; if so, the next try is put off."""
+        """Whether to try now; if so, the next wait begins."""
         if now_s < self._next_s:
             return False
         self._next_s = now_s + self._wait_s

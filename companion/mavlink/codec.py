@@ -1,4 +1,4 @@
-"""MAVLink 2 on one side, the companion's events and commands on the other; the only place that scales units."""
+"""Codec between MAVLink packets and the companion's events and commands."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from dataclasses import dataclass
 
 from companion.core.frames import GeoPoint
 from companion.core.round_marks import Mark
-from companion.mavlink.decode import AUTOPILOT, MISSION_ACK_COMMAND, Decoder
+from companion.mavlink.decode import MISSION_ACK_COMMAND, Decoder
 from companion.mavlink.encode import EncodeError, Encoder, command_number
-from companion.mavlink.framing import MAGIC_V2, SIGNED, Framer, Packet
+from companion.mavlink.framing import AUTOPILOT, MAGIC_V2, SIGNED, Framer, Packet
 from companion.mavlink.signing import Recorded, Refused, Signer, trouble
 from companion.settings import LinkSettings
 from companion.vehicle.commands import Command
-from companion.vehicle.events.event import Event
+from companion.vehicle.events import Event
 
 __all__ = ["MISSION_ACK_COMMAND", "Codec", "EncodeError", "LinkCounters", "Packet", "command_number"]
 
 
 @dataclass(frozen=True, slots=True)
 class LinkCounters:
-    """How good the line is; all counted from the start."""
+    """Counters of the link's quality, from the start."""
 
     bad_bytes: int
     """Bytes that belonged to no valid packet."""
@@ -29,16 +29,16 @@ class LinkCounters:
     other_systems: int
     """Packets of other vehicles and ground stations, or before the vehicle was known."""
     lost: int
-    """Packets of the autopilot that are missing, by their sequence numbers."""
+    """Lost packets of the autopilot, by sequence numbers."""
     refused: Refused
-    """Packets that were not believed, because of their signature or for want of one."""
+    """Packets refused because of a wrong or missing signature."""
 
 
 class Codec:
-    """Decodes what the vehicle sends and encodes what the companion says to it.
+    """Decodes packets of the vehicle and encodes commands to it.
 
-    The vehicle is the first ArduPilot rover or boat whose heartbeat is heard (component 1); until then ``system_id`` is a guess.
-    The companion speaks under the vehicle's system id. Any bytes may be fed; none make it fail.
+    The vehicle is the first ArduPilot rover or boat whose heartbeat is heard (component 1); until then ``system_id`` is
+    a guess. The companion uses the vehicle's system id. Any bytes are accepted; none raise.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class Codec:
 
     @property
     def system_id(self) -> int:
-        """The vehicle's system id, and ours."""
+        """The system id of the vehicle and the companion."""
         return self._decoder.system_id
 
     @property
@@ -68,17 +68,17 @@ class Codec:
 
     @property
     def impostor_type(self) -> int | None:
-        """MAV_TYPE of something else that says heartbeats under the rover's own ids, which are not heeded; None if nothing does."""
+        """MAV_TYPE of another vehicle whose heartbeats use the rover's ids, and are ignored; None if there is none."""
         return self._decoder.impostor_type
 
     @property
     def origin(self) -> GeoPoint | None:
-        """The EKF origin; None until heard, and again after the autopilot has restarted."""
+        """The EKF origin; None until known, and after a restart of the autopilot."""
         return self._decoder.origin
 
     @property
     def boot_s(self) -> float:
-        """The autopilot's time since boot when last heard, in seconds."""
+        """The autopilot's time since boot in its newest message, in seconds."""
         return self._decoder.boot_ms / 1000.0
 
     @property
@@ -87,13 +87,13 @@ class Codec:
         return self._decoder.message_counts
 
     def is_own(self, packet: Packet) -> bool:
-        """Whether this was said under our own system and component id."""
+        """Whether a packet has the companion's own system and component id."""
         own = (self._decoder.system_id, self._decoder.component_id)
         return self.vehicle_known and (packet.system_id, packet.component_id) == own
 
     @property
     def counters(self) -> LinkCounters:
-        """How good the line is."""
+        """The counters of the link's quality."""
         decoder = self._decoder
         refused = Refused() if self._signer is None else self._signer.refused
         return LinkCounters(self._framer.bad_bytes, self._framer.unknown, decoder.other_systems, decoder.lost, refused)
@@ -111,11 +111,11 @@ class Codec:
 
     @property
     def marks(self) -> Mark:
-        """What a record must know of signatures."""
+        """What a record keeps about signatures."""
         return Mark(0) if self._signer is None else Mark.SIGNED | self._signer.refused.marks
 
     def accepts(self, packet: Packet) -> bool:
-        """Whether to believe a packet: with a key, only if it is signed with it, and newer than those before."""
+        """Whether to accept a packet: with a key, only if it is signed with it and newer than those before."""
         if self._signer is not None:
             return self._signer.accepts(packet)
         signed = packet.raw[0] == MAGIC_V2 and bool(packet.raw[2] & SIGNED)
@@ -123,7 +123,10 @@ class Codec:
         return True
 
     def decode(self, data: bytes, time_s: float) -> list[Event]:
-        """The events in these bytes; pieces of packets are kept for the next call. ``time_s``: the companion's clock."""
+        """The events in these bytes; incomplete packets are kept for the next call.
+
+        ``time_s``: by the companion's clock.
+        """
         return [
             event
             for packet in self.packets(data)
@@ -132,7 +135,7 @@ class Codec:
         ]
 
     def packets(self, data: bytes) -> list[Packet]:
-        """The whole packets in these bytes, of whomever and whatever (for recording)."""
+        """The complete packets in these bytes, of all senders."""
         return self._framer.feed(data)
 
     def decode_packet(self, packet: Packet, time_s: float) -> list[Event]:
@@ -144,6 +147,6 @@ class Codec:
         return b"".join(self.encode_packets(command, confirmation))
 
     def encode_packets(self, command: Command, confirmation: int = 0) -> list[bytes]:
-        """The same, packet by packet (a long text is several)."""
+        """The packets of a command; a long text has several."""
         decoder = self._decoder
         return self._encoder.encode(command, decoder.system_id, decoder.boot_ms, decoder.origin, confirmation)

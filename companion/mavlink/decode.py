@@ -1,4 +1,4 @@
-"""From MAVLink packets to the companion's events: whom to believe, what is old, and what the numbers mean."""
+"""Decodes MAVLink packets into events: which senders count, which packets are old, and the units of their fields."""
 
 from __future__ import annotations
 
@@ -9,24 +9,30 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint
-from companion.mavlink import batteries, live_ranges, others, parameter_requests, requests
-from companion.mavlink.framing import Packet
-from companion.mavlink.live_ranges import LiveRanges
-from companion.mavlink.places import point_of
-from companion.mavlink.texts import TextAssembler
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import FenceStatusSeen, PlanChangedSeen, PlanCountSeen, PlanItemSeen
-from companion.vehicle.events.targets import ItemCurrentSeen, ItemReachedSeen, LegSeen
-from companion.vehicle.events.vehicle import (
+from companion.mavlink import positions, ranges, requests
+from companion.mavlink.framing import AUTOPILOT, Packet
+from companion.mavlink.positions import point_of
+from companion.mavlink.ranges import RangeDecoder
+from companion.mavlink.statustext import TextAssembler
+from companion.vehicle.events import (
     AckSeen,
     AttitudeSeen,
+    BatterySeen,
     EkfStatusSeen,
+    Event,
+    FenceStatusSeen,
     GlobalPositionSeen,
     HeartbeatSeen,
     HomeSeen,
+    ItemCurrentSeen,
+    ItemReachedSeen,
+    LegSeen,
     LocalPositionSeen,
     OriginSeen,
     ParameterSeen,
+    PlanChangedSeen,
+    PlanCountSeen,
+    PlanItemSeen,
     PrearmSeen,
     RangeSeen,
     TargetSeen,
@@ -35,18 +41,18 @@ from companion.vehicle.events.vehicle import (
 from companion.vehicle.link_latency import TimeAnswered
 from companion.vehicle.rc_input import SticksSeen
 
-AUTOPILOT = 1
-"""Component id of the autopilot: only it speaks for the vehicle."""
 ROVERS = (mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT)
 REBOOT_MS = 5000
-"""A boot time that goes back further than packets overtake each other means that the autopilot has restarted."""
+"""If the boot time runs back by more than this (more than packets overtake each other), the autopilot has restarted."""
 MISSION_ACK_COMMAND = -1
 NOT_TOLD = 0xFFFF
 """``total`` of MISSION_CURRENT."""
+NO_CELL_MV = 65535
+OF_SYS_STATUS = -1
 
 
 class Decoder:
-    """Turns packets into events and remembers what that needs: the vehicle's id, its clock, and what was heard before."""
+    """Turns packets into events; keeps the vehicle's id, its clock and the last packets."""
 
     def __init__(self, system_id: int, component_id: int) -> None:
         self.system_id = system_id
@@ -56,18 +62,18 @@ class Decoder:
         self.boot_ms = 0
         self.other_systems = 0
         self.refused_type: int | None = None
-        """MAV_TYPE of an autopilot that was heard and is not an ArduPilot rover."""
+        """MAV_TYPE of an autopilot that was heard but is not an ArduPilot rover."""
         self.impostor_type: int | None = None
-        """MAV_TYPE of something else that speaks under the rover's own ids."""
+        """MAV_TYPE of another vehicle that uses the rover's own ids."""
         self.message_counts: dict[int, int] = {}
         self._mav: Any = mavlink.MAVLink(None)
         self._last: dict[int, Packet] = {}
         self.lost = 0
         self._newest_ms: dict[int, int] = {}
         self._texts = TextAssembler()
-        self._ranges = LiveRanges()
+        self._ranges = RangeDecoder()
         self._readers: dict[int, Callable[[Any, float], Event | None]] = {
-            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: batteries.battery_status,
+            mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery_status,
             mavlink.MAVLINK_MSG_ID_FENCE_STATUS: _fence_status,
             mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
@@ -90,28 +96,28 @@ class Decoder:
         }
 
     def decode(self, packet: Packet, time_s: float) -> list[Event]:
-        """The events of one packet; none when it is of no interest, from somebody else, repeated or too old."""
+        """The events of one packet; none if it is of no interest, from another system, repeated or too old."""
         if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not self.vehicle_known:
-            self._learn(packet)
-        if packet.message_id in parameter_requests.READERS and self.vehicle_known:
-            asked = parameter_requests.request(self._message(packet), self.system_id, self.component_id, time_s)
+            self._learn_vehicle(packet)
+        if packet.message_id in requests.PARAMETER_REQUESTS and self.vehicle_known:
+            asked = requests.parameter_asked(self._message(packet), self.system_id, self.component_id, time_s)
             return [] if asked is None else [asked]
         if packet.system_id != self.system_id or not self.vehicle_known:
             self.other_systems += 1
             return self._of_others(packet, time_s) if self.vehicle_known else []
         if packet.component_id == self.component_id or self._is_repeated(packet):
             return []
-        self._ranges.begin(time_s)
+        self._ranges.vehicle_heard(time_s)
         if packet.component_id == AUTOPILOT:
             self.message_counts[packet.message_id] = self.message_counts.get(packet.message_id, 0) + 1
             return self._of_autopilot(packet, time_s)
-        if packet.message_id in live_ranges.MESSAGES:
+        if packet.message_id in ranges.MESSAGES:
             return self._range(packet, time_s)
-        ours = (*others.RECEIVED, *requests.REQUESTS)
+        ours = (*positions.RECEIVED, *requests.REQUESTS)
         return self._of_others(packet, time_s) if packet.message_id in ours else []
 
     def _asked(self, packet: Packet, time_s: float) -> list[Event]:
-        """What is asked of this very component; what is meant for everybody, or for others, is not ours to answer."""
+        """A guided target asked of this component; requests to all components or to others are not answered."""
         message = self._message(packet)
         if (message.target_system, message.target_component) != (self.system_id, self.component_id):
             return []
@@ -119,16 +125,16 @@ class Decoder:
         return [] if event is None else [event]
 
     def _of_others(self, packet: Packet, time_s: float) -> list[Event]:
-        """Where somebody else says that he is, or where a receiver has heard him; or what he asks of us."""
+        """The position of another vehicle, or a request to the companion."""
         if packet.message_id in requests.REQUESTS:
             return self._asked(packet, time_s)
-        if packet.message_id not in others.READERS:
+        if packet.message_id not in positions.READERS:
             return []
-        event = others.READERS[packet.message_id](self._message(packet), time_s)
+        event = positions.READERS[packet.message_id](self._message(packet), time_s)
         return [] if event is None else [event]
 
-    def _learn(self, packet: Packet) -> None:
-        """The first ArduPilot rover that is heard is ours."""
+    def _learn_vehicle(self, packet: Packet) -> None:
+        """The first ArduPilot rover that is heard becomes the vehicle."""
         if packet.component_id != AUTOPILOT:
             return
         message = self._message(packet)
@@ -141,7 +147,7 @@ class Decoder:
         self.refused_type = None
 
     def _of_autopilot(self, packet: Packet, time_s: float) -> list[Event]:
-        if packet.message_id in live_ranges.MESSAGES:
+        if packet.message_id in ranges.MESSAGES:
             return self._range(packet, time_s)
         if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT:
             beat = self._heartbeat(self._message(packet), time_s)
@@ -151,8 +157,8 @@ class Decoder:
             return [*self._texts.add(TextSeen(time_s, message.severity, message.text), message.id, message.chunk_seq)]
         if packet.message_id == mavlink.MAVLINK_MSG_ID_SYS_STATUS:
             message = self._message(packet)
-            return [_prearm(message, time_s), batteries.sys_status(message, time_s)]
-        if packet.message_id in others.RECEIVED:
+            return [_prearm(message, time_s), _sys_status(message, time_s)]
+        if packet.message_id in positions.RECEIVED:
             return self._of_others(packet, time_s)
         reader = self._readers.get(packet.message_id)
         event = reader(self._message(packet), time_s) if reader is not None else None
@@ -162,7 +168,7 @@ class Decoder:
         return self._mav.decode(bytearray(packet.raw))
 
     def _is_repeated(self, packet: Packet) -> bool:
-        """Whether this very packet has just been heard (two routes to one place); also counts what is missing."""
+        """Whether the same packet has just been heard, over two routes; also counts lost packets."""
         last = self._last.get(packet.component_id)
         self._last[packet.component_id] = packet
         if last is None:
@@ -175,9 +181,9 @@ class Decoder:
         return False
 
     def _is_late(self, message: Any) -> bool:
-        """Whether this message, or a newer one of its kind, has been heard; notices a restart, after which nothing old holds.
+        """Whether this message or a newer one of its kind has been heard. A restart of the autopilot resets that.
 
-        One that comes again and again is as old as its boot time says: what it tells grows stale as if nothing came.
+        A message that is repeated is as old as its boot time: its content becomes stale.
         """
         message_id, now_ms = message.get_msgId(), message.time_boot_ms
         newest_ms = self._newest_ms.get(message_id, -1)
@@ -241,7 +247,7 @@ class Decoder:
         return PlanCountSeen(time_s, message.mission_type, message.count)
 
     def _plan_item(self, message: Any, time_s: float) -> Event | None:
-        """One item of a download; values that are no numbers stay so: who reads the list decides."""
+        """One item of a download; nan stays nan, for the reader of the list to judge."""
         if not self._is_for_us(message):
             return None
         params = (message.param1, message.param2, message.param3, message.param4)
@@ -250,13 +256,13 @@ class Decoder:
         return PlanItemSeen(time_s, *head, params, *place, bool(message.autocontinue))
 
     def _leg(self, message: Any, time_s: float) -> Event | None:
-        """A leg of AUTO that is handed over to this very component."""
+        """A leg of an AUTO mission that is handed over to this component."""
         ours = (message.target_system, message.target_component) == (self.system_id, self.component_id)
         point = point_of(message.lat_int, message.lon_int) if ours and requests.is_place(message) else None
         return None if point is None else LegSeen(time_s, point)
 
     def _is_for_us(self, message: Any) -> bool:
-        """Answers to a ground station come by as well; 0 is everybody (and what a MAVLink 1 answer says)."""
+        """Whether a message is for the companion, not for a ground station; 0 is everybody (also in MAVLink 1)."""
         return message.target_system in (0, self.system_id) and message.target_component in (0, self.component_id)
 
 
@@ -287,7 +293,7 @@ def _sticks(message: Any, time_s: float) -> Event:
 
 
 def _time_answered(message: Any, time_s: float) -> Event | None:
-    """An answer bears the autopilot's time; without it, it is a question."""
+    """TIMESYNC: an answer has the autopilot's time; without it, it is a question."""
     return TimeAnswered(time_s, message.ts1) if message.tc1 > 0 else None
 
 
@@ -301,3 +307,23 @@ def _prearm(message: Any, time_s: float) -> Event:
 
 def _fence_status(message: Any, time_s: float) -> Event:
     return FenceStatusSeen(time_s, message.breach_status != 0)
+
+
+def _battery_status(message: Any, time_s: float) -> BatterySeen:
+    """BATTERY_STATUS. Without cell voltages ArduPilot sends the whole voltage as the first cell, split above 65 V."""
+    cells_mv = [cell for cell in message.voltages if cell != NO_CELL_MV] + list(message.voltages_ext)
+    volts = sum(cells_mv) / 1000.0
+    return _battery(time_s, message.id, volts, message.battery_remaining, message.charge_state)
+
+
+def _sys_status(message: Any, time_s: float) -> BatterySeen:
+    """SYS_STATUS: a summary of the first battery."""
+    volts = 0.0 if message.voltage_battery == NO_CELL_MV else message.voltage_battery / 1000.0
+    return _battery(time_s, OF_SYS_STATUS, volts, message.battery_remaining, 0)
+
+
+def _battery(time_s: float, number: int, volts: float, percent: int, charge_state: int) -> BatterySeen:
+    """0 V is no reading. Without a voltage 0 % is none either: a vehicle without a battery monitor may send it."""
+    known_v = volts if volts > 0.0 else None
+    unknown = not 0 <= percent <= 100 or (percent == 0 and known_v is None)
+    return BatterySeen(time_s, number, known_v, None if unknown else percent, charge_state)

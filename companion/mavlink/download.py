@@ -1,4 +1,4 @@
-"""Fetches mission, fence or rally items from the autopilot (MAVLink's mission protocol), one list at a time, never waiting."""
+"""Downloads mission, fence or rally items from the autopilot (MAVLink's mission protocol), one list at a time."""
 
 from __future__ import annotations
 
@@ -9,26 +9,24 @@ from dataclasses import dataclass, field
 from companion.mavlink.decode import MISSION_ACK_COMMAND
 from companion.mission.items import Item
 from companion.vehicle.commands import Command, EndTransfer, RequestItem, RequestList
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import PlanCountSeen, PlanItemSeen, PlanKind
-from companion.vehicle.events.vehicle import AckSeen
+from companion.vehicle.events import AckSeen, Event, PlanCountSeen, PlanItemSeen, PlanKind
 
 ANSWER_S = 0.8
-"""A request that is not answered for so long is repeated: a slow radio needs about half of it there and back."""
+"""A request is repeated after this time without answer: a slow radio's round trip takes about half of it."""
 TRIES = 5
 MOST_ITEMS = 4000
-"""Longer lists are refused: no flight controller without a memory card keeps more than about 700."""
+"""Longer lists are refused: flight controllers without a memory card hold about 700 items."""
 RESTARTS = 3
-"""A list that changes under way is begun anew, at most so often."""
+"""How often a download is restarted because the list changes."""
 ACCEPTED, ERROR, UNSUPPORTED, INVALID_SEQUENCE, DENIED = 0, 1, 3, 13, 14
-"""MAV_MISSION_RESULT, as far as a download cares."""
+"""Values of MAV_MISSION_RESULT that a download meets."""
 
 
 @dataclass(frozen=True, slots=True)
 class Downloaded:
-    """How a transfer ended. ``failure`` is empty when all ``items`` have arrived; item 0 of a mission is home.
+    """The result of a download. ``failure`` is empty if all ``items`` have arrived; item 0 of a mission is home.
 
-    An autopilot that knows no such list has none: no items, no failure.
+    If the autopilot does not support such a list, it is empty: no items, no failure.
     """
 
     kind: PlanKind
@@ -39,7 +37,7 @@ class Downloaded:
 
 @dataclass
 class _Transfer:
-    """The one under way. ``count`` is None until it has been told."""
+    """A download in progress. ``count`` is None until known."""
 
     kind: PlanKind
     sent_s: float | None = None
@@ -50,35 +48,38 @@ class _Transfer:
 
 
 class Downloads:
-    """Asks for lists in the order they were wanted, and keeps how each ended last."""
+    """Downloads lists in the order of request, and keeps the last result of each."""
 
     def __init__(self) -> None:
         self._wanted: deque[PlanKind] = deque()
         self._now: _Transfer | None = None
         self._last: dict[PlanKind, Downloaded] = {}
-        self._farewell: EndTransfer | None = None
+        self._closing: EndTransfer | None = None
 
     def ask(self, kind: PlanKind) -> None:
-        """Fetch this list (again); nothing happens while it is wanted already. One under way may be an older state: it ends first."""
+        """Request this list (again), unless it is waiting already.
+
+        A download in progress ends first: it may be older.
+        """
         if kind not in self._wanted:
             self._wanted.append(kind)
 
     def cancel(self) -> None:
-        """Forget what is wanted and what is under way."""
+        """Cancel waiting downloads and the one in progress."""
         self._wanted.clear()
         if self._now is not None:
             self._end(self._now, None, "cancelled", cancelled=True)
 
     def last(self, kind: PlanKind) -> Downloaded | None:
-        """How the last transfer of this list ended; None before."""
+        """The last result of this list; None before the first."""
         return self._last.get(kind)
 
     def busy(self, kind: PlanKind) -> bool:
-        """Whether this list is wanted or under way."""
+        """Whether this list is waiting or in progress."""
         return kind in self._wanted or (self._now is not None and self._now.kind is kind)
 
     def heard(self, event: Event) -> None:
-        """An answer, perhaps to us; what does not belong to the transfer under way is passed over."""
+        """Call for each event; those that do not belong to the download in progress are ignored."""
         now = self._now
         if now is None or now.sent_s is None:
             return
@@ -86,18 +87,18 @@ class Downloads:
             case PlanCountSeen() if event.kind == now.kind:
                 self._counted(now, event)
             case PlanItemSeen() if event.kind == now.kind and event.index == len(now.items) and now.count is not None:
-                self._take(now, event)
+                self._add_item(now, event)
             case AckSeen() if event.command == MISSION_ACK_COMMAND and event.kind == now.kind:
                 self._refused(now, event)
             case _:
                 pass
 
     def due(self, now_s: float) -> list[Command]:
-        """What to send now."""
+        """The commands to send now."""
         commands: list[Command] = []
-        if self._farewell is not None:
-            commands.append(self._farewell)
-            self._farewell = None
+        if self._closing is not None:
+            commands.append(self._closing)
+            self._closing = None
         if self._now is None and self._wanted:
             self._now = _Transfer(self._wanted.popleft())
         now = self._now
@@ -112,7 +113,7 @@ class Downloads:
 
     def _counted(self, now: _Transfer, event: PlanCountSeen) -> None:
         if now.count == event.count:
-            return  # told twice
+            return  # sent twice
         if now.count is not None:
             self._restart(now, event.time_s)
             return
@@ -122,19 +123,19 @@ class Downloads:
         now.count = event.count
         self._next(now, event.time_s)
 
-    def _take(self, now: _Transfer, event: PlanItemSeen) -> None:
+    def _add_item(self, now: _Transfer, event: PlanItemSeen) -> None:
         place = (event.lat_deg, event.lon_deg)
         now.items.append(Item(event.index, event.command, event.frame, event.params, *place, event.autocontinue))
         self._next(now, event.time_s)
 
     def _next(self, now: _Transfer, time_s: float) -> None:
-        """Go on with the next item at once, or be done."""
+        """Request the next item at once, or end."""
         now.sent_s, now.tries = -math.inf, 0
         if len(now.items) == now.count:
             self._end(now, time_s, "")
 
     def _refused(self, now: _Transfer, event: AckSeen) -> None:
-        """The autopilot will not go on: the list became shorter, somebody uploads one, or it knows none."""
+        """The autopilot refuses: the list has become shorter, an upload is in progress, or it supports no such list."""
         if event.result == ACCEPTED:
             return
         if event.result == UNSUPPORTED and now.count is None:
@@ -153,9 +154,9 @@ class Downloads:
         self._now = _Transfer(now.kind, sent_s=-math.inf, restarts=now.restarts + 1)
 
     def _end(self, now: _Transfer, time_s: float | None, failure: str, *, cancelled: bool = False) -> None:
-        """``time_s`` None: by ourselves, nothing is kept of it. A whole list is acknowledged, an unfinished one called off."""
+        """End the download: acknowledge a complete list, cancel another one. With ``time_s`` None no result is kept."""
         self._now = None
         if time_s is not None:
             self._last[now.kind] = Downloaded(now.kind, time_s, () if failure else tuple(now.items), failure)
         if cancelled or not failure:
-            self._farewell = EndTransfer(now.kind, cancelled)
+            self._closing = EndTransfer(now.kind, cancelled)

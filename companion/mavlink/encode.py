@@ -1,4 +1,4 @@
-"""From the companion's commands to MAVLink packets."""
+"""Encodes the companion's commands as MAVLink packets."""
 
 from __future__ import annotations
 
@@ -8,14 +8,12 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
-from companion.mavlink.answers import answer_message
+from companion.mavlink.requests import answer_message
 from companion.mavlink.signing import Signer
-from companion.mavlink.texts import chunks_of
+from companion.mavlink.statustext import chunks_of
 from companion.vehicle.commands import (
     AnswerTarget,
     Arm,
-    AskPrearm,
-    AskTime,
     ChangeSpeed,
     Command,
     EndTransfer,
@@ -23,39 +21,41 @@ from companion.vehicle.commands import (
     GuidedPosition,
     GuidedVelocity,
     Heartbeat,
+    NamedValue,
+    ParameterValue,
     ReadParameter,
     RequestItem,
     RequestList,
     RequestMessage,
     RequestRate,
-    Say,
+    RunPrearmChecks,
     SetMode,
-    TellFigure,
-    TellParameter,
+    StatusText,
+    TimeSync,
 )
 
 POSITION_ONLY = 0x0DFC
-"""Type mask 3580: x and y count, nothing else does (height included)."""
+"""Type mask 3580: only x and y are used."""
 VELOCITY_AND_YAW_RATE = 1511
-"""Type mask. With the yaw rate given, a negative speed means backwards; without it the rover would turn round (measured)."""
+"""Type mask. With a yaw rate, a negative speed means backwards; without, the rover turns round first (measured)."""
 YAW_ONLY = 2559
-"""Type mask."""
+"""Type mask: only the yaw is used."""
 KEEP_THROTTLE = -1.0
 KEEP_SPEED = -1.0
 GUIDED_ITEM = 2
-"""``current`` of a mission item that is not part of a mission but a guided target."""
+"""``current`` of a mission item that is a guided target."""
 
 
-Spoken = SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage | AskPrearm
-"""What is said as COMMAND_LONG."""
+LongCommand = SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage | RunPrearmChecks
+"""Commands sent as COMMAND_LONG."""
 
 
 class EncodeError(Exception):
-    """A command that cannot be said in the chosen form (yet)."""
+    """A command that cannot be encoded yet in the chosen form."""
 
 
 class Encoder:
-    """Writes packets under one system and component id, numbered in order."""
+    """Encodes packets with one system and component id and rising sequence numbers."""
 
     def __init__(self, setpoint_form: str, component_id: int, signer: Signer | None = None) -> None:
         self._form = setpoint_form
@@ -74,7 +74,7 @@ class Encoder:
     ) -> list[bytes]:
         """The packets of a command. ``confirmation`` counts repetitions.
 
-        Raises EncodeError for a position that is to be said in degrees while the EKF origin is unknown.
+        Raises EncodeError for a position in degrees while the EKF origin is unknown.
         """
         self._system_id, self._boot_ms = system_id, boot_ms
         self._mav.srcSystem = system_id
@@ -99,23 +99,23 @@ class Encoder:
                 return [self._heading(command)]
             case ReadParameter():
                 return [self._read(command)]
-            case AskTime():
+            case TimeSync():
                 return [mavlink.MAVLink_timesync_message(0, command.asked_ns)]
-            case Say():
-                return self._say(command)
+            case StatusText():
+                return self._text(command)
             case RequestList() | RequestItem() | EndTransfer():
                 return [self._transfer(command)]
             case AnswerTarget():
                 return [answer_message(command)]
-            case TellParameter():
+            case ParameterValue():
                 return [_parameter_value(command)]
-            case TellFigure():
+            case NamedValue():
                 name = command.name.encode("ascii")
                 return [mavlink.MAVLink_named_value_float_message(self._boot_ms, name, command.value)]
             case _:
                 return [self._command_long(command, confirmation)]
 
-    def _command_long(self, command: Spoken, again: int) -> Any:
+    def _command_long(self, command: LongCommand, again: int) -> Any:
         first, second, third = _parameters(command)
         number = command_number(command)
         return mavlink.MAVLink_command_long_message(
@@ -137,13 +137,15 @@ class Encoder:
                 self._boot_ms, self._system_id, 1, frame, POSITION_ONLY, lat_e7, lon_e7, *[0.0] * 9
             )
         if self._form == "mission-item":
+            waypoint = mavlink.MAV_CMD_NAV_WAYPOINT
             return mavlink.MAVLink_mission_item_int_message(
-                self._system_id, 1, 0, frame, mavlink.MAV_CMD_NAV_WAYPOINT, GUIDED_ITEM, 0, *[0.0] * 4, lat_e7, lon_e7, 0.0
-            )  # fmt: skip
-        # The flag that would switch to GUIDED stays 0: only a person, or the start-up, chooses the mode.
+                self._system_id, 1, 0, frame, waypoint, GUIDED_ITEM, 0, *[0.0] * 4, lat_e7, lon_e7, 0.0
+            )
+        # The flag that switches to GUIDED stays 0: only a person or the start-up sets the mode.
+        reposition = mavlink.MAV_CMD_DO_REPOSITION
         return mavlink.MAVLink_command_int_message(
-            self._system_id, 1, frame, mavlink.MAV_CMD_DO_REPOSITION, 0, 0, KEEP_SPEED, 0.0, 0.0, 0.0, lat_e7, lon_e7, 0.0
-        )  # fmt: skip
+            self._system_id, 1, frame, reposition, 0, 0, KEEP_SPEED, 0.0, 0.0, 0.0, lat_e7, lon_e7, 0.0
+        )
 
     def _velocity(self, command: GuidedVelocity) -> Any:
         return self._local_target(
@@ -186,14 +188,14 @@ class Encoder:
                 result = mavlink.MAV_MISSION_OPERATION_CANCELLED if command.cancelled else mavlink.MAV_MISSION_ACCEPTED
                 return mavlink.MAVLink_mission_ack_message(*to, result, int(command.kind))
 
-    def _say(self, command: Say) -> list[Any]:
-        pieces = chunks_of(command.text)
-        if len(pieces) == 1:
-            return [mavlink.MAVLink_statustext_message(command.severity, pieces[0])]
+    def _text(self, command: StatusText) -> list[Any]:
+        chunks = chunks_of(command.text)
+        if len(chunks) == 1:
+            return [mavlink.MAVLink_statustext_message(command.severity, chunks[0])]
         self._text_id = self._text_id % 65535 + 1
         return [
-            mavlink.MAVLink_statustext_message(command.severity, piece, self._text_id, number)
-            for number, piece in enumerate(pieces)
+            mavlink.MAVLink_statustext_message(command.severity, chunk, self._text_id, number)
+            for number, chunk in enumerate(chunks)
         ]
 
 
@@ -203,15 +205,15 @@ def _heartbeat() -> Any:
     )
 
 
-def _parameter_value(command: TellParameter) -> Any:
-    """Whole numbers travel as such in the float, as ArduPilot sends them, not as its bytes."""
+def _parameter_value(command: ParameterValue) -> Any:
+    """Whole numbers are sent as float values, as ArduPilot does, not as their bytes."""
     kind = mavlink.MAV_PARAM_TYPE_INT32 if command.whole_number else mavlink.MAV_PARAM_TYPE_REAL32
     name = command.name.encode("ascii")
     return mavlink.MAVLink_param_value_message(name, command.value, kind, command.count, command.index)
 
 
 def command_number(command: Command) -> int | None:
-    """The MAV_CMD of a command that is answered with a COMMAND_ACK; None for those that are not."""
+    """The MAV_CMD of a command that is answered by COMMAND_ACK; None for other commands."""
     match command:
         case SetMode():
             return int(mavlink.MAV_CMD_DO_SET_MODE)
@@ -221,7 +223,7 @@ def command_number(command: Command) -> int | None:
             return int(mavlink.MAV_CMD_DO_CHANGE_SPEED)
         case RequestRate():
             return int(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL)
-        case AskPrearm():
+        case RunPrearmChecks():
             return int(mavlink.MAV_CMD_RUN_PREARM_CHECKS)
         case RequestMessage():
             return int(mavlink.MAV_CMD_REQUEST_MESSAGE)
@@ -229,10 +231,10 @@ def command_number(command: Command) -> int | None:
             return None
 
 
-def _parameters(command: Spoken) -> tuple[float, float, float]:
+def _parameters(command: LongCommand) -> tuple[float, float, float]:
     """The first three parameters of COMMAND_LONG."""
     match command:
-        case AskPrearm():
+        case RunPrearmChecks():
             return 0.0, 0.0, 0.0
         case SetMode():
             return float(mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED), float(command.mode), 0.0

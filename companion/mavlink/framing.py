@@ -1,8 +1,8 @@
-"""From a stream of bytes to MAVLink packets, checked and with as little lost as possible.
+"""Splits a stream of bytes into MAVLink packets with valid checksums (MAVLink guide, "Packet Serialization").
 
-pymavlink's own stream parser gives up as many bytes as a damaged header claims, which costs up to 280 good ones; and
-it decodes every message, though most are of no interest. Here a beginning that fails its check costs one byte, a stray
-beginning does not hold up the valid packets behind it, and only the frame is looked at (MAVLink guide, "Packet Serialization").
+pymavlink's stream parser skips as many bytes as a damaged header claims, up to 280 good ones, and decodes every
+message. Here a start byte whose packet fails its check costs one byte, a stray start byte does not delay the valid
+packets after it, and messages are not decoded.
 """
 
 from __future__ import annotations
@@ -16,11 +16,13 @@ MAGIC_V1, MAGIC_V2 = 0xFE, 0xFD
 HEADER_V1, HEADER_V2 = 6, 10
 CHECKSUM, SIGNATURE = 2, 13
 SIGNED = 0x01
+AUTOPILOT = 1
+"""Component id of the autopilot: only it speaks for the vehicle."""
 MAGIC = re.compile(b"[\xfd\xfe]")
 
 
 class Packet(NamedTuple):
-    """One packet as it came over the line."""
+    """One packet as received."""
 
     message_id: int
     system_id: int
@@ -30,13 +32,13 @@ class Packet(NamedTuple):
 
 
 class Framer:
-    """Takes bytes in any pieces, gives whole packets. Knows nothing of what is in them."""
+    """Takes bytes in blocks of any size, gives whole packets, not decoded."""
 
     def __init__(self) -> None:
         self.bad_bytes = 0
         """Bytes that belong to no packet."""
         self.unknown = 0
-        """Packets of messages that the dialect does not have (their checksum cannot be checked)."""
+        """Packets of messages that are not in the dialect, so that their checksum cannot be checked."""
         self._rest = b""
 
     def feed(self, data: bytes) -> list[Packet]:
@@ -73,7 +75,7 @@ class Framer:
 
 
 def first_packet(buffer: bytes) -> bytes | None:
-    """The valid packet that these bytes begin with; None if there is none, or not the whole of it."""
+    """The valid packet at the start of these bytes; None if there is none or it is incomplete."""
     end = _end(buffer, 0) if buffer[:1] in (b"\xfe", b"\xfd") else None
     packet = _packet(buffer, 0, end) if end is not None and end <= len(buffer) else None
     return None if packet is None else packet.raw
@@ -95,7 +97,7 @@ def _packet(buffer: bytes, at: int, end: int) -> Packet | None:
 
 
 class _Ahead:
-    """Finds the next valid packet. It remembers, so that a place is looked at once, however much nonsense there is."""
+    """Finds the next valid packet, and remembers it, so that every byte is examined once even among garbage."""
 
     def __init__(self, buffer: bytes) -> None:
         self._buffer = buffer
@@ -118,9 +120,9 @@ class _Ahead:
 
 
 def _is_unknown(buffer: bytes, at: int, end: int, ahead: _Ahead) -> bool:
-    """Whether this is a packet of a message we do not know, rather than a stray byte that looks like a beginning.
+    """Whether this is a packet of an unknown message, rather than a stray start byte.
 
-    Its checksum cannot be checked; so nothing valid may lie in it, and another packet, or nothing, must follow.
+    Its checksum cannot be checked. So it must not contain a valid packet, and another packet or the end must follow it.
     """
     if _identity(buffer, at)[0] in ardupilotmega.mavlink_map:
         return False
@@ -129,7 +131,7 @@ def _is_unknown(buffer: bytes, at: int, end: int, ahead: _Ahead) -> bool:
 
 
 def _end(buffer: bytes, at: int) -> int | None:
-    """Where the packet that begins at ``at`` ends; None while its header is not there yet."""
+    """The end of the packet that begins at ``at``; None while its header is incomplete."""
     if buffer[at] == MAGIC_V1:
         return at + HEADER_V1 + buffer[at + 1] + CHECKSUM if at + 1 < len(buffer) else None
     if at + 2 >= len(buffer):

@@ -1,28 +1,38 @@
-"""What the three range messages say, as RangeScan; the only place that knows their units and their special values.
+"""Range messages as RangeScan: DISTANCE_SENSOR, OBSTACLE_DISTANCE and RANGEFINDER, without the autopilot's echoes.
 
-Rules (ArduRover's behaviour and the MAVLink definitions; where they leave room, the safe reading):
+Rules (ArduRover's behaviour and the MAVLink definitions; where these are ambiguous, the safe interpretation):
 
-- A reading at or beyond the sensor's maximum is "nothing seen up to the maximum" (``inf``), never an obstacle.
-- A reading between zero and the minimum is an obstacle at that distance: in doubt the rover stops.
-- Zero, 65535 and signal quality 1 are "unknown" (``nan``). MAVLink calls a zero of OBSTACLE_DISTANCE "touching", but drivers
-  fill unused cells with it and ArduPilot itself passes over it; unknown is safe, for ground that has not been seen is not
-  driven on, and an obstacle that came near was on the map before.
-- A message in which all is unknown is no scan at all, so that range data grows stale and the rover stops.
-- A wide beam says "somewhere in here": it is given as several narrow ones of the same range.
-- Orientations count clockwise (1 is right-front); the text of common.xml says the reverse, ArduPilot does not.
-- OBSTACLE_DISTANCE is taken as relative to the rover whatever its frame field says, as ArduPilot does: most drivers
-  leave the field at 0, which would mean north.
+- A reading at or beyond the sensor's maximum means "nothing up to the maximum" (``inf``), never an obstacle. - A
+reading between zero and the minimum is an obstacle at that distance: in doubt the rover stops. - Zero, 65535 and signal
+quality 1 are "unknown" (``nan``). MAVLink defines zero in OBSTACLE_DISTANCE as "touching", but drivers fill unused
+sectors with it and ArduPilot ignores it. Unknown is safe: unseen ground is not driven on, and an obstacle that comes
+near was on the map before. - A message with unknown readings only is no scan: range data becomes stale and the rover
+stops. - A wide beam has an obstacle somewhere in its width: it becomes several narrow beams of the same range. -
+Orientations count clockwise (1 is right-front), as in ArduPilot; the text of common.xml says the reverse. -
+OBSTACLE_DISTANCE is relative to the rover whatever its frame field says, as in ArduPilot: most drivers leave the field
+at 0, which would mean north.
+
+An autopilot repeats much of what it receives or measures in a coarser form (an echo); ``RangeDecoder`` leaves that out.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.scan import RangeScan
+from companion.mavlink.framing import AUTOPILOT
+from companion.perception.newest_scans import MOST_SCANS, Sensor, sensor_of
 
+MESSAGES = (mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE)
+FORGOTTEN_S = 5.0
+"""At most MOST_SCANS sensors are used, first come, first served; one that is silent for this long loses its place."""
+ECHO_S = 2.0
+"""For this long after a message, coarser messages that repeat its readings are left out."""
 UNKNOWN_CM = 65535
 INVALID_QUALITY = 1
 HORIZONTAL = range(8)
@@ -31,15 +41,80 @@ MAX_TILT_RAD = math.radians(15.0)
 SECTOR_IDS = range(10, 18)
 SECTOR_RAD = math.radians(45.0)
 OWN_BEAM_RAD = math.radians(4.0)
-"""Width of a rangefinder that does not state its own (small laser rangefinders have 2 to 4 degrees)."""
+"""Width of a rangefinder that does not report its own (small laser rangefinders have 2 to 4 degrees)."""
 NARROW_RAD = math.radians(6.0)
-"""Wider beams are given as several."""
+"""Wider beams become several."""
 RANGEFINDER_MIN_M, RANGEFINDER_TRUST_M = 0.2, 5.0
-"""RANGEFINDER does not state its limits: beyond the second figure it is taken as nothing seen."""
+"""RANGEFINDER has no limits of its own: a reading beyond the second figure means nothing seen."""
+
+
+class RangeDecoder:
+    """Decodes range messages and leaves out echoes; remembers when each source was heard last."""
+
+    def __init__(self) -> None:
+        self._first_s: float | None = None
+        self._lidar_s = -math.inf
+        self._other_range_s = -math.inf
+        self._beam_s: dict[int, float] = {}
+        self._seen_s: dict[int, float] = {}
+        """When data finer than sectors last showed an obstacle, by octants of the circle."""
+        self._heard_s: dict[Sensor, float] = {}
+        """When each sensor was heard last."""
+
+    def vehicle_heard(self, time_s: float) -> None:
+        """Call when the vehicle is heard; the first time counts."""
+        if self._first_s is None:
+            self._first_s = time_s
+
+    def scan(self, message: Any, time_s: float, sender: int) -> RangeScan | None:
+        """The scan of one of ``MESSAGES``; None when it is an echo, useless, or from one sensor too many."""
+        cells = message.get_msgId() == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
+        sector = not cells and sender == AUTOPILOT and is_sector(message)
+        scan = obstacle_distance(message, time_s) if cells else distance_sensor(message, time_s, sector=sector)
+        if scan is None or (sector and self._is_echo(message.orientation, scan)):
+            return None
+        scan = replace(scan, sender=sender)
+        if not self._has_place(sensor_of(scan), time_s):
+            return None
+        self._other_range_s = time_s
+        if cells:
+            self._lidar_s = time_s
+        elif not sector:
+            self._beam_s[message.orientation] = time_s
+        if not sector:
+            self._seen_s.update((octant, time_s) for octant in _octants(scan))
+        return scan
+
+    def _is_echo(self, orientation: int, sector: RangeScan) -> bool:
+        """Whether a proximity sector only repeats finer data, of a lidar or a rangefinder that faces the same way.
+
+        An obstacle that the finer data has not shown comes from a sensor of the autopilot's own.
+        """
+        near = [self._seen_s.get((orientation + aside) % 8, -math.inf) for aside in (-1, 0, 1)]
+        finer_s = max(self._lidar_s, self._beam_s.get(orientation, -math.inf))
+        if np.isfinite(sector.range_m).any():
+            finer_s = min(finer_s, max(near))
+        return sector.time_s - finer_s < ECHO_S
+
+    def _has_place(self, sensor: Sensor, time_s: float) -> bool:
+        """Whether there is a place for this sensor; if so, it takes it."""
+        if sensor not in self._heard_s and len(self._heard_s) >= MOST_SCANS:
+            self._heard_s = {one: heard_s for one, heard_s in self._heard_s.items() if time_s - heard_s < FORGOTTEN_S}
+            if len(self._heard_s) >= MOST_SCANS:
+                return False
+        self._heard_s[sensor] = time_s
+        return True
+
+    def rangefinder(self, message: Any, time_s: float) -> RangeScan | None:
+        """The scan of a RANGEFINDER, only if no better range data has been heard for a while."""
+        assert self._first_s is not None
+        if time_s - max(self._other_range_s, self._first_s) < ECHO_S:
+            return None
+        return rangefinder(message, time_s)
 
 
 def distance_sensor(message: Any, time_s: float, *, sector: bool) -> RangeScan | None:
-    """DISTANCE_SENSOR: one beam, or one of the autopilot's 45-degree proximity sectors; None if not horizontal or unknown."""
+    """DISTANCE_SENSOR: one beam, or a 45-degree proximity sector; None if not horizontal or unknown."""
     bearing_rad = _bearing_rad(message)
     if bearing_rad is None or message.max_distance <= message.min_distance:
         return None
@@ -59,12 +134,12 @@ def distance_sensor(message: Any, time_s: float, *, sector: bool) -> RangeScan |
 
 
 def obstacle_distance(message: Any, time_s: float) -> RangeScan | None:
-    """OBSTACLE_DISTANCE: up to 72 cells; None if all are unknown or the message makes no sense."""
+    """OBSTACLE_DISTANCE: up to 72 sectors; None if all are unknown or the message is invalid."""
     step_deg = message.increment_f if message.increment_f else float(message.increment)
-    # A field of any width would be laid out in as many beams as it takes: more than a full turn is no width.
+    # A sector becomes as many beams as its width needs: more than a full turn is invalid.
     if not (0.0 < abs(step_deg) <= 360.0 and abs(message.angle_offset) <= 360.0):
         return None
-    # More cells than make a full turn would speak of the same place twice.
+    # Sectors beyond a full turn would cover the same directions twice.
     cells = min(len(message.distances), max(1, round(360.0 / abs(step_deg))))
     distance = np.asarray(message.distances[:cells], np.float64)
     unknown = (distance == 0.0) | (distance == UNKNOWN_CM)
@@ -84,9 +159,9 @@ def obstacle_distance(message: Any, time_s: float) -> RangeScan | None:
 
 
 def rangefinder(message: Any, time_s: float) -> RangeScan | None:
-    """RANGEFINDER, the last resort: the nearest of all sensors in whatever direction, taken as one narrow beam ahead.
+    """RANGEFINDER, the last resort: the nearest reading of all sensors, in any direction, as one narrow beam ahead.
 
-    So an obstacle at the side stops the rover as well, while only the ground straight ahead counts as free.
+    So an obstacle at the side stops the rover too, and only the ground straight ahead counts as free.
     """
     distance_m = message.distance
     if not math.isfinite(distance_m) or distance_m <= 0.0:
@@ -97,12 +172,12 @@ def rangefinder(message: Any, time_s: float) -> RangeScan | None:
 
 
 def is_sector(message: Any) -> bool:
-    """Whether a DISTANCE_SENSOR of the autopilot is a proximity sector rather than a sensor of its own."""
+    """Whether a DISTANCE_SENSOR of the autopilot is a proximity sector rather than a real sensor."""
     return message.id in SECTOR_IDS and message.orientation in HORIZONTAL
 
 
 def _bearing_rad(message: Any) -> float | None:
-    """Clockwise from ahead, or None for a sensor that does not look along the ground."""
+    """Bearing clockwise from ahead; None for a sensor that does not face along the ground."""
     if message.orientation in HORIZONTAL:
         return float(message.orientation) * math.radians(45.0)
     if message.orientation != CUSTOM_ORIENTATION:
@@ -111,7 +186,7 @@ def _bearing_rad(message: Any) -> float | None:
     norm = w * w + x * x + y * y + z * z
     if not math.isfinite(norm) or not 0.5 < norm < 1.5:
         return None
-    # Where the sensor's x-axis points in the rover's frame (forward, right, down).
+    # The direction of the sensor's x-axis in the rover's frame (forward, right, down).
     forward, right, down = w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)
     if abs(math.asin(max(-1.0, min(1.0, down / norm)))) > MAX_TILT_RAD:
         return None
@@ -127,9 +202,15 @@ def _scan(
     width_rad: float,
     source: str,
 ) -> RangeScan:
-    parts = max(1, math.ceil(width_rad / NARROW_RAD - 1e-9))
-    if parts > 1:
-        offsets = ((np.arange(parts) + 0.5) / parts - 0.5) * width_rad
+    beams = max(1, math.ceil(width_rad / NARROW_RAD - 1e-9))
+    if beams > 1:
+        offsets = ((np.arange(beams) + 0.5) / beams - 0.5) * width_rad
         bearing_rad = (bearing_rad[:, None] + offsets).ravel()
-        range_m = np.repeat(range_m, parts)
-    return RangeScan(time_s, bearing_rad, range_m, min_range_m, max_range_m, width_rad / parts, source)
+        range_m = np.repeat(range_m, beams)
+    return RangeScan(time_s, bearing_rad, range_m, min_range_m, max_range_m, width_rad / beams, source)
+
+
+def _octants(scan: RangeScan) -> set[int]:
+    """The octants of the circle, clockwise from ahead, in which the scan shows something."""
+    seen = np.degrees(scan.bearing_rad[np.isfinite(scan.range_m)])
+    return set((np.rint(seen / 45.0).astype(int) % 8).tolist())

@@ -1,4 +1,4 @@
-"""Asks for the message rates that are needed, and sees to it that they really come."""
+"""Requests message rates, measures them, and repeats requests that had no effect."""
 
 from __future__ import annotations
 
@@ -11,27 +11,26 @@ from companion.settings import LinkSettings
 from companion.vehicle.commands import RequestRate
 
 WINDOW_S = 3.0
-"""Rates are measured over so long."""
+"""Rates are measured over this time."""
 ENOUGH = 0.6
-"""Less than this share of what was asked for is asked for again."""
+"""A rate below this share of the requested one is requested again."""
 LONGEST_WAIT_S = 30.0
 EKF_HZ = 5.0
-"""Silence for a second stops the rover: on a bad line several in a row may be lost before that."""
+"""A second without stops the rover: so several in a row may be lost."""
 SLOW_HZ = 2.0
 STICKS_HZ = 5.0
 POWER_HZ = 1.0
 STICKS_UNSEEN = "the pilot's sticks are not seen"
 HEARTBEAT_HZ = 5.0
-"""Mode and arming are known only from it: at the 1 Hz that comes unasked, a pilot could be overlooked for a second."""
+"""Only the heartbeat shows mode and arming: at its default of 1 Hz a pilot could be overlooked for a second."""
 
 
 @dataclass(frozen=True, slots=True)
 class WantedRate:
-    """A message that is to come at a rate.
+    """A message and the rate at which it is needed.
 
-    ``always`` False: it comes only under conditions, so that none at all is no fault. ``told`` False: asked for again
-    while it is too seldom, but nobody need hear of it. ``silence``: what it means that none comes at all, which people do
-    hear then.
+    ``always`` False: sent only under conditions, so that none at all is no fault. ``told`` False: a low rate is not
+    reported to people. ``silence``: what it means if none arrives at all; this is reported.
     """
 
     message_id: int
@@ -43,13 +42,13 @@ class WantedRate:
 
 @dataclass(frozen=True, slots=True)
 class RateFault:
-    """A message that comes too seldom."""
+    """A message whose rate is too low."""
 
     message_id: int
     wanted_hz: float
     measured_hz: float
     means: str = ""
-    """What follows from it, where that is not plain."""
+    """What follows from it, if that is not obvious."""
 
     @property
     def name(self) -> str:
@@ -58,12 +57,12 @@ class RateFault:
 
 
 def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
-    """What the companion needs of ArduRover, which sends everything at 1 Hz unasked.
+    """The rates that the companion needs; ArduRover's default is 1 Hz for every message.
 
-    OBSTACLE_DISTANCE is not asked for: ArduRover refuses to stream it, it comes from the lidar's own driver. The read-back of the
-    target comes only while there is one (not while it turns or brakes), DISTANCE_SENSOR and RANGEFINDER only with a rangefinder,
-    BATTERY_STATUS only with a battery monitor, FENCE_STATUS only while a fence is switched on; these two are asked for again
-    all the same, for a request that was lost would never be missed.
+    OBSTACLE_DISTANCE is not requested: ArduRover refuses to stream it, and the lidar's driver sends it. The target is
+    read back only while there is one (not while turning or braking), DISTANCE_SENSOR and RANGEFINDER only with a
+    rangefinder, BATTERY_STATUS only with a battery monitor, FENCE_STATUS only while a fence is enabled. The last two
+    are requested again although they may be missing for good reason: otherwise a lost request would go unnoticed.
     """
     return (
         WantedRate(mavlink.MAVLINK_MSG_ID_HEARTBEAT, HEARTBEAT_HZ, told=False),
@@ -81,8 +80,8 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
     )
 
 
-class RateKeeper:
-    """Requests every rate once, then measures, and repeats the request with growing pauses while too little comes."""
+class RateMonitor:
+    """Requests every rate once, then measures; repeats the request with growing pauses while the rate is too low."""
 
     def __init__(self, wanted: tuple[WantedRate, ...]) -> None:
         self._wanted = wanted
@@ -92,13 +91,13 @@ class RateKeeper:
         self._wait_s = {rate.message_id: WINDOW_S for rate in wanted}
         self._again_s = {rate.message_id: 0.0 for rate in wanted}
         self.faults: tuple[RateFault, ...] = ()
-        """What came too seldom when last measured."""
+        """The messages whose rate was too low in the last measurement."""
 
     def due(self, now_s: float, counts: Mapping[int, int]) -> list[RequestRate]:
         """The requests to send now; ``counts``: messages heard so far, by id."""
         if not self._asked:
             self._asked = True
-            self._begin(now_s, counts)
+            self._start_window(now_s, counts)
             for rate in self._wanted:
                 self._again_s[rate.message_id] = now_s + self._wait_s[rate.message_id]
             return [RequestRate(rate.message_id, rate.rate_hz) for rate in self._wanted]
@@ -107,10 +106,10 @@ class RateKeeper:
         found = [(rate, self._fault(rate, now_s - self._began_s, counts)) for rate in self._wanted]
         faults = [(rate, fault) for rate, fault in found if fault is not None]
         self.faults = tuple(fault for rate, fault in faults if rate.told or fault.means)
-        self._begin(now_s, counts)
+        self._start_window(now_s, counts)
         return [RequestRate(fault.message_id, fault.wanted_hz) for _, fault in faults if self._may_ask(fault, now_s)]
 
-    def _begin(self, now_s: float, counts: Mapping[int, int]) -> None:
+    def _start_window(self, now_s: float, counts: Mapping[int, int]) -> None:
         self._began_s, self._counts = now_s, dict(counts)
 
     def _fault(self, rate: WantedRate, elapsed_s: float, counts: Mapping[int, int]) -> RateFault | None:

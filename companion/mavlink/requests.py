@@ -1,32 +1,66 @@
-"""What others ask of the companion itself: guided targets addressed to its own system and component id."""
+"""Requests of ground stations to the companion itself, and its answers: guided targets, and its own parameters."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint
-from companion.mavlink.places import point_of
-from companion.vehicle.events.targets import Asker, TargetAnswer, TargetAsked, TargetForm
+from companion.mavlink.positions import point_of
+from companion.vehicle.commands import AnswerTarget
+from companion.vehicle.events import (
+    Asker,
+    ParameterAsked,
+    ParameterChangeAsked,
+    ParameterRequest,
+    ParametersAsked,
+    TargetAnswer,
+    TargetAsked,
+    TargetForm,
+)
 
 COMMANDS = (mavlink.MAVLINK_MSG_ID_COMMAND_INT, mavlink.MAVLINK_MSG_ID_COMMAND_LONG)
 ITEMS = (mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT, mavlink.MAVLINK_MSG_ID_MISSION_ITEM)
 REQUESTS = (*COMMANDS, *ITEMS)
 IN_DEGREES = (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_MISSION_ITEM)
-"""These say places as floats in degrees, good to half a metre or worse; the others in whole 1e-7 degrees."""
+"""These hold places as floats in degrees, exact to half a metre at best; the others hold 1e-7 degrees."""
 GLOBAL_FRAMES = (0, 3, 5, 6, 10, 11)
-"""Latitude and longitude, with altitudes of several kinds, none of which matters to a rover (as ArduRover takes them)."""
+"""Frames with latitude and longitude, as ArduRover accepts them; their altitudes do not matter to a rover."""
 GUIDED_ITEM = 2
-"""``current`` of a mission item that is no part of a mission but a guided target."""
+"""``current`` of a mission item that is a guided target."""
 NO_POSITION = 0b11
-"""Bits of a type mask: x or y does not count."""
+"""Bits of a type mask: x or y is not used."""
 KEEP_SPEED = (-1.0, 0.0)
+COMMAND_RESULTS: Mapping[TargetAnswer, int] = MappingProxyType(
+    {
+        TargetAnswer.ACCEPTED: mavlink.MAV_RESULT_ACCEPTED,
+        TargetAnswer.DENIED: mavlink.MAV_RESULT_DENIED,
+        TargetAnswer.NOT_NOW: mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
+        TargetAnswer.BAD_FRAME: mavlink.MAV_RESULT_DENIED,
+        TargetAnswer.BAD_VALUE: mavlink.MAV_RESULT_DENIED,
+        TargetAnswer.UNSUPPORTED: mavlink.MAV_RESULT_UNSUPPORTED,
+    }
+)
+"""ArduRover denies local frames and places of zeros too."""
+ITEM_RESULTS: Mapping[TargetAnswer, int] = MappingProxyType(
+    {
+        TargetAnswer.ACCEPTED: mavlink.MAV_MISSION_ACCEPTED,
+        TargetAnswer.DENIED: mavlink.MAV_MISSION_DENIED,
+        TargetAnswer.NOT_NOW: mavlink.MAV_MISSION_ERROR,
+        TargetAnswer.BAD_FRAME: mavlink.MAV_MISSION_UNSUPPORTED_FRAME,
+        TargetAnswer.BAD_VALUE: mavlink.MAV_MISSION_INVALID_PARAM5_X,
+        TargetAnswer.UNSUPPORTED: mavlink.MAV_MISSION_UNSUPPORTED,
+    }
+)
+EVERYBODY = 0
 
 
 def target_asked(message: Any, time_s: float) -> TargetAsked | None:
-    """The guided target in a message that is addressed to us; None for other commands and items of missions."""
+    """The guided target in a message to the companion; None for other commands and for items of missions."""
     number = message.get_msgId()
     asker = Asker(message.get_srcSystem(), message.get_srcComponent())
     if number in COMMANDS:
@@ -53,7 +87,7 @@ def target_asked(message: Any, time_s: float) -> TargetAsked | None:
 
 
 def is_place(message: Any) -> bool:
-    """Whether a SET_POSITION_TARGET_GLOBAL_INT says a place; ArduRover says it in frame 6, its older versions in others."""
+    """Whether a SET_POSITION_TARGET_GLOBAL_INT holds a place; ArduRover uses frame 6, older versions others."""
     return message.coordinate_frame in GLOBAL_FRAMES and not message.type_mask & NO_POSITION
 
 
@@ -69,3 +103,43 @@ def _place(message: Any) -> GeoPoint | None:
     if message.get_msgId() not in IN_DEGREES:
         return point_of(lat, lon)
     return point_of(round(lat * 1e7), round(lon * 1e7)) if math.isfinite(lat) and math.isfinite(lon) else None
+
+
+def answer_message(command: AnswerTarget) -> Any:
+    """The message that answers a guided target."""
+    to = (command.asker.system_id, command.asker.component_id)
+    if command.form is TargetForm.COMMAND:
+        result = COMMAND_RESULTS[command.answer]
+        return mavlink.MAVLink_command_ack_message(mavlink.MAV_CMD_DO_REPOSITION, result, 0, 0, *to)
+    return mavlink.MAVLink_mission_ack_message(*to, ITEM_RESULTS[command.answer], mavlink.MAV_MISSION_TYPE_MISSION)
+
+
+def _parameters_asked(message: Any, time_s: float, to_us: bool) -> ParameterRequest:
+    return ParametersAsked(time_s)
+
+
+def _parameter_asked(message: Any, time_s: float, to_us: bool) -> ParameterRequest:
+    return ParameterAsked(time_s, _name(message), message.param_index)
+
+
+def _change_asked(message: Any, time_s: float, to_us: bool) -> ParameterRequest:
+    return ParameterChangeAsked(time_s, _name(message), message.param_value, to_us)
+
+
+def _name(message: Any) -> str:
+    """A parameter's name as ArduPilot reads it: up to 16 characters, in any case."""
+    return "".join(c for c in str(message.param_id) if c.isascii() and c.isprintable()).upper()
+
+
+PARAMETER_REQUESTS: dict[int, Callable[[Any, float, bool], ParameterRequest]] = {
+    mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_LIST: _parameters_asked,
+    mavlink.MAVLINK_MSG_ID_PARAM_REQUEST_READ: _parameter_asked,
+    mavlink.MAVLINK_MSG_ID_PARAM_SET: _change_asked,
+}
+
+
+def parameter_asked(message: Any, system_id: int, component_id: int, time_s: float) -> ParameterRequest | None:
+    """The request in a message of ``PARAMETER_REQUESTS``; None if it is for another component or system."""
+    if message.target_system not in (EVERYBODY, system_id) or message.target_component not in (EVERYBODY, component_id):
+        return None
+    return PARAMETER_REQUESTS[message.get_msgId()](message, time_s, message.target_component == component_id)

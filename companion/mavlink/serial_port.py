@@ -1,4 +1,4 @@
-"""MAVLink over a serial port; an unplugged adapter may be plugged in again."""
+"""MAVLink over a serial port, with reconnection of an unplugged adapter."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, LinkError, OutB
 
 
 class SerialLink:
-    """A serial port, 8N1 without flow control. Raises LinkError when it cannot be opened at first; later it tries again by itself."""
+    """A serial port, 8N1 without flow control.
+
+    Raises LinkError if it cannot be opened first; later it opens again by itself.
+    """
 
     def __init__(self, device: str, baud: int, clock: Clock) -> None:
         self._device = device
@@ -34,7 +37,7 @@ class SerialLink:
         return self._name if self._port is not None else f"{self._name} (not there)"
 
     def read(self) -> bytes:
-        """What has arrived; tries to open the port again when it was lost."""
+        """The bytes that have arrived; opens the port again if it was lost."""
         if self._port is None and not self._reopen():
             return b""
         assert self._port is not None
@@ -47,7 +50,7 @@ class SerialLink:
             return b""
 
     def write(self, data: bytes) -> None:
-        """Send; dropped while the port is not there."""
+        """Send; bytes are dropped while the port is missing."""
         if self._port is None:
             return
         self._out.add(data)
@@ -80,7 +83,7 @@ class SerialLink:
             try:
                 self._out.taken(int(self._port.write(bytes(self._out.waiting)) or 0))
             except serial.SerialTimeoutException:
-                return  # the port's own buffer is full: next time
+                return  # the port's buffer is full
 
     def _lose(self) -> None:
         self._out.clear()
@@ -90,7 +93,7 @@ class SerialLink:
 
 
 def _reason(error: Exception) -> str:
-    """pyserial's error in plain words, with the remedy."""
+    """pyserial's error in words, with the remedy."""
     text = str(error)
     if isinstance(error, FileNotFoundError) or "No such file" in text:
         return "there is no such device; check the cable and `ls /dev/tty*`"

@@ -1,4 +1,4 @@
-"""Signed packets (MAVLink guide, "Message Signing"): signed with a key and the time, and believed only if signed so."""
+"""Message signing (MAVLink guide, "Message Signing"): signs packets with a key and a timestamp, and verifies them."""
 
 from __future__ import annotations
 
@@ -17,23 +17,23 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.core.clock import unix_time_us
 from companion.core.round_marks import Mark
 from companion.mavlink.framing import CHECKSUM, MAGIC_V2, SIGNATURE, SIGNED, Packet
-from companion.storage.reading import open_file
+from companion.storage.files import open_file
 
 TICKS_PER_S = 100_000
-"""Signing timestamps count 10 microseconds since the beginning of 2015 (UTC)."""
+"""Signing timestamps count units of 10 microseconds since the beginning of 2015 (UTC)."""
 EPOCH_UNIX_S = 1_420_070_400
 MINUTE = 60 * TICKS_PER_S
-"""A sender that has not been heard before may be so late, no more."""
+"""The first packet of a sender may be this late."""
 LAST_TICK = (1 << 48) - 1
 AHEAD = 60 * TICKS_PER_S
-"""The time is saved so far ahead of what has been used,"""
+"""The saved timestamp is this far ahead of the used one,"""
 AGAIN = 30 * TICKS_PER_S
-"""and again when less than this is left of it: every half minute."""
+"""and is saved again when less than this is left: every half minute."""
 MOST_STREAMS = 64
 HEX_DIGITS = 64
 LONGEST_KEY = 1024
 ACCEPTED_UNSIGNED = frozenset({mavlink.MAVLINK_MSG_ID_RADIO_STATUS, mavlink.MAVLINK_MSG_ID_RADIO})
-"""What radios say of themselves, having no key; as in ArduPilot. Nothing is done upon either."""
+"""Status of radios, which have no key; as in ArduPilot. The companion does not use them."""
 
 
 class SigningKeyError(Exception):
@@ -41,9 +41,10 @@ class SigningKeyError(Exception):
 
 
 def load_key(path: Path) -> bytes:
-    """The 32 bytes of a key file: 64 hexadecimal digits, or else a passphrase, of which it is the SHA-256.
+    """The 32 bytes of a key file: 64 hexadecimal digits, or else the SHA-256 of a passphrase.
 
-    So MAVProxy and Mission Planner make a key of a passphrase. Raises SigningKeyError, also if others may read the file.
+    MAVProxy and Mission Planner derive the key of a passphrase likewise. Raises SigningKeyError, also if others may
+    read the file.
     """
     try:
         mode = path.stat().st_mode
@@ -55,7 +56,8 @@ def load_key(path: Path) -> bytes:
             data = file.read(LONGEST_KEY + 1)
     except OSError as error:
         raise SigningKeyError(
-            f"{path}: cannot be read: {error.strerror or error}; name a file with the passphrase or 64 hexadecimal digits"
+            f"{path}: cannot be read: {error.strerror or error}; "
+            "name a file with the passphrase or 64 hexadecimal digits"
         ) from error
     try:
         text = data.decode().removesuffix("\n").removesuffix("\r")
@@ -72,7 +74,7 @@ def load_key(path: Path) -> bytes:
 
 
 def without_signature(raw: bytes) -> bytes:
-    """Header and payload of a packet as if it had not been signed (its check sum counts the header's flag)."""
+    """Header and payload of a packet as if it were not signed (its checksum includes the header's flag)."""
     if raw[0] != MAGIC_V2:
         return raw
     end = len(raw) - CHECKSUM - (SIGNATURE if raw[2] & SIGNED else 0)
@@ -85,20 +87,20 @@ def ticks_now() -> int:
 
 
 class SavedTime(Protocol):
-    """Keeps a timestamp beyond the end of the program."""
+    """Keeps a timestamp beyond the program's end."""
 
     @property
     def saved(self) -> float:
-        """The newest timestamp that is safely kept; inf if nothing is to be kept."""
+        """The newest timestamp that is on disk; inf if none is to be kept."""
         ...
 
     def save(self, timestamp: int) -> None:
-        """Keep this one; returns at once, ``saved`` follows."""
+        """Save this one; returns at once, ``saved`` follows."""
         ...
 
 
 class NotSaved:
-    """For those who rely on the computer's clock."""
+    """Keeps nothing: for callers that rely on the computer's clock."""
 
     saved = math.inf
 
@@ -107,7 +109,7 @@ class NotSaved:
 
 
 class Refusal(StrEnum):
-    """Why a packet is not believed."""
+    """Why a packet is refused."""
 
     UNSIGNED = "unsigned"
     WRONG = "signed with another key"
@@ -116,7 +118,7 @@ class Refusal(StrEnum):
 
 @dataclass(slots=True)
 class Refused:
-    """How many packets were not believed, by reason."""
+    """The number of refused packets, by reason."""
 
     unsigned: int = 0
     wrong: int = 0
@@ -129,18 +131,18 @@ class Refused:
             (self.wrong, "signed with another key"),
             (self.old, "signed too long ago"),
         )
-        parts = [f"{count} {what}" for count, what in named if count]
-        return f"packets refused: {', '.join(parts)}" if parts else ""
+        counts = [f"{count} {what}" for count, what in named if count]
+        return f"packets refused: {', '.join(counts)}" if counts else ""
 
     def count(self, why: Refusal) -> None:
-        """One more."""
+        """Count one more."""
         self.unsigned += why is Refusal.UNSIGNED
         self.wrong += why is Refusal.WRONG
         self.old += why is Refusal.OLD
 
     @property
     def marks(self) -> Mark:
-        """The same for a record, which has no counts."""
+        """The reasons as marks for a record, without counts."""
         return (
             (Mark.UNSIGNED if self.unsigned else Mark(0))
             | (Mark.WRONG if self.wrong else Mark(0))
@@ -149,23 +151,25 @@ class Refused:
 
 
 class Recorded:
-    """What a record says of signatures, which it does not have the key to check."""
+    """What a record says about signatures; a replay has no key to verify them."""
 
     def __init__(self) -> None:
         self.signed = False
         self.refused = Refused()
 
-    def take(self, marks: int) -> None:
-        """What was so in the next round."""
+    def set_marks(self, marks: int) -> None:
+        """The marks of the next round."""
         self.signed |= bool(marks & Mark.SIGNED)
         self.refused = Refused(bool(marks & Mark.UNSIGNED), bool(marks & Mark.WRONG), bool(marks & Mark.OLD))
 
 
 class Signer:
-    """One key. ``clock``: the time in ticks, right or wrong; ``saved``: no timestamp up to what was saved may be used again.
+    """Signs and verifies packets with one key.
 
-    Its own timestamps never go back, whatever the clock does, also over restarts: none is used that does not lie
-    below what has been saved, unless only a packet's worth beyond the last one.
+    ``clock``: the time in ticks, right or wrong; ``saved``: keeps timestamps over restarts.
+
+    Its own timestamps always rise, whatever the clock does, also over restarts: none is used above the saved one,
+    except one tick above the last.
     """
 
     def __init__(self, key: bytes, clock: Callable[[], int] = ticks_now, saved: SavedTime | None = None) -> None:
@@ -179,7 +183,7 @@ class Signer:
         self._streams: dict[tuple[int, int, int], int] = {}
 
     def next_timestamp(self) -> int:
-        """For the next packet: the time, but later than any before."""
+        """The timestamp of the next packet: the time, but later than all before."""
         now = max(self._clock(), self._heard)
         if now + AGAIN > self._asked:
             self._asked = min(now + AHEAD, LAST_TICK)
@@ -188,14 +192,18 @@ class Signer:
         return self._sent
 
     def accepts(self, packet: Packet) -> bool:
-        """Whether to believe a packet; if not, it is counted."""
+        """Whether to accept a packet; a refused one is counted."""
         why = self._refusal(packet)
         if why is not None:
             self.refused.count(why)
         return why is None
 
     def _refusal(self, packet: Packet) -> Refusal | None:
-        """pymavlink's own check notes the time of a packet before it looks at its signature: a forger could silence a sender."""
+        """Why to refuse a packet; None to accept it.
+
+        pymavlink's own check stores a packet's timestamp before it verifies the signature: a forger could silence a
+        sender.
+        """
         raw = packet.raw
         if raw[0] != MAGIC_V2 or not raw[2] & SIGNED:
             return None if packet.message_id in ACCEPTED_UNSIGNED else Refusal.UNSIGNED
@@ -215,7 +223,7 @@ class Signer:
 
 
 def trouble(refused: Refused, vehicle_known: bool) -> str:
-    """What refused packets mean, in words for people; empty for none. Of several reasons the gravest."""
+    """A warning about refused packets, by their gravest reason; empty for none."""
     if not vehicle_known:
         if refused.wrong:
             return "Heard only packets that are signed with another key: is it the key that the autopilot was given?"
@@ -230,7 +238,7 @@ def trouble(refused: Refused, vehicle_known: bool) -> str:
 
 
 def remedy(refused: Refused) -> str:
-    """What to do when nothing is believed; empty when nothing was refused."""
+    """What to do when packets are refused; empty for none."""
     if refused.wrong:
         return "name with --signing-key the key that the autopilot was given, or give it this one (docs/signing.md)"
     if refused.old:

@@ -1,24 +1,24 @@
-"""The signing timestamp in a file, so that it does not go back when the program, or the computer's clock, begins anew."""
+"""The file that keeps the signing timestamp, so that it rises over restarts of program and computer."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from companion.mavlink.signing import LAST_TICK, SigningKeyError
-from companion.storage.reading import open_file
-from companion.storage.saving import Saver
+from companion.storage.background_writer import BackgroundWriter
+from companion.storage.files import open_file
 
 
 class TimeFile:
-    """Read at once, written by a thread. Raises SigningKeyError when the file is there and cannot be used."""
+    """Reads the file at once, writes it in a thread. Raises SigningKeyError if the file exists but cannot be used."""
 
-    def __init__(self, path: Path, saver: Saver) -> None:
+    def __init__(self, path: Path, saver: BackgroundWriter) -> None:
         self._path = path
         self._saver = saver
         self.saved: float = _read(path)
 
     def save(self, timestamp: int) -> None:
-        """Write it; ``saved`` follows when that is done, also if it failed: a full disk must not silence the rover."""
+        """Write it; ``saved`` follows when done, also after a failure: a full disk must not silence the rover."""
 
         def done() -> None:
             self.saved = timestamp

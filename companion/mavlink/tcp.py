@@ -1,4 +1,4 @@
-"""MAVLink over TCP, as client or as server; a peer that dies may come back."""
+"""MAVLink over TCP, as client or as server, with reconnection."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from companion.mavlink.udp import cannot_listen, resolve
 
 CONNECT_TIMEOUT_S = 5.0
 UNACKNOWLEDGED_LIMIT_MS = 5000
-"""A peer that has vanished without a word is given up when it has not acknowledged anything for so long."""
+"""A connection is dropped when the peer has acknowledged nothing for this long."""
 
 
 class _Stream:
-    """One connected socket, never waiting. ``ok`` turns False when the peer has gone."""
+    """One connected, non-blocking socket. ``ok`` becomes False when the peer has gone."""
 
     def __init__(self, connection: socket.socket) -> None:
         connection.setblocking(False)
@@ -57,7 +57,7 @@ class _Stream:
 
 
 class TcpLink:
-    """A client that connects by itself, again and again with growing pauses; nothing of it waits, except the look-up of the name."""
+    """A client that connects by itself, with growing pauses between attempts; only the name look-up may block."""
 
     def __init__(self, host: str, port: int, clock: Clock) -> None:
         self._name = f"tcp:{host}:{port}"
@@ -81,7 +81,7 @@ class TcpLink:
         return self._stream is not None
 
     def read(self) -> bytes:
-        """What has arrived; looks after the connection as well."""
+        """The bytes that have arrived; also connects again."""
         if self._stream is None:
             self._connect()
             if self._stream is None:
@@ -91,7 +91,7 @@ class TcpLink:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send; dropped while there is no peer."""
+        """Send; bytes are dropped while there is no peer."""
         if self._stream is not None:
             self._stream.write(data)
             self._drop_if_gone()
@@ -99,9 +99,9 @@ class TcpLink:
     def close(self) -> None:
         """Close the connection for good."""
         self._closed = True
-        for thing in (self._connecting, self._stream):
-            if thing is not None:
-                thing.close()
+        for connection in (self._connecting, self._stream):
+            if connection is not None:
+                connection.close()
         self._connecting = self._stream = None
 
     def _drop_if_gone(self) -> None:
@@ -110,7 +110,7 @@ class TcpLink:
             self._stream = None
 
     def _connect(self) -> None:
-        """Move the connection on by one step: begin it, or see whether it has come about."""
+        """Start a connection, or see whether it is established."""
         now_s = self._clock.now_s()
         if self._connecting is None:
             if self._closed or not self._back_off.due(now_s):
@@ -129,7 +129,7 @@ class TcpLink:
             self._connecting = None
 
     def _is_up(self) -> bool:
-        """A refused connection is writable too, and its error may have been fetched already: a peer is the proof."""
+        """Whether there is a peer: a refused connection is writable too, and its error may have been fetched before."""
         assert self._connecting is not None
         try:
             return self._connecting.getpeername() is not None
@@ -138,7 +138,7 @@ class TcpLink:
 
 
 class TcpServerLink:
-    """Listens, and talks to the one who connected last: an autopilot that has restarted takes its own old place.
+    """A server that serves the newest connection: a restarted autopilot replaces its old one.
 
     Raises LinkError when the port is taken.
     """
@@ -164,11 +164,11 @@ class TcpServerLink:
 
     @property
     def port(self) -> int:
-        """The local port (of interest when 0 was asked for)."""
+        """The local port, which matters if 0 was given."""
         return int(self._listener.getsockname()[1])
 
     def read(self) -> bytes:
-        """What has arrived; takes a new connection as well."""
+        """The bytes that have arrived; also accepts a new connection."""
         try:
             connection, _ = self._listener.accept()
         except OSError:
@@ -184,7 +184,7 @@ class TcpServerLink:
         return data
 
     def write(self, data: bytes) -> None:
-        """Send; dropped while nobody is connected."""
+        """Send; bytes are dropped while nobody is connected."""
         if self._stream is not None:
             self._stream.write(data)
             if not self._stream.ok:

@@ -1,4 +1,4 @@
-"""From a URL to a link."""
+"""Opens the link that a URL names: UDP, TCP or serial."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ __all__ = [
 
 
 def open_link(url: str, clock: Clock | None = None) -> ByteLink:
-    """Open the link that a URL names; ``clock`` times the tries to connect again.
+    """Open the link that a URL names; ``clock`` times reconnections.
 
-    ``udp`` means listening, as in pymavlink. Raises LinkError with one line: an unknown form, a port that is taken, a device
-    that is not there. A TCP server that does not answer yet is no error: the link tries again by itself.
+    ``udp`` means listening, as in pymavlink. Raises LinkError with one line: an unknown form, a port in use, a missing
+    device. A TCP server that does not answer yet is no error: the link tries again by itself.
     """
     clock = clock or WallClock()
     if url.startswith("/dev/"):

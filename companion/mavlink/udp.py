@@ -1,4 +1,4 @@
-"""MAVLink over UDP: every datagram holds whole packets."""
+"""MAVLink over UDP; every datagram holds whole packets."""
 
 from __future__ import annotations
 
@@ -10,11 +10,14 @@ from companion.mavlink.byte_link import MAX_READ_BYTES, LinkError
 
 Address = tuple[Any, ...]
 MAX_PEERS = 8
-"""More speakers than this on one port: the one that has been silent longest is forgotten."""
+"""With more peers than this on one port, the one silent for longest is dropped."""
 
 
 def resolve(host: str, port: int, kind: socket.SocketKind, what: str) -> tuple[socket.AddressFamily, Address]:
-    """Family and address of a host name or number. Raises LinkError. May wait for the name server: only when opening."""
+    """Family and address of a host name or number. Raises LinkError.
+
+    May block for the name server, so it is called only when a link is opened.
+    """
     try:
         family, _, _, _, address = socket.getaddrinfo(host, port, type=kind)[0]
     except (OSError, UnicodeError) as error:
@@ -23,7 +26,7 @@ def resolve(host: str, port: int, kind: socket.SocketKind, what: str) -> tuple[s
 
 
 def cannot_listen(what: str, error: OSError) -> LinkError:
-    """The address exists on this computer but is taken, or does not exist on it at all."""
+    """The error for an address that is in use or is not this computer's."""
     remedy = "stop the other program or choose another port"
     if error.errno == errno.EADDRNOTAVAIL:
         remedy = "this computer has no such address, 0.0.0.0 listens on all it has"
@@ -31,7 +34,7 @@ def cannot_listen(what: str, error: OSError) -> LinkError:
 
 
 class UdpLink:
-    """A datagram socket. ``bind``: listens there and answers to whoever has spoken; otherwise it speaks first, to the address.
+    """A datagram socket. ``bind``: listens, and sends to all peers it has heard; otherwise sends to the address.
 
     Raises LinkError when the port is taken or the address unknown.
     """
@@ -60,12 +63,12 @@ class UdpLink:
 
     @property
     def port(self) -> int:
-        """The local port (of interest when 0 was asked for)."""
+        """The local port, which matters if 0 was given."""
         return int(self._socket.getsockname()[1])
 
     def read(self) -> bytes:
-        """All datagrams that have arrived, one after the other."""
-        parts: list[bytes] = []
+        """All datagrams that have arrived, joined."""
+        datagrams: list[bytes] = []
         size = 0
         while size < MAX_READ_BYTES:
             try:
@@ -73,16 +76,16 @@ class UdpLink:
             except BlockingIOError:
                 break
             except OSError:
-                # For instance "connection refused" from a host where nobody listens yet: nothing has arrived.
+                # For instance "connection refused" from a host that does not listen yet.
                 break
             if self._fixed is None:
                 self._remember(sender)
-            parts.append(data)
+            datagrams.append(data)
             size += len(data) + 1
-        return b"".join(parts)
+        return b"".join(datagrams)
 
     def write(self, data: bytes) -> None:
-        """One datagram to everybody who has spoken (bound) or to the address."""
+        """Send one datagram to all peers heard (bound) or to the address."""
         for address in [self._fixed] if self._fixed is not None else list(self._peers):
             try:
                 self._socket.sendto(data, address)

@@ -1,4 +1,4 @@
-"""Areas in the local frame, and which fields of a grid they cover."""
+"""Areas as shapes in the local frame, and which fields of a grid they touch or cover (rasterisation)."""
 
 from __future__ import annotations
 
@@ -17,15 +17,18 @@ from companion.mission.mission import Area, Place
 Mask = NDArray[np.bool_]
 
 EDGE = 1e-6
-"""A shape that reaches less than this share of a field over a field's edge does not touch it: rounding, no more."""
+"""A shape that overlaps a field by less than this share of its side does not touch it: rounding errors."""
 
 CIRCLE_QUARTER = 32
-"""Straight pieces a quarter circle is made of; the polygon is 0.03 % narrower than the circle, EDGE apart."""
+"""Segments of a quarter circle; the polygon is at most 0.03 % narrower than the circle."""
 
 
 @dataclass(frozen=True, slots=True)
 class Places:
-    """Where a mission's places lie. ``middle_of`` gives the middle of a field, if the mission has a grid of its own."""
+    """Converts a mission's places to the local frame.
+
+    ``middle_of``: the middle of a field, if the mission's grid is fixed.
+    """
 
     frame: LocalFrame
     home: NedPoint
@@ -52,12 +55,12 @@ def shape_of(area: Area, places: Places) -> BaseGeometry:
 
 
 def touched(grid: Grid, shape: BaseGeometry) -> Mask:
-    """Which fields have any ground in common with the shape; shape (height, width)."""
+    """Which fields overlap the shape; shape (height, width)."""
     return _fields(grid, shape, whole=False)
 
 
 def covered(grid: Grid, shape: BaseGeometry) -> Mask:
-    """Which fields lie wholly inside the shape; shape (height, width)."""
+    """Which fields lie entirely inside the shape; shape (height, width)."""
     return _fields(grid, shape, whole=True)
 
 
@@ -71,13 +74,13 @@ def middles_in(grid: Grid, shape: BaseGeometry) -> Mask:
 
 
 def _fields(grid: Grid, shape: BaseGeometry, *, whole: bool) -> Mask:
-    """Quarter the grid until each piece is wholly inside or wholly outside the shape, or a single field."""
+    """Halves the grid until each block is entirely inside or outside the shape, or is a single field."""
     mask = np.zeros((grid.height, grid.width), dtype=np.bool_)
     shapely.prepare(shape)
     size_m = grid.resolution_m
-    pieces = [(0, 0, grid.width, grid.height)]
-    while pieces:
-        x0, y0, x1, y1 = pieces.pop()
+    blocks = [(0, 0, grid.width, grid.height)]
+    while blocks:
+        x0, y0, x1, y1 = blocks.pop()
         square = shapely.box(
             grid.south_west.east_m + (x0 + EDGE) * size_m,
             grid.south_west.north_m + (y0 + EDGE) * size_m,
@@ -91,7 +94,7 @@ def _fields(grid: Grid, shape: BaseGeometry, *, whole: bool) -> Mask:
         elif x1 - x0 == 1 and y1 - y0 == 1:
             mask[y0, x0] = not whole
         else:
-            pieces.extend(_halves(x0, y0, x1, y1))
+            blocks.extend(_halves(x0, y0, x1, y1))
     return mask
 
 

@@ -1,6 +1,6 @@
-"""Borders that the rover must not cross, laid on the ground: fences of the mission, and the autopilot's own.
+"""Borders of the mission's and the autopilot's fences: which fields they close, and which lines cross them.
 
-Which fields they close is for the planner; whether a line crosses one is asked again, with the shapes themselves, before anything is sent.
+The planner uses the closed fields. Before a target is sent, the line to it is checked with the exact shapes.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from shapely.geometry.base import BaseGeometry
 from companion.core.frames import LocalFrame, NedPoint
 from companion.core.grid import Cell, Grid
 from companion.mission.areas import CIRCLE_QUARTER, Mask, Places, covered, middles_in, shape_of, touched
-from companion.mission.fence import AutopilotFence
+from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import Area, Mission
 
 SLACK_M = 0.05
-"""A rover may come nearer to a border than it should by no more than this: positions wander."""
+"""How much nearer to a border than planned the rover may come: positions are noisy."""
 NEARER_M = 0.01
-"""One that is nearer still comes no nearer at all; so much is no way."""
+"""A rover that is too near must not come nearer; less than this does not count."""
 ROUND = 1.0 / math.cos(math.pi / (4 * CIRCLE_QUARTER))
-"""A circle drawn with corners on it lies inside of it; one that keeps out is drawn so much larger."""
+"""The factor by which a polygon must grow to contain the circle that its corners lie on."""
 OURS = "the autopilot's fence"
 
 
@@ -31,8 +31,8 @@ OURS = "the autopilot's fence"
 class Bound:
     """One border. ``shape``: x metres east, y metres north in the local frame.
 
-    ``keep_m``: how far from it the rover's middle stays by plan, ``body_m``: and how far it must stay in any case.
-    ``in_fields``: it was drawn in fields, and keeps whole fields.
+    ``keep_m``: the distance that plans keep between it and the rover's middle; ``body_m``: the distance that is never
+    undercut. ``in_fields``: it was given in fields, and applies to whole fields.
     """
 
     name: str
@@ -49,17 +49,17 @@ class Bound:
         return touched(grid, self.shape if self.in_fields else self.shape.buffer(self.keep_m))
 
     def depth_m(self, place: BaseGeometry) -> float:
-        """How far inside the open ground a place or line stays, at the least; 0 or less when it touches the border or is beyond it."""
+        """The smallest distance of a point or line from the border; 0 or less when it touches or crosses it."""
         edge_m = float(shapely.distance(self.shape.boundary, place))
         inside = shapely.covers(self.shape, place) if self.keeps_in else not shapely.intersects(self.shape, place)
         return edge_m if inside else -edge_m
 
 
 class Bounds:
-    """All borders together. ``fault`` and ``outside`` are asked often: what is well inside costs a few microseconds a border."""
+    """All borders. ``fault`` and ``outside`` are fast (microseconds a border) for places well inside."""
 
     def __init__(self, bounds: Sequence[Bound] = (), resolution_m: float = 1.0) -> None:
-        """``resolution_m``: side of the fields in which some of them were drawn."""
+        """``resolution_m``: side of the fields in which some borders were given."""
         self._bounds = tuple(_widened(bound, resolution_m) for bound in bounds)
         self._roomy = tuple(_roomy(bound) for bound in self._bounds)
 
@@ -68,12 +68,12 @@ class Bounds:
         return len(self._bounds)
 
     def outside(self, point: NedPoint) -> str:
-        """The border that the rover's middle is beyond; empty when there is none."""
+        """The name of the border that the rover's middle has crossed; empty if none."""
         place = shapely.Point(point.east_m, point.north_m)
         return next((bound.name for bound in self._near(place) if bound.depth_m(place) <= 0.0), "")
 
     def too_near(self, point: NedPoint) -> str:
-        """The border from which a rover that is to begin here stands too near, with what it needs; empty when there is none."""
+        """For a rover that is to start here: what a border that is too near requires; empty if none is."""
         place = shapely.Point(point.east_m, point.north_m)
         for bound in self._bounds:
             if bound.depth_m(place) < bound.keep_m - SLACK_M:
@@ -82,9 +82,9 @@ class Bounds:
         return ""
 
     def fault(self, points: Sequence[NedPoint]) -> str:
-        """The border that the rover's body would cross on the way through the points; empty when there is none.
+        """The name of the border that the rover's body would cross along the line through the points; empty if none.
 
-        A rover that is too near already may move as long as it comes no nearer, and its middle stays on this side.
+        A rover that is already too near may move if it comes no nearer and its middle does not cross the border.
         """
         places = [_place(point) for point in points]
         way, here = shapely.LineString(places), shapely.Point(places[0])
@@ -96,7 +96,7 @@ class Bounds:
         return ""
 
     def _near(self, shape: BaseGeometry) -> Iterator[Bound]:
-        """The borders that need a closer look."""
+        """The borders that need an exact check."""
         for bound, roomy in zip(self._bounds, self._roomy, strict=True):
             free = roomy.covers(shape) if bound.keeps_in else not roomy.intersects(shape)
             if not free:
@@ -104,7 +104,7 @@ class Bounds:
 
 
 def mission_bounds(mission: Mission, places: Places) -> list[Bound]:
-    """The fences of the mission file, in its order."""
+    """The borders of the mission's fences, in its order."""
     body_m = mission.rover.radius_m
     bounds = []
     for keeps_in, areas in ((False, mission.keep_out), (True, mission.keep_in)):
@@ -117,7 +117,7 @@ def mission_bounds(mission: Mission, places: Places) -> list[Bound]:
 
 
 def autopilot_bounds(fence: AutopilotFence, frame: LocalFrame, body_m: float) -> list[Bound]:
-    """The autopilot's fence: its margin and the rover's radius both count."""
+    """The borders of the autopilot's fence, with the larger of its margin and the rover's radius."""
     places = Places(frame, NedPoint(0.0, 0.0), _no_fields)
     keep_m = max(fence.margin_m, body_m)
     bounds = []
@@ -138,12 +138,12 @@ def autopilot_bounds(fence: AutopilotFence, frame: LocalFrame, body_m: float) ->
 
 
 def _place(point: NedPoint) -> tuple[float, float]:
-    """To a micrometre: lengths whose square is no number any more have no distance from anything."""
+    """East and north, to a micrometre: shapely gives no distance for lengths whose square underflows."""
     return round(point.east_m, 6), round(point.north_m, 6)
 
 
 def _in_fields(area: Area) -> bool:
-    """A polygon through the middles of its corner fields is meant to hold those fields."""
+    """Whether an area is a polygon given in fields: it includes its corner fields."""
     return area.radius_m is None and area.width_m is None and all(isinstance(place, Cell) for place in area.places)
 
 
@@ -152,15 +152,15 @@ def _no_fields(cell: Cell) -> NedPoint:
 
 
 def _sound(shape: BaseGeometry) -> BaseGeometry:
-    """The ground that a polygon encloses, even if its sides cross."""
+    """The area that a polygon encloses, even if its sides cross."""
     if shape.is_valid:
         return shape
-    parts = shapely.get_parts(shapely.make_valid(shape))
-    return shapely.union_all([part for part in parts if part.geom_type in ("Polygon", "MultiPolygon")])
+    polygons = shapely.get_parts(shapely.make_valid(shape))
+    return shapely.union_all([polygon for polygon in polygons if polygon.geom_type in ("Polygon", "MultiPolygon")])
 
 
 def _widened(bound: Bound, resolution_m: float) -> Bound:
-    """What keeps whole fields reaches half a field beyond the middles of its corner fields."""
+    """A keep-in border given in fields, moved out from the middles of its corner fields to their edges."""
     if not bound.in_fields or not bound.keeps_in:
         return bound
     shape = bound.shape.buffer(resolution_m / 2.0, join_style="mitre")
@@ -168,7 +168,7 @@ def _widened(bound: Bound, resolution_m: float) -> Bound:
 
 
 def _roomy(bound: Bound) -> BaseGeometry:
-    """Where nothing needs a closer look: wholly inside of this (or, of what keeps out, clear of it)."""
+    """A shape for the fast check: entirely inside it (keep-in) or apart from it (keep-out) no exact check is needed."""
     shape = bound.shape.buffer(-bound.keep_m if bound.keeps_in else bound.keep_m)
     shapely.prepare(shape)
     return shape

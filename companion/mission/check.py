@@ -1,4 +1,4 @@
-"""What must hold for a mission whatever file it came from. Anything else is a MissionError with one line."""
+"""Checks of a mission, whatever file it came from: grid, places, areas, files."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ import shapely
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.mission import Area, HomePoint, Mission, MissionError, Place
-from companion.storage.reading import why_no_file
+from companion.storage.files import why_no_file
 
 MAX_GRID_FIELDS = 4_000_000
-"""Larger grids are refused: the companion keeps several rasters of that size."""
+"""Larger grids are refused: the companion holds several rasters of that size."""
 
 
 def check_mission(mission: Mission) -> None:
-    """Raise MissionError (file, place, reason) unless the mission can be driven, as far as the file alone tells."""
+    """Raise MissionError (file, place, reason) unless the mission can be driven, as far as the file alone shows."""
     try:
         _check_grid(mission)
         for kind, areas in _areas(mission).items():
@@ -48,7 +48,7 @@ def _check_grid(mission: Mission) -> None:
 
 
 def _check_place(mission: Mission, what: str, place: Place) -> None:
-    """A field needs a fixed grid to lie in; metres from home are checked against it as soon as it is fixed."""
+    """Fields need a fixed grid; places in metres must lie in it, if there is one."""
     grid = mission.grid
     if isinstance(place, Cell):
         if grid.size is None or grid.home is None:
@@ -68,7 +68,7 @@ def _check_place(mission: Mission, what: str, place: Place) -> None:
 
 
 def _check_area(mission: Mission, what: str, area: Area) -> None:
-    """Areas may reach beyond the grid, but they need a shape."""
+    """Areas may extend beyond the grid; polygons must be simple, lines need two places."""
     if any(isinstance(place, Cell) for place in area.places) and mission.grid.size is None:
         raise MissionError(f"{what}: fields need [grid] size and home; or give metres or degrees instead")
     if area.radius_m is not None:
@@ -88,7 +88,7 @@ def _check_area(mission: Mission, what: str, area: Area) -> None:
 
 
 def _plane(place: Place, first: Place) -> tuple[float, float]:
-    """Any flat coordinates will do to see whether sides cross; longitudes are taken the short way round from the first."""
+    """Plane coordinates, good enough to see whether sides cross; longitudes are relative to the first place."""
     if isinstance(place, GeoPoint):
         west_deg = first.lon_deg if isinstance(first, GeoPoint) else 0.0
         return ((place.lon_deg - west_deg + 180.0) % 360.0 - 180.0, place.lat_deg)

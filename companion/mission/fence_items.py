@@ -1,4 +1,4 @@
-"""What fence and rally items enclose and where they lie: polygons of several items each, circles, points."""
+"""Fence and rally items as areas and points: polygons (several items each), circles, rally points."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from companion.mission.mission import Area, open_ring
 
 @dataclass
 class Fences:
-    """What has been understood so far."""
+    """The areas found so far, and notes about items that are not used."""
 
     keep_in: list[Area] = field(default_factory=list)
     keep_out: list[Area] = field(default_factory=list)
@@ -23,7 +23,7 @@ class Fences:
 
 @dataclass(frozen=True, slots=True)
 class FenceAreas:
-    """What a list of fence items encloses: ground is open inside of ``keep_in`` and outside each of ``keep_out``."""
+    """The areas of a list of fence items: the rover must stay inside ``keep_in`` and outside each of ``keep_out``."""
 
     keep_in: tuple[Area, ...] = ()
     keep_out: tuple[Area, ...] = ()
@@ -36,7 +36,7 @@ def fence_areas(items: Sequence[Item]) -> FenceAreas:
 
 
 def rally_points(items: Sequence[Item]) -> tuple[GeoPoint, ...]:
-    """The places of rally items, in their order. Raises ItemError."""
+    """The places of rally items, in order. Raises ItemError."""
     for item in items:
         if item.command != mav.RALLY_POINT:
             raise ItemError(f"{item.label}: is no rally point")
@@ -56,7 +56,7 @@ def is_fence(item: Item) -> bool:
 
 
 def fences_of(items: Sequence[Item]) -> Fences:
-    """All of them, and notes of what is not used. Raises ItemError with the item's index and its command."""
+    """The areas of fence items, and notes about items that are not used. Raises ItemError with index and command."""
     fences = Fences()
     i = 0
     while i < len(items):
@@ -82,7 +82,7 @@ def fences_of(items: Sequence[Item]) -> Fences:
 
 
 def _corners(items: Sequence[Item], first: int) -> list[GeoPoint]:
-    """The corners of one polygon: every vertex item says how many there are, and they follow one another."""
+    """The corners of one polygon: its vertex items are consecutive, and each holds their number."""
     item = items[first]
     count = item.param(1)
     if not math.isfinite(count) or count != int(count) or not 3 <= count <= MAX_ITEMS:

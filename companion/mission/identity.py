@@ -1,4 +1,4 @@
-"""Whether two missions are the same, wherever their files lie and however they are written."""
+"""Fingerprint of a mission: equal for equal missions, whatever their files are called and how they are written."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ import hashlib
 from dataclasses import replace
 
 from companion.mission.mission import Mission, MissionError
-from companion.storage.reading import open_file
+from companion.storage.files import open_file
 
 
 def fingerprint(mission: Mission) -> str:
-    """SHA-256, in hexadecimal, of all that decides where the rover drives: not of comments, notes and the simulator's part.
+    """SHA-256, in hexadecimal, of everything that decides where the rover drives.
 
-    Nor of the planned home: the rover's own is what counts, and an autopilot tells its stored mission with its home of now.
-    A known map counts with its contents. Raises MissionError when that cannot be read.
+    Comments, notes and the simulator's table do not count. Neither does the planned home: the rover's own home counts,
+    and an autopilot sends its stored mission with its present home. A prior map counts with its content. Raises
+    MissionError when that cannot be read.
     """
     plain = replace(mission, source=None, notes=(), sitl=None, prior_map=None, planned_home=None, stored="")
     digest = hashlib.sha256(repr(plain).encode())

@@ -1,4 +1,4 @@
-"""One mission item, as files and the autopilot have it, and what can be wrong with one."""
+"""A MAVLink mission item, as files and the autopilot hold it, and the error for a wrong one."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ MAX_ITEMS = 100_000
 
 
 class ItemError(Exception):
-    """Something wrong inside a file: place and reason. Whoever knows the file makes it a MissionError."""
+    """A wrong item: place and reason. The reader adds the file and makes it a MissionError."""
 
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One mission item. ``index`` is what jumps refer to; ``params`` are p1 to p4, nan where the file has none."""
+    """One mission item. Jumps refer to ``index``; ``params`` are p1 to p4, nan where the file has none."""
 
     index: int
     command: int
@@ -29,17 +29,17 @@ class Item:
 
     @property
     def label(self) -> str:
-        """How messages call it."""
+        """Its name in messages."""
         return f"item {self.index}: {mav.command_name(self.command)}"
 
     def param(self, number: int) -> float:
-        """p1 to p4; one that is not given counts as 0, its default in every command that is understood here."""
+        """p1 to p4; a missing one is 0, the default in every command that is understood here."""
         value = self.params[number - 1]
         return 0.0 if math.isnan(value) else value
 
 
 def geo_point(lat_deg: float, lon_deg: float, what: str) -> GeoPoint:
-    """A checked place on the earth. Raises ItemError."""
+    """A latitude and longitude that exist. Raises ItemError."""
     if not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):
         raise ItemError(f"{what}: latitude and longitude are missing")
     if not (-90.0 <= lat_deg <= 90.0 and -180.0 <= lon_deg <= 180.0):

@@ -1,6 +1,6 @@
-"""Names of the MAVLink commands that mission files are likely to hold, and of their frames (common.xml numbers).
+"""MAVLink commands and frames of mission items, with their numbers (common.xml).
 
-Missions are read without a MAVLink library: only a few commands are understood, the rest is named and refused.
+Missions are read without a MAVLink library: a few commands are understood, the others are refused by name.
 """
 
 from __future__ import annotations
@@ -91,11 +91,11 @@ NAMES = {
 }
 
 GLOBAL_FRAMES = (0, 3, 5, 6, 10, 11)
-"""Latitude and longitude, with altitudes of several kinds; a rover stays on the ground, so altitudes do not matter."""
+"""Frames with latitude and longitude; their altitudes differ, which does not matter to a rover."""
 
 FRAME_NAMES = {1: "LOCAL_NED", 2: "MISSION", 4: "LOCAL_ENU", 7: "LOCAL_OFFSET_NED", 8: "BODY_NED", 9: "BODY_OFFSET_NED"}
 
 
 def command_name(command: int) -> str:
-    """``NAV_LAND (21)``, or only the number of an unknown command."""
+    """``NAV_LAND (21)``; only the number for an unknown command."""
     return f"{NAMES[command]} ({command})" if command in NAMES else f"command {command}"

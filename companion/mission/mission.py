@@ -1,4 +1,4 @@
-"""A mission: targets in order, the ground they lie on, and the rover that is to drive there."""
+"""A mission as plain values: targets in order, grid, fences, weighted ground, rover, and the simulator's table."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ class OnBlocked(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class HomePoint:
-    """A place in metres north and east of home (where the rover stands when the mission begins)."""
+    """A place in metres north and east of home, the rover's place when the mission begins."""
 
     north_m: float
     east_m: float
 
 
 Place = Cell | HomePoint | GeoPoint
-"""A place as missions write it: a field of the mission's grid, local metres from home, or latitude and longitude."""
+"""A place in a mission: a field of its grid, metres from home, or latitude and longitude."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +49,10 @@ class Target:
 
 @dataclass(frozen=True, slots=True)
 class GridSpec:
-    """The grid as the mission asks for it.
+    """The grid that the mission asks for.
 
-    With ``size`` (width, height in fields) and ``home`` (the field whose middle is home) the grid is fixed; without, it
-    is laid round home, all targets and fences with ``margin_m`` to spare.
+    With ``size`` (width, height in fields) and ``home`` (the field whose middle is home) the grid is fixed. Without, it
+    encloses home, all targets and fences, with a margin of ``margin_m``.
     """
 
     resolution_m: float = 1.0
@@ -65,7 +65,7 @@ class GridSpec:
 class RoverSpec:
     """The vehicle: everything within ``radius_m`` of its centre must stay clear.
 
-    ``turning_radius_m`` is the tightest arc that its centre can drive; 0: it turns on the spot.
+    ``turning_radius_m``: the tightest arc of its centre; 0: it turns on the spot.
     """
 
     radius_m: float = 0.35
@@ -75,7 +75,7 @@ class RoverSpec:
 
 @dataclass(frozen=True, slots=True)
 class Area:
-    """A polygon (three or more places, closed by itself), with ``radius_m`` a circle, with ``width_m`` a broad line."""
+    """A polygon of three or more places; with ``radius_m`` a circle, with ``width_m`` a wide line."""
 
     places: tuple[Place, ...]
     radius_m: float | None = None
@@ -83,13 +83,13 @@ class Area:
 
 
 def open_ring(places: tuple[Place, ...]) -> tuple[Place, ...]:
-    """A polygon's corners without the repeated first one at the end, which some files write and some do not."""
+    """A polygon's corners, without the first one repeated at the end as in some files."""
     return places[:-1] if len(places) > 1 and places[0] == places[-1] else places
 
 
 @dataclass(frozen=True, slots=True)
 class WeightedArea:
-    """Ground with a weight of its own, 0 (preferred) to below 1: a corridor or rough ground."""
+    """Ground with its own weight, from 0 (preferred) to below 1: a corridor or rough ground."""
 
     area: Area
     weight: float
@@ -97,10 +97,10 @@ class WeightedArea:
 
 @dataclass(frozen=True, slots=True)
 class MoverSpec:
-    """A disc that moves in the simulator's world: from place to place at an even speed, from ``start_s`` on.
+    """A disc that moves in the simulator's world, from place to place at a constant speed.
 
-    The time counts from when the simulator is switched on. ``repeat``: from the last place back to the first, and again.
-    ``announce``: vehicle, adsb or ais, or None: it tells nobody of itself.
+    ``start_s``: when it starts, from the simulator's start. ``repeat``: back to the first place, and round again.
+    ``announce``: how it reports its position (vehicle, adsb or ais); None: not at all.
     """
 
     name: str
@@ -114,12 +114,12 @@ class MoverSpec:
 
 @dataclass(frozen=True, slots=True)
 class SitlSpec:
-    """What only the simulator reads.
+    """The simulator's table of a mission.
 
-    ``world``: map file; ``resolution_m``: its field size where it has none of its own (None: the mission's);
-    ``start``: the field of the world where the rover stands; heading clockwise from north;
-    ``home``: where on earth that is (None: the planned home, else the first target in degrees, else somewhere);
-    ``parameters``: a file with ArduRover's parameters;
+    ``world``: map file; ``resolution_m``: its field size if it has none (None: the mission's);
+    ``start``: the rover's field in the world; heading clockwise from north;
+    ``home``: latitude and longitude of the start (None: planned home, else first target in degrees, else a default);
+    ``parameters``: a file of ArduRover parameters;
     ``steering``: skid or ackermann (None: ackermann if the rover has a turning radius).
     """
 
@@ -136,12 +136,13 @@ class SitlSpec:
 
 @dataclass(frozen=True, slots=True)
 class Mission:
-    """Everything that a mission file says. ``notes`` tells people what was understood beyond the targets; ``also_read`` are the files,
-    beside ``source`` and those named below, that it was made of.
+    """The content of a mission file. The rover may drive inside all of ``keep_in`` and outside each of ``keep_out``.
 
-    ``prior_map`` is a known map, its field size where the file has none (None: the grid's), and where its outer south-west
-    corner lies from home (None: as the file says, or on the grid). ``in_auto``: the autopilot drives this mission itself, in AUTO, and
-    hands its targets over to the companion, in an order of its own (NAV_GUIDED_ENABLE). ``stored``: the digest of what the autopilot had stored when this mission was read from it, else empty. Ground is passable inside all of ``keep_in`` and outside each of ``keep_out``.
+    ``prior_map``: a map known beforehand; ``prior_resolution_m``: its field size if the file has none (None: the
+    grid's); ``prior_corner``: its outer south-west corner (None: as the file says, or on the grid). ``in_auto``: the
+    autopilot drives this mission in AUTO and hands targets over to the companion, in its own order (NAV_GUIDED_ENABLE).
+    ``stored``: the digest of the autopilot's stored items if the mission was read from them, else empty. ``notes``: for
+    people, what was read beyond the targets. ``also_read``: further files that the mission was read from.
     """
 
     name: str

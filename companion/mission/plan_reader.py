@@ -1,4 +1,4 @@
-"""QGroundControl's ``.plan``: JSON with the mission's items, the geofence and rally points."""
+"""Reader of QGroundControl's ``.plan`` files: JSON with mission items, geofence and rally points."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from pathlib import Path
 
 from companion.core.frames import GeoPoint
 from companion.mission.fence_items import circle
-from companion.mission.item_meaning import understand
+from companion.mission.item_interpreter import mission_from_items
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
 from companion.mission.mission import Area, Mission, MissionError, open_ring
-from companion.mission.text_file import read_text
+from companion.storage.files import read_text
 
 MAX_BYTES = 50_000_000
 
 LARGEST = 1e18
-"""No number in a plan has a reason to be larger."""
+"""Larger numbers are refused: no value of a plan can be that large."""
 
 Json = dict[str, object]
 
@@ -27,18 +27,18 @@ def load(path: Path) -> Mission:
     """Read a plan; fences without any target are allowed. Raises MissionError: file, place, reason."""
     plan = _read(path)
     try:
-        return _understood(plan, path)
+        return _mission(plan, path)
     except ItemError as error:
         raise MissionError(f"{path}: {error}") from None
 
 
-def _understood(plan: Json, path: Path) -> Mission:
+def _mission(plan: Json, path: Path) -> Mission:
     if plan.get("fileType") != "Plan":
         raise ItemError(f'fileType: expected "Plan", got {reprlib.repr(plan.get("fileType"))}')
     _expect_version(plan, "version", 1)
-    mission = _table(plan, "mission")
-    _expect_version(mission, "mission.version", 2)
-    items = list(_items(_list(mission, "mission.items"), "mission.items"))
+    listing = _table(plan, "mission")
+    _expect_version(listing, "mission.version", 2)
+    items = list(_items(_list(listing, "mission.items"), "mission.items"))
     if len(items) > MAX_ITEMS:
         raise ItemError(f"mission.items: {len(items)} items are more than {MAX_ITEMS}")
     seen: set[int] = set()
@@ -46,23 +46,23 @@ def _understood(plan: Json, path: Path) -> Mission:
         if item.index in seen:
             raise ItemError(f"item {item.index}: two items have this doJumpId")
         seen.add(item.index)
-    home = mission.get("plannedHomePosition")
+    home = listing.get("plannedHomePosition")
     planned_home = None if home is None else _geo(home, "mission.plannedHomePosition")
-    understood = understand(items, path, path.stem, planned_home)
+    mission = mission_from_items(items, path, path.stem, planned_home)
     keep_out, keep_in, notes = _geofence(plan)
     return Mission(
-        name=understood.name,
-        targets=understood.targets,
-        keep_out=understood.keep_out + keep_out,
-        keep_in=understood.keep_in + keep_in,
+        name=mission.name,
+        targets=mission.targets,
+        keep_out=mission.keep_out + keep_out,
+        keep_in=mission.keep_in + keep_in,
         planned_home=planned_home,
         source=path,
-        notes=(*understood.notes, *notes, *_rally_notes(plan)),
+        notes=(*mission.notes, *notes, *_rally_notes(plan)),
     )
 
 
 def _read(path: Path) -> Json:
-    text = read_text(path, MAX_BYTES)
+    text = read_text(path, MissionError, MAX_BYTES, "utf-8-sig")
     try:
         plan = json.loads(text)
     except json.JSONDecodeError as error:
@@ -78,7 +78,7 @@ def _read(path: Path) -> Json:
 
 
 def _items(entries: list[object], place: str, *, inner: bool = False) -> Iterator[Item]:
-    """Simple items in order; a complex item (a survey, say) stands for the simple items it was worked out to."""
+    """The simple items in order; a complex item (such as a survey) is replaced by the simple items that it holds."""
     for position, entry in enumerate(entries, start=1):
         where = f"{place} {position}"
         if not isinstance(entry, dict):

@@ -1,4 +1,4 @@
-"""A mission where it is to be driven: its places in the autopilot's local frame, its grid with fences and known ground."""
+"""Resolves a mission in the autopilot's local frame: targets as points and fields, grid with fences and prior map."""
 
 from __future__ import annotations
 
@@ -12,18 +12,18 @@ from companion.core.frames import LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid, empty_grid
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.areas import Mask, Places, shape_of, touched
+from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import OURS, Bound, Bounds, autopilot_bounds, mission_bounds
 from companion.mission.check import MAX_GRID_FIELDS
-from companion.mission.fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, MissionError, OnBlocked
-from companion.mission.prior import stamp_prior
+from companion.mission.prior_map import stamp_prior
 
 MIN_MARGIN_M = 25.0
 
 
 @dataclass(frozen=True, slots=True)
 class ResolvedTarget:
-    """A target where it lies: local frame and field of the grid."""
+    """A target in the local frame, and its field of the grid."""
 
     name: str
     point: NedPoint
@@ -35,11 +35,11 @@ class ResolvedTarget:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ResolvedMission:
-    """The ground as known before the rover moves, and the targets in order. ``home_cell`` is where home lies.
+    """The ground as known before the rover moves, and the targets in order. ``home_cell``: the field of home.
 
-    ``ground``: weights, known obstacles as large as they are, and fences that were drawn in fields. ``closed``: the fields that the
-    rover's middle must not enter, its radius and the autopilot's margin counted. ``refused``: what is wrong with targets behind
-    the autopilot's fence, by their number from 0.
+    ``ground``: weights with known obstacles, not inflated, and fences given in fields. ``closed``: the fields that the
+    rover's middle must not enter, because of its radius and the autopilot's margin. ``refused``: reasons why targets
+    behind the autopilot's fence are refused, by number from 0.
     """
 
     ground: Grid
@@ -66,14 +66,17 @@ class _Shut:
 
 
 def resolve(mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence = NO_FENCE) -> ResolvedMission:
-    """Lay the mission out. ``home`` is the place, in the autopilot's local frame, that its local metres count from.
+    """Resolve the mission. ``home``: the origin of its metres, in the autopilot's local frame.
 
-    A grid with a size lies so that the middle of the field ``grid.home`` is home; otherwise it is laid round home,
-    targets, fences and known map, with home in the middle of a field. Weights: base, known map, weighted areas,
-    obstacles of the known map, fences. A field is closed when part of it is nearer to a keep-out area than the rover's radius, or
-    nearer than that to the edge of a keep-in area or beyond it; of areas given in fields, the fields that they touch, or whose
-    middle they hold, are closed or open. The autopilot's fence closes fields in the same way, with its margin. Targets that
-    it closes are listed in ``refused``: it may have changed on the way. Raises MissionError: file, place, reason.
+    A grid with a size is placed with the middle of the field ``grid.home`` on home. Otherwise it encloses home,
+    targets, fences and prior map, with home in the middle of a field. Weights, by precedence: fences, obstacles of
+    the prior map, weighted areas, prior map, base.
+
+    A field is closed if any part of it is nearer to a keep-out area than the rover's radius, or nearer than that to the
+    edge of a keep-in area, or outside it. Keep-out areas given in fields close the fields that they touch; keep-in
+    areas given in fields leave those open whose middle they contain. The autopilot's fence closes fields likewise, with
+    its margin. Targets that it closes are listed in ``refused``: the fence may change during the drive. Raises
+    MissionError: file, place, reason.
     """
     try:
         return _resolved(mission, frame, home, fence)
@@ -90,7 +93,7 @@ def _resolved(mission: Mission, frame: LocalFrame, home: NedPoint, fence: Autopi
     places = Places(frame, home, _no_fields if grid is None else grid.centre_of)
     points = [places.point(target.place) for target in mission.targets]
     if grid is None:
-        grid = _laid_grid(mission, places, points, prior)
+        grid = _enclosing_grid(mission, places, points, prior)
     if prior is not None:
         grid = stamp_prior(grid, prior)
     weights = grid.weights.copy()
@@ -135,7 +138,7 @@ def _away(home: NedPoint, point: NedPoint) -> str:
 
 
 def _south_west(home: NedPoint, home_cell: Cell, resolution_m: float) -> NedPoint:
-    """The grid's corner that puts the middle of ``home_cell`` on home."""
+    """The south-west corner of a grid with the middle of ``home_cell`` on home."""
     return NedPoint(
         home.north_m - (home_cell.y + 0.5) * resolution_m,
         home.east_m - (home_cell.x + 0.5) * resolution_m,
@@ -151,8 +154,8 @@ def _fixed_grid(mission: Mission, home: NedPoint) -> Grid | None:
     return empty_grid(width, height, spec.resolution_m, _south_west(home, spec.home, spec.resolution_m))
 
 
-def _laid_grid(mission: Mission, places: Places, points: list[NedPoint], prior: Grid | None) -> Grid:
-    """A grid round everything the mission names."""
+def _enclosing_grid(mission: Mission, places: Places, points: list[NedPoint], prior: Grid | None) -> Grid:
+    """A grid that encloses everything in the mission, with a margin."""
     home, size_m = places.home, mission.grid.resolution_m
     corners = [(point.east_m, point.north_m) for point in (home, *points)]
     areas = (*mission.keep_out, *mission.keep_in, *(weighted.area for weighted in mission.weighted))
@@ -183,16 +186,16 @@ def _refuse_large(width: int, height: int, resolution_m: float, mission: Mission
         enough_m = resolution_m * math.sqrt(width * height / MAX_GRID_FIELDS)
         of_ours = not mission.stored and (mission.source is None or mission.source.suffix.lower() == ".toml")
         remedy = f"use resolution_m = {math.ceil(enough_m * 10.0) / 10.0:g} or larger, or a smaller margin_m"
-        if not of_ours:  # nothing of the kind can be said in a ground station's mission
+        if not of_ours:  # a ground station's mission has no resolution
             remedy = "write a TOML mission with a larger resolution_m"
         raise MissionError(
-            f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; are all places near "
-            f"home? If they are, {remedy}"
+            f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; "
+            f"are all places near home? If they are, {remedy}"
         )
 
 
 def _prior_map(mission: Mission, home: NedPoint) -> Grid | None:
-    """The known map in the local frame. A ROS yaml says where it lies from home; others lie on the mission's grid."""
+    """The prior map in the local frame. A ROS yaml holds its place from home; other maps lie on the mission's grid."""
     path = mission.prior_map
     if path is None:
         return None
@@ -214,7 +217,10 @@ def _prior_map(mission: Mission, home: NedPoint) -> Grid | None:
 
 
 def _refusal(what: str, cell: Cell, shut: list[_Shut]) -> str:
-    """What is wrong with a place behind the autopilot's fence; empty when it is open. Raises MissionError for the mission's own."""
+    """Why a place behind the autopilot's fence is refused; empty if it is open.
+
+    Raises MissionError for the mission's own fences.
+    """
     for one in shut:
         if one.fields[cell.y, cell.x]:
             bound = one.bound

@@ -1,4 +1,4 @@
-"""The tables that describe simulated range sensors: ``[sitl.sensors]`` of a mission, or a file of its own with the same content."""
+"""Tables of simulated range sensors: ``[sitl.sensors]`` of a mission, or a separate file with the same content."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
-from companion.mission.tables import Positive, Table, read_table
-from companion.settings import describe_first
+from companion.mission.tables import Positive, Table
+from companion.storage.toml_file import describe_first, read_table
 
 NAMED = ("lidar-90", "lidar-360", "beams", "none")
-"""Suites that need no description."""
+"""Named suites."""
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
 RateHz = Annotated[float, Field(gt=0.0, le=50.0)]
@@ -19,7 +19,7 @@ Degrees = Annotated[float, Field(ge=-360.0, le=360.0)]
 
 
 class SunTable(Table):
-    """Low sun: sensors that look towards it see less far. ``bearing_deg`` is the sun's, clockwise from north."""
+    """Low sun: sensors that face it have a shorter range. ``bearing_deg``: the sun's bearing, clockwise from north."""
 
     bearing_deg: Degrees = 0.0
     width_deg: Annotated[float, Field(gt=0.0, le=360.0)] = 360.0
@@ -27,7 +27,7 @@ class SunTable(Table):
 
 
 class SensorTable(Table):
-    """What every range sensor has, flaws included."""
+    """The keys of every range sensor, with its flaws."""
 
     min_m: Annotated[float, Field(ge=0.0, le=300.0)]
     max_m: Annotated[float, Field(gt=0.0, le=300.0)]
@@ -46,7 +46,7 @@ class SensorTable(Table):
 
 
 class LidarTable(SensorTable):
-    """``[lidar]``: sectors clockwise, the first one looks to ``first_deg`` from ahead."""
+    """``[lidar]``: sectors clockwise; the first faces ``first_deg`` from ahead."""
 
     first_deg: Degrees
     increment_deg: Annotated[float, Field(gt=0.0, le=180.0)]
@@ -61,14 +61,17 @@ class LidarTable(SensorTable):
 
 
 def _number(value: object) -> object:
-    """Python takes true for 1. Raises ValueError."""
+    """Refuses true and false, which Python counts as numbers. Raises ValueError."""
     if isinstance(value, bool):
         raise ValueError("a number is needed, not true or false")
     return value
 
 
 class BeamTable(SensorTable):
-    """``[[beam]]``: a rangefinder; ``orientation`` 0 to 7 in eighths of a turn clockwise from ahead, 24 up, 25 down."""
+    """``[[beam]]``: a rangefinder.
+
+    ``orientation``: 0 to 7 in eighths of a turn clockwise from ahead, 24 up, 25 down.
+    """
 
     orientation: Annotated[Literal[0, 1, 2, 3, 4, 5, 6, 7, 24, 25], BeforeValidator(_number)]
     width_deg: Annotated[float, Field(ge=0.0, le=90.0)] = 2.0
@@ -91,11 +94,11 @@ class SensorsTable(Table):
     proximity: ProximityTable | None = None
 
     def __str__(self) -> str:
-        """For people: what there is."""
-        parts = ["a lidar"] if self.lidar else []
-        parts += [f"{len(self.beam)} beams" if len(self.beam) > 1 else "a beam"] if self.beam else []
-        parts += ["proximity sectors"] if self.proximity else []
-        return " and ".join(parts) or "none"
+        """The sensors in words."""
+        sensors = ["a lidar"] if self.lidar else []
+        sensors += [f"{len(self.beam)} beams" if len(self.beam) > 1 else "a beam"] if self.beam else []
+        sensors += ["proximity sectors"] if self.proximity else []
+        return " and ".join(sensors) or "none"
 
 
 Sensors = str | SensorsTable
@@ -115,12 +118,13 @@ def sensors_given(value: object) -> Sensors:
 
 
 def sensors_from(value: Sensors, folder: Path, error: type[Exception]) -> Sensors:
-    """The same with a file read. Raises ``error`` for a bad one."""
+    """The sensors, read from their file if they are given as one. Raises ``error`` for a bad file."""
     if isinstance(value, str) and value.endswith(".toml"):
         sensors = read_table(folder / value, SensorsTable, error, "docs/worlds.md describes range sensors")
         if str(sensors) == "none":
             raise error(
-                f"{folder / value}: describes no sensor; give a [lidar], [[beam]] or [proximity], or write sensors = 'none'"
+                f"{folder / value}: describes no sensor; "
+                "give a [lidar], [[beam]] or [proximity], or write sensors = 'none'"
             )
         return sensors
     return value

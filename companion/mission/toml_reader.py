@@ -16,6 +16,7 @@ from pydantic import BeforeValidator, Field
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.check import check_mission
+from companion.mission.ground_station_reader import load_ground_station_file
 from companion.mission.mission import (
     Area,
     GridSpec,
@@ -31,7 +32,6 @@ from companion.mission.mission import (
     WeightedArea,
     open_ring,
 )
-from companion.mission.qgc import load_qgc
 from companion.mission.sensor_tables import SensorsTable, sensors_from, sensors_given
 from companion.mission.tables import (
     Field2,
@@ -46,8 +46,8 @@ from companion.mission.tables import (
     T,
     Table,
     named,
-    read_table,
 )
+from companion.storage.toml_file import read_table
 
 
 class PlaceTable(Table):
@@ -60,7 +60,7 @@ class PlaceTable(Table):
     lon_deg: Lon | None = None
 
     def place(self) -> Place | None:
-        """The place, or None if none is given. Raises ValueError when it is ambiguous or half given."""
+        """The place, or None if none is given. Raises ValueError when it is given twice or incompletely."""
         metres = self.north_m is not None or self.east_m is not None
         degrees = self.lat_deg is not None or self.lon_deg is not None
         if (self.field is not None) + metres + degrees > 1:
@@ -87,7 +87,7 @@ class TargetTable(PlaceTable):
     speed_m_s: Positive | None = None
 
     def target(self, number: int) -> Target:
-        """The target; without a name it is called after its number, counted from 1."""
+        """The target; the default of its name is its number, counted from 1."""
         place = self.place()
         if place is None:
             raise ValueError("has no place; use one of field, north_m and east_m, lat_deg and lon_deg")
@@ -122,7 +122,7 @@ class AreaTable(PlaceTable):
 
 
 class CorridorTable(AreaTable):
-    """``[[corridor]]``: ground with a weight of its own; also a line with a width."""
+    """``[[corridor]]``: ground with its own weight; also a line with a width."""
 
     weight: Annotated[float, Field(ge=0.0, lt=1.0)]
     line_fields: list[Field2] | None = None
@@ -174,7 +174,7 @@ class MoverTable(Table):
     announce: Literal["vehicle", "adsb", "ais"] | None = None
 
     def mover(self, number: int) -> MoverSpec:
-        """The mover. Raises ValueError when it has nowhere to go."""
+        """The mover. Raises ValueError for fewer than two different places."""
         route = tuple(HomePoint(*pair) for pair in self.route_m)
         if len(set(route)) < 2:
             raise ValueError("route_m needs at least two different places")
@@ -212,7 +212,7 @@ class MissionTable(Table):
 
 
 def load(path: Path, *, simulated: bool = True) -> Mission:
-    """Read one of our mission files; ``simulated``: with the files of its ``[sitl]`` table, which a real rover does not need.
+    """Read a TOML mission. ``simulated``: with the ``[sitl]`` table and its files, which a real rover does not need.
 
     Raises MissionError: one line with file, place and reason.
     """
@@ -224,7 +224,7 @@ def load(path: Path, *, simulated: bool = True) -> Mission:
 
 def _mission(table: MissionTable, path: Path) -> Mission:
     folder = path.parent
-    fences = load_qgc(folder / table.fence) if table.fence else None
+    fences = load_ground_station_file(folder / table.fence) if table.fence else None
     keep_out = tuple(_named(path, "keep_out", i, item.area) for i, item in enumerate(table.keep_out, 1))
     keep_in = tuple(_named(path, "keep_in", i, item.area) for i, item in enumerate(table.keep_in, 1))
     return Mission(
@@ -252,7 +252,7 @@ def _mission(table: MissionTable, path: Path) -> Mission:
 
 
 def _also_read(table: MissionTable) -> tuple[str, ...]:
-    """The files whose content is in the mission itself."""
+    """The files whose content has become part of the mission."""
     sensors = table.sitl.sensors if table.sitl is not None else None
     names = (table.fence, sensors if isinstance(sensors, str) and sensors.endswith(".toml") else None)
     return tuple(name for name in names if name is not None)
@@ -275,7 +275,7 @@ def _sitl(table: SitlTable, path: Path) -> SitlSpec:
 def _places(
     fields: list[Field2] | None, metres: list[Pair] | None, degrees: list[LatLon] | None
 ) -> list[tuple[Place, ...]]:
-    """The lists of places that are given, each in its own kind."""
+    """The given lists of places, each of one kind."""
     lists: list[tuple[Place, ...]] = []
     if fields is not None:
         lists.append(tuple(Cell(*pair) for pair in fields))

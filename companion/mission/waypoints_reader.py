@@ -1,8 +1,8 @@
-"""QGC WPL 110: the text form that Mission Planner, MAVProxy and older QGroundControl write.
+"""Reader of QGC WPL 110 (``.waypoints``): the text form of Mission Planner, MAVProxy and older QGroundControl.
 
 A header line, then one item a line: index, current, frame, command, p1 to p4, latitude, longitude, altitude,
-autocontinue, parted by tabs or spaces. Item 0 is home if it is a waypoint. Mission Planner saves fences and rally points
-as files of their own in the same form; here they may also stand after the mission's items.
+autocontinue, separated by tabs or spaces. Item 0 is home if it is a waypoint. Mission Planner saves fences and rally
+points as separate files of the same form; here they may also follow the mission's items.
 """
 
 from __future__ import annotations
@@ -14,10 +14,10 @@ from pathlib import Path
 
 from companion.core.frames import GeoPoint
 from companion.mission import mav_commands as mav
-from companion.mission.item_meaning import understand
+from companion.mission.item_interpreter import mission_from_items
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
 from companion.mission.mission import Mission, MissionError
-from companion.mission.text_file import read_text
+from companion.storage.files import read_text
 
 HEADER = ("QGC", "WPL", "110")
 MAX_BYTES = 20_000_000
@@ -42,14 +42,14 @@ def load(path: Path) -> Mission:
         raise MissionError(f"{path}: holds no items")
     try:
         home, items = home_of(items)
-        return understand(items, path, path.stem, home)
+        return mission_from_items(items, path, path.stem, home)
     except ItemError as error:
         raise MissionError(f"{path}: {error}") from None
 
 
 def _lines(path: Path) -> list[tuple[int, list[str]]]:
     """Line numbers and words, without comments and blank lines."""
-    text = read_text(path, MAX_BYTES)
+    text = read_text(path, MissionError, MAX_BYTES, "utf-8-sig")
     split = (
         (number, line.partition("#")[0].split()) for number, line in enumerate(re.split(r"\r\n|\r|\n", text), start=1)
     )
@@ -72,7 +72,7 @@ def _item(words: list[str], position: int) -> Item:
 
 
 def home_of(items: list[Item]) -> tuple[GeoPoint | None, list[Item]]:
-    """Item 0 is home unless it is anything but a waypoint (fence files begin with a fence)."""
+    """Home and the other items. Item 0 is home if it is a waypoint (fence files begin with a fence)."""
     first = items[0]
     if first.command != mav.NAV_WAYPOINT:
         return None, items

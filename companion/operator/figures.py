@@ -10,7 +10,7 @@ import math
 from companion.executive.mission_executor import MissionExecutor
 from companion.navigation.field_step import Decision, Part
 from companion.planning.problem import path_cost
-from companion.vehicle.commands import Command, TellFigure
+from companion.vehicle.commands import Command, NamedValue
 
 PARTS = {Part.RETURN: 1.0, Part.EXPLORE: 2.0, Part.SEARCH: 3.0}
 """The parts A, B and C of the step function."""
@@ -28,7 +28,7 @@ class Telemetry:
         if executor is None or self._period_s == math.inf or now_s - self._told_s < self._period_s - 1e-6:
             return []
         self._told_s = now_s
-        return [TellFigure(name, value) for name, value in figures(executor).items()]
+        return [NamedValue(name, value) for name, value in figures(executor).items()]
 
 
 def figures(executor: MissionExecutor) -> dict[str, float]:

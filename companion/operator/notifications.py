@@ -18,7 +18,7 @@ from companion.mavlink.rates import RateFault
 from companion.navigation.field_step import Decision
 from companion.safety.mode_latch import Control
 from companion.safety.reasons import Activity, PowerReason, Reason
-from companion.vehicle.commands import Say
+from companion.vehicle.commands import StatusText
 
 NOT_FOLLOWED_S = 5.0
 """People are told when the autopilot's read-back has shown another target for this long."""
@@ -94,7 +94,7 @@ class Notifier:
         self.said.append(text)
         del self.said[:-SAID_KEPT]
         self.note(text, severity)
-        self._autopilot.send(Say(severity, text), self._clock.now_s())
+        self._autopilot.send(StatusText(severity, text), self._clock.now_s())
 
     def once(self, text: str) -> None:
         """Warn of what stays so, the first time only."""

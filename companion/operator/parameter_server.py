@@ -12,9 +12,13 @@ from companion.core.severity import Severity, TextSink
 from companion.settings import Settings
 from companion.settings.live_settings import LiveSettings
 from companion.settings.tunable_parameters import BY_NAME, TABLE, RefusedError, changed
-from companion.vehicle.commands import Command, TellParameter
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
+from companion.vehicle.commands import Command, ParameterValue
+from companion.vehicle.events import (
+    Event,
+    ParameterAsked,
+    ParameterChangeAsked,
+    ParametersAsked,
+)
 from companion.vehicle.state import VehicleState
 
 ANSWER_S = 0.05
@@ -69,7 +73,7 @@ class ParameterServer:
         del self._answers[index]
         parameter, settings = TABLE[index], self._settings.current
         return [
-            TellParameter(parameter.name, parameter.value(settings), index, len(TABLE), whole_number=parameter.whole)
+            ParameterValue(parameter.name, parameter.value(settings), index, len(TABLE), whole_number=parameter.whole)
         ]
 
     def _change(self, asked: ParameterChangeAsked) -> None:

@@ -15,7 +15,7 @@ from companion.core.frames import LocalFrame, NedPoint, Pose
 from companion.core.grid import Grid
 from companion.planning.problem import ObstacleTrajectory
 from companion.settings import TrafficSettings
-from companion.vehicle.events.vehicle import OtherSeen
+from companion.vehicle.events import OtherSeen
 from companion.vehicle.state import VehicleState
 
 SAME_M = 1.2

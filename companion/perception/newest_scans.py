@@ -6,8 +6,10 @@ import math
 from collections.abc import Sequence
 
 from companion.core.scan import RangeScan
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import RangeSeen
+from companion.vehicle.events import (
+    Event,
+    RangeSeen,
+)
 
 MOST_SCANS = 20
 """In one tick, and of so many sensors at all: eight sectors, as many beams, and lidars."""

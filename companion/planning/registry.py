@@ -20,7 +20,8 @@ from companion.planning.papers.wang_ga import vertex, vertex_plus
 from companion.planning.planner import Planner, PlannerFactory
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.raster import cells_cost
-from companion.settings import PlannerSettings, alike
+from companion.settings import PlannerSettings
+from companion.storage.toml_file import alike
 
 PLANNERS: dict[str, PlannerFactory] = {
     "bspline-ga": BsplineGa,

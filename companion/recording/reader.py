@@ -17,8 +17,8 @@ from typing import IO, NamedTuple
 from pydantic import ValidationError
 
 from companion.mavlink.framing import first_packet
-from companion.mission.as_json import from_json
 from companion.mission.mission import Mission, MissionError
+from companion.mission.serialization import from_json
 from companion.recording.record_format import (
     CHECKED_ROUND,
     DECISIONS,
@@ -38,7 +38,7 @@ from companion.recording.record_format import (
 )
 from companion.settings import Settings, SettingsError, parse_settings
 from companion.settings.versions import versions
-from companion.storage.reading import open_file, read_at_most
+from companion.storage.files import open_file, read_at_most
 
 MAX_META_BYTES = 10_000_000
 MAX_BYTES = 200_000_000

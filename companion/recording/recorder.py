@@ -17,9 +17,9 @@ from typing import IO, Protocol
 
 from companion.core.clock import unix_time_us
 from companion.core.round_marks import Mark
-from companion.mission.as_json import to_json
-from companion.mission.files import files_of
 from companion.mission.mission import Mission
+from companion.mission.serialization import to_json
+from companion.mission.source_files import source_files
 from companion.navigation.field_step import Decision
 from companion.recording.record_format import (
     DECISIONS,
@@ -42,9 +42,8 @@ from companion.recording.record_format import (
 )
 from companion.settings import Settings
 from companion.settings.versions import versions
-from companion.storage.beside import Beside, Job
-from companion.storage.disk import write_whole
-from companion.storage.reading import open_file, refuse_pipe
+from companion.storage.background_writer import BackgroundWorker, Job
+from companion.storage.files import open_file, refuse_pipe, write_whole
 
 FLUSH_INTERVAL_S = 1.0
 MAX_UNWRITTEN_BYTES = 20_000_000
@@ -113,7 +112,7 @@ class Recorder:
         arm: bool = False,
         files: Mapping[str, Path | None] | None = None,
         start_us: int | None = None,
-        beside: Beside | None = None,
+        beside: BackgroundWorker | None = None,
     ) -> None:
         """``files``: further input files by kind; they are copied. None: there is no file of that kind.
 
@@ -297,7 +296,7 @@ def _written_mission(directory: Path, mission: Mission, inputs: list[InputFile])
 def _copied_inputs(directory: Path, mission: Mission | None, files: Mapping[str, Path | None]) -> list[InputFile]:
     """Copy the files of a mission in their folders, and the others by their kind. Raises OSError."""
     entries: list[InputFile] = []
-    mission_files = () if mission is None else files_of(mission)
+    mission_files = () if mission is None else source_files(mission)
     folders = [os.path.dirname(os.path.abspath(path)) for path in mission_files]
     common = os.path.commonpath(folders) if folders else ""
     for path in mission_files:

@@ -19,14 +19,14 @@ from companion.checkpoint.state_format import MAX_FILE_BYTES, StateError, decode
 from companion.core.round_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
-from companion.mavlink.naming import compared, named
+from companion.mavlink.describe import packet_difference, packet_name
 from companion.mavlink.signing import Recorded, without_signature
 from companion.mission.mission import MissionError
 from companion.navigation.field_step import Decision, NavState
 from companion.navigation.step_runner import StepCall
 from companion.recording.reader import Record, RecordedRound
 from companion.recording.record_format import STATE, RecordError, Round, decision_line
-from companion.storage.reading import read_at_most
+from companion.storage.files import read_at_most
 
 Answer = tuple[NavState, Decision]
 
@@ -83,7 +83,7 @@ class RecordPlayer:
         if self._next is None:
             raise EndOfRecordError
         self._current, self._next = self._next, next(self._rounds, None)
-        self.signatures.take(self.round.marks)
+        self.signatures.set_marks(self.round.marks)
         self._unread, self._said = list(self._current.heard), []
         self._began_s = self.round.time_s if self._began_s is None else self._began_s
         self.result.rounds += 1
@@ -163,11 +163,11 @@ class RecordPlayer:
         self.result.said += len(now)
         for was, is_now in zip(recorded, now, strict=False):
             if without_signature(was) != without_signature(is_now):
-                self.differs(f"said {compared(was, is_now)}")
+                self.differs(f"said {packet_difference(was, is_now)}")
         for raw in recorded[len(now) :]:
-            self.differs(f"{named(raw)} was said in the run, not in the replay")
+            self.differs(f"{packet_name(raw)} was said in the run, not in the replay")
         for raw in () if last else now[len(recorded) :]:
-            self.differs(f"{named(raw)} is said in the replay, not in the run")
+            self.differs(f"{packet_name(raw)} is said in the replay, not in the run")
 
 
 class ReplayStepRunner:

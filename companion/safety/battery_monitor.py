@@ -11,8 +11,10 @@ from enum import IntEnum
 
 from companion.safety.reasons import PowerReason, Reason, WaitReason
 from companion.settings import PowerSettings
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import BatterySeen
+from companion.vehicle.events import (
+    BatterySeen,
+    Event,
+)
 from companion.vehicle.state import VehicleState
 
 STALE_S = 10.0

@@ -13,8 +13,10 @@ from companion.perception.scan_watch import ScanWatch
 from companion.safety.reasons import Doubt, Reason
 from companion.settings import SafetySettings
 from companion.settings.live_settings import LiveSettings
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import RangeSeen
+from companion.vehicle.events import (
+    Event,
+    RangeSeen,
+)
 from companion.vehicle.state import VehicleState
 
 LATE_S = 0.1

@@ -1,7 +1,7 @@
-"""Every setting of the companion, with its default, unit and meaning, and the file they are read from."""
+"""Settings of the companion: every setting with default, unit and meaning; settings files; MAVLink parameters."""
 
 from companion.settings.planners import PlannerSettings
-from companion.settings.section import Section, SettingsError, alike
+from companion.settings.section import Section, SettingsError
 from companion.settings.settings import (
     FenceSettings,
     GuidanceSettings,
@@ -15,7 +15,7 @@ from companion.settings.settings import (
     SteeringSettings,
     TrafficSettings,
 )
-from companion.settings.settings_file import describe_first, load_settings, parse_settings
+from companion.settings.settings_file import load_settings, parse_settings
 
 __all__ = [
     "FenceSettings",
@@ -32,8 +32,6 @@ __all__ = [
     "SettingsError",
     "SteeringSettings",
     "TrafficSettings",
-    "alike",
-    "describe_first",
     "load_settings",
     "parse_settings",
 ]

@@ -1,35 +1,35 @@
-"""The settings that a ground station may change while the rover is out: their names, bounds, and the file that keeps them."""
+"""Settings that a ground station may change during a drive, as MAVLink parameters: names, bounds, and their file."""
 
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import ValidationError
 
-from companion.settings import Settings, SettingsError
-from companion.settings.settings_file import MAX_BYTES, describe_first
-from companion.storage.reading import open_file
+from companion.settings.section import SettingsError
+from companion.settings.settings import Settings
+from companion.storage.toml_file import describe_first, read_toml
 
 LONGEST_NAME = 16
-"""Characters of a MAVLink parameter's name."""
+"""Maximum length of a MAVLink parameter's name."""
 DIGITS = 7
-"""A parameter travels as a 32 bit number: 0.15 must not come out as 0.1500000059."""
+"""Values are sent as 32-bit floats; rounding to 7 digits keeps 0.15 from becoming 0.1500000059."""
 
 
 class RefusedError(Exception):
-    """A value that a parameter does not take; the text is the reason, in a few words."""
+    """A value that is refused; the text is the reason in a few words."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
     """A setting as a MAVLink parameter of the companion.
 
-    ``low`` to ``high``: what may be set from afar, narrower than what a settings file may say, lest a slip of the finger
-    switch off a watchdog or let the rover drive beyond what it sees: it is not believed that it brakes much harder than was
-    measured, nor is it made to creep faster than by default. ``next_leg``: it counts from the next leg on, all others at once.
+    ``low`` to ``high``: the bounds for ground stations. They are narrower than those of a settings file, so that a
+    typing error cannot switch off a watchdog or let the rover drive beyond what it sees: braking much harder than
+    measured and a minimum speed above the default are refused. ``next_leg``: it applies from the next leg on, all
+    others at once.
     """
 
     name: str
@@ -41,7 +41,7 @@ class Parameter:
     next_leg: bool = False
 
     def value(self, settings: Settings) -> float:
-        """What it is now."""
+        """Its present value."""
         return float(getattr(getattr(settings, self.section), self.key))
 
 
@@ -73,7 +73,7 @@ TABLE: tuple[Parameter, ...] = (
     Parameter("CMP_TRF_RADIUS", "traffic", "radius_m", 0.1, 10.0),
     Parameter("CMP_TRF_WAIT", "traffic", "patience_s", 5.0, 600.0),
 )
-"""In this order they are listed; new ones are added at the end."""
+"""In the order of their list; new ones are added at the end."""
 
 BY_NAME = {parameter.name: parameter for parameter in TABLE}
 
@@ -81,7 +81,7 @@ SLOWEST, FASTEST = "CMP_SPD_MIN", "CMP_SPD_MAX"
 
 
 def changed(settings: Settings, parameter: Parameter, value: float) -> Settings:
-    """The settings with one parameter set. Raises RefusedError: not a number, not whole, out of bounds."""
+    """The settings with one parameter changed. Raises RefusedError: not a number, not whole, out of bounds."""
     if not math.isfinite(value):
         raise RefusedError("not a number")
     value = float(f"{value:.{DIGITS}g}")
@@ -99,7 +99,7 @@ def changed(settings: Settings, parameter: Parameter, value: float) -> Settings:
 
 
 def _refuse_crossed(settings: Settings, parameter: Parameter, value: float) -> None:
-    """The slowest speed must not lie above the fastest."""
+    """Refuses a minimum speed above the maximum speed."""
     if parameter.name == SLOWEST and value > (fastest := BY_NAME[FASTEST].value(settings)):
         raise RefusedError(f"{value:g} above {FASTEST} {fastest:g}")
     if parameter.name == FASTEST and value < (slowest := BY_NAME[SLOWEST].value(settings)):
@@ -107,7 +107,7 @@ def _refuse_crossed(settings: Settings, parameter: Parameter, value: float) -> N
 
 
 def as_toml(base: Settings, tuned: Settings) -> str:
-    """What a ground station has changed, as a settings file; people may take its lines over into their own."""
+    """The changes by ground stations as a settings file, whose lines people may copy into their own."""
     lines = ["# Set from a ground station; counts after the settings file."]
     sections: dict[str, list[str]] = {}
     for parameter in TABLE:
@@ -121,22 +121,16 @@ def as_toml(base: Settings, tuned: Settings) -> str:
 
 
 def with_tuned(base: Settings, path: Path) -> Settings:
-    """The settings with what was set from a ground station in earlier runs, in the bounds that hold for it; no file changes nothing.
+    """The settings with the changes in a file that ``as_toml`` wrote, within the same bounds; no file changes nothing.
 
     Raises SettingsError (one line: file, place, reason, remedy).
     """
     remedy = "put it right, or delete it to go back to the settings file"
-    try:
-        with open_file(path) as file:
-            told = tomllib.loads(file.read(MAX_BYTES).decode("utf-8"))
-    except FileNotFoundError:
+    saved = read_toml(path, SettingsError, remedy=remedy, name_it="make it readable", missing_ok=True)
+    if not saved:
         return base
-    except OSError as error:
-        raise SettingsError(f"{path}: cannot be read: {error.strerror}; make it readable") from error
-    except (ValueError, RecursionError) as error:
-        raise SettingsError(f"{path}: not valid TOML: {str(error)[:200]}; {remedy}") from error
     values = base.model_dump()
-    for section, entries in told.items():
+    for section, entries in saved.items():
         inside = values.get(section)
         values[section] = inside | entries if isinstance(inside, dict) and isinstance(entries, dict) else entries
     try:
@@ -144,15 +138,15 @@ def with_tuned(base: Settings, path: Path) -> Settings:
     except ValidationError as error:
         raise SettingsError(f"{path}: {describe_first(error, Settings)}; {remedy}") from error
     for parameter in TABLE:
-        value, inside = parameter.value(tuned), told.get(parameter.section)
-        if inside and parameter.key in inside and not parameter.low <= value <= parameter.high:
+        value, inside = parameter.value(tuned), saved.get(parameter.section)
+        if isinstance(inside, dict) and parameter.key in inside and not parameter.low <= value <= parameter.high:
             place, bounds = f"{parameter.section}.{parameter.key}", f"{parameter.low:g}..{parameter.high:g}"
             raise SettingsError(f"{path}: {place}: {value:g} not in {bounds} ({parameter.name}); {remedy}")
     return tuned
 
 
 def differences(base: Settings, tuned: Settings) -> list[str]:
-    """What has been tuned, in words."""
+    """The changed settings in words."""
     return [
         f"{parameter.name} {parameter.value(tuned):g} (settings file: {parameter.value(base):g})"
         for parameter in TABLE

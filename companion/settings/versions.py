@@ -1,4 +1,4 @@
-"""What a result was made with, so that it can be made again."""
+"""Versions and settings that a result was made with, so that it can be reproduced."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ PACKAGES = ("rover-companion", "numpy", "numba", "shapely", "pymavlink")
 
 
 def versions() -> dict[str, str]:
-    """Of Python, of this program and of the libraries that its results depend on."""
+    """Versions of Python, this program and the libraries that its results depend on."""
     return {"python": platform.python_version(), **{name: _version(name) for name in PACKAGES}}
 
 
 def made_with(settings: Settings) -> dict[str, object]:
-    """The part of a JSON result that says what else than seed and command it follows from."""
+    """The keys of a JSON result that reproduce it together with seed and command."""
     return {"versions": versions(), "settings": settings.model_dump(mode="json")}
 
 

@@ -25,7 +25,7 @@ from companion.settings import SafetySettings
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.mission_limits import MissionLimits
 from companion.vehicle.commands import Arm, Command, SetMode
-from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen, RoverMode
+from companion.vehicle.events import AckSeen, HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState
 
 ASK_AGAIN_S = 3.0

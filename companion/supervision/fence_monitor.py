@@ -11,15 +11,19 @@ from companion.core.frames import GeoPoint
 from companion.core.severity import Severity, TextSink
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.download import Downloaded
-from companion.mission.fence import NO_FENCE, PARAMETERS, AutopilotFence, autopilot_fence
+from companion.mission.autopilot_fence import NO_FENCE, PARAMETERS, AutopilotFence, autopilot_fence
 from companion.mission.fence_items import rally_points
 from companion.mission.items import ItemError
 from companion.safety.reasons import Doubt, Reason, WaitReason
 from companion.settings import FenceSettings
 from companion.vehicle.commands import ReadParameter
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import FenceStatusSeen, PlanChangedSeen, PlanKind
-from companion.vehicle.events.vehicle import ParameterSeen
+from companion.vehicle.events import (
+    Event,
+    FenceStatusSeen,
+    ParameterSeen,
+    PlanChangedSeen,
+    PlanKind,
+)
 from companion.vehicle.state import VehicleState
 
 PARAMETER_S, PARAMETER_TRIES = 1.0, 8

@@ -17,8 +17,11 @@ from companion.perception.newest_scans import newest_ranges
 from companion.safety.mode_latch import LatchState, latched
 from companion.safety.watchdogs import ScanMonitor
 from companion.supervision.localization_monitor import LocalizationMonitor
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import RangeSeen, TextSeen
+from companion.vehicle.events import (
+    Event,
+    RangeSeen,
+    TextSeen,
+)
 from companion.vehicle.state import VehicleState, fold
 
 

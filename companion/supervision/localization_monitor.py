@@ -15,8 +15,12 @@ from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.reasons import Doubt, Reason
 from companion.settings.live_settings import LiveSettings
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import HomeSeen, LocalPositionSeen, OriginSeen
+from companion.vehicle.events import (
+    Event,
+    HomeSeen,
+    LocalPositionSeen,
+    OriginSeen,
+)
 from companion.vehicle.state import VehicleState
 
 HOME_MOVED_M = 2.0

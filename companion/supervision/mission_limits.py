@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from companion.core.frames import LocalFrame
 from companion.executive.mission_run import MissionRun
-from companion.mission.fence import AutopilotFence
+from companion.mission.autopilot_fence import AutopilotFence
 from companion.operator.notifications import Outcome
 from companion.safety.battery_monitor import BatteryMonitor, Level
 from companion.safety.reasons import Doubt, PowerReason, Reason, WaitReason
 from companion.settings import PowerSettings
 from companion.supervision.fence_monitor import FenceMonitor
 from companion.supervision.rival_monitor import RivalMonitor
-from companion.vehicle.events.event import Event
+from companion.vehicle.events import Event
 from companion.vehicle.state import VehicleState
 
 

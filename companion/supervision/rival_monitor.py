@@ -9,8 +9,11 @@ import math
 
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.reasons import Doubt, Reason, WaitReason
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
+from companion.vehicle.events import (
+    Event,
+    HeartbeatSeen,
+    RoverMode,
+)
 from companion.vehicle.state import VehicleState
 
 LISTEN_S = 1.5

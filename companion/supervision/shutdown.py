@@ -16,7 +16,7 @@ from companion.safety.mode_latch import Control
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import SetMode
-from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.events import RoverMode
 from companion.vehicle.state import fold
 
 CONFIRM_S = 0.7

@@ -1,1 +1,1 @@
-"""The vehicle as the companion knows it: events from it, its state, commands to it."""
+"""The vehicle: events from it, its state, commands to it."""

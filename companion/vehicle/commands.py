@@ -1,17 +1,16 @@
-"""What the companion can ask of the autopilot, as plain values; only the codec knows their bytes."""
+"""Commands and messages to the autopilot and ground stations, as plain values; the codec makes packets of them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from companion.core.frames import NedPoint
-from companion.vehicle.events.plan import PlanKind
-from companion.vehicle.events.targets import Asker, TargetAnswer, TargetForm
+from companion.vehicle.events import Asker, PlanKind, TargetAnswer, TargetForm
 
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """Here I am: component 191, an onboard controller."""
+    """HEARTBEAT of the companion: component 191, an onboard controller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,16 +27,16 @@ class Arm:
 
 @dataclass(frozen=True, slots=True)
 class GuidedPosition:
-    """Drive to a place in the local frame (from the EKF origin)."""
+    """Drive to a place in the local frame (metres from the EKF origin)."""
 
     point: NedPoint
 
 
 @dataclass(frozen=True, slots=True)
 class GuidedVelocity:
-    """Drive along the rover's own axis at this speed (negative: backwards) with this turn rate, clockwise.
+    """Drive forwards (negative: backwards) with a turn rate, clockwise.
 
-    The autopilot stops by itself 3 s after the last one.
+    The autopilot stops 3 s after the last one (GUID_TIMEOUT).
     """
 
     forward_m_s: float
@@ -60,7 +59,7 @@ class ChangeSpeed:
 
 @dataclass(frozen=True, slots=True)
 class RequestRate:
-    """Stream a message at a rate."""
+    """Have a message sent at a rate."""
 
     message_id: int
     rate_hz: float
@@ -68,19 +67,19 @@ class RequestRate:
 
 @dataclass(frozen=True, slots=True)
 class RequestMessage:
-    """Send one message now."""
+    """Have a message sent once, now."""
 
     message_id: int
 
 
 @dataclass(frozen=True, slots=True)
-class AskPrearm:
-    """Have the autopilot check whether it could be armed, and say what is in the way. Nothing moves."""
+class RunPrearmChecks:
+    """Have the autopilot run its pre-arm checks and report failures. Nothing moves."""
 
 
 @dataclass(frozen=True, slots=True)
-class AskTime:
-    """TIMESYNC: the answer brings ``asked_ns`` back, nanoseconds of our own clock."""
+class TimeSync:
+    """TIMESYNC: the answer returns ``asked_ns``, nanoseconds of the companion's clock."""
 
     asked_ns: int
 
@@ -94,14 +93,14 @@ class ReadParameter:
 
 @dataclass(frozen=True, slots=True)
 class RequestList:
-    """Tell how many items a stored list has."""
+    """Ask how many items a stored list has."""
 
     kind: PlanKind
 
 
 @dataclass(frozen=True, slots=True)
 class RequestItem:
-    """Tell one item of a stored list."""
+    """Ask for one item of a stored list."""
 
     kind: PlanKind
     index: int
@@ -109,15 +108,15 @@ class RequestItem:
 
 @dataclass(frozen=True, slots=True)
 class EndTransfer:
-    """The transfer of a stored list is over: all has arrived, or (``cancelled``) no more is wanted."""
+    """End the transfer of a stored list: complete, or ``cancelled``."""
 
     kind: PlanKind
     cancelled: bool = False
 
 
 @dataclass(frozen=True, slots=True)
-class TellParameter:
-    """One of the companion's own parameters, at its place in the list of ``count``."""
+class ParameterValue:
+    """PARAM_VALUE: one of the companion's own parameters, with its index in the list of ``count``."""
 
     name: str
     value: float
@@ -127,24 +126,25 @@ class TellParameter:
 
 
 @dataclass(frozen=True, slots=True)
-class TellFigure:
-    """A figure for people to watch; its name has at most 10 characters."""
+class NamedValue:
+    """NAMED_VALUE_FLOAT: a figure for ground stations; its name has at most 10 characters."""
 
     name: str
     value: float
 
 
 @dataclass(frozen=True, slots=True)
-class Say:
-    """Text for the people at the ground station; severity as in MAVLink (6 info, 4 warning, 2 critical)."""
+class StatusText:
+    """STATUSTEXT: a text for the people at the ground station."""
 
     severity: int
+    """See ``core.severity``."""
     text: str
 
 
 @dataclass(frozen=True, slots=True)
 class AnswerTarget:
-    """What becomes of a guided target that somebody asked of the companion; to him alone."""
+    """The answer to a guided target asked of the companion; sent to the asker alone."""
 
     asker: Asker
     form: TargetForm
@@ -162,38 +162,14 @@ Command = (
     | ChangeSpeed
     | RequestRate
     | RequestMessage
-    | AskTime
-    | AskPrearm
+    | TimeSync
+    | RunPrearmChecks
     | ReadParameter
     | RequestList
     | RequestItem
     | EndTransfer
-    | Say
+    | StatusText
     | AnswerTarget
-    | TellParameter
-    | TellFigure
+    | ParameterValue
+    | NamedValue
 )
-
-__all__ = [
-    "AnswerTarget",
-    "Arm",
-    "AskPrearm",
-    "AskTime",
-    "ChangeSpeed",
-    "Command",
-    "EndTransfer",
-    "GuidedHeading",
-    "GuidedPosition",
-    "GuidedVelocity",
-    "Heartbeat",
-    "ReadParameter",
-    "RequestItem",
-    "RequestList",
-    "RequestMessage",
-    "RequestRate",
-    "Say",
-    "SetMode",
-    "Setpoint",
-    "TellFigure",
-    "TellParameter",
-]

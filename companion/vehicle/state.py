@@ -1,4 +1,4 @@
-"""What is known of the vehicle: events come in, ``fold`` keeps the state."""
+"""State of the vehicle: ``fold`` adds one event to it."""
 
 from __future__ import annotations
 
@@ -6,23 +6,18 @@ import math
 from dataclasses import dataclass, field, replace
 
 from companion.core.frames import Pose
-from companion.vehicle.dead_reckoning import Reckoned, Wander, jump_m, reckoned, wandered
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.targets import (
-    GuidedLeg,
-    ItemCurrentSeen,
-    ItemReachedSeen,
-    LegSeen,
-    LegState,
-    leg_after,
-    leg_at_heartbeat,
-)
-from companion.vehicle.events.vehicle import (
+from companion.vehicle.auto_leg import GuidedLeg, LegState, leg_after, leg_at_heartbeat
+from companion.vehicle.dead_reckoning import Drift, Reckoning, drift_after, jump_m, reckoning_after
+from companion.vehicle.events import (
     AttitudeSeen,
     EkfStatusSeen,
+    Event,
     GlobalPositionSeen,
     HeartbeatSeen,
     HomeSeen,
+    ItemCurrentSeen,
+    ItemReachedSeen,
+    LegSeen,
     LocalPositionSeen,
     OriginSeen,
     OtherSeen,
@@ -32,27 +27,27 @@ from companion.vehicle.events.vehicle import (
     RoverMode,
     TargetSeen,
 )
-from companion.vehicle.link_latency import BACK_S, Latency, TimeAnswered, answered, reported
-from companion.vehicle.rc_input import Sticks, SticksSeen, followed
+from companion.vehicle.link_latency import BACK_S, Latency, TimeAnswered, latency_after_answer, latency_after_report
+from companion.vehicle.rc_input import Sticks, SticksSeen, sticks_after
 
 EKF_ATTITUDE, EKF_VELOCITY = 1, 2
 """ATTITUDE and VELOCITY_HORIZ must both be set to drive."""
 EKF_POSITION = 8 | 16
 """POS_HORIZ_REL or POS_HORIZ_ABS: one of them must be set to drive."""
 EKF_CONST_POSITION = 128
-"""CONST_POS_MODE must not be set. No other flag counts: GPS_GLITCH alone stops neither ArduRover nor us."""
+"""CONST_POS_MODE must not be set. No other flag counts: GPS_GLITCH alone stops neither ArduRover nor the companion."""
 PARAMETERS_KEPT = frozenset(
     ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS", "WP_RADIUS")
 )
-"""The autopilot tells hundreds of parameters whenever somebody lists them; no other is of use to a run."""
+"""The parameters that a run needs: the autopilot sends hundreds whenever a ground station lists them."""
 OTHERS_KEPT = 64
 OTHERS_FORGOTTEN_S = 30.0
-"""Other vehicles are remembered for so long after they were last heard, and no more than so many of them."""
+"""Other vehicles are kept for this long after their last message, and no more than OTHERS_KEPT of them."""
 
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
-    """The newest of everything; ``None`` until first heard."""
+    """The newest event of each kind; None until the first."""
 
     heartbeat: HeartbeatSeen | None = None
     position: LocalPositionSeen | None = None
@@ -63,28 +58,28 @@ class VehicleState:
     home: HomeSeen | None = None
     scan: RangeSeen | None = None
     scan_ahead: RangeSeen | None = None
-    """The newest range data that says something about straight ahead: without it the rover would drive blind."""
+    """The newest range data that covers straight ahead: without it the rover would drive blind."""
     target: TargetSeen | None = None
     prearm: PrearmSeen | None = None
     jump_m: float = 0.0
-    """How far the last position report lay from where the velocity had led us to expect it."""
+    """How far the last position report was from where the velocity led."""
     frozen: bool = False
-    """The velocity says that the rover moves and the position does not: kept until a person sets GUIDED again."""
-    reckoned: Reckoned | None = None
-    """The check for that, under way."""
-    wander: Wander = field(default_factory=Wander)
-    """How far the position has wandered from where the velocity has led."""
+    """The velocity says that the rover moves, the position that it stands: kept until a person sets GUIDED again."""
+    reckoned: Reckoning | None = None
+    """The state of that check."""
+    wander: Drift = field(default_factory=Drift)
+    """How far the position has drifted from where the velocity led."""
     restarted: bool = False
     """The autopilot's boot time has run back: kept until a person sets GUIDED again."""
     latency: Latency = field(default_factory=Latency)
     """How late the link is."""
     sticks: Sticks = field(default_factory=Sticks)
-    """Whether a pilot has taken hold of them since a person set GUIDED."""
+    """Whether a pilot has moved the sticks since a person set GUIDED."""
     parameters: dict[str, float] = field(default_factory=dict)
     others: dict[str, OtherSeen] = field(default_factory=dict)
-    """Who else is about, by name."""
+    """Other vehicles, by name."""
     in_auto: bool = False
-    """Whether the companion drives legs that AUTO hands over, instead of a mission of its own in GUIDED."""
+    """Whether the companion drives legs of an AUTO mission, instead of a mission of its own in GUIDED."""
     leg: GuidedLeg | None = None
     """The last leg that was handed over."""
 
@@ -95,13 +90,13 @@ class VehicleState:
 
     @property
     def is_ours(self) -> bool:
-        """Whether the companion may steer, by the mode: in GUIDED; or, if it serves AUTO, there while a leg is handed over."""
+        """Whether the mode lets the companion steer: GUIDED; or AUTO with a live leg, if it drives legs of AUTO."""
         if self.heartbeat is None or self.heartbeat.mode != self.own_mode:
             return False
         return not self.in_auto or (self.leg is not None and self.leg.state is LegState.LIVE)
 
     def pose_at(self, time_s: float) -> Pose | None:
-        """Position and heading carried forward to a moment with the last known velocities; None if not known yet."""
+        """Position and heading, extrapolated to a time with the last velocities; None until both are known."""
         if self.position is None or self.attitude is None:
             return None
         ahead_s = min(max(time_s - self.position.time_s, 0.0), 0.5)
@@ -120,12 +115,12 @@ class VehicleState:
 
     @property
     def latency_s(self) -> float:
-        """From something seen to a command that arrives, as far as the link is to blame; measured, 0 until then."""
+        """The link's share of the time from an observation to the arrival of a command; 0 until measured."""
         return self.latency.longest_s
 
     @property
     def ekf_lacks(self) -> str:
-        """What the autopilot does not trust of its own estimate, in a word; empty when the rover may be driven by it."""
+        """The part of its estimate that the autopilot does not trust, in a word; empty when the rover may drive."""
         flags = 0 if self.ekf is None else self.ekf.flags
         if not flags & EKF_POSITION or flags & EKF_CONST_POSITION:
             return "position"
@@ -157,15 +152,15 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
         case TargetSeen():
             return replace(state, target=event)
         case SticksSeen():
-            return replace(state, sticks=followed(state.sticks, event))
+            return replace(state, sticks=sticks_after(state.sticks, event))
         case TimeAnswered():
-            return replace(state, latency=answered(state.latency, event))
+            return replace(state, latency=latency_after_answer(state.latency, event))
         case _:
-            return _fold_seldom(state, event)
+            return _fold_rare(state, event)
 
 
-def _fold_seldom(state: VehicleState, event: Event) -> VehicleState:
-    """What comes once, or by the way."""
+def _fold_rare(state: VehicleState, event: Event) -> VehicleState:
+    """The state after an event of a rarer kind."""
     match event:
         case OriginSeen():
             return replace(state, origin=event)
@@ -190,13 +185,16 @@ def _with_parameter(state: VehicleState, event: ParameterSeen) -> VehicleState:
 
 
 def _with_other(others: dict[str, OtherSeen], event: OtherSeen) -> dict[str, OtherSeen]:
-    """The newest of everybody; who has been silent for long is forgotten, and of too many those heard longest ago."""
+    """The newest event of each vehicle, without those silent for too long; of too many, the newest."""
     kept = [one for one in others.values() if one.name != event.name and event.time_s - one.time_s < OTHERS_FORGOTTEN_S]
     return {one.name: one for one in [*kept[-(OTHERS_KEPT - 1) :], event]}
 
 
 def _with_heartbeat(state: VehicleState, event: HeartbeatSeen) -> VehicleState:
-    """Mode and arming; whoever sets our mode anew has looked after position and clock, and has the sticks as he wants them."""
+    """Mode and arming.
+
+    A person who sets the companion's mode again accepts the position, the clock and the sticks as they are.
+    """
     leg = leg_at_heartbeat(state.leg, event.time_s, in_auto=event.armed and event.mode == RoverMode.AUTO)
     before, state = state.heartbeat, replace(state, heartbeat=event, leg=leg)
     if before is None:
@@ -207,15 +205,15 @@ def _with_heartbeat(state: VehicleState, event: HeartbeatSeen) -> VehicleState:
 
 
 def _with_position(state: VehicleState, now: LocalPositionSeen) -> VehicleState:
-    """The position, compared with where the velocity has led, and its time with our clock."""
+    """The position, compared with where the velocity led, and its time compared with the companion's clock."""
     before = state.position
     if before is not None and now.boot_s < before.boot_s - BACK_S:
         off_m = jump_m(before, now, clock_jumped=True)
         return replace(state, position=now, jump_m=off_m, restarted=True, latency=Latency(), reckoned=None)
-    latency = reported(state.latency, now.time_s, now.boot_s)
+    latency = latency_after_report(state.latency, now.time_s, now.boot_s)
     clock_jumped = latency.jumped_s == now.time_s
-    so_far, frozen = reckoned(None if clock_jumped else state.reckoned, before, now)
+    so_far, frozen = reckoning_after(None if clock_jumped else state.reckoned, before, now)
     off_m = jump_m(before, now, clock_jumped=clock_jumped)
     frozen = state.frozen or frozen
-    wander = wandered(state.wander, before, now)
+    wander = drift_after(state.wander, before, now)
     return replace(state, position=now, jump_m=off_m, reckoned=so_far, frozen=frozen, latency=latency, wander=wander)

@@ -1,4 +1,4 @@
-"""What can be learned of an autopilot without moving anything."""
+"""Survey of an autopilot: what it says about itself, its sensors and its link, without moving anything."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from companion.vehicle.state import VehicleState
 class RangeSource:
     """A range sensor, as its messages describe it.
 
-    ``sector``: one of the autopilot's own 45 degree sectors. ``orientation`` as in DISTANCE_SENSOR, None for one that looks about
-    (OBSTACLE_DISTANCE). ``blind``: no reading so far meant anything.
+    ``sector``: one of the autopilot's own 45 degree sectors. ``orientation`` as in DISTANCE_SENSOR; None for a scanning
+    sensor (OBSTACLE_DISTANCE). ``blind``: no valid reading so far.
     """
 
     message: str
@@ -29,7 +29,7 @@ class RangeSource:
 
 @dataclass(frozen=True, slots=True)
 class SlowMessage:
-    """A message that comes at less than three fifths of the rate asked for."""
+    """A message that arrives at less than three fifths of the requested rate."""
 
     name: str
     wanted_hz: float
@@ -38,7 +38,7 @@ class SlowMessage:
 
 @dataclass(frozen=True, slots=True)
 class Autopilot:
-    """Somebody who spoke as an autopilot (component 1): MAV_TYPE and MAV_AUTOPILOT."""
+    """A sender of heartbeats as an autopilot (component 1): ``kind`` is its MAV_TYPE, ``make`` its MAV_AUTOPILOT."""
 
     system: int
     kind: int
@@ -46,8 +46,11 @@ class Autopilot:
 
 
 @dataclass(frozen=True, slots=True)
-class Examined:
-    """After having listened and asked. ``parameters`` holds those that were told; ``asked`` those that were asked for."""
+class Survey:
+    """What listening and asking has shown.
+
+    ``asked``: the parameters asked for; ``parameters``: those that were answered.
+    """
 
     place: str
     system: int = 1
@@ -56,7 +59,7 @@ class Examined:
     rover_heard: bool = False
     autopilots: tuple[Autopilot, ...] = ()
     systems: frozenset[int] = frozenset()
-    """Everybody who was heard."""
+    """The system ids of all senders."""
     companion_heard: bool = False
     version: tuple[int, int, int] | None = None
     parameters: Mapping[str, float] = field(default_factory=dict)
@@ -66,10 +69,10 @@ class Examined:
     texts: tuple[str, ...] = ()
     fence_breached: bool = False
     signing: str = ""
-    """What is wrong with signatures, and"""
+    """What is wrong with signatures; empty if nothing is."""
     signing_remedy: str = ""
-    """what to do about it."""
+    """What to do about it."""
     unbelieved: int | None = None
-    """The system id of a rover that is heard, but not believed: its packets are not signed with our key."""
+    """The system id of a rover whose packets are refused, because they are not signed with the companion's key."""
     lost: int = 0
     packets: int = 0

@@ -1,8 +1,8 @@
 """Draws the worlds of the shipped missions: ``python missions/maps/draw.py [FOLDER]``.
 
-100 x 50 fields of 1 m, black is an obstacle. Fields are written (x, y), x east and y north from the south-west corner, as in
-missions; the pictures are north up. Start is (0, 24), target (98, 24). Every passage is at least three fields wide. The
-chance in it is seeded: the same pictures come out each time.
+100 x 50 fields of 1 m, black is an obstacle. Fields are written (x, y), x east and y north from the south-west corner,
+as in missions; north is up. Start is (0, 24), target (98, 24). Every passage is at least three fields
+wide. Random numbers are seeded: every run draws the same images.
 """
 
 from __future__ import annotations
@@ -290,7 +290,7 @@ def known_2() -> Mask:
 
 
 def known_3() -> Mask:
-    """Walls with openings far to the left and right of the straight way: near the limit of a curve with 4 control points."""
+    """Walls with openings far to the left and right of the straight line: near the limit of 4 control points."""
     world = open_ground()
     for x, y0, y1 in ((28, 0, 30), (28, 44, 49), (64, 0, 4), (64, 18, 49), (85, 0, 14), (85, 30, 49)):
         fill(world, x, y0, x + 1, y1)

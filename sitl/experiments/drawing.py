@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Cell, Grid
-from companion.storage.reading import refuse_pipe
+from companion.storage.files import refuse_pipe
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0072b2", "#d1495b", "#009e73", "#e69f00", "#8a8f98"
 WALL, UNSEEN, GROUND = (0.20, 0.22, 0.26), (0.78, 0.80, 0.83), (0.985, 0.985, 0.975)

@@ -74,7 +74,7 @@ class Series:
     def missed(self) -> int:
         """Drives in which a target was missed."""
         return sum(
-            report.outcome not in (Outcome.REACHED, Outcome.COLLISION)
+            report.outcome not in (DriveOutcome.REACHED, DriveOutcome.COLLISION)
             or any(status is not TargetStatus.REACHED for _, status in report.targets)
             for report in self.reports
         )

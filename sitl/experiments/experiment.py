@@ -16,7 +16,7 @@ from companion.core.grid import Cell, Grid
 from companion.mapping.map_files import load_map
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings
-from companion.storage.reading import why_no_file
+from companion.storage.files import why_no_file
 
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from rich import box
 from rich.table import Table
 
-from companion.storage.reading import read_at_most
+from companion.storage.files import read_at_most
 
 MOST_BYTES = 10_000_000
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Weights
 from companion.planning.problem import PlanningProblem
-from companion.storage.reading import read_at_most
+from companion.storage.files import read_at_most
 from sitl.experiments.experiment import ExperimentError
 
 MOST_BYTES = 10_000_000

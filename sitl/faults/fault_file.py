@@ -7,8 +7,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from companion.mission.tables import read_table
-from companion.settings import alike, describe_first
+from companion.storage.toml_file import alike, describe_first, read_table
 from sitl.faults.plan import Fault, FaultPlan
 from sitl.faults.tables import KINDS, PlanTable
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from companion.storage.reading import read_at_most
+from companion.storage.files import read_at_most
 from sitl.autopilot.control.servo_outputs import (
     GROUND_STEERING,
     THROTTLE,

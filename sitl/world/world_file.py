@@ -24,8 +24,9 @@ from shapely.geometry.base import BaseGeometry
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Grid
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.mission import MoverSpec
-from companion.mission.tables import FileName, Metres, Name, Pair, Positive, Table, named, read_table
+from companion.mission.tables import FileName, Metres, Name, Pair, Positive, Table, named
 from companion.mission.toml_reader import MoverTable
+from companion.storage.toml_file import read_table
 from sitl.world.doors import FOR_EVER_MS, Door, whole_ms
 from sitl.world.movers import Announcement, Mover, timed_track
 from sitl.world.world import FIRM, TOP_SPEED_M_S, Ground, World

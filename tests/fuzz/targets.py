@@ -147,7 +147,7 @@ def record(data: bytes) -> None:
 
 def recorded_mission(data: bytes) -> None:
     """The mission in a record."""
-    from companion.mission.as_json import from_json
+    from companion.mission.serialization import from_json
 
     with refusing():
         from_json(data, "mission.json")

@@ -16,12 +16,11 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
-from companion.diagnosis.diagnose import diagnose
+from companion.diagnosis.checks import PARAMETERS, diagnose
 from companion.diagnosis.finding import Level
-from companion.diagnosis.parameters import PARAMETERS
 from companion.mavlink.byte_link import MemoryLink
-from companion.mavlink.examination import Examination
 from companion.mavlink.signing import Signer
+from companion.mavlink.surveyor import Surveyor
 from companion.settings import Settings
 from sitl.scenario import scenario_from_mission
 from tests.sitl.network.test_server import free_port
@@ -66,7 +65,7 @@ class Case:
         simulator.advance_to_s(self.on_s + 0.2)
         modes = {(simulator.time_s, int(m.custom_mode), m.base_mode) for m in heartbeats(pilot.take())}
         vehicle.take()
-        examination = Examination(near, Settings().link, PARAMETERS, self.signer)
+        examination = Surveyor(near, Settings().link, PARAMETERS, self.signer)
         parser, listener = mavlink.MAVLink(None), mavlink.MAVLink(None)
         start_s = simulator.time_s
         while not examination.done and simulator.time_s - start_s < self.seconds:
@@ -212,7 +211,7 @@ def test_a_key_that_only_we_have(tmp_path: Path) -> None:
 def test_what_real_firmware_said() -> None:
     """A recording of ArduRover 4.7 with three rangefinders, while another companion drove it."""
     near, far = MemoryLink.pair()
-    examination = Examination(near, Settings().link, PARAMETERS)
+    examination = Surveyor(near, Settings().link, PARAMETERS)
     for number, raw in enumerate(raw_packets(SHARED / "data" / "ardurover-4.7-transcripts" / "rangefinders.tlog")):
         far.write(raw)
         examination.step(0.005 * number)
@@ -229,7 +228,7 @@ def test_what_real_firmware_said() -> None:
 def test_no_rover_but_a_copter_or_nobody() -> None:
     for data, finding in ((Station(1, 1).heartbeat(kind=2), "not-a-rover"), (b"", "no-autopilot")):
         near, far = MemoryLink.pair()
-        examination = Examination(near, Settings().link, PARAMETERS)
+        examination = Surveyor(near, Settings().link, PARAMETERS)
         far.write(data)
         for tick in range(100):
             examination.step(0.05 * tick)
@@ -242,7 +241,7 @@ def test_no_rover_but_a_copter_or_nobody() -> None:
 @given(st.lists(st.binary(max_size=300), max_size=6))
 def test_any_bytes_are_survived(pieces: list[bytes]) -> None:
     near, far = MemoryLink.pair()
-    examination = Examination(near, Settings().link, PARAMETERS)
+    examination = Surveyor(near, Settings().link, PARAMETERS)
     far.write(Station().heartbeat())
     for tick, piece in enumerate(pieces):
         far.write(piece)
@@ -254,7 +253,7 @@ def test_any_bytes_are_survived(pieces: list[bytes]) -> None:
 def test_any_values_in_what_it_looks_at_are_survived(data: st.DataObject) -> None:
     """Whole packets with any bytes for their fields, of anybody."""
     near, far = MemoryLink.pair()
-    examination = Examination(near, Settings().link, PARAMETERS)
+    examination = Surveyor(near, Settings().link, PARAMETERS)
     far.write(Station().heartbeat())
     for tick in range(4):
         number = data.draw(st.sampled_from([0, 1, 22, 132, 148, 173, 193, 242, 253, 330]))

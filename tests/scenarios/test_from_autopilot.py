@@ -17,7 +17,7 @@ from companion.cli.commands import app
 from companion.cli.source import refuse_arming
 from companion.executive.autopilot_mission import AGAIN_S, TRIES, MissionFetcher
 from companion.mission.mission import Mission, MissionError, RoverSpec
-from companion.mission.stored import mission_of
+from companion.mission.stored_mission import mission_of
 from tests.scenarios.test_auto_legs import GUIDED_ENABLE, NONE, ON, WAYPOINT, Row, place_deg
 from tests.support.asker import Asker
 from tests.support.rig import ARM, AUTO, SET_MODE, yard

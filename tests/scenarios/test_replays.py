@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 from companion.app import Companion
 from companion.cli.commands import app
-from companion.cli.why_image import FREE_COLOUR
+from companion.cli.images import FREE_COLOUR
 from companion.core.round_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec

@@ -19,7 +19,7 @@ from companion.navigation.step_runner import InlineRunner
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.settings.live_settings import LiveSettings
-from companion.vehicle.events.vehicle import AttitudeSeen, HeartbeatSeen, LocalPositionSeen, RangeSeen
+from companion.vehicle.events import AttitudeSeen, HeartbeatSeen, LocalPositionSeen, RangeSeen
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import GUIDED, PLACE, vehicle
 from tests.support.fake_autopilot import FakeAutopilot

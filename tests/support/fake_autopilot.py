@@ -7,9 +7,11 @@ from dataclasses import dataclass, field
 from companion.mavlink.download import Downloaded
 from companion.mavlink.rates import RateFault
 from companion.vehicle.commands import Command
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import PlanKind
-from companion.vehicle.events.vehicle import AckSeen
+from companion.vehicle.events import (
+    AckSeen,
+    Event,
+    PlanKind,
+)
 
 
 @dataclass

@@ -33,7 +33,7 @@ from companion.navigation.step_runner import InlineRunner
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.safety.reasons import Activity, Doubt, RunPhase, WaitReason
 from companion.settings import Settings
-from companion.storage.disk import OsDisk
+from companion.storage.files import OsDisk
 from companion.vehicle.commands import GuidedPosition
 from sitl.scenario import scenario_from_mission
 from sitl.simulator import Simulator

@@ -32,7 +32,7 @@ from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
 from companion.safety.mode_latch import Control
-from companion.storage.disk import OsDisk, replace_file
+from companion.storage.files import OsDisk, replace_file
 
 FIELD = st.integers(-1000, 1000)
 METRES = st.floats(-1e6, 1e6)

@@ -35,7 +35,7 @@ from companion.navigation.field_step import NavState, initial_state
 from companion.recording.recorder import NullRecorder
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
-from companion.vehicle.events.vehicle import HeartbeatSeen, LocalPositionSeen, RoverMode
+from companion.vehicle.events import HeartbeatSeen, LocalPositionSeen, RoverMode
 from companion.vehicle.state import VehicleState
 from tests.support.rig import yard
 

@@ -23,7 +23,7 @@ from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.mission import Mission
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
-from companion.vehicle.events.vehicle import HeartbeatSeen, LocalPositionSeen, RoverMode
+from companion.vehicle.events import HeartbeatSeen, LocalPositionSeen, RoverMode
 from companion.vehicle.state import VehicleState
 from tests.support.rig import yard
 from tests.support.states import a_state

@@ -144,7 +144,14 @@ def test_scenarios_are_read_with_y_upward(tmp_path):
     assert spread([first, second] * 50, 3) == [first, first, second]
 
 
-@pytest.mark.parametrize(("text", "place"), [("hello\n", "line 1"), ("version 1\n0 m 8 6 0 3 7\n", "line 2"), ("version 1\n\n0 m 8 6 0 3 7 x 8\n", "line 3")])  # fmt: skip
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("hello\n", "line 1"),
+        ("version 1\n0 m 8 6 0 3 7\n", "line 2"),
+        ("version 1\n\n0 m 8 6 0 3 7 x 8\n", "line 3"),
+    ],
+)
 def test_a_bad_scenario_file_names_its_line(tmp_path, text, place):
     file = tmp_path / "m.scen"
     file.write_text(text)

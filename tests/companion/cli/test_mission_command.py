@@ -10,7 +10,10 @@ from companion.cli.commands import app
 MISSIONS = Path(__file__).resolve().parents[3] / "missions"
 
 
-@pytest.mark.parametrize("path", sorted(path for path in MISSIONS.iterdir() if path.suffix in (".toml", ".plan", ".waypoints")), ids=lambda path: path.name)  # fmt: skip
+SHIPPED = sorted(path for path in MISSIONS.iterdir() if path.suffix in (".toml", ".plan", ".waypoints"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
 def test_every_shipped_mission_is_understood(path: Path) -> None:
     result = CliRunner().invoke(app, ["mission", "check", str(path)])
     assert result.exit_code == 0
@@ -20,7 +23,8 @@ def test_every_shipped_mission_is_understood(path: Path) -> None:
 def test_it_says_what_was_understood(tmp_path: Path) -> None:
     path = tmp_path / "m.toml"
     path.write_text(
-        'name = "[bold]yard[/bold]"\n[[target]]\nname = "gate"\nnorth_m = 5\neast_m = 2.5\nhold_s = 3\non_blocked = "wait"\n'
+        'name = "[bold]yard[/bold]"\n[[target]]\nname = "gate"\nnorth_m = 5\neast_m = 2.5\n'
+        'hold_s = 3\non_blocked = "wait"\n'
         "[[keep_out]]\nlat_deg = 53.0\nlon_deg = 23.0\nradius_m = 7\n"
         "[[keep_in]]\npolygon_m = [[-50, -50], [-50, 50], [50, 50]]\n"
         "[[corridor]]\nweight = 0.2\nline_m = [[0, 0], [5, 5]]\nwidth_m = 2\n"

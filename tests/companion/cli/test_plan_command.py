@@ -6,8 +6,8 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
-from companion.cli.plan_answer import tightest_radius
-from companion.cli.plan_image import CURVE_COLOUR, OBSTACLE_COLOUR, PATH_COLOUR, START_COLOUR, TARGET_COLOUR
+from companion.cli.images import CURVE_COLOUR, OBSTACLE_COLOUR, PATH_COLOUR, START_COLOUR, TARGET_COLOUR
+from companion.cli.plan import tightest_radius
 
 MAP = """type octile
 height 6

@@ -6,7 +6,7 @@ import os
 import socket
 from pathlib import Path
 
-from companion.cli.levels import Reader, levelled, reader_of
+from companion.cli.live import Reader, levelled, reader_of
 from companion.cli.service import Service
 from companion.operator.notifications import Status
 from companion.safety.reasons import Activity, RunPhase

@@ -11,10 +11,9 @@ import pytest
 
 from companion.core.frames import GeoPoint
 from companion.core.scan import RangeScan
-from companion.diagnosis.diagnose import diagnose, kernels
+from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Level
-from companion.diagnosis.parameters import PARAMETERS
-from companion.vehicle.events.vehicle import (
+from companion.vehicle.events import (
     EkfStatusSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -25,7 +24,7 @@ from companion.vehicle.events.vehicle import (
     RoverMode,
 )
 from companion.vehicle.state import VehicleState
-from companion.vehicle.survey import Autopilot, Examined, RangeSource, SlowMessage
+from companion.vehicle.survey import Autopilot, RangeSource, SlowMessage, Survey
 
 HERE = GeoPoint(53.0, 23.0)
 SCAN = RangeSeen(0.0, RangeScan(0.0, np.array([0.0]), np.array([3.0]), 0.1, 8.0, 0.1, "x"))
@@ -36,7 +35,7 @@ WELL_SET = {
     "PRX1_TYPE": 0.0, "RNGFND1_TYPE": 0.0, "FS_GCS_ENABLE": 1.0, "FENCE_ENABLE": 0.0, "MAV_GCS_SYSID": 255.0,
     "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0,
 }  # fmt: skip
-WELL = Examined(
+WELL = Survey(
     place="memory",
     vehicle=VehicleState(
         heartbeat=HeartbeatSeen(0.0, RoverMode.HOLD, False, 1),
@@ -59,24 +58,24 @@ WELL = Examined(
 )
 
 
-def with_set(**values: float) -> Examined:
+def with_set(**values: float) -> Survey:
     return replace(WELL, parameters={**WELL_SET, **values})
 
 
-def without(*names: str) -> Examined:
+def without(*names: str) -> Survey:
     return replace(WELL, parameters={name: value for name, value in WELL_SET.items() if name not in names})
 
 
-def with_state(**parts: Any) -> Examined:
+def with_state(**parts: Any) -> Survey:
     return replace(WELL, vehicle=replace(WELL.vehicle, **parts))
 
 
-def beat(mode: int, *, armed: bool) -> Examined:
+def beat(mode: int, *, armed: bool) -> Survey:
     return with_state(heartbeat=HeartbeatSeen(0.0, mode, armed, 1))
 
 
 S, W, N = Level.STOP, Level.WARN, Level.NOTE
-CASES: list[tuple[str, Level, Examined]] = [
+CASES: list[tuple[str, Level, Survey]] = [
     ("oa-type", S, with_set(OA_TYPE=1.0)),
     ("avoid-enable", S, with_set(AVOID_ENABLE=7.0)),
     ("guid-options", S, with_set(GUID_OPTIONS=72.0)),
@@ -126,7 +125,7 @@ CASES: list[tuple[str, Level, Examined]] = [
     ("signing", S, replace(WELL, rover_heard=False, signing="Heard only unsigned packets", signing_remedy="so")),
     ("not-a-rover", S, replace(WELL, rover_heard=False, autopilots=(Autopilot(1, 2, 3),))),
     ("no-autopilot", S, replace(WELL, rover_heard=False, autopilots=())),
-    ("no-autopilot", S, Examined(place="memory")),
+    ("no-autopilot", S, Survey(place="memory")),
 ]  # fmt: skip
 
 
@@ -135,7 +134,7 @@ def test_a_rover_that_is_well_has_no_findings() -> None:
 
 
 @pytest.mark.parametrize(("name", "level", "seen"), CASES, ids=[f"{case[0]}-{n}" for n, case in enumerate(CASES)])
-def test_one_fault_is_one_finding(name: str, level: Level, seen: Examined) -> None:
+def test_one_fault_is_one_finding(name: str, level: Level, seen: Survey) -> None:
     findings = diagnose(seen)
     assert [(one.name, one.level) for one in findings] == [(name, level)]
     (finding,) = findings

@@ -14,19 +14,16 @@ from companion.core.frames import GeoPoint, LocalFrame
 from companion.core.severity import Severity
 from companion.executive.auto_mode_legs import AutoModeLegs
 from companion.executive.mission_progress import MissionPhase, TargetStatus, on_reached
+from companion.vehicle.auto_leg import LEG_KEPT_S, GuidedLeg, LegState, leg_after, leg_at_heartbeat
 from companion.vehicle.commands import GuidedPosition
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.targets import (
-    LEG_KEPT_S,
-    GuidedLeg,
+from companion.vehicle.events import (
+    Event,
+    HeartbeatSeen,
     ItemCurrentSeen,
     ItemReachedSeen,
     LegSeen,
-    LegState,
-    leg_after,
-    leg_at_heartbeat,
+    RoverMode,
 )
-from companion.vehicle.events.vehicle import HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState, fold
 from tests.companion.safety.test_mode_latch import PLACE
 from tests.support.desk import Desk

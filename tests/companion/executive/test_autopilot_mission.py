@@ -8,12 +8,16 @@ from companion.core.severity import Severity
 from companion.executive.autopilot_mission import MissionChangeMonitor
 from companion.mavlink.download import Downloaded, Downloads
 from companion.mission.items import Item
-from companion.mission.stored import digest
-from companion.vehicle.events.plan import PlanChangedSeen, PlanItemSeen, PlanKind
-from companion.vehicle.events.targets import ItemCurrentSeen
-from companion.vehicle.events.vehicle import TextSeen
+from companion.mission.stored_mission import digest
+from companion.vehicle.events import (
+    ItemCurrentSeen,
+    PlanChangedSeen,
+    PlanItemSeen,
+    PlanKind,
+    TextSeen,
+)
 from companion.vehicle.state import VehicleState
-from tests.companion.mission.test_stored_missions import GOING
+from tests.companion.mission.test_stored_mission import GOING
 from tests.support.notices import Notices
 
 

@@ -13,8 +13,14 @@ from companion.executive.mission_progress import MissionPhase
 from companion.mission.bounds import Bounds
 from companion.safety.reasons import Reason, Refusal
 from companion.vehicle.commands import AnswerTarget
-from companion.vehicle.events.targets import Asker, TargetAnswer, TargetAsked, TargetForm
-from companion.vehicle.events.vehicle import EkfStatusSeen, RoverMode
+from companion.vehicle.events import (
+    Asker,
+    EkfStatusSeen,
+    RoverMode,
+    TargetAnswer,
+    TargetAsked,
+    TargetForm,
+)
 from tests.companion.safety.test_mode_latch import PLACE
 from tests.support.desk import Desk
 

@@ -12,7 +12,7 @@ from companion.core.frames import LocalFrame, NedPoint
 from companion.core.grid import Cell
 from companion.executive.mission_executor import Task
 from companion.executive.mission_progress import MissionPhase, TargetStatus
-from companion.mission.fence import AutopilotFence
+from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.safety.reasons import RunPhase

@@ -13,7 +13,7 @@ from companion.executive.mission_run import LocatedScan, MissionRun, Order
 from companion.safety.mode_latch import Reaction, Verdict
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
 from companion.vehicle.commands import SetMode
-from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.events import RoverMode
 from tests.support.desk import Desk
 
 DRIVE = Verdict(Reaction.DRIVE)

@@ -19,11 +19,11 @@ from companion.vehicle.commands import (
     GuidedHeading,
     GuidedPosition,
     GuidedVelocity,
+    NamedValue,
     RequestMessage,
     SetMode,
-    TellFigure,
 )
-from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen
+from companion.vehicle.events import AckSeen, HeartbeatSeen
 from tests.support.mavlink_vehicle import Station
 from tests.support.notices import HandClock
 from tests.support.tlog import messages
@@ -358,7 +358,7 @@ def test_another_companion_is_noticed_and_our_own_echo_is_not() -> None:
 
 def test_figures_of_another_companion_tell_that_it_drives_and_our_own_do_not() -> None:
     bench, twin = Bench(), Station(1, 191)
-    bench.link.send(TellFigure("PROGRESS", 50.0), 1.0)
+    bench.link.send(NamedValue("PROGRESS", 50.0), 1.0)
     bench.hear(1.1, bench.far.read())
     assert not bench.link.rival_heard(1.2)
     raw = twin.pack(mavlink.MAVLink_named_value_float_message(0, b"PROGRESS", 50.0))

@@ -11,8 +11,8 @@ from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
 from companion.settings import LinkSettings
-from companion.vehicle.commands import GuidedPosition, GuidedVelocity, Say
-from companion.vehicle.events.vehicle import LocalPositionSeen, RangeSeen
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity, StatusText
+from companion.vehicle.events import LocalPositionSeen, RangeSeen
 from companion.vehicle.state import VehicleState, fold
 from tests.support.mavlink_vehicle import Station
 from tests.support.tlog import messages
@@ -109,7 +109,7 @@ def test_velocities_come_out_as_they_went_in(forward_m_s: float, yaw_rate_rad_s:
 
 @given(st.text(max_size=300))
 def test_any_text_can_be_said(text: str) -> None:
-    parts = messages(listening().encode(Say(6, text)))
+    parts = messages(listening().encode(StatusText(6, text)))
     data = b"".join(bytes(part._text_raw).rstrip(b"\0") for part in parts)
     assert data == text.replace("\0", " ").encode("utf-8", errors="replace")
     assert [part.chunk_seq for part in parts] == list(range(len(parts)))

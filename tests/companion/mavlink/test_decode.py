@@ -8,8 +8,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.core.frames import GeoPoint
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
-from companion.vehicle.events.plan import BatterySeen, FenceStatusSeen
-from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen, PrearmSeen, TextSeen
+from companion.vehicle.events import AckSeen, BatterySeen, FenceStatusSeen, HeartbeatSeen, PrearmSeen, TextSeen
 from tests.support.mavlink_vehicle import Station
 
 

@@ -16,7 +16,7 @@ from companion.mavlink.codec import Codec
 from companion.mavlink.download import MOST_ITEMS, TRIES, Downloaded
 from companion.mavlink.transport import MemoryLink
 from companion.settings import LinkSettings
-from companion.vehicle.events.plan import PlanChangedSeen, PlanKind
+from companion.vehicle.events import PlanChangedSeen, PlanKind
 from tests.support import mission_client
 from tests.support.mavlink_vehicle import Station
 from tests.support.mission_client import at

@@ -20,8 +20,8 @@ from companion.vehicle.commands import (
     ReadParameter,
     RequestMessage,
     RequestRate,
-    Say,
     SetMode,
+    StatusText,
 )
 from tests.support.mavlink_vehicle import Station
 from tests.support.tlog import messages
@@ -128,7 +128,7 @@ def test_read_a_parameter() -> None:
 
 
 def test_short_text_is_one_message() -> None:
-    message = said(Say(6, "x" * 50))
+    message = said(StatusText(6, "x" * 50))
     assert (message.text, message.severity, message.id) == ("x" * 50, 6, 0)
 
 
@@ -136,17 +136,17 @@ def test_short_text_is_one_message() -> None:
 def test_long_text_is_several(length: int) -> None:
     text = ("0123456789" * 20)[:length]
     codec = codec_of()
-    parts = [message for raw in codec.encode_packets(Say(4, text)) for message in messages(raw)]
+    parts = [message for raw in codec.encode_packets(StatusText(4, text)) for message in messages(raw)]
     assert "".join(part.text for part in parts) == text
     assert [part.chunk_seq for part in parts] == list(range(len(parts)))
     assert {part.id for part in parts} == {1}
     assert all(len(part.text) == 50 for part in parts[:-1]) and len(parts[-1].text) < 50
-    (first, *_) = messages(codec.encode(Say(4, text)))
+    (first, *_) = messages(codec.encode(StatusText(4, text)))
     assert first.id == 2
 
 
 def test_text_is_never_cut_within_a_character() -> None:
-    parts = codec_of().encode_packets(Say(6, "ä" * 49))
+    parts = codec_of().encode_packets(StatusText(6, "ä" * 49))
     pieces = [mavlink.MAVLink(None).decode(bytearray(raw)).get_payload() for raw in parts]
     assert len(pieces) == 2
     text = b"".join(bytes(m._text_raw).rstrip(b"\0") for raw in parts for m in messages(raw))

@@ -5,7 +5,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.mavlink.codec import Codec
 from companion.mavlink.framing import Framer
 from companion.settings import LinkSettings
-from companion.vehicle.events.vehicle import AttitudeSeen, HeartbeatSeen, LocalPositionSeen
+from companion.vehicle.events import AttitudeSeen, HeartbeatSeen, LocalPositionSeen
 from tests.support.mavlink_vehicle import Station
 
 

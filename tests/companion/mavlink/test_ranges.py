@@ -8,7 +8,7 @@ import pytest
 from companion.core.scan import RangeScan
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
-from companion.vehicle.events.vehicle import RangeSeen
+from companion.vehicle.events import RangeSeen
 from tests.support.mavlink_vehicle import Station
 
 

@@ -8,11 +8,11 @@ import pytest
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import (
+from companion.vehicle.events import (
     AckSeen,
     AttitudeSeen,
     EkfStatusSeen,
+    Event,
     GlobalPositionSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -88,7 +88,7 @@ def test_values_agree_with_pymavlink() -> None:
 
 
 def test_local_frame_is_the_autopilots_own() -> None:
-    """Degrees become the same metres that the autopilot reports at the same moment; the origin is that of this simulator."""
+    """Degrees become the metres that the autopilot reports at the same moment; the origin is this simulator's."""
     origin = next(e.point for e in events_of("commands-and-acks") if isinstance(e, OriginSeen))
     assert origin == ORIGIN
     frame = LocalFrame(origin)
@@ -150,7 +150,7 @@ def test_answers_to_others_are_not_ours() -> None:
 
 
 def test_rangefinder_orientations_count_clockwise() -> None:
-    """The rover drives at a post, then turns right: the left-front sensor (7) sees the post where the forward one did."""
+    """The rover drives at a post, then turns right: the left-front sensor (7) sees the post, not the front one."""
     state = VehicleState()
     hits: dict[str, list[NedPoint]] = {}
     nothing: Counter[str] = Counter()

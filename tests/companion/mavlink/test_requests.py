@@ -13,7 +13,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
 from companion.vehicle.commands import AnswerTarget
-from companion.vehicle.events.targets import Asker, TargetAnswer, TargetAsked, TargetForm
+from companion.vehicle.events import Asker, TargetAnswer, TargetAsked, TargetForm
 
 PLACE = (531_325_000, 231_688_000)
 NAN = math.nan

@@ -23,11 +23,8 @@ from companion.mavlink.signing import (
     Signer,
     SigningKeyError,
     load_key,
-    ticks_now,
 )
-from companion.mavlink.signing_time import TimeFile
 from companion.settings import Settings
-from companion.storage.saving import Saver
 from companion.vehicle.commands import Heartbeat
 from tests.support.mavlink_vehicle import Station
 
@@ -72,7 +69,7 @@ def test_a_passphrase_makes_the_key_that_ground_stations_make_of_it(tmp_path: Pa
     assert load_key(key_file(tmp_path, odd + ending)) == hashlib.sha256(odd).digest()
 
 
-@pytest.mark.parametrize("mode", [0o640, 0o604, 0o660, 0o620, 0o610, 0o601, 0o644, 0o777])
+@pytest.mark.parametrize("mode", [0o640, 0o601, 0o777])
 def test_a_key_that_others_may_use_is_refused(tmp_path: Path, mode: int) -> None:
     path = key_file(tmp_path, b"secret", mode)
     with pytest.raises(SigningKeyError) as caught:
@@ -125,7 +122,7 @@ class Disk:
 )
 @example([("clock", TIME), ("send", 3), ("disk", 0), ("send", 3), ("crash", 0), ("clock", 0), ("send", 3)])
 def test_timestamps_never_go_back_whatever_clock_disk_and_power_do(steps: list[tuple[str, int]]) -> None:
-    """The loop sends no more than AGAIN packets while the disk works: then nothing sent before a crash is sent again."""
+    """The loop sends fewer than AGAIN packets while the disk works: so no timestamp is used again after a crash."""
     disk, now = Disk(), [TIME]
     signer = Signer(KEY, lambda: now[0], disk)
     sent: list[int] = []
@@ -163,39 +160,6 @@ def test_it_is_saved_every_half_minute_and_not_more_often() -> None:
         now[0] += 5_000  # 50 ms
     assert 19 <= len(disk.asked) <= 22
     assert disk.asked[-1] - now[0] >= AGAIN - 10_000
-
-
-def test_the_time_file(tmp_path: Path) -> None:
-    path, saver = tmp_path / "state" / "signing-time", Saver()
-    file = TimeFile(path, saver)
-    assert file.saved == 0
-    file.save(TIME)
-    saver.close()
-    assert file.saved == TIME == TimeFile(path, Saver()).saved
-    assert abs(ticks_now() - TIME) < 1e5 * 3600 * 24 * 365 * 30  # of this century
-
-
-@given(st.binary(max_size=70))
-def test_any_bytes_for_a_time_file_are_a_time_or_one_line(tmp_path_factory: Any, data: bytes) -> None:
-    path = tmp_path_factory.mktemp("state") / "signing-time"
-    path.write_bytes(data)
-    try:
-        assert 0 <= TimeFile(path, Saver()).saved <= LAST_TICK
-    except SigningKeyError as error:
-        assert str(path) in str(error) and "\n" not in str(error)
-
-
-def test_a_disk_that_is_full_does_not_silence_the_rover(tmp_path: Path) -> None:
-    place = tmp_path / "file"
-    place.write_text("in the way")
-    saver = Saver()
-    file = TimeFile(tmp_path / "signing-time", saver)
-    file._path = place / "signing-time"
-    signer = Signer(KEY, lambda: TIME, file)
-    signer.next_timestamp()
-    saver.close()
-    assert signer.next_timestamp() == TIME
-    assert "cannot be written" in saver.problem
 
 
 # Whom to believe ----------------------------------------------------------------------------------------------------
@@ -284,7 +248,7 @@ def test_what_we_send_is_believed_by_pymavlink() -> None:
         (Signer(KEY, lambda: TIME), signed(Station(), beat(), key=b"y" * 32), "signed with another key: is it"),
         (Signer(KEY, lambda: TIME), signed(Station(), beat(), TIME - 2 * MINUTE), "is this computer's clock ahead?"),
         (Signer(KEY, lambda: TIME), signed(Station(), beat()), ""),
-        (Signer(KEY, lambda: TIME), signed(Station(), beat()) + Station(255, 190).heartbeat(), "Ignoring unsigned packets"),
+        (Signer(KEY, lambda: TIME), signed(Station(), beat()) + Station(255, 190).heartbeat(), "Ignoring unsigned"),
     ],
 )  # fmt: skip
 def test_trouble_is_told_in_words(signer: Signer | None, data: bytes, said: str) -> None:

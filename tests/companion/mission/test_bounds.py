@@ -12,13 +12,13 @@ from hypothesis import strategies as st
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell
-from companion.mission.bounds import Bound, Bounds, autopilot_bounds
-from companion.mission.fence import (
+from companion.mission.autopilot_fence import (
     NO_FENCE,
     PARAMETERS,
     AutopilotFence,
     autopilot_fence,
 )
+from companion.mission.bounds import Bound, Bounds, autopilot_bounds
 from companion.mission.items import Item, ItemError
 from companion.mission.mission import Area, GridSpec, HomePoint, Mission, MissionError, RoverSpec, Target
 from companion.mission.resolve import ResolvedMission, resolve
@@ -45,7 +45,8 @@ def geo_area(corners: tuple[tuple[float, float], ...]) -> Area:
 
 def laid(fence: AutopilotFence, *targets: HomePoint, **fields: object) -> ResolvedMission:
     places = targets or (HomePoint(0.0, 5.0),)
-    mission = Mission("m", tuple(Target(f"t{i}", place) for i, place in enumerate(places)), **fields)  # type: ignore[arg-type]
+    targets = tuple(Target(f"t{i}", place) for i, place in enumerate(places))
+    mission = Mission("m", targets, **fields)  # type: ignore[arg-type]
     return resolve(mission, FRAME, HERE, fence)
 
 

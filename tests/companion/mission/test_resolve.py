@@ -22,7 +22,7 @@ from companion.mission.mission import (
     Target,
     WeightedArea,
 )
-from companion.mission.prior import stamp_prior
+from companion.mission.prior_map import stamp_prior
 from companion.mission.resolve import ResolvedMission, resolve
 
 FRAME = LocalFrame(GeoPoint(53.1325, 23.1688))

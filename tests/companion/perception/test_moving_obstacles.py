@@ -14,7 +14,7 @@ from companion.mavlink.codec import Codec
 from companion.perception.moving_obstacles import Moving, announced, merged, motion_changed, planners_movers
 from companion.planning.problem import Path
 from companion.settings import LinkSettings, TrafficSettings
-from companion.vehicle.events.vehicle import GlobalPositionSeen, OriginSeen, OtherSeen
+from companion.vehicle.events import GlobalPositionSeen, OriginSeen, OtherSeen
 from companion.vehicle.state import OTHERS_KEPT, VehicleState, fold
 
 ORIGIN = GeoPoint(53.0, 23.0)

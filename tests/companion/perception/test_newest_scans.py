@@ -8,8 +8,11 @@ import numpy as np
 
 from companion.core.scan import RangeScan
 from companion.perception.newest_scans import MOST_SCANS, SAME, newest_ranges
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import RangeSeen, TextSeen
+from companion.vehicle.events import (
+    Event,
+    RangeSeen,
+    TextSeen,
+)
 
 
 def seen(time_s: float, source: str = "obstacle distance", bearing_deg: float = 0.0, sender: int = 1) -> RangeSeen:

@@ -9,9 +9,9 @@ import pytest
 from pymavlink import mavutil
 
 from companion.core.round_marks import Mark
-from companion.mission.as_json import from_json
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
+from companion.mission.serialization import from_json
 from companion.recording.record_format import RecordError, Round, unpacked_rounds
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from companion.safety.battery_monitor import STALE_S, BatteryMonitor, BatteryState, Level, judged, with_battery
 from companion.safety.reasons import PowerReason, Reason, WaitReason
 from companion.settings import PowerSettings
-from companion.vehicle.events.plan import BatterySeen
+from companion.vehicle.events import BatterySeen
 from companion.vehicle.state import VehicleState
 
 SETTINGS = PowerSettings(return_percent=20.0, hold_percent=10.0, return_volts=11.0, hold_volts=10.0, after_s=5.0)

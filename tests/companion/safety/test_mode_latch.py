@@ -16,7 +16,7 @@ from companion.safety.reasons import Doubt, LatchReason, Reason, WaitReason
 from companion.safety.watchdogs import DataMonitor, SticksMonitor, first_doubt
 from companion.settings import SafetySettings, Settings
 from companion.settings.live_settings import LiveSettings
-from companion.vehicle.events.vehicle import (
+from companion.vehicle.events import (
     AttitudeSeen,
     EkfStatusSeen,
     HeartbeatSeen,

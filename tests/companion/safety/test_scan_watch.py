@@ -10,7 +10,7 @@ import pytest
 
 from companion.core.scan import RangeScan
 from companion.perception.scan_watch import STUCK_M, STUCK_S, ScanWatch
-from companion.vehicle.events.vehicle import AttitudeSeen, LocalPositionSeen
+from companion.vehicle.events import AttitudeSeen, LocalPositionSeen
 from companion.vehicle.state import VehicleState
 from tests.support.shared_data import SHARED, needs_shared
 

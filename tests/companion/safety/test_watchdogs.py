@@ -24,8 +24,12 @@ from companion.safety.watchdogs import (
 )
 from companion.settings import SafetySettings, Settings
 from companion.settings.live_settings import LiveSettings
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import EkfStatusSeen, LocalPositionSeen, RangeSeen
+from companion.vehicle.events import (
+    EkfStatusSeen,
+    Event,
+    LocalPositionSeen,
+    RangeSeen,
+)
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import doubt_of, vehicle
 

@@ -4,8 +4,7 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel
 
-from companion.planning.registry import PLANNERS
-from companion.settings import Settings, SettingsError, alike, load_settings, parse_settings
+from companion.settings import Settings, SettingsError, load_settings, parse_settings
 
 
 def refused(text: str, tmp_path: Path) -> str:
@@ -37,20 +36,6 @@ def test_an_unknown_key_is_named_with_the_nearest_known_one(text, place, near, t
     assert f"{place}: unknown key, did you mean '{near}'?" in refused(text, tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("name", "near"),
-    [
-        ("hibryd", "hybrid"),
-        ("teta-star", "theta-star"),
-        ("atsar", "astar"),
-        ("", ""),
-        ("rrt", ""),
-    ],
-)
-def test_only_what_is_spelt_alike_is_offered(name, near):
-    assert alike(name, PLANNERS) == near
-
-
 def test_a_key_like_no_other_is_not_taken_for_one_that_is_unrelated(tmp_path):
     message = refused("[navigator]\nreplan_evry = 1", tmp_path)
     assert "did you mean" not in message
@@ -74,15 +59,6 @@ def test_a_key_like_no_other_is_not_taken_for_one_that_is_unrelated(tmp_path):
 )
 def test_a_bad_value_is_named_with_its_place(text, place, tmp_path):
     assert f": {place}: " in refused(text, tmp_path)
-
-
-def test_a_file_that_is_no_toml_or_not_there_is_refused(tmp_path):
-    assert "not valid TOML" in refused("planner = [", tmp_path)
-    (tmp_path / "bytes.toml").write_bytes(b"profile = '\xff'")
-    with pytest.raises(SettingsError, match="not UTF-8"):
-        load_settings(tmp_path / "bytes.toml")
-    with pytest.raises(SettingsError, match=r"none\.toml: cannot be read"):
-        load_settings(tmp_path / "none.toml")
 
 
 def test_part_of_a_section_leaves_the_rest_at_its_defaults():

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import os
-import threading
 from pathlib import Path
 from typing import Any
 
@@ -28,11 +26,8 @@ from companion.settings.tunable_parameters import (
     differences,
     with_tuned,
 )
-from companion.storage.beside import Patience
-from companion.storage.disk import OsDisk
-from companion.storage.saving import Saver
-from companion.vehicle.commands import TellParameter
-from companion.vehicle.events.parameters import ParameterAsked, ParameterChangeAsked, ParametersAsked
+from companion.vehicle.commands import ParameterValue
+from companion.vehicle.events import ParameterAsked, ParameterChangeAsked, ParametersAsked
 from companion.vehicle.state import VehicleState
 from tests.support.mavlink_vehicle import Station
 from tests.support.notices import Notices
@@ -50,17 +45,17 @@ class Ground:
         self.server = ParameterServer(self.settings, self.notices, self.kept.append)
         self.now_s = 100.0
 
-    def ask(self, *events: object, ticks: int = 1) -> list[TellParameter]:
+    def ask(self, *events: object, ticks: int = 1) -> list[ParameterValue]:
         for event in events:
             self.server.take(event, VehicleState())
         answers = []
         for _ in range(ticks):
             self.now_s += 0.05
             answers += self.server.due(self.now_s)
-        assert all(isinstance(answer, TellParameter) for answer in answers)
+        assert all(isinstance(answer, ParameterValue) for answer in answers)
         return answers  # type: ignore[return-value]
 
-    def set(self, name: str, value: float, *, to_us: bool = True) -> list[TellParameter]:
+    def set(self, name: str, value: float, *, to_us: bool = True) -> list[ParameterValue]:
         self.now_s += 1.0
         return self.ask(ParameterChangeAsked(self.now_s, name, value, to_us), ticks=3)
 
@@ -281,7 +276,8 @@ def codec() -> Codec:
 
 
 @pytest.mark.parametrize(("system", "component", "heard"), [
-    (1, 191, True), (1, 0, True), (0, 0, True), (0, 191, True), (1, 1, False), (1, 154, False), (2, 191, False), (2, 0, False),
+    (1, 191, True), (1, 0, True), (0, 0, True), (0, 191, True),
+    (1, 1, False), (1, 154, False), (2, 191, False), (2, 0, False),
 ])  # fmt: skip
 def test_a_request_counts_if_it_is_for_us_or_for_everybody(system: int, component: int, heard: bool) -> None:
     station = Station(255, 190)
@@ -312,67 +308,13 @@ def test_any_name_index_and_value_are_survived(name: bytes, index: int, value: f
 
 def test_the_answer_on_the_wire() -> None:
     for command, kind in (
-        (TellParameter("CMP_ARRIVAL", 0.5, 9, 26), mavlink.MAV_PARAM_TYPE_REAL32),
-        (TellParameter("CMP_DOUBTS", 3.0, 14, 26, whole_number=True), mavlink.MAV_PARAM_TYPE_INT32),
+        (ParameterValue("CMP_ARRIVAL", 0.5, 9, 26), mavlink.MAV_PARAM_TYPE_REAL32),
+        (ParameterValue("CMP_DOUBTS", 3.0, 14, 26, whole_number=True), mavlink.MAV_PARAM_TYPE_INT32),
     ):
         message = mavlink.MAVLink(None).decode(bytearray(codec().encode(command)))
         assert (message.get_srcSystem(), message.get_srcComponent()) == (1, 191)
         told = (message.param_id, message.param_value, message.param_type, message.param_index, message.param_count)
         assert told == (command.name, command.value, kind, command.index, 26)
-
-
-# The file -----------------------------------------------------------------------------------------------------------
-
-
-def test_a_write_that_fails_leaves_the_old_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = tmp_path / "tuned.toml"
-    path.write_bytes(b"old")
-
-    def broken(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", broken)
-    saver = Saver()
-    saver.save(path, b"new")
-    saver.close()
-    assert path.read_bytes() == b"old"
-    assert saver.problem == f"{path}: cannot be written: No space left on device"
-
-
-def test_the_newest_of_many_is_what_stays(tmp_path: Path) -> None:
-    saver, path, other = Saver(), tmp_path / "a", tmp_path / "b"
-    for number in range(200):
-        saver.save(path, str(number).encode())
-    saver.save(other, b"too")
-    saver.close()
-    assert (path.read_bytes(), other.read_bytes()) == (b"199", b"too")
-    assert sorted(one.name for one in tmp_path.iterdir()) == ["a", "b"]
-
-
-class HangingDisk(OsDisk):
-    """One that takes a file and never says that it has it, until it is let go."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.free = threading.Event()
-
-    def sync(self, handle: int) -> None:
-        self.free.wait(30.0)
-
-
-def test_a_disk_that_hangs_keeps_nobody_from_ending(tmp_path: Path) -> None:
-    disk = HangingDisk()
-    saver = Saver(disk, Patience(0.01))
-    saver.save(tmp_path / "tuned.toml", b"new")
-    writers = [thread for thread in threading.enumerate() if thread.name == "saver"]
-    saver.close()
-    saver.close()
-    still = [thread for thread in writers if thread.is_alive()]
-    assert still and all(thread.daemon for thread in still), (
-        "a thread that is no daemon is waited for at the program's end"
-    )
-    assert saver.problem == f"{tmp_path / 'tuned.toml'}: not written yet: the disk does not answer"
-    disk.free.set()
 
 
 def test_the_page_lists_every_parameter() -> None:

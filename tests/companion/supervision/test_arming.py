@@ -11,7 +11,7 @@ from companion.safety.reasons import Reason, WaitReason
 from companion.settings import SafetySettings
 from companion.supervision.arming import arming_step
 from companion.vehicle.commands import Arm, Command, SetMode
-from companion.vehicle.events.vehicle import RoverMode
+from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import GUIDED, HOLD, MANUAL, vehicle
 

@@ -17,9 +17,11 @@ from companion.supervision.fence_monitor import FenceMonitor
 from companion.supervision.judge import Judge
 from companion.supervision.mission_limits import MissionLimits
 from companion.supervision.rival_monitor import RivalMonitor
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.plan import BatterySeen
-from companion.vehicle.events.vehicle import HeartbeatSeen
+from companion.vehicle.events import (
+    BatterySeen,
+    Event,
+    HeartbeatSeen,
+)
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import HOLD, vehicle
 from tests.support.desk import Desk

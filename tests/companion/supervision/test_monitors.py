@@ -10,7 +10,7 @@ import pytest
 
 from companion.core.frames import LocalFrame, NedPoint
 from companion.mavlink.download import Downloaded
-from companion.mission.fence import NO_FENCE, PARAMETERS, AutopilotFence
+from companion.mission.autopilot_fence import NO_FENCE, PARAMETERS, AutopilotFence
 from companion.mission.items import Item
 from companion.safety.reasons import Doubt, Reason, WaitReason
 from companion.settings import FenceSettings, Settings
@@ -26,8 +26,16 @@ from companion.supervision.localization_monitor import (
 from companion.supervision.mission_limits import BorderMonitor
 from companion.supervision.rival_monitor import LISTEN_S, RivalMonitor
 from companion.vehicle.dead_reckoning import Wander
-from companion.vehicle.events.plan import FenceStatusSeen, PlanChangedSeen, PlanKind
-from companion.vehicle.events.vehicle import HeartbeatSeen, HomeSeen, LocalPositionSeen, OriginSeen, ParameterSeen
+from companion.vehicle.events import (
+    FenceStatusSeen,
+    HeartbeatSeen,
+    HomeSeen,
+    LocalPositionSeen,
+    OriginSeen,
+    ParameterSeen,
+    PlanChangedSeen,
+    PlanKind,
+)
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import GUIDED, HOLD, PLACE, vehicle
 from tests.support.desk import Desk

@@ -13,7 +13,7 @@ from companion.safety.mode_latch import Control, LatchState
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
 from companion.supervision.shutdown import AGAIN_S, CONFIRM_S, Shutdown
 from companion.vehicle.commands import SetMode
-from companion.vehicle.events.vehicle import AckSeen, HeartbeatSeen, RoverMode
+from companion.vehicle.events import AckSeen, HeartbeatSeen, RoverMode
 from tests.companion.safety.test_mode_latch import HOLD
 from tests.support.desk import Desk
 

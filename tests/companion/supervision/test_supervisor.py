@@ -27,17 +27,25 @@ from companion.supervision.keeper import Keeper
 from companion.supervision.listener import Listener
 from companion.supervision.pace import Pace
 from companion.supervision.supervisor import Supervisor
-from companion.vehicle.commands import AnswerTarget, Arm, GuidedHeading, GuidedPosition, Say, SetMode, TellParameter
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.parameters import ParameterAsked
-from companion.vehicle.events.vehicle import (
+from companion.vehicle.commands import (
+    AnswerTarget,
+    Arm,
+    GuidedHeading,
+    GuidedPosition,
+    ParameterValue,
+    SetMode,
+    StatusText,
+)
+from companion.vehicle.events import (
     AckSeen,
     AttitudeSeen,
     EkfStatusSeen,
+    Event,
     HeartbeatSeen,
     HomeSeen,
     LocalPositionSeen,
     OriginSeen,
+    ParameterAsked,
     RangeSeen,
     RoverMode,
     TextSeen,
@@ -114,7 +122,7 @@ class Whole:
         """One round; what it sends, texts aside."""
         self.autopilot.events = [*([] if silent else self.heard()), *events]
         self.companion.tick()
-        return [command for command in self.autopilot.taken() if not isinstance(command, Say)]
+        return [command for command in self.autopilot.taken() if not isinstance(command, StatusText)]
 
     def awaited(self) -> WaitReason | None:
         awaited = self.companion.status().activity.awaited
@@ -195,7 +203,7 @@ def test_faults_that_stop_nothing_are_told_once(whole: Whole) -> None:
 
 def test_ground_stations_are_answered_and_the_autopilots_warnings_shown(whole: Whole) -> None:
     answers = whole.tick(ParameterAsked(100.0, "CMP_STALE", -1), TextSeen(100.0, 3, "Bad battery"))
-    assert [answer.name for answer in answers if isinstance(answer, TellParameter)] == ["CMP_STALE"]
+    assert [answer.name for answer in answers if isinstance(answer, ParameterValue)] == ["CMP_STALE"]
     assert not any(isinstance(answer, AnswerTarget) for answer in answers)
     assert whole.companion.status().news == (News(Severity.ERROR, "autopilot: Bad battery"),)
     whole.tick()

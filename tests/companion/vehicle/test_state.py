@@ -7,12 +7,12 @@ import pytest
 
 from companion.core.frames import GeoPoint
 from companion.core.scan import RangeScan
-from companion.mission.fence import PARAMETERS
-from companion.vehicle.events.event import Event
-from companion.vehicle.events.vehicle import (
+from companion.mission.autopilot_fence import PARAMETERS
+from companion.vehicle.events import (
     AckSeen,
     AttitudeSeen,
     EkfStatusSeen,
+    Event,
     GlobalPositionSeen,
     HeartbeatSeen,
     HomeSeen,

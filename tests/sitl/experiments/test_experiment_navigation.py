@@ -10,7 +10,7 @@ from companion.executive.mission_progress import TargetStatus
 from sitl.cli.commands import app
 from sitl.experiments import navigation
 from sitl.experiments.driving import Series, shortfalls
-from sitl.lockstep import Outcome, Report
+from sitl.lockstep import DriveOutcome, Report
 
 MAP = """type octile
 height 6
@@ -65,7 +65,7 @@ def test_a_map_without_scenarios_is_one_line(tmp_path: Path) -> None:
     assert result.exit_code == 2 and "bare.map.scen" in result.stderr and len(result.stderr.splitlines()) == 1
 
 
-def driven(planner: str, mission: str, time_s: float, steps: int, outcome: Outcome = Outcome.REACHED) -> Series:
+def driven(planner: str, mission: str, time_s: float, steps: int, outcome: DriveOutcome = DriveOutcome.REACHED) -> Series:
     return Series(planner, mission, (Report(0, outcome, steps=steps, driving_time_s=time_s),))
 
 
@@ -74,7 +74,7 @@ def test_every_shortfall_of_driving_is_said() -> None:
     text = shortfalls((*good, driven("dstar-lite", "a", 8.0, 100)))
     assert text.count("reached") == 3 and "not reached" not in text
     bad = (
-        driven("hybrid", "b", 11.0, 120, Outcome.TIME_LIMIT),
+        driven("hybrid", "b", 11.0, 120, DriveOutcome.TIME_LIMIT),
         driven("theta-star", "b", 10.0, 90),
         driven("dstar-lite", "b", 8.0, 100),
     )
@@ -85,11 +85,13 @@ def test_every_shortfall_of_driving_is_said() -> None:
 
 def test_a_target_missed_counts_in_a_drive_with_a_collision_too() -> None:
     report = Report(
-        0, Outcome.COLLISION, [("gate", TargetStatus.REACHED), ("home", TargetStatus.UNREACHABLE)], collisions=1
+        0, DriveOutcome.COLLISION, [("gate", TargetStatus.REACHED), ("home", TargetStatus.UNREACHABLE)], collisions=1
     )
     assert Series("hybrid", "a", (report,)).missed == 1
     assert (
-        Series("hybrid", "a", (Report(0, Outcome.COLLISION, [("gate", TargetStatus.REACHED)], collisions=1),)).missed
+        Series(
+            "hybrid", "a", (Report(0, DriveOutcome.COLLISION, [("gate", TargetStatus.REACHED)], collisions=1),)
+        ).missed
         == 0
     )
 

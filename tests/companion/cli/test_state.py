@@ -1,0 +1,66 @@
+"""What is said in the end of a state that could not be kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from companion.checkpoint.checkpointer import Checkpointer
+from companion.checkpoint.state_directory import StateDirectoryError
+from companion.checkpoint.state_format import SavedProgress
+from companion.cli.state import RunState
+from tests.support.rig import yard
+from tests.support.states import a_state, leave_state
+
+
+def test_a_state_that_is_older_than_the_run_is_told_with_the_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with_state = RunState(yard(tmp_path), tmp_path / "state", resume=False, say=lambda _: None)
+    with_state.start()
+    assert with_state.problem == ""
+    monkeypatch.setattr(Checkpointer, "problem", "mission.state: the state cannot be saved: No space left on device")
+    assert with_state.problem.endswith("; make room there or name another place with --state DIR")
+    assert with_state.file is not None
+    with_state.file.write_bytes(b"as it was")
+    assert "do not --resume: mission.state is older than this run" in with_state.problem
+    with_state.close()
+
+
+def test_a_place_that_cannot_be_used_is_refused_only_where_it_was_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mission = yard(tmp_path)
+    nowhere = tmp_path / "yard.toml" / "state"
+    with pytest.raises(StateDirectoryError, match="choose another place with --state DIR"):
+        RunState(mission, nowhere, resume=False, say=print)
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "yard.toml"))
+    with pytest.raises(StateDirectoryError, match="no state can be kept here"):
+        RunState(mission, None, resume=True, say=print)
+    said: list[str] = []
+    keeping = RunState(mission, None, resume=False, say=said.append)
+    keeping.start()
+    keeping.close()
+    assert keeping.checkpointer is None and len(said) == 1 and said[0].endswith("this run cannot be resumed")
+
+
+def test_without_resume_a_mission_begins_anew_and_the_state_before_is_kept(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    leave_state(tmp_path, mission).close()
+    keeping = RunState(mission, tmp_path / "state", resume=False, say=print)
+    assert keeping.previous is None
+    keeping.close()
+    assert sorted(path.name for path in (tmp_path / "state").iterdir()) == ["lock", "mission.state.before"]
+
+
+def test_a_mission_that_has_ended_is_told_and_not_driven_again(tmp_path: Path) -> None:
+    mission = yard(tmp_path)
+    values = {**a_state().progress.model_dump(), "statuses": ["reached"], "leg": "done", "index": 1}
+    progress = SavedProgress.model_validate(values)
+    leave_state(tmp_path, mission, ended=True, progress=progress).close()
+    said: list[str] = []
+    keeping = RunState(mission, tmp_path / "state", resume=True, say=said.append)
+    assert keeping.ended and keeping.statuses == [("gate", "reached")]
+    assert said == ["Yard was driven to its end: 1 of 1 targets reached", "to drive it again, start without --resume"]
+    keeping.close()

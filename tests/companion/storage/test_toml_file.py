@@ -1,0 +1,77 @@
+"""What is wrong with a TOML file, in one line with file, place, reason and remedy."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from pydantic import BaseModel, ConfigDict
+
+from companion.storage.toml_file import alike, read_table, read_toml
+
+
+class Wheel(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    radius_m: float
+
+
+class Cart(BaseModel):
+    model_config = ConfigDict(extra="forbid")
+
+    name: str = ""
+    wheel: list[Wheel] = []
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"a = ", "not valid TOML: Invalid value (at end of document); see the manual"),
+        (b"a = '\xff'", "not UTF-8 text (byte 5); save it as UTF-8"),
+        (b"a = " + b"[" * 100_000, "not valid TOML: nested too deeply; see the manual"),
+        (b"a = " + b"9" * 5000, "not valid TOML: Exceeds the limit"),
+        (b"# \n" * 50, "larger than 100 bytes; a short TOML file is expected"),
+    ],
+)
+def test_what_is_no_toml_is_refused_in_one_line(tmp_path: Path, content: bytes, reason: str) -> None:
+    file = tmp_path / "f.toml"
+    file.write_bytes(content)
+    with pytest.raises(KeyError) as caught:
+        read_toml(file, KeyError, remedy="see the manual", limit=100 if content[:1] == b"#" else 1_000_000)
+    (text,) = caught.value.args
+    assert text.startswith(f"{file}: {reason}") and "\n" not in text
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    none = tmp_path / "none.toml"
+    assert read_toml(none, KeyError, missing_ok=True) == {}
+    with pytest.raises(KeyError, match=r"none\.toml: cannot be read: No such file or directory; name one"):
+        read_toml(none, KeyError, name_it="name one")
+    with pytest.raises(KeyError, match="cannot be read: Is a directory; check the path"):
+        read_toml(tmp_path, KeyError, missing_ok=True)
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        ("[[wheel]]\nradius_m = 1.0\n[[wheel]]\n", "wheel 2.radius_m: field required, it is missing; see the manual"),
+        ("[[wheel]]\nradius = 1.0", "wheel 1.radius_m: field required, it is missing"),
+        ("[[wheel]]\nradius_m = 'a'", "wheel 1.radius_m: input should be a valid number"),
+        ("nam = 'a'", "nam: unknown key, did you mean 'name'?; see the manual"),
+        ('"a\\nb" = 1', "a\\nb: unknown key; known here: name, wheel"),
+    ],
+)
+def test_a_wrong_table_is_told_with_its_place_counted_from_one(tmp_path: Path, content: str, reason: str) -> None:
+    file = tmp_path / "f.toml"
+    file.write_text(content)
+    with pytest.raises(KeyError) as caught:
+        read_table(file, Cart, KeyError, "see the manual")
+    (text,) = caught.value.args
+    assert text.startswith(f"{file}: {reason}") and "\n" not in text
+
+
+@pytest.mark.parametrize(
+    ("name", "near"), [("hibryd", "hybrid"), ("teta-star", "theta-star"), ("atsar", "astar"), ("", ""), ("rrt", "")]
+)
+def test_only_names_with_nearly_the_same_spelling_are_offered(name: str, near: str) -> None:
+    assert alike(name, ["hybrid", "theta-star", "astar", "prm", "dijkstra"]) == near
