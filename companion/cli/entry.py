@@ -7,20 +7,17 @@ import os
 import signal
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from types import FrameType
 from typing import cast
 
-from companion.cli.kernels import VARIABLE, choose_place
+from companion.cli import kernels
 
 EXIT_USAGE, EXIT_STOPPED = 2, 130
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-HERE = Path(__file__).parents[1]
-"""The package ``companion``; ``sitl`` is installed beside it."""
 
 
 class StoppedError(Exception):
-    """Ctrl-C or SIGTERM has ended a command that has more to say about it; the text is one line, without which of the two it was."""
+    """Ctrl-C or SIGTERM has ended a command. The text is one line that says what it leaves behind."""
 
 
 def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
@@ -32,9 +29,11 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
         print(f"{name}: {fault}", file=sys.stderr)
         return EXIT_USAGE
     try:
-        choose_place(os.environ, (HERE, HERE.with_name("sitl")))
+        kernels.use_cache(os.environ)
     except OSError as error:
-        print(f"{name}: no place for compiled kernels ({error.strerror or error}); set {VARIABLE}", file=sys.stderr)
+        print(
+            f"{name}: no place for compiled kernels ({error.strerror or error}); set {kernels.PLACE}", file=sys.stderr
+        )
         return EXIT_USAGE
     terminated = _Terminated()
     before = signal.signal(signal.SIGTERM, terminated)
@@ -108,7 +107,7 @@ def _run(name: str, commands: Callable[..., object]) -> int:
 
 
 def _let_go_of_output() -> None:
-    """What standard output does not take any more is thrown away: Python would complain once more when it flushes at the end."""
+    """Throw away what standard output cannot take. Otherwise Python would report it again when it flushes at exit."""
     try:
         if sys.stdout is not None:
             sys.stdout.flush()
