@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import os
 import sys
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 
 from companion.cli import kernels
+from companion.core.clock import stopwatch_s
 
 Job = Callable[[], None]
 
@@ -77,7 +77,7 @@ def main() -> None:
     """Run all jobs, with a line for each."""
     groups = FOR_ALL if "--all" in sys.argv[1:] else FOR_A_DRIVE
     kernels.use_cache(os.environ)
-    count, done, since_s = sum(map(len, groups)), 0, time.monotonic()
+    count, done, since_s = sum(map(len, groups)), 0, stopwatch_s()
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
         for group in groups:
             running = {pool.submit(job): job.__name__ for job in group}
@@ -85,7 +85,7 @@ def main() -> None:
                 future.result()
                 done += 1
                 name = running[future].replace("_", " ")
-                print(f"  compiled {done} of {count}: {name} ({time.monotonic() - since_s:.0f} s)", flush=True)
+                print(f"  compiled {done} of {count}: {name} ({stopwatch_s() - since_s:.0f} s)", flush=True)
 
 
 def _planners(*names: str) -> None:
