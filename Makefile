@@ -39,7 +39,7 @@ bench: $(ALL_KERNELS)
 
 # Looks for inputs that break something: new ones every time, for SECONDS in all.
 fuzz: $(ALL_KERNELS)
-	$(BIN)/python -m tests.fuzz all --seconds $(SECONDS)
+	$(BIN)/python -m tests.fuzz all properties --seconds $(SECONDS)
 
 results: $(TOOLS)
 	$(BIN)/rover-sitl experiment kwasniewski-table1 --docs docs

@@ -6,10 +6,25 @@ import os
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis.database import DirectoryBasedExampleDatabase
 
 from companion.cli import kernels
 
 kernels.use_cache(os.environ)  # before a test imports numba
+
+# The same examples every time, on however busy a machine. ``make fuzz`` draws new ones, and tries finds again.
+settings.register_profile(
+    "fixed", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile(
+    "search",
+    parent=settings.get_profile("fixed"),
+    derandomize=False,
+    database=DirectoryBasedExampleDatabase("out/fuzz/examples"),
+    print_blob=True,
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
 
 
 @pytest.fixture(scope="session", autouse=True)

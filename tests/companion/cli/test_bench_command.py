@@ -197,7 +197,7 @@ def test_the_command_writes_table_json_and_page(tmp_path):
         (["--sizes", "one"], "--sizes one"),
         (["--sizes", "1000"], "--sizes 1000"),
         (["--sizes", ""], "nothing to measure"),
-        (["--planners", "dijkstar"], "'dijkstra'"),
+        (["--sizes", "1", "--planners", "dijkstar"], "'dijkstra'"),
         (["none.map"], "none.map"),
     ],
 )
