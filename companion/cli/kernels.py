@@ -90,11 +90,23 @@ class Locator:
 
 @cache
 def kernel_digest(file: Path) -> str:
-    """SHA-256 of a file with kernels and of all project files that these kernels depend on."""
-    digest = hashlib.sha256()
+    """SHA-256 of a file with kernels and of all project files that these kernels depend on.
+
+    A file that was edited while this process runs may be loaded in its older form: then the digest is this process's own.
+    """
+    at_first, digest = _times_at_first(), hashlib.sha256()
     for path in sorted(_files_used_by(file)):
         digest.update(f"{path.relative_to(ROOT)}\0".encode() + path.read_bytes() + b"\0")
+        if at_first.get(path) != path.stat().st_mtime_ns:
+            digest.update(f"edited {os.getpid()}\0".encode())
     return digest.hexdigest()
+
+
+@cache
+def _times_at_first() -> dict[Path, int]:
+    """When each file was changed, as it was when this process loaded its first kernel."""
+    files = (file for package in PACKAGES for file in (ROOT / package).rglob("*.py"))
+    return {file: file.stat().st_mtime_ns for file in files}
 
 
 def _files_used_by(file: Path) -> set[Path]:

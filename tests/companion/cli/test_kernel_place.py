@@ -172,6 +172,16 @@ def test_of_a_files_old_versions_some_are_kept(tmp_path: Path, monkeypatch: pyte
     assert left == ["3", "4", "5"] and other.is_dir()
 
 
+def test_a_file_that_is_edited_while_the_program_loads_makes_no_kernel_for_others(tmp_path: Path) -> None:
+    program = Program(tmp_path / "one", tmp_path / "cache")
+    outer = program.folder / "companion" / "outer.py"
+    editing = f"\nimport os\nos.utime({str(program.folder / 'companion' / 'inner.py')!r}, (1.0, 1.0))\n"
+    outer.write_text(outer.read_text().replace("\n@njit", editing + "\n@njit"))
+    assert program.run() == (7.0, ["scaled", "both", "other"])
+    os.utime(program.folder / "companion" / "inner.py", (2.0, 2.0))
+    assert program.run() == (7.0, ["both"])
+
+
 def test_kernels_of_other_projects_are_left_to_numba() -> None:
     assert kernels.Locator.from_function(json.dumps, json.__file__) is None
 
