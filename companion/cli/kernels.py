@@ -92,7 +92,7 @@ class Locator:
 def kernel_digest(file: Path) -> str:
     """SHA-256 of a file with kernels and of all project files that these kernels depend on.
 
-    A file that was edited while this process runs may be loaded in its older form: then the digest is this process's own.
+    If a file was edited while this process ran, its older form may be loaded: then no other process has this digest.
     """
     at_first, digest = _times_at_first(), hashlib.sha256()
     for path in sorted(_files_used_by(file)):

@@ -138,7 +138,7 @@ class Scene:
 
 @contextmanager
 def scene(folder: Path, companion_on: str, *options: object) -> Iterator[Scene]:
-    """``companion_on``: tcp or udp; the ground station gets the other one. ``options`` of the companion. Nobody arms yet."""
+    """``companion_on``: tcp or udp; the ground station gets the other one. ``options`` go to the companion."""
     path = mission_path(yard(folder, TARGETS))
     path.write_text(path.read_text().replace("cruise_speed_m_s = 2.0", f"cruise_speed_m_s = {CRUISE_M_S}"))
     tcp, udp = free_port(), free_port(socket.SOCK_DGRAM)

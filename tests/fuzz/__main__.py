@@ -44,7 +44,7 @@ SAID = ("stat::number_of_executed_units", "Done ")
 
 
 def compiled_modules() -> list[str]:
-    """The companion's modules that numba compiles: it would have to compile what atheris puts into them to watch their branches."""
+    """Modules with kernels. They are not watched: numba would have to compile what atheris adds to them."""
     files = (ROOT / "companion").rglob("*.py")
     found = [path for path in files if re.search(r"^(from|import) numba\b", path.read_text(), re.MULTILINE)]
     return sorted(".".join(path.relative_to(ROOT).with_suffix("").parts) for path in found)

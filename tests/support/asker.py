@@ -1,4 +1,4 @@
-"""A rig with a person at a ground station who speaks to the companion as well: places, missions, and what it answers."""
+"""A rig with a ground station that also talks to the companion: places, missions, and its answers."""
 
 from __future__ import annotations
 

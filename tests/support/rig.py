@@ -107,8 +107,11 @@ Change = Callable[[Any], Any]
 
 
 class Rig:
-    """One run. ``change`` is the line from the vehicle to the companion, message by message, ``garble`` the same in bytes;
-    ``lose`` says whether a packet of the companion is lost; ``cut`` cuts the line both ways."""
+    """One run.
+
+    ``change``: what happens to a message on its way to the companion; ``garble``: the same for bytes; ``lose``: whether
+    a packet of the companion is lost; ``cut``: nothing gets through, both ways.
+    """
 
     def __init__(
         self,
@@ -123,8 +126,10 @@ class Rig:
         signer: Signer | None = None,
         prepare: Callable[[Simulator], None] = lambda simulator: None,
     ) -> None:
-        """``late_s``: how long the vehicle has been on when the companion comes; ``state``: the directory where it keeps its
-        state; ``port``: the vehicle's serial port it is on; ``prepare``: what others did with the vehicle by then."""
+        """``late_s``: how long the vehicle has been on when the companion comes; ``prepare``: what others did by then.
+
+        ``state``: the companion's state directory; ``port``: the vehicle's serial port that it is on.
+        """
         settings = settings or Settings()
         warm_up(settings, mission.rover.turning_radius_m)
         self.settings = settings
@@ -154,7 +159,7 @@ class Rig:
         self.restart_companion(mission)
 
     def restart_companion(self, mission: Mission, *, resume: bool = False) -> None:
-        """A companion that knows nothing yet takes the place of the one before, or with ``resume`` one that takes up what that has left."""
+        """A new companion replaces the one before; with ``resume`` it continues from the saved state."""
         checkpointer = None if self._state is None else kept_in(self._state, mission, resume=resume)
         near, self._far = MemoryLink.pair()
         self.link = AutopilotLink(

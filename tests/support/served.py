@@ -103,7 +103,7 @@ def slowness() -> float:
 def process(
     module: str, *arguments: object, first: str = "", watchdogs: bool = False
 ) -> Iterator[subprocess.Popen[str]]:
-    """``rover-companion`` (module companion) or ``rover-sitl`` (module sitl) with its own state directory, killed at the end.
+    """Runs ``rover-companion`` (module companion) or ``rover-sitl`` (module sitl), and kills it at the end.
 
     ``first``: code that the process runs before anything else. A companion that drives has PATIENT settings, unless it
     has others or ``watchdogs`` asks for the default ones.

@@ -1,4 +1,4 @@
-"""A person who plans at the ground station while a ``Rig`` runs: uploads fences and rally points, sets parameters. Real bytes."""
+"""A ground station beside a ``Rig`` that uploads fences and rally points and sets parameters, as bytes."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ def test_a_kernel_is_compiled_again_only_when_something_it_uses_has_changed(tmp_
 
 
 def test_a_package_that_cannot_be_written_is_compiled_once(tmp_path: Path) -> None:
-    """If these tests run as root, the program runs without root's power to write everywhere; ``HOME`` does not exist."""
+    """If these tests run as root, the program lacks root's right to write everywhere; ``HOME`` does not exist."""
     program = Program(tmp_path / "site", tmp_path / "cache")
     for path in (program.folder, *program.folder.rglob("*")):
         path.chmod(0o555 if path.is_dir() else 0o444)
