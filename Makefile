@@ -1,36 +1,47 @@
-# First set-up: make demo, make test. Everything lives in .venv; nothing is installed once it is there.
+# make demo and make test need nothing but make and Python 3.11 or newer. Everything lives in .venv, and the compiled
+# kernels in the user's cache (~/.cache/rover-companion).
 VENV := .venv
 BIN := $(VENV)/bin
-READY := $(VENV)/.ready
+PROGRAM := $(VENV)/.program
+TOOLS := $(VENV)/.tools
 KERNELS := $(VENV)/.kernels
+ALL_KERNELS := $(VENV)/.all-kernels
 SOURCES := $(shell find companion sitl -name '*.py')
 # The forerunners of sedighi take an hour here, and no unknown map is made for them.
 NAVIGATORS := hybrid,bspline-ga,astar,theta-star,dstar-lite,dijkstra,achour,prm,vertex++
 CANDIDATES := python3.11 python3.12 python3.13 python3.14 python3 python
+# For make fuzz: how long it searches.
+SECONDS := 600
 
-.PHONY: demo test lint bench results soak fuzz clean
+.PHONY: demo test lint pytest bench results soak fuzz clean
 
 demo: $(KERNELS)
+	@echo "driving missions/rooms.toml ..."
 	@$(BIN)/rover-sitl drive missions/rooms.toml --image out/rooms.png --map out/rooms-map
 
+# The linters and the compiler side by side, then the tests.
+test: $(TOOLS)
+	@$(MAKE) --no-print-directory --jobs=2 lint $(ALL_KERNELS)
+	@$(MAKE) --no-print-directory pytest
+
 # One worker more than processors: many tests wait for real time.
-test: $(KERNELS) lint
+pytest: $(ALL_KERNELS)
 	$(BIN)/python -m pytest -n 3 --dist loadgroup
 
-lint: $(READY)
+lint: $(TOOLS)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-cache
 
-bench: $(KERNELS)
+bench: $(ALL_KERNELS)
 	$(BIN)/python -m pytest tests/bench --override-ini addopts= -q -s --benchmark-columns=median,min,max,rounds
 
-# Each reader of bytes from outside for a minute, guided by what of the program the bytes reach.
-fuzz: $(KERNELS)
-	$(BIN)/python -m tests.fuzz all --seconds 60
+# Looks for inputs that break something: new ones every time, for SECONDS in all.
+fuzz: $(ALL_KERNELS)
+	$(BIN)/python -m tests.fuzz all properties --seconds $(SECONDS)
 
-results: $(KERNELS)
+results: $(TOOLS)
 	$(BIN)/rover-sitl experiment kwasniewski-table1 --docs docs
 	$(BIN)/rover-sitl experiment adaptive-control-points --docs docs
 	$(BIN)/rover-sitl experiment kwasniewski-maps --docs docs
@@ -45,24 +56,38 @@ results: $(KERNELS)
 soak: $(KERNELS)
 	$(BIN)/rover-sitl experiment soak --runs 100 --json out/soak.json --docs docs
 
-# A virtual environment with the versions of constraints.txt, made once and from then on used without a network.
-# PYTHON=... chooses the interpreter; otherwise the first one that works is taken.
-$(READY): pyproject.toml constraints.txt
-	@for python in $(or $(PYTHON),$(CANDIDATES)); do \
-	  if "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
-	    echo "setting up $(VENV) with $$("$$python" --version) (once, some minutes) ..."; \
-	    "$$python" -m venv $(VENV) && \
-	    $(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e '.[test]' && \
-	    touch $(READY); exit; \
-	  fi; \
-	done; \
-	echo "rover-companion needs Python 3.11 or newer with its venv module; tried: $(or $(PYTHON),$(CANDIDATES))" >&2; exit 1
+# The environment, with the versions of constraints.txt; once it is there, no network is needed. PYTHON=... chooses the
+# interpreter; otherwise it is the first one that works.
+$(PROGRAM): pyproject.toml constraints.txt
+	@$(call install,.,the program: about 450 MB)
+	@touch $(PROGRAM)
 
-# numba keeps compiled kernels beside their sources, but looks only at the file a kernel is in, not at the files it calls
-# into. So when any source is newer than the last look, all kernels are compiled anew.
-$(KERNELS): $(READY) $(SOURCES)
-	@find companion sitl tests \( -name '*.nbi' -o -name '*.nbc' \) -delete
+$(TOOLS): pyproject.toml constraints.txt
+	@$(call install,.[test],the program and the tools of its tests: about 1.2 GB)
+	@touch $(PROGRAM) $(TOOLS)
+
+define install
+for python in $(or $(PYTHON),$(CANDIDATES)); do \
+  if "$$python" -c 'import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+    echo "making $(VENV) with $$("$$python" --version) ..." && \
+    "$$python" -m venv $(VENV) && \
+    echo "installing $(2) ..." && \
+    $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile -c constraints.txt -e '$(1)'; exit; \
+  fi; \
+done; \
+echo "rover-companion needs Python 3.11 or newer with its venv module; tried: $(or $(PYTHON),$(CANDIDATES))" >&2; exit 1
+endef
+
+# Compiled before they are needed, in several processes. Kernels whose sources have not changed are only loaded.
+$(KERNELS): $(PROGRAM) $(SOURCES)
+	@echo "compiling the kernels, once: about a minute ..."
+	@$(BIN)/python -m sitl.cli.compile
 	@touch $(KERNELS)
+
+$(ALL_KERNELS): $(TOOLS) $(SOURCES)
+	@echo "compiling all kernels, once: some minutes ..."
+	@$(BIN)/python -m sitl.cli.compile --all
+	@touch $(KERNELS) $(ALL_KERNELS)
 
 clean:
 	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache

@@ -2,14 +2,34 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 
 import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis.database import DirectoryBasedExampleDatabase
+
+from companion.cli import kernels
+
+kernels.use_cache(os.environ)  # before a test imports numba
+
+# The same examples every time, on however busy a machine. ``make fuzz`` draws new ones, and tries finds again.
+settings.register_profile(
+    "fixed", derandomize=True, database=None, deadline=None, suppress_health_check=[HealthCheck.too_slow]
+)
+settings.register_profile(
+    "search",
+    parent=settings.get_profile("fixed"),
+    derandomize=False,
+    database=DirectoryBasedExampleDatabase("out/fuzz/examples"),
+    print_blob=True,
+)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "fixed"))
 
 
 @pytest.fixture(scope="session", autouse=True)
 def own_place_for_states(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Runs that are not told where to keep their state keep none in the user's own place, nor meet those of another worker there."""
+    """Runs without a state directory do not use that of the user, nor that of another worker."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("states")))
         yield

@@ -7,16 +7,13 @@ import os
 import signal
 import sys
 from collections.abc import Callable
-from pathlib import Path
 from types import FrameType
 from typing import cast
 
-from companion.cli.kernels import VARIABLE, choose_place
+from companion.cli import kernels
 
 EXIT_USAGE, EXIT_STOPPED = 2, 130
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
-HERE = Path(__file__).parents[1]
-"""The package ``companion``; ``sitl`` is installed beside it."""
 
 
 class StoppedError(Exception):
@@ -32,9 +29,11 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
         print(f"{name}: {fault}", file=sys.stderr)
         return EXIT_USAGE
     try:
-        choose_place(os.environ, (HERE, HERE.with_name("sitl")))
+        kernels.use_cache(os.environ)
     except OSError as error:
-        print(f"{name}: no place for compiled kernels ({error.strerror or error}); set {VARIABLE}", file=sys.stderr)
+        print(
+            f"{name}: no place for compiled kernels ({error.strerror or error}); set {kernels.PLACE}", file=sys.stderr
+        )
         return EXIT_USAGE
     terminated = _Terminated()
     before = signal.signal(signal.SIGTERM, terminated)

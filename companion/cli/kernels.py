@@ -1,50 +1,211 @@
-"""Where compiled kernels are kept: chosen before the compiler is imported, which looks for a place only once."""
+"""The cache of compiled kernels: where numba keeps them, and how long one is valid.
+
+A kernel is valid while the text of its own file, and of all project files whose kernels and constants it uses, is
+unchanged. The times of files, the folder of the project and all other files do not matter. numba itself looks at the
+kernel's own file only. ``use_cache`` replaces that rule by ``Locator``, through numba's hook
+``NUMBA_CACHE_LOCATOR_CLASSES``; child processes inherit it.
+"""
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import hashlib
 import os
 import shutil
 import tempfile
-from collections.abc import Iterable, MutableMapping
+from collections import defaultdict
+from collections.abc import Callable, MutableMapping
+from functools import cache
 from pathlib import Path
+from typing import Any, NamedTuple
 
-VARIABLE = "NUMBA_CACHE_DIR"
-KEPT = 2
-"""So many versions of the program keep their kernels; older ones' are removed."""
+PLACE, LOCATORS = "NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"
+ROOT = Path(__file__).resolve().parents[2]
+"""The directory of the packages."""
+PACKAGES = ("companion", "sitl")
+KEPT = 4
+"""Versions of a file whose kernels are kept; several, because all copies of the program share a cache."""
 
 
-def choose_place(environment: MutableMapping[str, str], packages: Iterable[Path]) -> Path | None:
-    """Set where kernels are kept, unless the user has (``NUMBA_CACHE_DIR``); None: beside the sources, as the compiler does by itself.
+def use_cache(environment: MutableMapping[str, str]) -> Path:
+    """Tell numba where the kernels are kept and when they are valid. Call it before numba is imported.
 
-    Beside the sources only in a working copy that can be written. Elsewhere there is a directory for every state of the sources: the compiler looks only
-    at the file a kernel is in, not at the files it calls into, and would take an older version's kernels for those of a newer one.
-    ``packages``: the directories of all packages with kernels.
+    The place is what the user has set (``NUMBA_CACHE_DIR``), or the first of these that can be written: systemd's
+    cache directory, systemd's state directory, the user's cache directory (XDG), a new temporary directory.
+
+    Raises:
+        OSError: nothing can be written, not even a temporary directory.
     """
-    packages = tuple(packages)
-    if environment.get(VARIABLE):
-        return Path(environment[VARIABLE])
-    if all((package.parent / "pyproject.toml").exists() and _is_writable(package) for package in packages):
+    environment.setdefault(LOCATORS, f"{__name__}.Locator,UserProvidedCacheLocator")
+    if not environment.get(PLACE):
+        writable = (place for base in _bases(environment) if _is_writable(place := base / "kernels"))
+        environment[PLACE] = str(next(writable, None) or tempfile.mkdtemp(prefix="rover-companion-kernels-"))
+    return Path(environment[PLACE])
+
+
+class Locator:
+    """numba's cache locator for kernels of this project: a directory for each version of a file with kernels.
+
+    The methods are those of numba's own locators in ``numba.core.caching``.
+    """
+
+    def __init__(self, file: Path, line: int) -> None:
+        self._py_file = str(file)  # numba's name for it
+        self._line = line
+        module = ".".join(file.relative_to(ROOT).with_suffix("").parts)
+        self._digest = kernel_digest(file)
+        self._directory = Path(os.environ[PLACE]) / f"{module}-{self._digest[:16]}"
+
+    @classmethod
+    def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Locator | None:
+        """None for functions of other projects."""
+        file = Path(py_file).resolve()
+        if not any(file.is_relative_to(ROOT / package) for package in PACKAGES):
+            return None
+        locator = cls(file, py_func.__code__.co_firstlineno)
+        locator.ensure_cache_path()
+        return locator
+
+    def ensure_cache_path(self) -> None:
+        """Make the directory and remove old ones. A cache that cannot be written is still read."""
+        with contextlib.suppress(OSError):
+            if not self._directory.exists():
+                self._directory.mkdir(parents=True, exist_ok=True)
+                _remove_old(self._directory)
+            os.utime(self._directory)
+
+    def get_cache_path(self) -> str:
+        """The directory of this version of the file."""
+        return str(self._directory)
+
+    def get_source_stamp(self) -> str:
+        """Kernels with another stamp are not used."""
+        return self._digest
+
+    def get_disambiguator(self) -> str:
+        """Tells functions of the same name in one file apart."""
+        return str(self._line)
+
+
+@cache
+def kernel_digest(file: Path) -> str:
+    """SHA-256 of a file with kernels and of all project files that these kernels depend on.
+
+    If a file was edited while this process ran, its older form may be loaded: then no other process has this digest.
+    """
+    at_first, digest = _times_at_first(), hashlib.sha256()
+    for path in sorted(_files_used_by(file)):
+        digest.update(f"{path.relative_to(ROOT)}\0".encode() + path.read_bytes() + b"\0")
+        if at_first.get(path) != path.stat().st_mtime_ns:
+            digest.update(f"edited {os.getpid()}\0".encode())
+    return digest.hexdigest()
+
+
+@cache
+def _times_at_first() -> dict[Path, int]:
+    """When each file was changed, as it was when this process loaded its first kernel."""
+    files = (file for package in PACKAGES for file in (ROOT / package).rglob("*.py"))
+    return {file: file.stat().st_mtime_ns for file in files}
+
+
+def _files_used_by(file: Path) -> set[Path]:
+    """The file itself and all that define a name which its decorated functions use, directly or through others."""
+    waiting = [(file, name) for name in _source(file).decorated]
+    seen = set(waiting)
+    while waiting:
+        found = _used_by(*waiting.pop()) - seen
+        waiting += found
+        seen |= found
+    return {file} | {path for path, _ in seen}
+
+
+def _used_by(file: Path, name: str) -> set[tuple[Path, str]]:
+    """What a name at the top level of a file is made from: files, each with a name there."""
+    source = _source(file)
+    base, _, attribute = name.partition(".")
+    found = {(file, used) for used in source.uses.get(base, ())}
+    for path, imported in source.imports.get(base, ()):
+        wanted = imported or attribute
+        found |= {(path, one) for one in (_source(path).uses if wanted in ("", "*") else (wanted,))}
+    return found
+
+
+class _Source(NamedTuple):
+    """The names at the top level of a file."""
+
+    decorated: frozenset[str]
+    """Functions with a decorator: kernels are among them."""
+    uses: dict[str, set[str]]
+    """The names in each definition; ``name.attribute`` for an attribute."""
+    imports: dict[str, set[tuple[Path, str]]]
+    """What an imported name stands for: a file, and a name there: "" for the module, "*" for all names."""
+
+
+@cache
+def _source(file: Path) -> _Source:
+    tree = ast.parse(file.read_bytes())
+    decorated, uses = set(), defaultdict[str, set[str]](set)
+    for statement in _statements(tree):
+        names = _names_in(statement)
+        if isinstance(statement, ast.FunctionDef | ast.ClassDef):
+            uses[statement.name] |= names
+            if isinstance(statement, ast.FunctionDef) and statement.decorator_list:
+                decorated.add(statement.name)
+        else:
+            for name in _stored_in(statement) or names:
+                uses[name.partition(".")[0]] |= names
+    return _Source(frozenset(decorated), uses, _imports(tree))
+
+
+def _statements(tree: ast.AST) -> list[ast.stmt]:
+    """Those at the top level, also inside ``if``, ``try`` and the like."""
+    found: list[ast.stmt] = []
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If | ast.Try | ast.With | ast.For | ast.ExceptHandler):
+            found += _statements(node)
+        if isinstance(node, ast.stmt):
+            found.append(node)
+    return found
+
+
+def _names_in(statement: ast.stmt) -> set[str]:
+    """All names it uses, those of argument types too: a kernel's code depends on the fields of a named tuple."""
+    nodes = list(ast.walk(statement))
+    attributes = {id(node.value): node.attr for node in nodes if isinstance(node, ast.Attribute)}
+    names = [node for node in nodes if isinstance(node, ast.Name)]
+    return {f"{name.id}.{attributes[id(name)]}" if id(name) in attributes else name.id for name in names}
+
+
+def _stored_in(statement: ast.stmt) -> set[str]:
+    """The names that an assignment defines; empty for statements that change a value in place."""
+    return {node.id for node in ast.walk(statement) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
+
+
+def _imports(tree: ast.Module) -> dict[str, set[tuple[Path, str]]]:
+    found = defaultdict[str, set[tuple[Path, str]]](set)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module and (package := _file_of(node.module)):
+            for alias in node.names:
+                module = _file_of(f"{node.module}.{alias.name}")
+                found[alias.asname or alias.name].add((module, "") if module else (package, alias.name))
+        elif isinstance(node, ast.Import):
+            for alias in node.names:
+                if module := _file_of(alias.name):
+                    found[alias.asname or alias.name.partition(".")[0]].add((module, "*"))
+    return found
+
+
+def _file_of(module: str) -> Path | None:
+    """The file of a module of this project; None for others."""
+    if module.partition(".")[0] not in PACKAGES:
         return None
-    name = f"kernels-{_digest(packages)}"
-    for base in _bases(environment):
-        place = base / name
-        try:
-            place.mkdir(mode=0o700, parents=True, exist_ok=True)
-        except OSError:
-            continue
-        if _is_writable(place):
-            os.utime(place)
-            _remove_old(base, place)
-            environment[VARIABLE] = str(place)
-            return place
-    environment[VARIABLE] = tempfile.mkdtemp(prefix="rover-companion-kernels-")
-    return Path(environment[VARIABLE])
+    path = ROOT.joinpath(*module.split("."))
+    return next((file for file in (path.with_suffix(".py"), path / "__init__.py") if file.exists()), None)
 
 
 def _bases(environment: MutableMapping[str, str]) -> list[Path]:
-    """What systemd has made for the service, then the user's own place for caches (XDG)."""
+    """What systemd has made for the service, then the user's own directory for caches (XDG)."""
     bases = [
         Path(environment[key].split(":")[0]) for key in ("CACHE_DIRECTORY", "STATE_DIRECTORY") if environment.get(key)
     ]
@@ -54,25 +215,18 @@ def _bases(environment: MutableMapping[str, str]) -> list[Path]:
 
 
 def _is_writable(directory: Path) -> bool:
-    """Tried, not asked: the answer of ``os.access`` is wrong on file systems that are mounted read-only or belong to root."""
+    """Tries it: ``os.access`` is wrong on read-only file systems and for root."""
     try:
+        directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=directory).close()
     except OSError:
         return False
     return True
 
 
-def _digest(packages: Iterable[Path]) -> str:
-    """Of all sources: two milliseconds."""
-    digest = hashlib.sha256()
-    for package in packages:
-        for path in sorted(package.rglob("*.py")):
-            digest.update(str(path).encode() + b"\0" + path.read_bytes())
-    return digest.hexdigest()[:16]
-
-
-def _remove_old(base: Path, newest: Path) -> None:
-    others = [path for path in base.glob("kernels-*") if path != newest]
-    with contextlib.suppress(OSError):  # another run is just doing the same
-        for path in sorted(others, key=lambda path: path.stat().st_mtime)[: -(KEPT - 1)]:
-            shutil.rmtree(path, ignore_errors=True)
+def _remove_old(newest: Path) -> None:
+    """Of the versions of a file's kernels, leave the ones used last."""
+    module = newest.name.rpartition("-")[0]
+    others = [path for path in newest.parent.glob(f"{module}-*") if path != newest]
+    for path in sorted(others, key=lambda path: path.stat().st_mtime)[: -(KEPT - 1)]:
+        shutil.rmtree(path, ignore_errors=True)

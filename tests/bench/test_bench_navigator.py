@@ -55,13 +55,14 @@ def test_planning_of_a_run_and_a_field_step(benchmark, profile, name):
 
 @pytest.mark.parametrize("name", list(TITLES))
 def test_field_steps_on_a_map_of_eight_million_fields(name):
-    """The maps at 40 times their size: of the first steps of a run 99 % take less than 150 ms, all searches included."""
+    """Maps at 40 times their size: 99 % of the first steps of a run take less than 150 ms, searches included."""
     warm_up()
     (case,) = (case for case in paper_cases(MAPS, (LARGE,)) if case.name == name)
     run = drive_fields(Grid(case.weights), *case.ends[0], Settings(), 0, LARGE_STEPS)
     steps_ms = 1e3 * np.array(run.step_seconds)
     print(
-        f"\n{name} x{LARGE}: {run.steps} steps, {run.searches} searches, field step median {np.median(steps_ms):.2f} ms, "
+        f"\n{name} x{LARGE}: {run.steps} steps, {run.searches} searches, "
+        f"field step median {np.median(steps_ms):.2f} ms, "
         f"p99 {np.percentile(steps_ms, 99):.1f} ms, largest {steps_ms.max():.1f} ms"
     )
     assert run.outcome is Outcome.REACHED or run.steps == LARGE_STEPS
@@ -70,7 +71,7 @@ def test_field_steps_on_a_map_of_eight_million_fields(name):
 
 @pytest.mark.parametrize("name", list(TITLES))
 def test_searches_of_a_known_map_of_eight_million_fields(name):
-    """As a rover asks: the whole map known, dearer ground round obstacles and behind it; from many places to the target."""
+    """As a rover asks: a known map, costlier ground round obstacles, from many places to the target."""
     warm_up()
     settings = Settings()
     (case,) = (case for case in paper_cases(MAPS, (LARGE,)) if case.name == name)

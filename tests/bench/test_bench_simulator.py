@@ -1,4 +1,4 @@
-"""What simulated seconds cost the simulator alone, with streams and a lidar; in CPU seconds, so that a busy computer tells the same."""
+"""The cost of a simulated second, with streams and a lidar; in CPU seconds, which a busy computer does not change."""
 
 import time
 from typing import Any
@@ -12,7 +12,7 @@ from sitl.world.world import World
 from tests.support.sitl_client import HOME, Client, ready
 
 STREAMED = (30, 32, 33, 62, 74, 87, 132, 193)
-"""ATTITUDE, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, NAV_CONTROLLER_OUTPUT, VFR_HUD, the read-back, ranges, EKF_STATUS_REPORT."""
+"""Attitude, positions, NAV_CONTROLLER_OUTPUT, VFR_HUD, the target's read-back, ranges, EKF_STATUS_REPORT."""
 STEP_S = 0.05
 
 
@@ -53,7 +53,8 @@ def test_a_hundred_times_real_time(sensors: str) -> None:
         assert run_s(client, 3.0) > 3000
         factors.append(3.0 / (time.process_time() - began_s))
     print(
-        f"\n{sensors}, eight streams at 10 Hz: {min(factors):.0f} to {max(factors):.0f} times real time, {np.median(factors):.0f} median"
+        f"\n{sensors}, eight streams at 10 Hz: {min(factors):.0f} to {max(factors):.0f} times real time, "
+        f"{np.median(factors):.0f} median"
     )
     assert np.median(factors) > 100.0
 

@@ -16,8 +16,7 @@ from pathlib import Path
 
 import pytest
 
-PATIENCE_S = 120.0
-"""For one answer on a machine that is busy with other things."""
+from tests.support.served import PATIENCE_S
 
 
 def installed(module: str, package: str) -> None:
@@ -91,10 +90,10 @@ class Program:
         self.child.stdin.close()
         self.child.send_signal(number)
         try:
-            code = self.ended(10.0)
+            code = self.ended(30.0)
         except subprocess.TimeoutExpired:
             self.child.kill()
-            code = self.ended(10.0)
+            code = self.ended()
         self.child.stdout.close()
         return code
 

@@ -16,10 +16,10 @@ from pymavlink import mavutil
 
 from companion.executive.warm_up import warm_up
 from companion.settings import Settings
-from tests.clients.program import PATIENCE_S, Program, program
+from tests.clients.program import Program, program
 from tests.sitl.network.test_server import free_port
 from tests.support.rig import GUIDED, yard
-from tests.support.served import mission_path
+from tests.support.served import PATIENCE_S, PATIENT, mission_path
 
 SPEEDUP = 5
 CRUISE_M_S = 0.4
@@ -138,18 +138,19 @@ class Scene:
 
 @contextmanager
 def scene(folder: Path, companion_on: str, *options: object) -> Iterator[Scene]:
-    """``companion_on``: tcp or udp; the ground station gets the other one. ``options`` of the companion. Nobody arms yet."""
+    """``companion_on``: tcp or udp; the ground station gets the other one. ``options`` go to the companion."""
     path = mission_path(yard(folder, TARGETS))
     path.write_text(path.read_text().replace("cruise_speed_m_s = 2.0", f"cruise_speed_m_s = {CRUISE_M_S}"))
     tcp, udp = free_port(), free_port(socket.SOCK_DGRAM)
     listen = [f"tcp:127.0.0.1:{tcp}", f"udpout:127.0.0.1:{udp}"]
     sitl = ["serve", path, "--listen", listen[0], "--listen", listen[1], "--speedup", SPEEDUP]
     url = {"tcp": f"tcp:127.0.0.1:{tcp}", "udp": f"udpin:127.0.0.1:{udp}"}[companion_on]
-    # Where nothing is compiled yet, that may take a minute; the companion is to find it done.
-    warm_up(Settings())
+    warm_up(Settings())  # where nothing is compiled yet, the companion would take a minute
     with program(folder, "-c", "from sitl.cli.main import main; main()", *sitl) as serve:
-        serve.says(f"sending to {listen[1]}", limit_s=180.0)
-        run = ["run", path, "--connect", url, "--state", folder / "state", *options]
+        serve.says(f"sending to {listen[1]}")
+        (folder / "patient.toml").write_text(PATIENT)
+        kept = ("--state", folder / "state", "--settings", folder / "patient.toml")
+        run = ["run", path, "--connect", url, *kept, *options]
         with program(folder, "-c", "from companion.cli.main import main; main()", *run) as companion:
             witness = Witness(tcp)
             try:

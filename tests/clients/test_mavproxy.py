@@ -89,7 +89,7 @@ def lists_up_and_down(ground: Program, here: Scene, folder: Path) -> None:
 
 
 def tuned(ground: Program, here: Scene, folder: Path) -> None:
-    """The companion's own parameters: by MAVProxy as a person types them, then by pymavlink; kept in the state directory."""
+    """The companion's parameters, by MAVProxy and by pymavlink; they are kept in the state directory."""
     kept = folder / "state" / "tuned.toml"
     ground.told("set target_component 191", rf"Received {len(TABLE)} parameters")
     ground.told("param show CMP_HORIZON", r"CMP_HORIZON +8\.0")

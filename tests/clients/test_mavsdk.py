@@ -11,9 +11,10 @@ from typing import Any
 
 import pytest
 
-from tests.clients.program import PATIENCE_S, installed
+from tests.clients.program import installed
 from tests.clients.scene import CRUISE_M_S, HOME_DEG, PLACES, Scene, metres_from_home, scene
 from tests.support.rig import HOLD
+from tests.support.served import PATIENCE_S
 
 WAYPOINT, RELATIVE = 16, 3
 

@@ -1,7 +1,12 @@
-"""Coverage-guided fuzzing with atheris: ``python -m tests.fuzz TARGET... --seconds N`` (TARGET ``all``: every one in turn).
+"""The search for inputs that break something: ``python -m tests.fuzz TARGET... --seconds N``.
 
-A find stops the target, prints its traceback and leaves its bytes in the directory ``out/fuzz``; once mended it goes into ``finds.py``,
-and every test run reads it again. ``--runs N`` stops after as many tries; ``--seed N`` tries the same ones again.
+A target is a reader of bytes, fuzzed with atheris guided by coverage (``all``: every reader), or ``properties``: all
+hypothesis tests, with new random examples in every round. The targets share the N seconds; ``properties`` gets half.
+
+A find of a reader stops that target, prints its traceback and leaves its bytes in ``out/fuzz``. Once mended it goes
+into ``finds.py``, and every test run reads it again. A find of a property is printed with the decorator that repeats it
+(``@reproduce_failure``) and is tried first in the next search; once mended it becomes an ``@example`` of its test.
+``--runs N`` stops a reader after as many tries; ``--seed N`` makes the same ones again.
 """
 
 from __future__ import annotations
@@ -13,12 +18,19 @@ import importlib.util
 import io
 import os
 import re
+import signal
+import subprocess
 import sys
 import tempfile
+import time
 import traceback
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+import pytest
+
+from companion.cli import kernels
 
 if TYPE_CHECKING:
     from tests.fuzz.targets import Target
@@ -27,11 +39,12 @@ ROOT = Path(__file__).resolve().parents[2]
 FOUND = Path("out/fuzz")
 WATCHED = ("companion", "tomllib", "yaml", "json", "pymavlink")
 """Packages that are looked into: which of their branches are taken."""
+PROPERTIES = "properties"
 SAID = ("stat::number_of_executed_units", "Done ")
 
 
 def compiled_modules() -> list[str]:
-    """The companion's modules that numba compiles: it would have to compile what atheris puts into them to watch their branches."""
+    """Modules with kernels. They are not watched: numba would have to compile what atheris adds to them."""
     files = (ROOT / "companion").rglob("*.py")
     found = [path for path in files if re.search(r"^(from|import) numba\b", path.read_text(), re.MULTILINE)]
     return sorted(".".join(path.relative_to(ROOT).with_suffix("").parts) for path in found)
@@ -92,6 +105,26 @@ def is_clean(name: str, target: Target, limits: list[str]) -> bool:
     return clean
 
 
+def properties_hold(seconds: float) -> bool:
+    """Run all hypothesis tests, again and again with other examples, for so long; whether all passed."""
+    stop_s, rounds = time.monotonic() + seconds, 0
+    command = [sys.executable, "-m", "pytest", "tests", "-m", "hypothesis", "-n", str(os.cpu_count()), "--tb=short"]
+    environment = {**os.environ, "HYPOTHESIS_PROFILE": "search"}
+    while time.monotonic() < stop_s:
+        with subprocess.Popen(command, cwd=ROOT, env=environment, stdout=subprocess.PIPE, text=True) as child:
+            try:
+                said, _ = child.communicate(timeout=stop_s - time.monotonic())
+            except subprocess.TimeoutExpired:
+                child.send_signal(signal.SIGINT)
+                said, _ = child.communicate()
+        if child.returncode not in (0, pytest.ExitCode.INTERRUPTED) or "FAILED" in said:
+            print(f"properties: FOUND\n{said}", flush=True)
+            return False
+        rounds += 1
+    print(f"properties: nothing found in {rounds} rounds", flush=True)
+    return True
+
+
 def main() -> None:
     """The command line; exit code 1 after a find."""
     parser = argparse.ArgumentParser(prog="tests.fuzz")
@@ -100,17 +133,30 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=-1)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
+    names = [name for name in given.targets if name != PROPERTIES]
+    share = 0.5 if names and PROPERTIES in given.targets else 1.0
+    FOUND.mkdir(parents=True, exist_ok=True)
+    clean = True
+    if names:
+        clean = readers_are_clean(names, share * given.seconds, [f"-runs={given.runs}", f"-seed={given.seed}"])
+    if PROPERTIES in given.targets:
+        clean = properties_hold(share * given.seconds) and clean
+    sys.exit(0 if clean else 1)
+
+
+def readers_are_clean(names: list[str], seconds: float, limits: list[str]) -> bool:
+    """Fuzz one reader after the other, each for its share of the time; whether nothing was found."""
     if importlib.util.find_spec("atheris") is None:
         sys.exit("atheris is not installed; there are builds of it for Linux on x86-64 only: pip install -e '.[fuzz]'")
     known = watched_targets()
-    names = list(known) if given.targets == ["all"] else given.targets
+    names = list(known) if names == ["all"] else names
     if unknown := sorted(set(names) - known.keys()):
-        sys.exit(f"{unknown[0]}: no such target; there are {', '.join(known)}")
-    FOUND.mkdir(parents=True, exist_ok=True)
-    limits = [f"-max_total_time={given.seconds}", f"-runs={given.runs}", f"-seed={given.seed}"]
+        sys.exit(f"{unknown[0]}: no such target; there are {', '.join(known)}, {PROPERTIES}")
+    limits = [f"-max_total_time={max(1, round(seconds / len(names)))}", *limits]
     results = [is_clean(name, known[name], limits) for name in names]
-    sys.exit(0 if all(results) else 1)
+    return all(results)
 
 
 if __name__ == "__main__":
+    kernels.use_cache(os.environ)
     main()

@@ -1,4 +1,4 @@
-"""What is fuzzed: every reader of bytes from outside, each as a function of bytes that returns, or refuses with one line."""
+"""What is fuzzed: every reader of outside bytes, as a function that returns or refuses in one line."""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ def link_contents(data: bytes) -> None:
 
 
 def driving(data: bytes) -> None:
-    """Packets whose frame is right, among those of a rover that is being driven: to parameters, errands, fence and all else that listens."""
+    """Well-formed packets among those of a rover that drives: parameters, errands, fences and the like."""
     with tempfile.TemporaryDirectory() as folder:
         rig = Rig(yard(Path(folder)), late_s=LONG_ON_S)
     rig.until_driven(0.2)

@@ -1,4 +1,4 @@
-"""Every reader of bytes from outside: what it once stumbled over, and what its files become when pieces of them are changed.
+"""Every reader of outside bytes: the inputs that once broke it, and its own files with pieces changed.
 
 ``make fuzz`` looks much further; it uses the same targets.
 """

@@ -24,18 +24,10 @@ def run_of(suite: str, seed: int) -> Drive:
     return Drive(mission, scenario, Settings(), seed, NullRecorder(), time_limit_s=900.0)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-@pytest.mark.parametrize("suite", ["lidar-360", "lidar-90"])
-def test_both_targets_are_reached_and_nothing_is_touched(suite: str, seed: int) -> None:
+@pytest.mark.parametrize(("suite", "seed"), [("lidar-360", 0), ("lidar-360", 2), ("lidar-90", 0), ("lidar-90", 1)])
+def test_both_targets_are_reached_on_arcs_and_nothing_is_touched(suite: str, seed: int) -> None:
+    """It is never told to turn on the spot; it backs up where it has to."""
     run = run_of(suite, seed)
-    report = run.run()
-    assert run.simulator.collisions == ()
-    assert [status for _, status in report.targets] == ["reached", "reached"]
-    assert report.exit_code == 0
-
-
-def test_it_is_never_told_to_turn_on_the_spot_and_it_backs_up() -> None:
-    run = run_of("lidar-360", 2)
     told, send = [], run.companion._autopilot.send
     speeds = []
 
@@ -45,6 +37,10 @@ def test_it_is_never_told_to_turn_on_the_spot_and_it_backs_up() -> None:
 
     run.companion._autopilot.send = heard  # type: ignore[method-assign]
     report = run.run(lambda status: speeds.append(run.simulator.truth.speed_m_s))
+    assert run.simulator.collisions == ()
+    assert [status for _, status in report.targets] == ["reached", "reached"]
     assert report.exit_code == 0
     assert len(told) > 500 and not any(isinstance(command, GuidedHeading) for command in told)
-    assert min(speeds) < -0.2 and max(speeds) > 1.8
+    assert max(speeds) > 1.8
+    if (suite, seed) == ("lidar-360", 2):
+        assert min(speeds) < -0.2

@@ -287,7 +287,7 @@ def test_a_parameter_file_with_faults_as_people_see_them(tmp_path: Path) -> None
         simulator(tmp_path, "--params", wrong) as url,
         process("companion", "doctor", "--connect", url, "--json", "--seconds", 40) as child,
     ):
-        code, out, err = finished(child, 90.0)
+        code, out, err = finished(child)
     assert code == 3, err
     findings = {one["name"]: one for one in json.loads(out)["findings"]}
     assert (findings["oa-type"]["parameter"], findings["oa-type"]["wanted"]) == ("OA_TYPE", 0.0)

@@ -12,7 +12,7 @@ import pytest
 import typer
 
 from companion.cli.entry import StoppedError, start
-from tests.support.served import finished, process
+from tests.support.served import PATIENCE_S, finished, process, slowness
 
 SCRIPTS = {"rover-companion": "companion", "rover-sitl": "sitl"}
 
@@ -58,9 +58,9 @@ def test_an_interrupt_while_it_loads_is_no_traceback(name: str) -> None:
     for delay_s in (0.15, 0.3, 0.45):
         arguments = command(name, "--help")
         with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
-            time.sleep(delay_s)
+            time.sleep(delay_s * slowness())
             process.send_signal(signal.SIGINT)
-            _, errors = process.communicate(timeout=30)
+            _, errors = process.communicate(timeout=PATIENCE_S)
         # Before our first line runs, the interpreter itself may still be starting: that is not ours.
         quiet += "cli/" not in errors and process.returncode in (0, 130)
     assert quiet >= 1
@@ -101,7 +101,7 @@ def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
     with process("sitl", *command, first=heeded) as child:
         assert child.stdout is not None and child.stdout.readline().startswith("Rooms")
         child.send_signal(number)
-        code, _, errors = finished(child, 20.0)
+        code, _, errors = finished(child)
     assert code == 130 and errors.count("\n") == 1
     assert errors.startswith(f"stopped by {word}: Rooms after ") and "0 of 1 targets reached" in errors
     assert errors.endswith(f"record so far: {record}\n") and (record / "link.tlog").stat().st_size > 0

@@ -18,7 +18,7 @@ def test_a_target_outside_the_autopilots_fence_ends_the_run_before_it_begins(tmp
         served(mission) as rover,
         process("companion", "run", mission_path(mission), "--connect", rover.url, "--arm") as run,
     ):
-        code, out, err = finished(run, 60.0)
+        code, out, err = finished(run)
         assert code == 2, (out, err)
         line = err.strip().splitlines()[-1]
         assert "yard.toml: target 1 'gate': lies outside" in line and "circle of 10 m round home" in line
@@ -33,9 +33,9 @@ def test_a_battery_that_runs_low_brings_the_rover_back_and_ends_the_run_with_exi
     with served(mission) as rover:
         arguments[3] = rover.url
         with process("companion", *arguments) as run:
-            wait_until(lambda: rover.simulator.driven_m > 3.0, 60.0)
+            wait_until(lambda: rover.simulator.driven_m > 3.0)
             rover.simulator._vehicle.battery.fault_v = 10.8
-            code, out, err = finished(run, 60.0)
+            code, out, err = finished(run)
             assert code == 3, (out, err)
             assert "gate: skipped (battery at 10." in out
             assert "Returning: battery at 10." in err

@@ -21,7 +21,7 @@ from companion.mission.stored_mission import mission_of
 from tests.scenarios.test_auto_legs import GUIDED_ENABLE, NONE, ON, WAYPOINT, Row, place_deg
 from tests.support.asker import Asker
 from tests.support.rig import ARM, AUTO, SET_MODE, yard
-from tests.support.served import finished, process, served, wait_until
+from tests.support.served import PATIENCE_S, finished, process, served, wait_until
 
 LAND, DELAY = 21, 93
 ROUND: list[Row] = [(WAYPOINT, NONE, (15, 7)), (DELAY, (1.0, 0.0, 0.0, 0.0), None), (WAYPOINT, NONE, (20, 3))]
@@ -147,10 +147,12 @@ def upload(url: str, rows: list[tuple[int, tuple[float, ...], tuple[int, int]]])
     """By pymavlink alone."""
     host, port = url.removeprefix("tcp:").split(":")
     link: Any = mavutil.mavlink_connection(f"tcp:{host}:{port}", source_system=254, source_component=190)
-    assert link.wait_heartbeat(timeout=20.0) is not None
+    assert link.wait_heartbeat(timeout=PATIENCE_S) is not None
     rows = [(WAYPOINT, NONE, rows[0][2]), *rows]
     link.mav.mission_count_send(1, 1, len(rows), 0)
-    while (asked := link.recv_match(type=["MISSION_REQUEST", "MISSION_ACK"], blocking=True, timeout=10.0)) is not None:
+    while (
+        asked := link.recv_match(type=["MISSION_REQUEST", "MISSION_ACK"], blocking=True, timeout=PATIENCE_S)
+    ) is not None:
         if asked.get_type() == "MISSION_ACK":
             assert asked.type == mavlink.MAV_MISSION_ACCEPTED
             link.close()
@@ -165,12 +167,12 @@ def test_the_command_itself(tmp_path: Path) -> None:
     with served(yard(tmp_path)) as world:
         arguments = ("--from-autopilot", "--connect", world.url, "--arm", "--state", tmp_path / "state")
         with process("companion", "run", *arguments) as run:
-            code, _, err = finished(run, 60.0)
+            code, _, err = finished(run)
         assert code == 2
         assert "the autopilot's mission: there is none; upload one" in err and "Traceback" not in err
         upload(world.url, stored([(WAYPOINT, NONE, (5, 9))]))
         with process("companion", "run", *arguments) as run:
-            code, out, err = finished(run, 90.0)
+            code, out, err = finished(run)
         assert code == 0, err
         assert out == "waypoint 1: reached\n"
         assert "fetching the mission" in err and "Traceback" not in err
@@ -185,9 +187,9 @@ def test_the_command_drives_what_auto_hands_over(tmp_path: Path) -> None:
             assert run.stderr is not None
             assert any("a person to arm and to set AUTO" in line for line in iter(run.stderr.readline, ""))
             world.pilot(ARM, 1)
-            wait_until(lambda: world.simulator.vehicle.armed, 10.0)
+            wait_until(lambda: world.simulator.vehicle.armed)
             world.pilot(SET_MODE, 1, AUTO)
-            code, out, err = finished(run, 60.0)
+            code, out, err = finished(run)
         assert (code, out) == (0, "guided item 1: reached\n"), err
         assert world.simulator.vehicle.mode == AUTO, "the autopilot goes on"
         assert world.simulator.collisions == ()

@@ -16,7 +16,7 @@ from pymavlink import mavutil
 from companion.core.clock import WallClock
 from tests.sitl.network.test_server import free_port
 from tests.support.rig import yard
-from tests.support.served import Served, finished, mission_path, process
+from tests.support.served import PATIENCE_S, Served, finished, mission_path, process
 
 KEY = bytes(range(1, 33))
 TEXT = "from the companion"
@@ -62,8 +62,8 @@ def connect(url: str, system: int, component: int) -> Any:
     return made
 
 
-def wait(connection: Any, fits: Callable[[Any], bool], limit_s: float = 8.0) -> Any:
-    stop_s = time.monotonic() + limit_s
+def wait(connection: Any, fits: Callable[[Any], bool]) -> Any:
+    stop_s = time.monotonic() + PATIENCE_S
     while time.monotonic() < stop_s:
         message = connection.recv_match(blocking=True, timeout=0.5)
         if message is not None and fits(message):
@@ -117,14 +117,14 @@ def test_ground_station_companion_and_tool_at_once(line: Line) -> None:
 def test_a_megabyte_of_noise_on_every_port(line: Line) -> None:
     noise = random.Random(1).randbytes(1_000_000)
     tcp, udp = line.addresses
-    with socket.create_connection(("127.0.0.1", tcp), timeout=5.0) as flood:
+    with socket.create_connection(("127.0.0.1", tcp), timeout=PATIENCE_S) as flood:
         flood.sendall(noise)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as flood:
         for at in range(0, len(noise), 1000):
             flood.sendto(noise[at : at + 1000], ("127.0.0.1", udp))
         flood.sendto(b"", ("127.0.0.1", udp))
     terminal = os.open(line.urls[2], os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
-    sent, stop_s = 0, time.monotonic() + 10.0
+    sent, stop_s = 0, time.monotonic() + PATIENCE_S
     while sent < len(noise) and time.monotonic() < stop_s:
         try:
             sent += os.write(terminal, noise[sent : sent + 4000])
@@ -176,12 +176,12 @@ def test_the_companion_drives_over_a_serial_line_while_a_ground_station_watches(
     texts: list[str] = []
     try:
         with process("companion", "run", mission_path(mission), "--connect", f"serial:{name}:57600", "--arm") as run:
-            limit_s = WallClock().now_s() + 90.0
+            limit_s = WallClock().now_s() + PATIENCE_S
             while run.poll() is None and WallClock().now_s() < limit_s:
                 message = ground.recv_match(type=["STATUSTEXT"], blocking=True, timeout=0.5)
                 if message is not None and message.get_srcComponent() == 191:
                     texts.append(message.text)
-            code, out, err = finished(run, 5.0)
+            code, out, err = finished(run)
     finally:
         ground.close()
         world.close()

@@ -13,7 +13,7 @@ from tests.support.shared_data import SHARED, needs_shared
 
 FILES = SHARED / "data" / "missions"
 OPEN = Path(__file__).parents[2] / "missions" / "open.toml"
-PATIENCE_S = 20.0
+PATIENCE_S = 120.0
 
 
 @pytest.fixture(scope="module")

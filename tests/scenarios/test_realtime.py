@@ -32,7 +32,7 @@ def test_companion_and_simulator_as_two_processes(tmp_path: Path, kind: str, spe
             "companion", "run", path, "--connect", f"{connect}:127.0.0.1:{port}", "--arm", "--record", record
         ) as run,
     ):
-        code, out, err = finished(run, 110.0)
+        code, out, err = finished(run)
     assert code == 0, err
     assert "gate: reached" in out
     for said in ("waiting for", "Heading for gate", "driving", "Mission ended: 1 of 1"):

@@ -303,14 +303,14 @@ def test_companion_and_simulator_as_two_processes_a_lidar_stuck_for_a_while(tmp_
     mission = yard(tmp_path)
     with (
         served(mission) as world,
-        process("companion", "run", mission_path(mission), "--connect", world.url, "--arm") as run,
+        process("companion", "run", mission_path(mission), "--connect", world.url, "--arm", watchdogs=True) as run,
     ):
         assert run.stderr is not None
         lines = iter(run.stderr.readline, "")
-        wait_until(lambda: world.simulator.driven_m > 2.0, 40.0)
+        wait_until(lambda: world.simulator.driven_m > 2.0)
         world.simulator._sensing.lidar_fault = Defect.STUCK
         assert any("Stopping: obstacle distance repeats itself" in line for line in lines)
         world.simulator._sensing.lidar_fault = None
-        code, out, _ = finished(run, 60.0)
+        code, out, _ = finished(run)
         assert world.simulator.collisions == ()
     assert (code, out) == (0, "gate: reached\n")

@@ -1,9 +1,9 @@
 """A stand-in for the firmware's side of the JSON interface: the frames it sends, and how it reads what comes back.
 
-Written after ArduPilot's libraries/SITL/SIM_JSON: keys are found as bare text, the value begins two characters after the key,
-an answer counts only between two newlines, and the frame's number goes up only when an answer was understood. ``OLD`` and ``NEW`` are
-the orders of its table of keys before and after latitude, longitude and altitude were put in; ranges are taken over by
-places 7 to 12 of that table in both, which in the new one are no longer theirs.
+It follows ArduPilot's libraries/SITL/SIM_JSON: keys are found as bare text, a value begins two characters after its
+key, an answer counts only between two newlines, and the frame number rises only when an answer was understood. ``OLD``
+and ``NEW`` are the orders of its table of keys before and after latitude, longitude and altitude were added. Both read
+the ranges from places 7 to 12 of that table, which in the new one belong to other keys.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ OLD = _table(
 )
 NEW = _table(
     "timestamp latitude longitude altitude imu/gyro imu/accel_body position attitude quaternion velocity "
-    "rng_1 rng_2 rng_3 rng_4 rng_5 rng_6 velocity_wind windvane/direction windvane/speed airspeed no_time_sync no_lockstep "
-    "rc/rc_1 rc/rc_2 rc/rc_3 rc/rc_4 battery/voltage battery/current"
+    "rng_1 rng_2 rng_3 rng_4 rng_5 rng_6 velocity_wind windvane/direction windvane/speed airspeed no_time_sync "
+    "no_lockstep rc/rc_1 rc/rc_2 rc/rc_3 rc/rc_4 battery/voltage battery/current"
 )
 REQUIRED = {"timestamp", "imu/gyro", "imu/accel_body", "position", "velocity"}
 SIZES = {"imu/gyro": 3, "imu/accel_body": 3, "position": 3, "attitude": 3, "velocity": 3, "quaternion": 4}

@@ -41,6 +41,8 @@ from sitl.simulator import Simulator
 MANUAL, HOLD, AUTO, RTL, GUIDED = 0, 4, 10, 11, 15
 SET_MODE, ARM, SPEED, REPOSITION, REBOOT = 176, 400, 178, 192, 246
 ARMED = 128
+ON_FOR_S = 45.0
+"""After so long a vehicle that was switched on can be armed."""
 
 HEAD = """
 name = "Yard"
@@ -132,7 +134,7 @@ class Rig:
         *,
         seed: int = 0,
         arm: bool = True,
-        late_s: float = 0.0,
+        late_s: float = ON_FOR_S,
         state: Path | None = None,
         port: int = 0,
         signer: Signer | None = None,

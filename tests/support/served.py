@@ -24,6 +24,17 @@ from sitl.simulator import Simulator
 from tests.sitl.network.test_server import free_port
 
 READY_S = 45.0
+PATIENCE_S = 180.0
+"""For anything that other processes do, on a machine that is busy with other things."""
+PATIENT = """
+[safety]
+stale_s = 5.0
+hold_after_s = 60.0
+heartbeat_s = 30.0
+latency_s = 10.0
+planner_s = 120.0
+"""
+"""Settings of a companion that does not give up on a busy machine."""
 
 
 class Served:
@@ -60,7 +71,7 @@ class Served:
         """As the next heartbeats say."""
         self.heard()
         beats: list[Any] = []
-        wait_until(lambda: bool(beats.extend(self._beats()) or beats), 3.0)
+        wait_until(lambda: bool(beats.extend(self._beats()) or beats))
         return int(beats[-1].custom_mode)
 
     def _beats(self) -> list[Any]:
@@ -68,45 +79,58 @@ class Served:
 
     def close(self) -> None:
         self._running = False
-        self._thread.join(timeout=5.0)
+        self._thread.join(timeout=PATIENCE_S)
         for endpoint in self._endpoints:
             endpoint.close()
 
 
-def wait_until(done: Callable[[], bool], limit_s: float) -> None:
-    stop_s = time.monotonic() + limit_s
+def wait_until(done: Callable[[], bool]) -> None:
+    stop_s = time.monotonic() + PATIENCE_S
     while not done():
-        assert time.monotonic() < stop_s, f"not within {limit_s} s"
+        assert time.monotonic() < stop_s, f"not within {PATIENCE_S} s"
         time.sleep(0.02)
 
 
-@contextmanager
-def process(module: str, *arguments: object, first: str = "") -> Iterator[subprocess.Popen[str]]:
-    """``rover-companion`` (module companion) or ``rover-sitl`` (module sitl); killed in the end. Its default place for states is its own.
+def slowness() -> float:
+    """How many times longer some work takes now than on a quiet machine; at least 1."""
+    began_s, worked_s = time.monotonic(), time.thread_time()
+    while time.thread_time() < worked_s + 0.1:
+        pass
+    return max(1.0, (time.monotonic() - began_s) / 0.1)
 
-    ``first``: code that the process runs before anything else.
+
+@contextmanager
+def process(
+    module: str, *arguments: object, first: str = "", watchdogs: bool = False
+) -> Iterator[subprocess.Popen[str]]:
+    """Runs ``rover-companion`` (module companion) or ``rover-sitl`` (module sitl), and kills it at the end.
+
+    ``first``: code that the process runs before anything else. A companion that drives has PATIENT settings, unless it
+    has others or ``watchdogs`` asks for the default ones.
     """
     code = f"{first}\nfrom {module}.cli.main import main; main()"
     command = [sys.executable, "-c", code, *map(str, arguments)]
-    with (
-        tempfile.TemporaryDirectory() as states,
-        subprocess.Popen(
+    with tempfile.TemporaryDirectory() as folder:
+        if module == "companion" and arguments[0] == "run" and not watchdogs and "--settings" not in arguments:
+            patient = Path(folder) / "patient.toml"
+            patient.write_text(PATIENT)
+            command += ["--settings", str(patient)]
+        with subprocess.Popen(
             command,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             text=True,
-            env={**os.environ, "XDG_STATE_HOME": states},
-        ) as child,
-    ):
-        try:
-            yield child
-        finally:
-            child.kill()
+            env={**os.environ, "XDG_STATE_HOME": folder},
+        ) as child:
+            try:
+                yield child
+            finally:
+                child.kill()
 
 
-def finished(child: subprocess.Popen[str], limit_s: float) -> tuple[int, str, str]:
+def finished(child: subprocess.Popen[str]) -> tuple[int, str, str]:
     """Exit code, stdout and stderr of a process that has ended or will."""
-    out, err = child.communicate(timeout=limit_s)
+    out, err = child.communicate(timeout=PATIENCE_S)
     return child.returncode, out, err
 
 

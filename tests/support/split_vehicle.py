@@ -1,6 +1,6 @@
 """Our simulated autopilot in the firmware's place: rover, world and lidar are at the other end of the JSON interface.
 
-What it believes comes from the interface's answers alone, what it wants goes there as pulses, and the lidar comes in on a MAVLink
+Its state comes only from the interface's answers, its outputs go there as pulses, and the lidar comes in on a MAVLink
 channel of its own. To clients it looks like a ``Simulator``.
 """
 

@@ -204,8 +204,8 @@ def test_the_command_writes_table_json_and_page(tmp_path):
         (["--sizes", "one"], "--sizes one"),
         (["--sizes", "1000"], "--sizes 1000"),
         (["--sizes", ""], "nothing to measure"),
-        (["--planners", "dijkstar"], "'dijkstra'"),
-        (["none.map"], "none.map"),
+        (["--sizes", "1", "--planners", "dijkstar"], "'dijkstra'"),
+        (["--sizes", "1", "none.map"], "none.map"),
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(arguments, words):

@@ -1,39 +1,26 @@
-"""Where compiled kernels are kept: beside the sources of a working copy, else in a directory of their own for every version."""
+"""The cache of compiled kernels: its place, and what makes a kernel invalid."""
 
 from __future__ import annotations
 
+import json
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from companion.cli import kernels
 from companion.cli.entry import start, unsuitable
-from companion.cli.kernels import VARIABLE, choose_place
 
-PACKAGE = Path(__file__).resolve().parents[3] / "companion"
-
-
-def installed(folder: Path, text: str = "x = 1\n", *, working_copy: bool = False) -> Path:
-    package = folder / "site" / "companion"
-    (package / "planning").mkdir(parents=True, exist_ok=True)
-    (package / "planning" / "kernel.py").write_text(text)
-    if working_copy:
-        (package.parent / "pyproject.toml").touch()
-    return package
+PACKAGE = Path(kernels.__file__).parents[1]
 
 
-def test_who_has_chosen_a_place_keeps_it(tmp_path: Path) -> None:
-    environment = {VARIABLE: "/my/own", "HOME": str(tmp_path)}
-    assert choose_place(environment, (installed(tmp_path),)) == Path("/my/own")
-    assert environment[VARIABLE] == "/my/own"
-
-
-def test_a_working_copy_keeps_its_kernels_beside_the_sources(tmp_path: Path) -> None:
-    environment = {"HOME": str(tmp_path)}
-    assert choose_place(environment, (installed(tmp_path, working_copy=True),)) is None
-    assert VARIABLE not in environment
+def test_the_users_choice_of_a_place_counts(tmp_path: Path) -> None:
+    environment = {kernels.PLACE: "/my/own", "HOME": str(tmp_path)}
+    assert kernels.use_cache(environment) == Path("/my/own")
+    assert environment[kernels.PLACE] == "/my/own"
 
 
 @pytest.mark.parametrize(
@@ -47,89 +34,156 @@ def test_a_working_copy_keeps_its_kernels_beside_the_sources(tmp_path: Path) -> 
     ],
     ids=["service", "service with a state only", "xdg", "home", "what cannot be written is passed over"],
 )
-def test_what_is_installed_keeps_them_elsewhere(tmp_path: Path, given: dict[str, str], base: str) -> None:
+def test_the_place_is_the_first_that_can_be_written(tmp_path: Path, given: dict[str, str], base: str) -> None:
     (tmp_path / "file").touch()
     environment = {key: value.replace("{}", str(tmp_path)) for key, value in given.items()}
-    place = choose_place(environment, (installed(tmp_path),))
-    assert place is not None and place.parent == tmp_path / base and place.is_dir()
-    assert environment[VARIABLE] == str(place)
+    place = kernels.use_cache(environment)
+    assert place == tmp_path / base / "kernels" and place.is_dir()
+    assert environment[kernels.PLACE] == str(place)
 
 
 def test_nowhere_to_write_is_a_temporary_place(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     environment = {"HOME": str(tmp_path / "file")}
-    place = choose_place(environment, (installed(tmp_path),))
-    assert place is not None and place.is_dir() and environment[VARIABLE] == str(place)
+    place = kernels.use_cache(environment)
+    assert place.is_dir() and environment[kernels.PLACE] == str(place)
     place.rmdir()
 
 
-def test_every_version_has_kernels_of_its_own_and_old_ones_go(tmp_path: Path) -> None:
-    places = []
-    for number in range(4):
-        environment = {"CACHE_DIRECTORY": str(tmp_path / "cache")}
-        place = choose_place(environment, (installed(tmp_path, f"x = {number}\n"),))
-        assert place is not None
-        os.utime(place, (number, number))
-        places.append(place)
-    assert len(set(places)) == 4
-    assert sorted((tmp_path / "cache").iterdir()) == sorted(places[2:])
-    again = choose_place({"CACHE_DIRECTORY": str(tmp_path / "cache")}, (installed(tmp_path, "x = 3\n"),))
-    assert again == places[3]
+MODULES = {
+    "limits.py": "FACTOR = 2.0\nUNUSED = 1.0\nclass Box:\n    pass\n",
+    "inner.py": """
+from numba import njit
+from companion.limits import FACTOR
+from companion.unrelated import WORD
 
+@njit(cache=True)
+def scaled(value):
+    return FACTOR * value
 
+def told():
+    return WORD
+""",
+    "outer.py": """
+from numba import njit
+from companion import inner
+
+@njit(cache=True)
+def both(value):
+    return inner.scaled(value) + 1.0
+""",
+    "other.py": "from numba import njit\n\n@njit(cache=True)\ndef other(value):\n    return value\n",
+    "unrelated.py": "WORD = 'one'\n",
+}
 SCRIPT = """
-import sys
+import json, sys
 from companion.cli.entry import start
 
 def load():
-    import numpy
-    from companion.mapping.kernels import nearest
+    from companion.inner import scaled
+    from companion.other import other
+    from companion.outer import both
     def command(prog_name, standalone_mode):
-        nearest(numpy.zeros((4, 4), numpy.float32), 1.0, 1.0, 1.0, 0.5)
-        stats = nearest.stats
-        print(stats.cache_path, sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+        both(3.0), other(3.0)
+        compiled = [k.__name__ for k in (scaled, both, other) if sum(k.stats.cache_misses.values())]
+        print(json.dumps([both(3.0), compiled]))
     return command
 
 sys.exit(start("rover-companion", load))
 """
 
 
-def test_a_package_that_cannot_be_written_is_compiled_once(tmp_path: Path) -> None:
-    """As root without root's power to write everywhere, where these tests run as root; ``HOME`` leads nowhere, as that of a service may."""
-    copied = ("__init__.py", "evidence.py", "reporting.py", "cli/__init__.py", "cli/entry.py", "cli/kernels.py")
-    site = tmp_path / "site"
-    for name in copied:
-        target = site / "companion" / name
-        target.parent.mkdir(parents=True, exist_ok=True)
-        target.write_bytes((PACKAGE / name).read_bytes())
-    for path in (site, *site.rglob("*")):
-        path.chmod(0o555 if path.is_dir() else 0o444)
-    powerless = (
-        ["setpriv", "--bounding-set", "-dac_override", "--inh-caps", "-dac_override", "--"] if os.geteuid() == 0 else []
-    )
-    environment = {
-        "PATH": os.environ["PATH"],
-        "PYTHONPATH": str(site),
-        "HOME": "/nowhere",
-        "CACHE_DIRECTORY": str(tmp_path / "cache"),
-    }
-    told = []
-    for _ in range(2):
-        done = subprocess.run(
-            [*powerless, sys.executable, "-c", SCRIPT],
-            env=environment,
-            cwd=tmp_path,
-            capture_output=True,
-            text=True,
-            timeout=120,
-            check=False,
-        )
+class Program:
+    """A small program with kernels in three files, and a cache; it starts with the project's own entry point."""
+
+    def __init__(self, folder: Path, cache: Path) -> None:
+        self.folder, self._cache = folder, cache
+        for name in ("__init__.py", "cli/__init__.py", "cli/entry.py", "cli/kernels.py"):
+            (folder / "companion" / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(PACKAGE / name, folder / "companion" / name)
+        for name, text in MODULES.items():
+            (folder / "companion" / name).write_text(text)
+
+    def edit(self, name: str, old: str, new: str) -> None:
+        path = self.folder / "companion" / name
+        path.write_text(path.read_text().replace(old, new))
+
+    def run(self, *before: str) -> tuple[float, list[str]]:
+        """What the outer kernel gives, and the kernels that had to be compiled."""
+        environment = {
+            "PATH": os.environ["PATH"],
+            "PYTHONPATH": str(self.folder),
+            "PYTHONDONTWRITEBYTECODE": "1",
+            "HOME": "/nowhere",
+            "CACHE_DIRECTORY": str(self._cache),
+        }
+        command = [*before, sys.executable, "-c", SCRIPT]
+        options = {"env": environment, "cwd": self._cache.parent, "capture_output": True, "text": True, "timeout": 300}
+        done = subprocess.run(command, check=False, **options)
         assert done.returncode == 0, done.stderr
-        told.append(done.stdout.split())
-    for path in (site, *site.rglob("*")):
+        value, compiled = json.loads(done.stdout)
+        return value, compiled
+
+
+def test_a_kernel_is_compiled_again_only_when_something_it_uses_has_changed(tmp_path: Path) -> None:
+    program = Program(tmp_path / "one", tmp_path / "cache")
+    assert program.run() == (7.0, ["scaled", "both", "other"])
+    assert program.run() == (7.0, [])
+
+    for path in program.folder.rglob("*.py"):
+        os.utime(path, (1.0, 1.0))
+    program.edit("unrelated.py", "one", "two")
+    assert program.run() == (7.0, []), "times, and a file whose names no kernel uses"
+    assert Program(tmp_path / "two", tmp_path / "cache").run() == (7.0, []), "a copy in another folder"
+
+    program.edit("limits.py", "2.0", "5.0")
+    assert program.run() == (16.0, ["scaled", "both"]), "a constant, two files away"
+    program.edit("inner.py", "* value", "* value * value")
+    assert program.run() == (46.0, ["scaled", "both"]), "a kernel that it calls"
+    program.edit("limits.py", "5.0", "2.0")
+    program.edit("inner.py", "* value * value", "* value")
+    assert program.run() == (7.0, []), "as it was: still kept"
+
+
+def test_a_package_that_cannot_be_written_is_compiled_once(tmp_path: Path) -> None:
+    """If these tests run as root, the program lacks root's right to write everywhere; ``HOME`` does not exist."""
+    program = Program(tmp_path / "site", tmp_path / "cache")
+    for path in (program.folder, *program.folder.rglob("*")):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    powerless = ["setpriv", "--bounding-set", "-dac_override", "--inh-caps", "-dac_override", "--"]
+    runs = [program.run(*(powerless if os.geteuid() == 0 else [])) for _ in range(2)]
+    for path in (program.folder, *program.folder.rglob("*")):
         path.chmod(0o755)
-    assert [words[1:] for words in told] == [["0", "1"], ["1", "0"]], "compiled the first time, found the second time"
-    assert told[0][0].startswith(str(tmp_path / "cache" / "kernels-"))
+    assert runs == [(7.0, ["scaled", "both", "other"]), (7.0, [])]
+
+
+def test_of_a_files_old_versions_some_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(kernels.PLACE, str(tmp_path))
+    for number in range(kernels.KEPT + 2):
+        old = tmp_path / f"companion.mapping.kernels-{number:016}"
+        old.mkdir()
+        os.utime(old, (number, number))
+    other = tmp_path / "companion.mapping.arc_kernels-0000000000000000"
+    other.mkdir()
+    file = PACKAGE / "mapping" / "kernels.py"
+    locator = kernels.Locator.from_function(test_of_a_files_old_versions_some_are_kept, str(file))
+    assert locator is not None and Path(locator.get_cache_path()).is_dir()
+    left = sorted(path.name[-1] for path in tmp_path.glob("companion.mapping.kernels-0*"))
+    assert left == ["3", "4", "5"] and other.is_dir()
+
+
+def test_a_file_that_is_edited_while_the_program_loads_makes_no_kernel_for_others(tmp_path: Path) -> None:
+    program = Program(tmp_path / "one", tmp_path / "cache")
+    outer = program.folder / "companion" / "outer.py"
+    editing = f"\nimport os\nos.utime({str(program.folder / 'companion' / 'inner.py')!r}, (1.0, 1.0))\n"
+    outer.write_text(outer.read_text().replace("\n@njit", editing + "\n@njit"))
+    assert program.run() == (7.0, ["scaled", "both", "other"])
+    os.utime(program.folder / "companion" / "inner.py", (2.0, 2.0))
+    assert program.run() == (7.0, ["both"])
+
+
+def test_kernels_of_other_projects_are_left_to_numba() -> None:
+    assert kernels.Locator.from_function(json.dumps, json.__file__) is None
 
 
 def test_a_32_bit_system_gets_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -25,7 +25,7 @@ from companion.supervision.localization_monitor import (
 )
 from companion.supervision.mission_limits import BorderMonitor
 from companion.supervision.rival_monitor import LISTEN_S, RivalMonitor
-from companion.vehicle.dead_reckoning import Wander
+from companion.vehicle.dead_reckoning import Drift
 from companion.vehicle.events import (
     FenceStatusSeen,
     HeartbeatSeen,
@@ -215,7 +215,7 @@ def test_a_position_that_wanders_again_and_again_is_not_driven_by(tmp_path: Path
     located = Located(tmp_path)
     for number in range(WANDERINGS):
         located.clock.time_s += ONCE_S + 0.1
-        located.report(wander=Wander(off_m=2.0))
+        located.report(wander=Drift(off_m=2.0))
         assert located.doubt is (Doubt.POSITION_WANDERS if number == WANDERINGS - 1 else Doubt.POSITION_WANDERED)
         located.clock.time_s += SETTLED_S + 0.01
         located.hear_origin()

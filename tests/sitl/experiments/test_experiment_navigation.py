@@ -65,7 +65,9 @@ def test_a_map_without_scenarios_is_one_line(tmp_path: Path) -> None:
     assert result.exit_code == 2 and "bare.map.scen" in result.stderr and len(result.stderr.splitlines()) == 1
 
 
-def driven(planner: str, mission: str, time_s: float, steps: int, outcome: DriveOutcome = DriveOutcome.REACHED) -> Series:
+def driven(
+    planner: str, mission: str, time_s: float, steps: int, outcome: DriveOutcome = DriveOutcome.REACHED
+) -> Series:
     return Series(planner, mission, (Report(0, outcome, steps=steps, driving_time_s=time_s),))
 
 

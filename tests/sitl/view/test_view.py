@@ -269,7 +269,7 @@ def on_a_terminal(arguments: list[str], until: bytes, number: signal.Signals, **
         os.close(theirs)
         try:
             told = False
-            while select.select([ours], [], [], 60.0)[0]:
+            while select.select([ours], [], [], 180.0)[0]:
                 try:
                     data = os.read(ours, 65536)
                 except OSError:  # the other end is closed
@@ -280,7 +280,7 @@ def on_a_terminal(arguments: list[str], until: bytes, number: signal.Signals, **
                 if until in written and not told:
                     told = True
                     child.send_signal(number)
-            return child.wait(timeout=10.0), written
+            return child.wait(timeout=180.0), written
         finally:
             child.kill()
             os.close(ours)
