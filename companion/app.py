@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from companion.checkpoint.checkpointer import Memory
-from companion.control.point_controller import STANDSTILL
+from companion.control.controller import STANDSTILL
 from companion.control.setpoint_check import SetpointCheck
 from companion.core.clock import Clock, stopwatch_s
 from companion.core.frames import GeoPoint
@@ -32,7 +32,7 @@ from companion.operator.overview import status_of, statuses_of
 from companion.operator.reporting import Outcome, Reporter, Status
 from companion.operator.telling import Teller
 from companion.perception.moving_obstacles import announced
-from companion.perception.newest_scans import newest_ranges
+from companion.perception.scan_filter import newest_ranges
 from companion.recording.recorder import DecisionLog
 from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
 from companion.safety.watchdogs import Watchdogs
@@ -317,13 +317,12 @@ class Companion:
             return
         others = announced(self.vehicle, pose, self._mission.rover.radius_m, self._settings.traffic)
         executor.heed_latency(self.vehicle.latency_s)
-        guide = executor.drive(pose, self.vehicle.speed_m_s, now_s, others)
+        view = executor.view(pose, self.vehicle.speed_m_s)
+        command = executor.drive(view, now_s, others)
         self._reporter.doing = executor.doing
-        guide = self._legs.guide(guide, executor, self._settings.guidance.min_speed_m_s)
-        if guide is not None:
-            self._speaker.guide(
-                self.output_check.passed(guide, pose, self.vehicle.speed_m_s, executor.surroundings), now_s
-            )
+        command = self._legs.guide(command, executor, self._settings.guidance.min_speed_m_s)
+        if command is not None:
+            self._speaker.guide(self.output_check.passed(command, view, executor.layout.bounds), now_s)
         else:
             self._end(executor, now_s)
 

@@ -90,7 +90,8 @@ class Memory:
         if leg is not None and pose is not None and drives:
             past = nav_state(leg, shift)
             if executor.evidence.base.centre_of(past.past[-1]).distance_m(pose.point) <= CARRIED_M:
-                executor.driver.take_up(progress.goal, past, leg.doubts_left, pose)
+                view = executor.view(pose, vehicle.speed_m_s)
+                executor.driver.take_up(progress.goal, past, leg.doubts_left, view)
         return True
 
     def note(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.control.point_controller import STANDSTILL, ControlCommand, Motion
+from companion.control.controller import ControlCommand, Purpose
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.executive.mission_executor import MissionExecutor, Tell
 from companion.executive.mission_progress import Leg, TargetStatus, ended_at, parked, sent_to
@@ -48,11 +48,11 @@ class AutoModeLegs:
     def guide(self, guide: ControlCommand | None, executor: MissionExecutor, slow_m_s: float) -> ControlCommand | None:
         """What to do: where the companion is content, the autopilot may want the rover nearer to the place (a small WP_RADIUS)."""
         progress = executor.progress
-        if self._leg is None or guide is not STANDSTILL or progress.leg is not Leg.STAY:
+        if self._leg is None or guide is None or guide.purpose is not Purpose.STAND or progress.leg is not Leg.STAY:
             return guide
         if progress.statuses[progress.index] is not TargetStatus.REACHED:
             return guide
-        return ControlCommand(Motion.DRIVE, GuidedPosition(progress.goal.point), slow_m_s)
+        return ControlCommand(Purpose.DRIVE, GuidedPosition(progress.goal.point), slow_m_s)
 
     def _begin(self, leg: GuidedLeg, executor: MissionExecutor) -> None:
         index = _index_of(leg.point, executor)

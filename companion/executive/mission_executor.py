@@ -8,13 +8,13 @@ from collections.abc import Callable
 import numpy as np
 
 from companion.control.braking import counted_s, for_link
-from companion.control.point_controller import ControlCommand
-from companion.control.setpoint_check import Surroundings
+from companion.control.controller import ControlCommand
+from companion.control.local_view import LocalView
 from companion.core.frames import GeoPoint, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
-from companion.executive.goal_driver import GoalDriver
+from companion.executive.goal_driver import GoalDriver, controller_for
 from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, lay_again
 from companion.executive.mission_progress import (
     Leg,
@@ -96,18 +96,17 @@ class MissionExecutor:
             tell("Single beams see too little for a rover that turns in arcs: give it a lidar", WARNING)
         planner = make_planner(settings.navigator.planner, settings.planner)
         searcher = Searcher(planner, settings.navigator, rng)
-        self.driver = GoalDriver(layout.evidence, self._limits, settings, searcher, runner)
-        self._tracker = ObjectTracker(layout.evidence, settings.traffic)
+        self.driver = GoalDriver(controller_for(self._limits), searcher, runner)
+        self._tracker = ObjectTracker(layout.evidence)
 
     @property
     def evidence(self) -> EvidenceMap:
         """The map."""
         return self.layout.evidence
 
-    @property
-    def surroundings(self) -> Surroundings:
-        """What is known of the ground, and the rover on it."""
-        return Surroundings(self.evidence, self._limits, self._settings, self.layout.bounds)
+    def view(self, pose: Pose, speed_m_s: float) -> LocalView:
+        """This moment, with the settings that the link's latency allows."""
+        return LocalView(pose, speed_m_s, self.evidence, self._limits, self._settings)
 
     @property
     def reached(self) -> int:
@@ -133,8 +132,7 @@ class MissionExecutor:
         """Other settings from the next tick on; those of the map itself and the planner stay."""
         self._given = settings
         self._settings = for_link(settings, self._link_s)
-        self._tracker.retune(settings.traffic)
-        self.driver.retune(self._settings)
+        self.driver.searcher.settings = self._settings.navigator
 
     def heed_latency(self, link_s: float) -> None:
         """Drive from now on so that a link that takes so long, there and back, does no harm."""
@@ -162,10 +160,10 @@ class MissionExecutor:
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
-        self.driver = GoalDriver(self.evidence, self._limits, self._settings, searcher, self._runner, seed)
+        self.driver = GoalDriver(controller_for(self._limits), searcher, self._runner, seed)
         self.driver.tally = before.tally
         self.driver.doubt_until(now_s + VERDICT_S)
-        self._tracker = ObjectTracker(self.evidence, self._settings.traffic)
+        self._tracker = ObjectTracker(self.evidence)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         return True
 
@@ -206,16 +204,14 @@ class MissionExecutor:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
         self.maps_begun += 1
-        self._tracker = ObjectTracker(self.evidence, self._settings.traffic)
+        self._tracker = ObjectTracker(self.evidence)
         self.driver.leave()
         self.driver.doubt_until(now_s + VERDICT_S)
 
-    def drive(
-        self, pose: Pose, speed_m_s: float, now_s: float, announced: tuple[Moving, ...] = ()
-    ) -> ControlCommand | None:
+    def drive(self, view: LocalView, now_s: float, announced: tuple[Moving, ...] = ()) -> ControlCommand | None:
         """What to do for the mission now; None when it has ended. ``announced``: who has told of itself and may come near."""
-        moving = merged(announced, self._tracker.moving(now_s), now_s)
-        self.trail.enter(self.evidence.base.cell_at(pose.point))
+        moving = merged(announced, self._tracker.moving(now_s, view.settings.traffic), now_s)
+        self.trail.enter(self.evidence.base.cell_at(view.pose.point))
         waited = self.progress.leg is Leg.WAIT
         self.progress = on_time(self.progress, now_s)
         if waited and self.progress.leg is Leg.TRAVEL:
@@ -225,17 +221,17 @@ class MissionExecutor:
         if self.progress.leg in (Leg.STAY, Leg.WAIT):
             self.doing = "holding" if self.progress.leg is Leg.STAY else "waiting for the way to clear"
             self.driver.pause()
-            return self.driver.standing(pose, speed_m_s, moving)
+            return self.driver.standing(view, moving)
         if self.driver.goal is not self.progress.goal:
             if self._is_refused(now_s):
-                return self.driver.standing(pose, speed_m_s, moving)
+                return self.driver.standing(view, moving)
             self._tell(f"Heading for {self.progress.goal.name}", INFO)
-            self.driver.head_for(self.progress.goal, pose, self._way_back(pose))
+            self.driver.head_for(self.progress.goal, view, self._way_back(view.pose))
         self.doing = "driving"
-        guide, decision = self.driver.update(pose, speed_m_s, moving)
+        command, decision = self.driver.update(view, moving)
         if decision is not None:
             self._take_decision(decision, now_s)
-        return guide
+        return command
 
     def _is_refused(self, now_s: float) -> bool:
         """Whether the target that is next lies behind the autopilot's fence: it is not even tried, and the mission goes on after it."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from companion.control.point_controller import ControlCommand
+from companion.control.controller import ControlCommand
 from companion.core.frames import wrap_pi_rad
 from companion.settings import GuidanceSettings, Settings
 from companion.vehicle.commands import ChangeSpeed, Command, GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from companion.control.point_controller import STANDSTILL, ControlCommand
+from companion.control.controller import STANDSTILL, ControlCommand
 from companion.executive.outbox import Outbox
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import EncodeError

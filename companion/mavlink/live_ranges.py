@@ -11,7 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.scan import RangeScan
 from companion.mavlink import ranges
-from companion.perception.newest_scans import MOST_SCANS, Sensor, sensor_of
+from companion.perception.scan_filter import MOST_SCANS, Sensor, sensor_of
 
 AUTOPILOT = 1
 """Its component id."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from companion.perception.scan_watch import ScanWatch
+from companion.perception.scan_filter import ScanWatch
 from companion.safety.loop_watch import LoopWatch
 from companion.settings import SafetySettings
 from companion.vehicle.events.event import Event

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from companion.control.point_controller import STANDSTILL
+from companion.control.controller import STANDSTILL
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.mode_latch import Control
 from companion.vehicle.commands import Command, SetMode

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 from companion.checkpoint.resume import Kept, Ownership, lay_resumed, ownership, same_boot
-from companion.control.point_controller import STANDSTILL
+from companion.control.controller import STANDSTILL
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import TargetStatus
 from companion.mission.bounds import Bounds

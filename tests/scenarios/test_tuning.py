@@ -70,12 +70,11 @@ def test_everything_that_keeps_settings_hears_of_a_change(tmp_path: Path) -> Non
     assert companion._settings.safety.stale_s == 0.7
     assert companion._whereabouts._jump_m == 3.0
     assert companion._executor._given is companion._settings  # as it is; what follows from a late link lies on top
-    assert companion._executor._settings is companion.driver._settings
-    assert companion.driver._settings.guidance.stuck_after_s == 9.0
-    assert companion.driver._recovery._settings.stuck_after_s == 9.0
+    in_force = companion._executor.view(companion.status().pose, 0.0).settings
+    assert in_force.guidance.stuck_after_s == 9.0
+    assert in_force.traffic == companion._settings.traffic
     assert companion._outbox._settings is companion._settings.guidance
     assert companion.driver.searcher.settings.wait_retry_s == 7.0
-    assert companion._executor._tracker._settings is companion._settings.traffic
 
 
 def test_a_watchdog_that_was_shortened_acts_sooner(tmp_path: Path) -> None:

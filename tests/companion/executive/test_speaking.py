@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from companion.control.point_controller import ControlCommand, Motion
+from companion.control.controller import ControlCommand, Purpose
 from companion.core.frames import NedPoint
 from companion.executive.outbox import Outbox
 from companion.executive.speaking import Speaker
@@ -17,7 +17,7 @@ from companion.vehicle.commands import GuidedPosition
 from tests.support.mavlink_vehicle import Station
 from tests.support.tlog import messages
 
-AHEAD = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(8.0, 0.0)), 2.0)
+AHEAD = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(8.0, 0.0)), 2.0)
 
 
 @pytest.mark.parametrize("origin", [True, False])
