@@ -4,6 +4,8 @@ It is told velocities and not positions: a guided position would leave it to the
 only an arc that is known can be looked along. How the rover would go on is played through on the map. It never
 drives farther than it has seen free for what it needs to stop, or for what it would drive if it were told nothing
 more.
+
+Nouns: arc controller.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Braking: how far the rover goes before it stands, and how fast it may go to stand in time.
 
 A rover at v m/s that sees ``sight`` metres must keep v * latency + v² / (2 * deceleration) + margin <= sight.
+
+Nouns: braking distance.
 """
 
 from __future__ import annotations

@@ -6,6 +6,8 @@ room, and if all would touch something, the one that goes well for longest. The 
 others, since going on is allowed only while there still is somewhere to stop; and it waits there until going on is
 safe again. Each option says what the autopilot would be told and where the rover would then be at each moment; the
 ground there must be clear and seen.
+
+Nouns: collision avoidance.
 """
 
 from __future__ import annotations

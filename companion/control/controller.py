@@ -1,4 +1,7 @@
-"""Controller protocol: a path and a moment in, a command to the autopilot out. The command is defined here, too."""
+"""Controller protocol: a path and a moment in, a command to the autopilot out. The command is defined here, too.
+
+Nouns: controller, control command, purpose.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 The states searched are the poses that arcs really lead to, one kept for each small square and heading. The length
 still to go is estimated by a flood round the obstacles that ignores headings. Lengths are in evidence cells, see
 ``arc_kernels``.
+
+Nouns: hybrid A*.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""What a controller sees of one moment: pose, speed, map, the rover's limits and the settings in force."""
+"""What a controller sees of one moment: pose, speed, map, the rover's limits and the settings in force.
+
+Nouns: local view.
+"""
 
 from __future__ import annotations
 

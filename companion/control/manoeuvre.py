@@ -1,4 +1,7 @@
-"""Manoeuvres: short ways of arcs, forwards and backwards, back to the path."""
+"""Manoeuvres: short ways of arcs, forwards and backwards, back to the path.
+
+Nouns: manoeuvre, arc segment.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Motion prediction: where the rover will be in the next seconds if it brakes, drives on, follows a line or an arc."""
+"""Motion prediction: where the rover will be in the next seconds if it brakes, drives on, follows a line or an arc.
+
+Nouns: motion prediction.
+"""
 
 from __future__ import annotations
 

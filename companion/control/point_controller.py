@@ -3,6 +3,8 @@
 The autopilot brakes for every guided position, so the position is moved on to the farthest place of the path that
 can be reached straight and clear. It never lies beyond the ground seen free plus the stopping distance. Where the
 next piece of the path has not been seen, the rover turns to look before it drives.
+
+Nouns: point controller.
 """
 
 from __future__ import annotations
@@ -125,10 +127,10 @@ def _is_at_end(path: ReferencePath) -> bool:
 
 
 def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> float:
-    """The bearing error from which the rover turns on the spot instead of driving an arc, which might be too narrow.
+    """The bearing error from which the rover turns on the spot; with less it drives an arc.
 
-    For a position far to the side the autopilot would pivot too, but with the integrator of its speed controller
-    still winding up for the old target. So a heading is told first, until the rest is small.
+    For a position far to the side the autopilot would pivot too, but with the integrator of its speed controller still
+    winding up for the old target. So a heading is told first, until the rest is small.
     """
     if turning:
         return math.radians(settings.turn_until_close_deg if close else settings.turn_until_deg)

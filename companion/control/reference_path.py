@@ -1,4 +1,7 @@
-"""The reference path: the line to drive in metres, from a planned path, and how far the rover has come on it."""
+"""The reference path: the line to drive in metres, from a planned path, and how far the rover has come on it.
+
+Nouns: reference path.
+"""
 
 from __future__ import annotations
 

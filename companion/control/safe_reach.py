@@ -3,6 +3,8 @@
 A setpoint may be the last that the autopilot receives, and it is followed to its end. So a place to drive to is one
 where the rover comes to stand on ground that has been seen free, with nothing beside the way there.
 ``setpoint_check`` asks the same once more of whatever is really sent.
+
+Nouns: safe reach.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 A setpoint may be the last one that the autopilot receives, and it is followed to its end. So each one is asked
 whether the rover may be left alone with it. One that may not is replaced by velocity zero, reported and counted.
 That this never happens is the task of the controllers; this file does not use their code.
+
+Nouns: setpoint check.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Stuck recovery: notices that the rover does not get on, backs it out, and remembers the place as costly."""
+"""Stuck recovery: notices that the rover does not get on, backs it out, and remembers the place as costly.
+
+Nouns: stuck recovery.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Goal driver: drives to one goal (a leg): navigator steps, the reference path from them, recovery when stuck."""
+"""Goal driver: drives to one goal (a leg): navigator steps, the reference path from them, recovery when stuck.
+
+Nouns: goal driver.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Warm-up: compiles every hot loop before the rover may move, so that no compilation falls into a drive."""
+"""Warm-up: compiles every hot loop before the rover may move, so that no compilation falls into a drive.
+
+Nouns: warm-up.
+"""
 
 from __future__ import annotations
 

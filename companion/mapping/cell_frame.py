@@ -1,4 +1,7 @@
-"""Metres to evidence cells and back: the one conversion between the local frame and the raster of a map."""
+"""Metres to evidence cells and back: the one conversion between the local frame and the raster of a map.
+
+Nouns: cell frame.
+"""
 
 from __future__ import annotations
 

@@ -4,6 +4,8 @@ The raster is finer than the fields, so that the free ground beside a thin post 
 field. A field is an obstacle when something was seen in it, or when the rover standing in its middle would touch
 something; beside obstacles the mission's own weight is raised (soft cost). What can be asked of the map is in
 ``map_queries``.
+
+Nouns: evidence map, log-odds.
 """
 
 from __future__ import annotations

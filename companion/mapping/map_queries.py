@@ -1,4 +1,7 @@
-"""Map queries, in metres: what lies along a line or an arc, the nearest obstacle, how a line would be followed."""
+"""Map queries, in metres: what lies along a line or an arc, the nearest obstacle, how a line would be followed.
+
+Nouns: map queries.
+"""
 
 from __future__ import annotations
 

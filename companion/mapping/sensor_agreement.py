@@ -1,4 +1,7 @@
-"""Sensor agreement: the cells in which a sensor has just seen something, which no other sensor may free."""
+"""Sensor agreement: the cells in which a sensor has just seen something, which no other sensor may free.
+
+Nouns: sensor agreement.
+"""
 
 from __future__ import annotations
 

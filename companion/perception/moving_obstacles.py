@@ -2,6 +2,8 @@
 
 Announced ones (other vehicles, ADS-B, AIS) and those that the range sensors track are the same here: a disc that
 goes on as it does now.
+
+Nouns: moving obstacle.
 """
 
 from __future__ import annotations

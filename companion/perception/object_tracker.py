@@ -3,6 +3,8 @@
 Ground on which something stands was never seen free. So only readings count that end on ground that had been seen
 free all round. Such readings that lie together are one thing, and a thing whose place changes evenly from scan to
 scan moves. The map does not use this: there a moving thing is evidence like any other, and is freed behind it.
+
+Nouns: object tracker.
 """
 
 from __future__ import annotations

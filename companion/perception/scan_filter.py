@@ -3,6 +3,8 @@
 Of range data that piles up within one tick only the newest of each sensor is taken in, so that a flood does not
 cost a tick its time. A sensor repeats itself when it sends the same readings again and again although the rover
 moves.
+
+Nouns: scan filter.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Controller of a rover that cannot turn on the spot: arcs it can drive, over ground it knows, never a turn on the spot."""
+"""The controller of a rover that cannot turn on the spot: arcs that it can drive, over ground that it knows."""
 
 import math
 
@@ -85,7 +85,7 @@ class Car:
         assert isinstance(told, GuidedVelocity), "it is never told a heading, and never a place"
         change = TICK_S * 1.0
         self.speed_m_s += min(max(told.forward_m_s - self.speed_m_s, -change), change)
-        # As ArduRover: up to 1 m/s the wheels are turned for the turn rate as if at 1 m/s; they need 0.6 s to full lock.
+        # As ArduRover: below 1 m/s the wheels turn for the turn rate as if at 1 m/s; they need 0.6 s to full lock.
         wanted = told.yaw_rate_rad_s / max(abs(self.speed_m_s), 1.0) * (-1.0 if self.speed_m_s < 0.0 else 1.0)
         wanted = min(max(wanted, -1.0 / RADIUS_M), 1.0 / RADIUS_M)
         most = TICK_S / 0.6 / RADIUS_M
@@ -233,7 +233,7 @@ def curvature_per_m(segment: ArcSegment) -> float:
 
 
 def is_joined(manoeuvre: Manoeuvre, start: Pose) -> bool:
-    """Each segment begins where the last one ended, in the same direction of the rover, and the first one at the rover."""
+    """Each segment begins where the last one ended, with the same heading, and the first one at the rover."""
     place, heading_rad = np.array([start.north_m, start.east_m]), start.heading_rad
     for segment in manoeuvre.segments:
         first = segment.points[1] - segment.points[0]

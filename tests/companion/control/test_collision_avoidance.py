@@ -131,7 +131,7 @@ def test_a_plan_of_meeting_by_chance_is_never_driven_into() -> None:
 
 
 def test_it_looks_where_it_really_drives_and_not_where_the_route_is() -> None:
-    """The path goes round the other one, the place that the rover is told lies behind it: straight there they would meet."""
+    """The path goes round the other; the place told to the rover lies behind it: straight there they would meet."""
     round_it = np.vstack(
         (
             np.column_stack((np.full(16, 20.0), np.arange(20.0, 24.0, 0.25))),

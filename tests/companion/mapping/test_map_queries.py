@@ -1,4 +1,4 @@
-"""Map queries: metres in, metres out, wherever the map lies and however fine it is; along lines, beside them, on arcs."""
+"""Map queries: metres in, metres out, wherever the map lies; along lines, beside them, on arcs."""
 
 from __future__ import annotations
 
