@@ -17,7 +17,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.mapping.arc_kernels import BLOCKED, UNSEEN, place
+from companion.mapping.arc_kernels import BLOCKED, UNSEEN, is_unseen, place
 
 HEADINGS = 36
 """So many headings are told apart."""
@@ -28,6 +28,9 @@ UNSEEN_COST, BACK_COST = 1.5, 1.6
 GREED = 1.2
 """Weight of the estimate against the cost so far: the way found is not quite the shortest, and is found much sooner."""
 SQRT2 = math.sqrt(2.0)
+AROUND = 0.3
+"""Half the side of a square in cells. Backwards, all cells that the square touches round each place of an arc must have
+been seen. The places looked at are half a cell apart or less, so no cell that the arc cuts is left out."""
 
 Poses = NDArray[np.float64]
 """Shape (n, 4): x, y, heading, and 1 forwards or -1 backwards: how the rover gets there."""
@@ -129,6 +132,17 @@ def _turn_cost(goal: Any, heading: float, sharpest: float) -> float:
 
 
 @njit(cache=True, nogil=True)
+def _unseen_around(ground: Any, x: float, y: float) -> bool:
+    """Whether a cell that the square round a place touches has not been seen."""
+    return (
+        is_unseen(ground, x - AROUND, y - AROUND)
+        or is_unseen(ground, x - AROUND, y + AROUND)
+        or is_unseen(ground, x + AROUND, y - AROUND)
+        or is_unseen(ground, x + AROUND, y + AROUND)
+    )
+
+
+@njit(cache=True, nogil=True)
 def _arc_cost(
     ground: Any, known: Any, left: int, low: int, pose: Any, curvature: float, way: float, limits: Any
 ) -> tuple[float, float, float, float]:
@@ -139,9 +153,12 @@ def _arc_cost(
     cost = 0.0
     for _ in range(pieces):
         middle = heading + 0.5 * curvature * piece
-        x, y, heading = x + piece * math.sin(middle), y + piece * math.cos(middle), heading + curvature * piece
+        dx, dy = piece * math.sin(middle), piece * math.cos(middle)
+        if way < 0.0 and (_unseen_around(ground, x + 0.5 * dx, y + 0.5 * dy) or _unseen_around(ground, x + dx, y + dy)):
+            return x, y, heading, math.inf
+        x, y, heading = x + dx, y + dy, heading + curvature * piece
         state = _state(ground, known, left, low, x, y, limits.room)
-        if state == BLOCKED or (state == UNSEEN and way < 0.0):
+        if state == BLOCKED:
             return x, y, heading, math.inf
         cost += abs(piece) * (BACK_COST if way < 0.0 else UNSEEN_COST if state == UNSEEN else 1.0)
     return x, y, heading, cost

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from companion.control.arc_controller import ArcController
@@ -256,6 +256,7 @@ places = st.floats(-7.0, 7.0)
     st.lists(st.tuples(places, places), max_size=4),
     st.sampled_from([-1, 0, 1]),
 )
+@example(heading_rad=-2.46875, posts=[], bearing_rad=1.0, dark=[(1.375, 0.0)], first=-1)  # across a cell's corner
 def test_every_manoeuvre_can_be_driven(
     heading_rad: float,
     posts: list[tuple[float, float]],

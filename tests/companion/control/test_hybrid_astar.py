@@ -1,6 +1,7 @@
 """The search of arcs: it ends where it is to end, on arcs the rover can drive, over ground it may drive on."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -106,3 +107,22 @@ def test_a_closed_field_is_not_entered_but_left() -> None:
     assert len(found(evidence, goal(32.0, 0.0))) > 1, "the field that the rover stands in does not count"
     evidence.base.weights[here.y + 2, :] = 1.0
     assert len(found(evidence, goal(32.0, 0.0))) == 0
+
+
+@pytest.mark.parametrize("offset", np.linspace(-1.0, 1.0, 9).tolist())
+def test_backwards_not_even_a_corner_of_an_unseen_cell_is_cut(offset: float) -> None:
+    """One unseen cell beside the way back, at any place of it: no point of the way found lies in it."""
+    evidence = open_map()
+    evidence.log_odds[62, 78] = 0.0
+    heading = math.atan2(MIDDLE - 78.5 + offset, MIDDLE - 62.5)
+    back = goal(-30.0 * math.cos(heading), -30.0 * math.sin(heading), heading, math.radians(25.0), 60.0)
+    way = found(evidence, back, heading, first_way=-1, expansions=20000)
+    assert len(way) > 1
+    for start, end in pairwise(way):
+        if end[3] > 0.0:
+            continue
+        shares = np.linspace(0.0, 1.0, 200)
+        turned = start[2] + 0.5 * (end[2] - start[2])
+        assert math.cos(turned - math.atan2(start[0] - end[0], start[1] - end[1])) > 0.99, "tail first"
+        places = start[:2] + shares[:, None] * (end[:2] - start[:2])
+        assert not ((np.floor(places) == (78, 62)).all(axis=1)).any()
