@@ -147,7 +147,7 @@ def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: Ve
     if saved is not None and pose is not None and drives:
         nav_state = resumed_nav_state(saved, shift)
         if executor.evidence.base.centre_of(nav_state.past[-1]).distance_m(pose.point) <= CARRIED_M:
-            executor.driver.take_up(progress.goal, nav_state, saved.doubts_left, pose)
+            executor.driver.take_up(progress.goal, nav_state, saved.doubts_left, executor.view(vehicle, now_s))
 
 
 def grid_shift(state: SavedState, layout: MissionLayout) -> Cell:

@@ -1,6 +1,8 @@
-"""How far the rover goes before it stands, and how fast it may go to stand in time.
+"""Braking: how far the rover goes before it stands, and how fast it may go to stand in time.
 
-Something v m/s fast that sees ``sight`` metres must keep v * latency + v² / (2 * deceleration) + margin <= sight.
+A rover at v m/s that sees ``sight`` metres must keep v * latency + v² / (2 * deceleration) + margin <= sight.
+
+Nouns: braking distance.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ LINK_STEP_S = 0.05
 
 
 def loop_latency_s(settings: Settings) -> float:
-    """From something coming into sight to braking, without the link: the wait for a scan, for a tick, and for the brakes."""
+    """From an obstacle coming into sight to braking, without the link: the wait for a scan, a tick and the brakes."""
     return 1.0 / settings.link.range_rate_hz + 1.0 / settings.link.tick_hz + settings.guidance.brake_delay_s
 
 
@@ -24,7 +26,7 @@ def counted_s(link_s: float) -> float:
 
 
 def for_link(settings: Settings, link_s: float) -> Settings:
-    """The settings to drive with while the link takes so long, there and back: latency and braking delay grow by that."""
+    """The settings to drive with while the link takes ``link_s``, there and back: latency and braking delay grow."""
     late_s, own = counted_s(link_s), settings.guidance
     latency_s = max(own.latency_s, loop_latency_s(settings) + late_s)
     guidance = own.model_copy(update={"latency_s": latency_s, "brake_delay_s": own.brake_delay_s + late_s})
@@ -42,7 +44,7 @@ def stopping_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
 
 
 def blind_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
-    """How far a rover drives that was told a velocity and is then told nothing more: until that is forgotten, and to standing."""
+    """How far a rover drives that is told nothing more after a velocity: until that is forgotten, and to standing."""
     return speed_m_s * settings.velocity_lasts_s + braking_distance_m(speed_m_s, settings)
 
 

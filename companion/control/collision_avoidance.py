@@ -1,110 +1,163 @@
-"""Making way for what moves: before the rover does what guidance says, it looks a few seconds ahead.
+"""Collision avoidance: before a command is used, the next seconds are played through with everything that moves.
 
-Several things that it might do now are played through against everything that moves: go on, go on a little and then stop, stop at
-once, turn and move aside, back off. The first that keeps its distance is done; if none does, the one that leaves the most
-room, and if all would touch something, the one that goes well for longest. The rover stops before the others' way, since going on
-is allowed only while there still is somewhere to stop; and it waits there until going on is safe again.
+Several options are played through: go on, go on a little and then stop, stop at once, turn and move aside, back
+off, drive off on an arc. The first that keeps its distance is taken; if none does, the one that leaves the most
+room, and if all would touch something, the one that goes well for longest. The rover stops before the way of
+others, since going on is allowed only while there still is somewhere to stop; and it waits there until going on is
+safe again. Each option says what the autopilot would be told and where the rover would then be at each moment; the
+ground there must be clear and seen.
+
+Nouns: collision avoidance.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
-from companion.control.evasion import Choice, Situation, on_arcs, on_the_way, out_of_the_way
-from companion.control.motion_prediction import PERIOD_S, Points
-from companion.control.point_controller import ControlCommand
-from companion.control.reference_path import Route
-from companion.core.frames import Pose
-from companion.core.rover_limits import RoverLimits
-from companion.mapping.evidence_map import EvidenceMap
+from companion.control.braking import blind_distance_m
+from companion.control.controller import ControlCommand, Purpose, stop_for
+from companion.control.local_view import LocalView
+from companion.control.motion_prediction import (
+    PERIOD_S,
+    TURN_RAD_S,
+    Points,
+    braked_m,
+    driven_m,
+    moved,
+    moved_on_arc,
+    places_ahead,
+    steered_along,
+)
+from companion.control.point_controller import turn_to
+from companion.control.reference_path import ReferencePath
+from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
+from companion.core.frames import NedPoint, Pose, wrap_pi_rad
+from companion.mapping.map_queries import ArcQueries, Until, look_along
 from companion.perception.moving_obstacles import Moving
-from companion.settings import Settings
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 MARGIN_SHARES = (1.0, 0.5)
-"""Rather less of the margin than out of the way altogether."""
+"""With half the margin the rover still goes on, rather than out of the way altogether."""
 NEAR_M = 0.15
-"""Where everything would touch something in the end, what keeps from coming so near for longest is done."""
+"""Where every option touches something in the end, the one that comes this near last is taken."""
+GO_ON_S = (math.inf, 3.0, 1.5, 0.4)
+"""How long the rover might go on before it stops, the longest first: 0.4 s is longer than to the next tick."""
+STRAIGHT_S = 1.0
+TURNING_S = 5.0
+"""A rover that stands to look about goes on with that while nothing comes within this time."""
+ASIDE_M = (2.5, 1.5)
+ASIDE_RAD = (0.5 * math.pi, -0.5 * math.pi, 0.25 * math.pi, -0.25 * math.pi)
+"""Where it might move aside to: this far, in these directions from the course of the other."""
+ASIDE_M_S = 1.2
+OFF_M = 1.5
+"""How far it backs off at most."""
+ARC_M, ARC_M_S, ARC_SHARES = 2.5, 0.7, (0.0, -1.0, 1.0)
+"""How far, how fast and with which shares of the sharpest curvature a rover drives off that cannot turn on the spot."""
 
 
-def yielded(
-    now: ControlCommand,
-    route: Route | None,
-    pose: Pose,
-    speed_m_s: float,
+@dataclass(frozen=True, eq=False, slots=True)
+class Option:
+    """Something to do, and where the rover then is at each moment; what comes after ``until_s`` does not count.
+
+    ``yields``: it is not what the controller said. ``aside_rad``: the bearing to which the rover moves aside with it.
+    """
+
+    command: ControlCommand
+    places: Points
+    yields: bool = True
+    until_s: float = math.inf
+    aside_rad: float | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Outlook:
+    """A moment, and the moments from now on that count (``times_s``). ``backwards``: the rover rolls tail first."""
+
+    view: LocalView
+    times_s: Points
+    backwards: bool = False
+
+    @property
+    def rolls_m(self) -> Points:
+        """How far the rover still rolls, at each moment, if it is told to stop."""
+        return braked_m(self.view.speed_m_s, self.times_s, self.view.settings.guidance)
+
+    def driven_m(self, wanted_m_s: float, goes_s: float) -> Points:
+        """How far the rover drives, at each moment, if it goes on at this speed for ``goes_s`` and then stops."""
+        return driven_m(self.view.speed_m_s, wanted_m_s, goes_s, self.times_s, self.view.settings.guidance)
+
+
+def avoided(
+    command: ControlCommand,
+    line: ReferencePath | None,
+    view: LocalView,
     moving: tuple[Moving, ...],
-    evidence: EvidenceMap,
-    rover: RoverLimits,
-    settings: Settings,
-    aside_rad: float | None = None,
     *,
+    aside_rad: float | None = None,
     backwards: bool = False,
-) -> tuple[ControlCommand, float | None]:
-    """What to do instead of ``now`` because of what moves; ``now`` itself if nothing comes across.
+) -> Option:
+    """What to do because of what moves, when the controller says ``command``; that command if nothing comes across.
 
-    Also which way the rover moves aside, if it does; handed in again as ``aside_rad`` it keeps to that.
+    ``line``: what the rover is led along. ``aside_rad``: the bearing to which it moves aside already; it keeps to that.
     ``backwards``: it rolls tail first.
     """
-    moving = tuple(one for one in moving if _matters(one, pose, rover, settings))
+    times_s = np.arange(0.0, view.settings.traffic.look_s + 1e-9, PERIOD_S)
+    outlook = Outlook(view, times_s, backwards)
+    moving = tuple(one for one in moving if _matters(one, view))
     if not moving:
-        return now, None
-    times_s = np.arange(0.0, settings.traffic.look_s + 1e-9, PERIOD_S)
-    at = Situation(pose, speed_m_s, evidence, rover, settings, times_s, backwards)
-    discs = _discs(moving, pose, rover)
-    margins_m = settings.traffic.margin_m + settings.traffic.drift_m_s * times_s
+        return Option(command, _halted(outlook), yields=False)
+    discs = _discs(moving, view)
+    margins_m = view.settings.traffic.margin_m + view.settings.traffic.drift_m_s * times_s
 
-    def room_m(choice: Choice, share: float) -> float:
-        return least_room_m(choice.places, discs, times_s, share * margins_m, choice.until_s)
+    def room_m(option: Option, share: float) -> float:
+        return least_room_m(option.places, discs, times_s, share * margins_m, option.until_s)
 
-    choices = list(on_the_way(at, now, route))
+    options = list(_on_the_way(outlook, command, line))
     for share in MARGIN_SHARES:
-        for choice in choices:
-            if room_m(choice, share) >= 0.0:
-                return choice.guide, None
-    for choice in on_arcs(at) if rover.turning_radius_m > 0.0 else out_of_the_way(at, moving, aside_rad):
-        if room_m(choice, MARGIN_SHARES[-1]) >= 0.0:
-            return choice.guide, choice.aside_rad
-        choices.append(choice)
+        for option in options:
+            if room_m(option, share) >= 0.0:
+                return option
+    turns_on_the_spot = view.rover.turning_radius_m == 0.0
+    for option in _out_of_the_way(outlook, moving, aside_rad) if turns_on_the_spot else _on_arcs(outlook):
+        if room_m(option, MARGIN_SHARES[-1]) >= 0.0:
+            return option
+        options.append(option)
 
-    def worth(choice: Choice) -> tuple[bool, float, float]:
-        first_s, least_m = first_near(choice.places, discs, times_s, NEAR_M)
+    def worth(option: Option) -> tuple[bool, float, float]:
+        first_s, least_m = first_near(option.places, discs, times_s, NEAR_M)
         return (True, least_m, 0.0) if least_m >= 0.0 else (False, first_s, least_m)
 
-    best = max(choices, key=worth)
-    return best.guide, best.aside_rad
+    return max(options, key=worth)
 
 
 class CollisionAvoidance:
-    """Makes way on behalf of one rover, and keeps in mind where it moves aside to and since when it has not got on."""
+    """Remembers where the rover moves aside to, and since when avoiding has kept it from getting on."""
 
-    def __init__(self, evidence: EvidenceMap, rover: RoverLimits) -> None:
-        self._evidence = evidence
-        self._rover = rover
+    def __init__(self) -> None:
         self._aside_rad: float | None = None
         self._since_s: float | None = None
 
-    def give(
+    def avoid(
         self,
-        now: ControlCommand,
-        route: Route | None,
-        pose: Pose,
-        speed_m_s: float,
+        command: ControlCommand,
+        line: ReferencePath | None,
+        view: LocalView,
         moving: tuple[Moving, ...],
-        settings: Settings,
         *,
         backwards: bool,
-    ) -> ControlCommand:
-        """What to do instead of ``now``, as ``yielded`` says."""
-        evidence, rover, aside_rad = self._evidence, self._rover, self._aside_rad
-        guide, self._aside_rad = yielded(
-            now, route, pose, speed_m_s, moving, evidence, rover, settings, aside_rad, backwards=backwards
-        )
-        return guide
+    ) -> Option:
+        """What to do, as ``avoided`` says."""
+        option = avoided(command, line, view, moving, aside_rad=self._aside_rad, backwards=backwards)
+        self._aside_rad = option.aside_rad
+        return option
 
     def is_patient(self, now_s: float, patience_s: float, *, yields: bool) -> bool:
-        """Whether the rover is kept from getting on by making way (``yields``: at this moment), and that not for too long yet."""
+        """Whether avoiding keeps the rover from getting on (``yields``: at this moment), and not for too long yet."""
         if not yields:
             self._since_s = None
             return False
@@ -112,27 +165,168 @@ class CollisionAvoidance:
         return now_s - self._since_s < patience_s
 
 
-def _matters(one: Moving, pose: Pose, rover: RoverLimits, settings: Settings) -> bool:
+def _matters(one: Moving, view: LocalView) -> bool:
     """Whether it moves at all and the two could meet while the rover looks ahead."""
-    traffic = settings.traffic
+    traffic, rover, pose = view.settings.traffic, view.rover, view.pose
     reach_m = (one.speed_m_s + rover.cruise_speed_m_s) * traffic.look_s + one.radius_m + rover.radius_m
     return one.speed_m_s >= traffic.moving_m_s and one.at(pose.time_s).distance_m(pose.point) <= reach_m
 
 
-def _discs(moving: tuple[Moving, ...], pose: Pose, rover: RoverLimits) -> Points:
+def _discs(moving: tuple[Moving, ...], view: LocalView) -> Points:
     """Rows for ``least_room_m``: place now, velocity, and how near the middles may come."""
     rows = []
     for one in moving:
-        here = one.at(pose.time_s)
-        rows.append((here.north_m, here.east_m, one.north_m_s, one.east_m_s, one.radius_m + rover.radius_m))
+        here = one.at(view.pose.time_s)
+        rows.append((here.north_m, here.east_m, one.north_m_s, one.east_m_s, one.radius_m + view.rover.radius_m))
     return np.array(rows)
+
+
+def _halted(outlook: Outlook) -> Points:
+    """Where the rover is while it comes to a stop."""
+    rolls_m = outlook.rolls_m
+    return places_ahead(outlook.view.pose, -rolls_m if outlook.backwards else rolls_m)
+
+
+def _on_the_way(outlook: Outlook, command: ControlCommand, line: ReferencePath | None) -> Iterator[Option]:
+    """Going on, going on a little, stopping."""
+    view = outlook.view
+    halted = _halted(outlook)
+    if command.purpose is Purpose.DRIVE and line is not None:
+        way = _told_way(command, line, view.pose)
+        course_rad = view.pose.heading_rad + (math.pi if outlook.backwards else 0.0)
+        for goes_s in GO_ON_S:
+            along_m = outlook.driven_m(command.speed_m_s, goes_s)
+            places = steered_along(way, course_rad, along_m, view.rover.turning_radius_m)
+            nearer = _nearer(command, view.pose, along_m)
+            yield Option(command, places, yields=False) if nearer is None else Option(nearer, places)
+    else:
+        yield Option(command, halted, yields=False, until_s=TURNING_S)
+    yield Option(stop_for(Purpose.BRAKE), halted)
+
+
+def _nearer(command: ControlCommand, pose: Pose, along_m: Points) -> ControlCommand | None:
+    """The same with a position no farther than where the rover is to come to stand; None where it is not farther.
+
+    The rover must stop there also if it is told nothing more.
+    """
+    if not isinstance(command.setpoint, GuidedPosition):
+        return None
+    stands_m, there = float(along_m[-1]), command.setpoint.point
+    if stands_m >= pose.point.distance_m(there):
+        return None
+    nearer = pose.point.moved(pose.point.bearing_rad(there), stands_m)
+    return ControlCommand(command.purpose, GuidedPosition(nearer), command.speed_m_s)
+
+
+def _told_way(command: ControlCommand, line: ReferencePath, pose: Pose) -> Points:
+    """Where it drives: straight to the position that it is told, and on from there along the line.
+
+    That position lies some metres ahead. Where the line turns off before it, a new one that begins sideways above
+    all, the rover cuts across, and is not where the line is.
+    """
+    ahead = line.points[line.progress + 1 :]
+    here = (pose.north_m, pose.east_m)
+    if isinstance(command.setpoint, GuidedPosition) and len(ahead) > 0:
+        told = np.array((command.setpoint.point.north_m, command.setpoint.point.east_m))
+        nearest = int(np.argmin(((ahead - told) ** 2).sum(axis=1)))
+        if nearest > 0:  # else it is not ahead any more
+            return np.vstack((here, told, ahead[nearest + 1 :]))
+    return np.vstack((here, ahead))
+
+
+def _out_of_the_way(outlook: Outlook, moving: tuple[Moving, ...], aside_rad: float | None) -> Iterator[Option]:
+    """Where a rover that turns on the spot might move to, best first, worked out only when it is asked for."""
+    pose = outlook.view.pose
+    yield from _straight_on(outlook)
+    if aside_rad is not None:
+        yield from _aside(outlook, aside_rad)
+    nearest = min(moving, key=lambda one: one.at(pose.time_s).distance_m(pose.point) - one.radius_m)
+    course_rad = math.atan2(nearest.east_m_s, nearest.north_m_s)
+    for turned_rad in ASIDE_RAD:
+        yield from _aside(outlook, wrap_pi_rad(course_rad + turned_rad))
+    yield from _back_off(outlook)
+
+
+def _straight_on(outlook: Outlook) -> list[Option]:
+    """Straight past, and stop then: a path that has just been laid anew may turn off before what comes across."""
+    view = outlook.view
+    along_m = outlook.driven_m(view.speed_m_s, STRAIGHT_S)
+    there = view.pose.point.moved(view.pose.heading_rad, float(along_m[-1]))
+    if view.speed_m_s <= view.settings.guidance.roll_out_m_s or not _may_stand(view, there):
+        return []
+    command = ControlCommand(Purpose.LOOK, GuidedPosition(there), view.speed_m_s)
+    return [Option(command, places_ahead(view.pose, along_m))]
+
+
+def _may_stand(view: LocalView, there: NedPoint) -> bool:
+    """Whether the way to a place, and a little farther, is clear and seen."""
+    here, guidance = view.pose.point, view.settings.guidance
+    reach_m = here.distance_m(there) + guidance.overshoot_m
+    beyond = here.moved(here.bearing_rad(there), reach_m)
+    line = look_along(view.evidence, here, beyond, view.rover.radius_m + guidance.clearance_m)
+    return min(line.clear_m, line.seen_m) >= reach_m - 0.05
+
+
+def _aside(outlook: Outlook, bearing_rad: float) -> list[Option]:
+    """Turn to a bearing and drive a little, if the ground there is free."""
+    view, pose, guidance = outlook.view, outlook.view.pose, outlook.view.settings.guidance
+    error_rad = abs(wrap_pi_rad(bearing_rad - pose.heading_rad))
+    turns_s = error_rad / TURN_RAD_S + view.speed_m_s / guidance.deceleration_m_s2
+    going_m_s = min(view.rover.cruise_speed_m_s, ASIDE_M_S)
+    for aside_m in ASIDE_M:
+        there = pose.point.moved(bearing_rad, aside_m)
+        if not _may_stand(view, there):
+            continue
+        after_s = np.maximum(outlook.times_s - turns_s, 0.0)
+        along_m = np.minimum(0.5 * guidance.deceleration_m_s2 * after_s**2, aside_m)
+        along_m = np.minimum(along_m, going_m_s * after_s)
+        places = moved(places_ahead(pose, outlook.rolls_m), bearing_rad, along_m)
+        if error_rad > math.radians(guidance.turn_until_close_deg):
+            return [Option(turn_to(bearing_rad, view), places, aside_rad=bearing_rad)]
+        going = ControlCommand(Purpose.LOOK, GuidedPosition(there), going_m_s)
+        return [Option(going, places, aside_rad=bearing_rad)]
+    return []
+
+
+def _back_off(outlook: Outlook) -> list[Option]:
+    """Straight back over ground that is known to be free."""
+    view, guidance = outlook.view, outlook.view.settings.guidance
+    back_m_s = backing_speed_m_s(view)
+    if back_m_s < BACK_LEAST_M_S or view.speed_m_s > guidance.roll_out_m_s + guidance.back_out_speed_m_s:
+        return []
+    stands_s = guidance.brake_delay_s + view.speed_m_s / guidance.deceleration_m_s2
+    back_m = np.minimum(np.maximum(outlook.times_s - stands_s, 0.0) * back_m_s, OFF_M)
+    command = ControlCommand(Purpose.LOOK, GuidedVelocity(-back_m_s, 0.0), back_m_s)
+    return [Option(command, places_ahead(view.pose, outlook.rolls_m - back_m))]
+
+
+def _on_arcs(outlook: Outlook) -> Iterator[Option]:
+    """Where a rover that drives arcs might go: straight or at full lock, the way it rolls; standing, either way."""
+    view, pose, rover = outlook.view, outlook.view.pose, outlook.view.rover
+    guidance, steering = view.settings.guidance, view.settings.steering
+    arcs = ArcQueries(view.evidence, pose)
+    room_m = arcs.kept_room_m(rover.radius_m + guidance.clearance_m, rover.radius_m - 0.05)
+    sharpest_per_m = 1.0 / (rover.turning_radius_m * steering.planned_radius)
+    for tail_first in (outlook.backwards,) if view.speed_m_s > steering.stopped_m_s else (False, True):
+        going_m_s = min(guidance.back_out_speed_m_s if tail_first else rover.cruise_speed_m_s, ARC_M_S)
+        course_rad = pose.heading_rad + (math.pi if tail_first else 0.0)
+        for share in ARC_SHARES:
+            curvature_per_m = share * sharpest_per_m
+            reach_m = max(ARC_M, blind_distance_m(going_m_s, guidance))
+            if not arcs.arc_is_clear(course_rad, curvature_per_m, room_m, reach_m, Until.UNSEEN):
+                continue
+            along_m = np.minimum(outlook.driven_m(going_m_s, math.inf), ARC_M)
+            turn_rate = curvature_per_m * max(view.speed_m_s, steering.scale_base_m_s)
+            setpoint = GuidedVelocity(-going_m_s if tail_first else going_m_s, round(turn_rate, 2))
+            places = moved_on_arc(pose, course_rad, curvature_per_m, along_m)
+            yield Option(ControlCommand(Purpose.LOOK, setpoint, going_m_s), places)
 
 
 @njit(cache=True, nogil=True)
 def least_room_m(places: Points, discs: Points, times_s: Points, margins_m: Points, until_s: float) -> float:
     """The least room beyond the margin that is left between the rover and anything that moves; negative: too little.
 
-    What is nearer than the margin already must not come nearer still.
+    A thing that is nearer than the margin already must not come nearer still.
     """
     least_m = math.inf
     for row in range(discs.shape[0]):
@@ -150,7 +344,7 @@ def least_room_m(places: Points, discs: Points, times_s: Points, margins_m: Poin
 
 @njit(cache=True, nogil=True)
 def first_near(places: Points, discs: Points, times_s: Points, near_m: float) -> tuple[float, float]:
-    """When anything that moves first comes within ``near_m`` of the rover (inf: never), and the least room there is at any time."""
+    """When anything that moves first comes within ``near_m`` (inf: never), and the least room at any time."""
     first_s, least_m = math.inf, math.inf
     for row in range(discs.shape[0]):
         north_m, east_m, north_m_s, east_m_s, touch_m = discs[row]

@@ -1,8 +1,11 @@
-"""What a controller sees of one moment: the rover's pose and speed, the map, the rover's limits and the settings."""
+"""What a controller sees of one moment: pose, speed, map, the rover's limits and the settings in force.
+
+Nouns: local view.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
@@ -19,3 +22,7 @@ class LocalView:
     evidence: EvidenceMap
     rover: RoverLimits
     settings: Settings
+
+    def with_speeds(self, cruise_speed_m_s: float, fastest_m_s: float) -> LocalView:
+        """The same moment with another cruise speed, and with the highest speed that is ever told on this way."""
+        return replace(self, rover=replace(self.rover, cruise_speed_m_s=cruise_speed_m_s, fastest_m_s=fastest_m_s))

@@ -1,4 +1,7 @@
-"""Where the rover will be at each of the next moments if it does this or that: braking, driving on, along its route, on an arc."""
+"""Motion prediction: where the rover will be in the next seconds if it brakes, drives on, follows a line or an arc.
+
+Nouns: motion prediction.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,14 @@ from companion.core.frames import Pose
 from companion.settings import GuidanceSettings
 
 Points = NDArray[np.float64]
-"""Shape (n, 2): columns north_m and east_m, one row for each of the moments looked at."""
+"""Shape (n, 2): columns north_m and east_m, one row for each of the moments that are looked at."""
 
 PERIOD_S = 0.2
 """From one moment to the next."""
 TURN_RAD_S = 1.2
-"""How fast it is taken to turn."""
+"""The turn rate that is assumed."""
 AIM_M = 1.0
-"""It steers for a place on its route so far ahead."""
+"""It steers for a place this far ahead on its line."""
 
 
 def braked_m(speed_m_s: float, times_s: Points, settings: GuidanceSettings) -> Points:
@@ -31,7 +34,7 @@ def braked_m(speed_m_s: float, times_s: Points, settings: GuidanceSettings) -> P
 
 
 def driven_m(speed_m_s: float, goal_m_s: float, goes_s: float, times_s: Points, settings: GuidanceSettings) -> Points:
-    """How far it has driven at each moment when it goes on at the speed it is told, and stops after ``goes_s``."""
+    """How far it has driven at each moment when it goes on at the speed ``goal_m_s``, and stops after ``goes_s``."""
     rate = settings.deceleration_m_s2
     fastest = (
         np.minimum(goal_m_s, speed_m_s + rate * times_s) if goal_m_s > speed_m_s else np.full(times_s.shape, goal_m_s)
@@ -43,26 +46,26 @@ def driven_m(speed_m_s: float, goal_m_s: float, goes_s: float, times_s: Points, 
     return np.concatenate(([0.0], np.cumsum((speeds[1:] + speeds[:-1]) / 2.0 * PERIOD_S)))
 
 
-def ahead(pose: Pose, along_m: Points) -> Points:
+def places_ahead(pose: Pose, along_m: Points) -> Points:
     """Places straight ahead of the rover."""
     return moved(np.tile((pose.north_m, pose.east_m), (len(along_m), 1)), pose.heading_rad, along_m)
 
 
 def moved(places: Points, bearing_rad: float, along_m: Points) -> Points:
-    """These places moved so far in one direction."""
+    """These places, each moved by its distance in one direction."""
     return np.asarray(places + along_m[:, None] * (math.cos(bearing_rad), math.sin(bearing_rad)))
 
 
-def moved_on_arc(pose: Pose, course_rad: float, curvature_m: float, along_m: Points) -> Points:
-    """Places on an arc from where the rover is."""
-    half_rad = 0.5 * curvature_m * along_m
+def moved_on_arc(pose: Pose, course_rad: float, curvature_per_m: float, along_m: Points) -> Points:
+    """Places on an arc from where the rover is; curvature clockwise positive, as seen in the direction of travel."""
+    half_rad = 0.5 * curvature_per_m * along_m
     chord_m = along_m * np.sinc(half_rad / math.pi)
     bearing_rad = course_rad + half_rad
     return np.column_stack((pose.north_m + chord_m * np.cos(bearing_rad), pose.east_m + chord_m * np.sin(bearing_rad)))
 
 
 def steered_along(points: Points, course_rad: float, along_m: Points, turning_radius_m: float) -> Points:
-    """Places on the way along a line from where the rover is, which rolls to ``course_rad`` now: it has to turn first.
+    """Places on the way along a line from where the rover is. It rolls to ``course_rad`` now, and has to turn first.
 
     ``turning_radius_m``: 0 for a rover that can turn on the spot.
     """
@@ -81,7 +84,7 @@ def steered_along(points: Points, course_rad: float, along_m: Points, turning_ra
 def steered(
     north_m: float, east_m: float, course_rad: float, aims: Points, along_m: Points, most_rad: Points
 ) -> Points:
-    """Places of a vehicle that at each moment turns towards its aim by no more than ``most_rad``, and goes as far as ``along_m`` says."""
+    """Places of a vehicle that turns towards its aim by at most ``most_rad`` at each moment, as far as ``along_m``."""
     places = np.empty_like(aims)
     places[0, 0], places[0, 1] = north_m, east_m
     for i in range(1, len(aims)):

@@ -1,176 +1,114 @@
-"""From the navigator's path to one guided setpoint and a speed.
+"""Controller of a rover that turns on the spot: from a path to one guided position ahead on it, and a speed.
 
-The autopilot brakes for every guided point, so the point is rolled to the farthest place of the route that can be reached
-straight and clear. It never lies beyond the ground seen free plus the stopping distance. Where the next piece of
-the route has not been seen, the rover turns to look before it drives.
+The autopilot brakes for every guided position, so the position is moved on to the farthest place of the path that
+can be reached straight and clear. It never lies beyond the ground seen free plus the stopping distance. Where the
+next piece of the path has not been seen, the rover turns to look before it drives.
+
+Nouns: point controller.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from enum import StrEnum
 
 from companion.control.braking import braking_distance_m, fastest_within_m, stopping_distance_m
-from companion.control.reference_path import STEP_M, Route
-from companion.control.safe_reach import arc_is_free, farthest_clear, unseen_flank
+from companion.control.controller import ControlCommand, Purpose, stop_for
+from companion.control.local_view import LocalView
+from companion.control.reference_path import STEP_M, ReferencePath
+from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, unseen_flank
 from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.evidence_map import EvidenceMap, clearance_m, look_along
+from companion.mapping.map_queries import clearance_m, look_along
 from companion.settings import GuidanceSettings
-from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
+from companion.vehicle.commands import GuidedHeading, GuidedPosition
 
-STOP = GuidedVelocity(0.0, 0.0)
+OVERSPEED = 1.15
+"""A rover this much faster than its highest speed, as on leaving soft ground, is braked: room was kept for less."""
 STRAIGHT_RAD = math.radians(2.0)
 """A target that is no farther aside is reached straight."""
 ROLL_SHARES = (0.25, 0.5, 0.75, 1.0)
 """Directions, as shares of a turn, that are looked along before a rolling rover begins to turn."""
 
 
-class Motion(StrEnum):
-    """What the setpoint is for."""
+class PointController:
+    """Remembers what it told last: the heading of a look, and whether it was braking.
 
-    DRIVE = "drive"
-    LOOK = "look"
-    BRAKE = "brake"
-    BLOCKED = "blocked"
-
-
-@dataclass(frozen=True, slots=True)
-class ControlCommand:
-    """What to tell the autopilot now."""
-
-    motion: Motion
-    setpoint: Setpoint
-    speed_m_s: float
-
-
-STANDSTILL = ControlCommand(Motion.BLOCKED, STOP, 0.0)
-
-
-def guide(
-    route: Route,
-    pose: Pose,
-    speed_m_s: float,
-    evidence: EvidenceMap,
-    rover: RoverLimits,
-    settings: GuidanceSettings,
-    *,
-    looking_rad: float | None = None,
-    braking: bool = False,
-) -> ControlCommand:
-    """The setpoint and speed for this moment. ``BLOCKED`` means that not even the next piece of the route is clear.
-
-    ``looking_rad``: the heading of the last answer if that was LOOK. It is kept until reached, and a longer clear reach is wanted
-    before driving off, so that a narrow sensor looks to both sides once, not at every step.
+    A look is kept until its heading is reached, and a longer clear reach is wanted before the rover drives off
+    again, so that a narrow sensor looks to both sides once and not at every step.
     """
-    needed_m = braking_distance_m(speed_m_s, settings)
-    if _would_touch(pose, speed_m_s, needed_m, evidence, rover, settings):
-        return ControlCommand(Motion.BRAKE, STOP, 0.0)
-    target, reach_m, room_m = farthest_clear(route, pose, speed_m_s, evidence, rover, settings)
-    distance_m = pose.point.distance_m(route.end)
-    at_end = len(route.points) - 1 - route.progress <= int(1.0 / STEP_M)
-    rolling = speed_m_s > settings.roll_out_m_s
-    if rolling and reach_m < min(needed_m + (settings.brake_on_m if braking else 0.0), distance_m - 0.1):
-        return ControlCommand(Motion.BRAKE, STOP, 0.0)
-    wanted_m = settings.least_reach_m if looking_rad is None else settings.reach_after_look_m
-    if reach_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach_m > 0.0):
-        if looking_rad is not None and not _is_turned_to(looking_rad, pose, settings):
-            return turn_to(looking_rad, speed_m_s, settings)
-        look = _look_or_blocked(route, pose, speed_m_s, evidence, rover, settings)
-        if look.motion is not Motion.DRIVE or reach_m < settings.least_reach_m:
-            return look
-    bearing = pose.point.bearing_rad(target)
-    error = abs(wrap_pi_rad(bearing - pose.heading_rad))
-    beside_m = clearance_m(evidence, pose.point, settings.slow_within_m + rover.radius_m) - rover.radius_m
-    close = beside_m < settings.slow_within_m
-    if error > _turn_first_rad(close, looking_rad is not None, settings) and pose.point.distance_m(target) > 0.5:
-        close = close or _would_touch_turning(pose, speed_m_s, bearing, evidence, rover, settings)
-        return turn_to(bearing, speed_m_s if close else 0.0, settings)
-    if error > STRAIGHT_RAD and not arc_is_free(pose, target, evidence, rover):
-        return turn_to(bearing, speed_m_s, settings)
-    limit_m_s = speed_limit_m_s(min(beside_m, room_m), error, rover, settings)
-    if not at_end:
-        limit_m_s = min(limit_m_s, max(fastest_within_m(reach_m, settings), settings.min_speed_m_s))
-    limit_m_s = min(limit_m_s, _limit_by_heading(pose, evidence, rover, settings))
-    return ControlCommand(Motion.DRIVE, GuidedPosition(target), limit_m_s)
+
+    backwards = False
+    """It backs off only in a recovery or an avoidance, never along a path."""
+
+    def __init__(self) -> None:
+        self._looking_rad: float | None = None
+        self._braking = False
+
+    def follow(self, path: ReferencePath, view: LocalView) -> ControlCommand:
+        """The command for this moment. ``BLOCKED``: not even the next piece of the path is clear."""
+        if view.speed_m_s > OVERSPEED * view.rover.fastest_m_s:
+            return stop_for(Purpose.BRAKE)
+        command = self._command(path, view)
+        self._braking = command.purpose is Purpose.BRAKE
+        self._looking_rad = command.setpoint.heading_rad if isinstance(command.setpoint, GuidedHeading) else None
+        return command
+
+    def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
+        """The path itself."""
+        return path
+
+    def reset(self) -> None:
+        """It knows no manoeuvres; a look outlasts a change of path."""
+
+    def _command(self, path: ReferencePath, view: LocalView) -> ControlCommand:
+        pose, settings = view.pose, view.settings.guidance
+        needed_m = braking_distance_m(view.speed_m_s, settings)
+        if _would_touch(view, needed_m):
+            return stop_for(Purpose.BRAKE)
+        reach = farthest_clear(path, view)
+        distance_m = pose.point.distance_m(path.end)
+        at_end = _is_at_end(path)
+        rolling = view.speed_m_s > settings.roll_out_m_s
+        if rolling and reach.distance_m < min(
+            needed_m + (settings.brake_on_m if self._braking else 0.0), distance_m - 0.1
+        ):
+            return stop_for(Purpose.BRAKE)
+        wanted_m = settings.least_reach_m if self._looking_rad is None else settings.reach_after_look_m
+        if reach.distance_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach.distance_m > 0.0):
+            if self._looking_rad is not None and not _is_turned_to(self._looking_rad, pose, settings):
+                return turn_to(self._looking_rad, view)
+            look = _look_or_blocked(path, view)
+            if look.purpose is not Purpose.DRIVE or reach.distance_m < settings.least_reach_m:
+                return look
+        return self._drive(path, reach, view)
+
+    def _drive(self, path: ReferencePath, reach: Reach, view: LocalView) -> ControlCommand:
+        """Drive to a place in reach: turn first where it lies far aside, then as fast as the surroundings allow."""
+        pose, rover, settings = view.pose, view.rover, view.settings.guidance
+        bearing = pose.point.bearing_rad(reach.target)
+        error = abs(wrap_pi_rad(bearing - pose.heading_rad))
+        beside_m = clearance_m(view.evidence, pose.point, settings.slow_within_m + rover.radius_m) - rover.radius_m
+        close = beside_m < settings.slow_within_m
+        turn_first_rad = _turn_first_rad(close, self._looking_rad is not None, settings)
+        if error > turn_first_rad and pose.point.distance_m(reach.target) > 0.5:
+            if close or _would_touch_turning(view, bearing):
+                return turn_to(bearing, view)
+            return ControlCommand(Purpose.LOOK, GuidedHeading(bearing), settings.min_speed_m_s)
+        if error > STRAIGHT_RAD and not arc_is_free(view, reach.target):
+            return turn_to(bearing, view)
+        limit_m_s = speed_limit_m_s(min(beside_m, reach.room_m), error, rover, settings)
+        if not _is_at_end(path):
+            limit_m_s = min(limit_m_s, max(fastest_within_m(reach.distance_m, settings), settings.min_speed_m_s))
+        limit_m_s = min(limit_m_s, _limit_by_heading(view))
+        return ControlCommand(Purpose.DRIVE, GuidedPosition(reach.target), limit_m_s)
 
 
-def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> float:
-    """The bearing error from which the rover turns on the spot instead of driving an arc, which it must not near something.
-
-    A position far to the side would make the autopilot pivot too, but with its old target still winding up behind the scenes; so
-    a heading is given first, until the rest is small.
-    """
-    if turning:
-        return math.radians(settings.turn_until_close_deg if close else settings.turn_until_deg)
-    return math.radians(settings.turn_first_close_deg if close else settings.turn_first_deg)
-
-
-def _would_touch(
-    pose: Pose, speed_m_s: float, needed_m: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
-) -> bool:
-    """Whether the rover, going straight on, would touch something before it could stop."""
-    if speed_m_s <= settings.roll_out_m_s:
-        return False
-    ahead = pose.point.moved(pose.heading_rad, needed_m)
-    return look_along(evidence, pose.point, ahead, rover.radius_m + 0.05).clear_m < needed_m - 1e-6
-
-
-def _would_touch_turning(
-    pose: Pose,
-    speed_m_s: float,
-    bearing_rad: float,
-    evidence: EvidenceMap,
-    rover: RoverLimits,
-    settings: GuidanceSettings,
-) -> bool:
-    """Whether the rover, turning to the bearing while it still rolls, could touch something: it comes to stand in between."""
-    roll_m = braking_distance_m(speed_m_s, settings)
-    turn_rad = wrap_pi_rad(bearing_rad - pose.heading_rad)
-    for share in ROLL_SHARES:
-        there = pose.point.moved(pose.heading_rad + share * turn_rad, roll_m)
-        if look_along(evidence, pose.point, there, rover.radius_m + 0.05).clear_m < roll_m - 1e-6:
-            return True
-    return False
-
-
-def _is_turned_to(bearing_rad: float, pose: Pose, settings: GuidanceSettings) -> bool:
-    return abs(wrap_pi_rad(bearing_rad - pose.heading_rad)) <= math.radians(settings.turned_deg)
-
-
-def turn_to(bearing_rad: float, speed_m_s: float, settings: GuidanceSettings) -> ControlCommand:
-    """Turn on the spot; a rover that still rolls brakes first, lest it drives an arc."""
-    if speed_m_s > settings.roll_out_m_s:
-        return ControlCommand(Motion.BRAKE, STOP, 0.0)
-    return ControlCommand(Motion.LOOK, GuidedHeading(bearing_rad), settings.min_speed_m_s)
-
-
-def _look_or_blocked(
-    route: Route,
-    pose: Pose,
-    speed_m_s: float,
-    evidence: EvidenceMap,
-    rover: RoverLimits,
-    settings: GuidanceSettings,
-) -> ControlCommand:
-    """The next piece is not clear, or has not been seen: turn to it; when turned and still so, it is blocked."""
-    ahead = route.point_ahead(settings.look_ahead_m)
-    line = look_along(evidence, pose.point, ahead, rover.radius_m)
-    distance_m = pose.point.distance_m(ahead)
-    unseen = unseen_flank(pose, route.point_ahead(settings.reach_after_look_m), evidence, rover)
-    view = ahead if line.seen_m < distance_m - 0.05 or unseen is None else unseen.place
-    bearing = pose.point.bearing_rad(view)
-    if not _is_turned_to(bearing, pose, settings):
-        return turn_to(bearing, speed_m_s, settings)
-    if line.clear_m >= distance_m - 0.05:
-        # Looked at, and nothing there, but between the beams: creep, up to what stands farther on.
-        bearing = pose.point.bearing_rad(ahead)
-        creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
-        clear_m = look_along(evidence, pose.point, pose.point.moved(bearing, creep_m), rover.radius_m).clear_m
-        target = pose.point.moved(bearing, min(creep_m, clear_m))
-        return ControlCommand(Motion.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
-    return ControlCommand(Motion.BLOCKED, STOP, 0.0)
+def turn_to(bearing_rad: float, view: LocalView) -> ControlCommand:
+    """Turn on the spot; a rover that still rolls brakes first, so that it does not drive an arc."""
+    settings = view.settings.guidance
+    if view.speed_m_s > settings.roll_out_m_s:
+        return stop_for(Purpose.BRAKE)
+    return ControlCommand(Purpose.LOOK, GuidedHeading(bearing_rad), settings.min_speed_m_s)
 
 
 def speed_limit_m_s(beside_m: float, bearing_error_rad: float, rover: RoverLimits, settings: GuidanceSettings) -> float:
@@ -183,13 +121,75 @@ def speed_limit_m_s(beside_m: float, bearing_error_rad: float, rover: RoverLimit
     return min(max(min(sight, beside, turning, narrow), settings.min_speed_m_s), rover.cruise_speed_m_s)
 
 
-def _limit_by_heading(pose: Pose, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings) -> float:
-    """The speed from which the rover can stop before its flanks enter unseen ground, should it go on as it points.
+def _is_at_end(path: ReferencePath) -> bool:
+    """Whether less than a metre of the path is left."""
+    return len(path.points) - 1 - path.progress <= int(1.0 / STEP_M)
 
-    A target a few degrees aside is reached on an arc, and what stands beside that arc was not looked at on the way to the target.
+
+def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> float:
+    """The bearing error from which the rover turns on the spot; with less it drives an arc.
+
+    For a position far to the side the autopilot would pivot too, but with the integrator of its speed controller still
+    winding up for the old target. So a heading is told first, until the rest is small.
     """
-    ahead = pose.point.moved(pose.heading_rad, stopping_distance_m(rover.cruise_speed_m_s, settings))
-    unseen = unseen_flank(pose, ahead, evidence, rover)
+    if turning:
+        return math.radians(settings.turn_until_close_deg if close else settings.turn_until_deg)
+    return math.radians(settings.turn_first_close_deg if close else settings.turn_first_deg)
+
+
+def _would_touch(view: LocalView, needed_m: float) -> bool:
+    """Whether the rover, going straight on, would touch something before it could stop."""
+    pose = view.pose
+    if view.speed_m_s <= view.settings.guidance.roll_out_m_s:
+        return False
+    ahead = pose.point.moved(pose.heading_rad, needed_m)
+    return look_along(view.evidence, pose.point, ahead, view.rover.radius_m + 0.05).clear_m < needed_m - 1e-6
+
+
+def _would_touch_turning(view: LocalView, bearing_rad: float) -> bool:
+    """Whether the rover could touch something if it turns to the bearing while it still rolls: it stops in between."""
+    pose, roll_m = view.pose, braking_distance_m(view.speed_m_s, view.settings.guidance)
+    turn_rad = wrap_pi_rad(bearing_rad - pose.heading_rad)
+    for share in ROLL_SHARES:
+        there = pose.point.moved(pose.heading_rad + share * turn_rad, roll_m)
+        if look_along(view.evidence, pose.point, there, view.rover.radius_m + 0.05).clear_m < roll_m - 1e-6:
+            return True
+    return False
+
+
+def _is_turned_to(bearing_rad: float, pose: Pose, settings: GuidanceSettings) -> bool:
+    return abs(wrap_pi_rad(bearing_rad - pose.heading_rad)) <= math.radians(settings.turned_deg)
+
+
+def _look_or_blocked(path: ReferencePath, view: LocalView) -> ControlCommand:
+    """The next piece is not clear, or has not been seen: turn to it; when turned and still so, it is blocked."""
+    pose, evidence, radius_m, settings = view.pose, view.evidence, view.rover.radius_m, view.settings.guidance
+    ahead = path.point_ahead(settings.look_ahead_m)
+    line = look_along(evidence, pose.point, ahead, radius_m)
+    distance_m = pose.point.distance_m(ahead)
+    unseen = unseen_flank(view, path.point_ahead(settings.reach_after_look_m))
+    target = ahead if line.seen_m < distance_m - 0.05 or unseen is None else unseen.place
+    bearing = pose.point.bearing_rad(target)
+    if not _is_turned_to(bearing, pose, settings):
+        return turn_to(bearing, view)
+    if line.clear_m >= distance_m - 0.05:
+        # It has looked, and nothing is there but ground between the beams: creep, up to the next obstacle.
+        bearing = pose.point.bearing_rad(ahead)
+        creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
+        clear_m = look_along(evidence, pose.point, pose.point.moved(bearing, creep_m), radius_m).clear_m
+        target = pose.point.moved(bearing, min(creep_m, clear_m))
+        return ControlCommand(Purpose.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
+    return stop_for(Purpose.BLOCKED)
+
+
+def _limit_by_heading(view: LocalView) -> float:
+    """The speed from which the rover can stop before its flanks enter unseen ground, if it goes on as it points.
+
+    A target a few degrees aside is reached on an arc, and the ground beside that arc was not looked at on the way
+    to the target.
+    """
+    pose, cruise_m_s, settings = view.pose, view.rover.cruise_speed_m_s, view.settings.guidance
+    unseen = unseen_flank(view, pose.point.moved(pose.heading_rad, stopping_distance_m(cruise_m_s, settings)))
     if unseen is None:
-        return rover.cruise_speed_m_s
-    return min(max(fastest_within_m(unseen.along_m, settings), settings.min_speed_m_s), rover.cruise_speed_m_s)
+        return cruise_m_s
+    return min(max(fastest_within_m(unseen.along_m, settings), settings.min_speed_m_s), cruise_m_s)

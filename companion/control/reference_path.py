@@ -1,4 +1,7 @@
-"""The line to drive: along the fields of a path or along its curve, and how far the rover has come on it."""
+"""The reference path: the line to drive in metres, from a planned path, and how far the rover has come on it.
+
+Nouns: reference path.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,8 @@ from numpy.typing import NDArray
 
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, Grid
-from companion.mapping.evidence_map import EvidenceMap, look_along
+from companion.mapping.evidence_map import EvidenceMap
+from companion.mapping.map_queries import look_along
 from companion.planning.problem import Path
 
 Points = NDArray[np.float64]
@@ -21,13 +25,13 @@ STEP_M = 0.25
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Route:
-    """The line to drive, in points ``STEP_M`` apart, and how far along it the rover has come."""
+class ReferencePath:
+    """The line to drive, in points ``STEP_M`` apart; ``progress``: index of the point that the rover has come to."""
 
     points: Points
     progress: int = 0
     speeds_m_s: NDArray[np.float64] | None = None
-    """The planned speed at each of the points, if the planner chooses speeds."""
+    """Shape (n,): the planned speed at each of the points, if the planner chooses speeds."""
 
     @property
     def end(self) -> NedPoint:
@@ -39,88 +43,86 @@ class Route:
         return NedPoint(float(self.points[index, 0]), float(self.points[index, 1]))
 
     def point_ahead(self, distance_m: float) -> NedPoint:
-        """The point so far on from the rover, along the route; at most its end."""
+        """The point at a distance ahead of the rover, along the path; at most its end."""
         return self.point(min(self.progress + round(distance_m / STEP_M), len(self.points) - 1))
 
     @property
     def planned_m_s(self) -> float:
-        """The planned speed where the rover is now; infinite when none was planned."""
+        """The planned speed where the rover is now; inf when none was planned."""
         return math.inf if self.speeds_m_s is None else float(self.speeds_m_s[self.progress])
 
     @property
     def left_m(self) -> float:
-        """Length of the route that is left, in metres."""
+        """Length of the path that is left, in metres."""
         return (len(self.points) - 1 - self.progress) * STEP_M
 
 
-def route_along_cells(grid: Grid, cells: tuple[Cell, ...], start: NedPoint, end: NedPoint | None) -> Route:
-    """The route from ``start`` (in the first field) through the middles of the others; ``end`` replaces the last one."""
+def path_along_fields(grid: Grid, cells: tuple[Cell, ...], start: NedPoint, end: NedPoint | None) -> ReferencePath:
+    """The path from ``start`` (in the first field) through the middles of the others; ``end`` replaces the last one."""
     corners = [start, *(grid.centre_of(cell) for cell in cells[1:])]
     if end is not None:
         corners[-1 if len(corners) > 1 else 1 :] = [end]
-    return Route(_densified(np.array([(p.north_m, p.east_m) for p in corners])))
+    return ReferencePath(_densified(np.array([(p.north_m, p.east_m) for p in corners])))
 
 
-def route_along_curve(grid: Grid, curve: NDArray[np.float64], start: NedPoint, end: NedPoint | None) -> Route:
-    """The route along a planner's smooth curve (x, y in fields); ``start`` and ``end`` replace its ends."""
-    north = grid.south_west.north_m + (curve[:, 1] + 0.5) * grid.resolution_m
-    east = grid.south_west.east_m + (curve[:, 0] + 0.5) * grid.resolution_m
-    points = np.column_stack((north, east))
+def path_along_curve(grid: Grid, curve: NDArray[np.float64], start: NedPoint, end: NedPoint | None) -> ReferencePath:
+    """The path along a planner's smooth curve (x, y in fields); ``start`` and ``end`` replace its ends."""
+    points = grid.places_of(curve)
     points[0] = (start.north_m, start.east_m)
     if end is not None:
         points[-1] = (end.north_m, end.east_m)
-    return Route(_densified(points))
+    return ReferencePath(_densified(points))
 
 
-def route_along(
-    path: Path | None,
+def reference_path(
+    planned: Path | None,
     cells: tuple[Cell, ...],
     evidence: EvidenceMap,
     start: NedPoint,
     end: NedPoint | None,
     half_width_m: float,
-) -> Route:
-    """The route along a planned path: along its curve where a rover of this half width can drive that, else through its fields.
+) -> ReferencePath:
+    """The line along a planned path: along its curve where a rover of this half width can, else through fields.
 
-    ``cells`` are those fields, or the way back (``path`` is None then). ``start`` and ``end`` replace the ends.
+    ``cells`` are those fields, or the way back (``planned`` is None then). ``start`` and ``end`` replace the ends.
     """
     grid = evidence.grid
-    if path is not None and path.curve is not None:
-        route = route_along_curve(grid, path.curve, start, end)
-        if route_is_clear(route, evidence, half_width_m):
-            return with_planned_speeds(route, path, grid.resolution_m)
-    route = route_along_cells(grid, cells, start, end)
-    return route if path is None else with_planned_speeds(route, path, grid.resolution_m)
+    if planned is not None and planned.curve is not None:
+        path = path_along_curve(grid, planned.curve, start, end)
+        if path_is_clear(path, evidence, half_width_m):
+            return with_planned_speeds(path, planned, grid.resolution_m)
+    path = path_along_fields(grid, cells, start, end)
+    return path if planned is None else with_planned_speeds(path, planned, grid.resolution_m)
 
 
-def route_is_clear(route: Route, evidence: EvidenceMap, half_width_m: float) -> bool:
-    """Whether a rover of this half width can drive the whole route on the map as known."""
+def path_is_clear(path: ReferencePath, evidence: EvidenceMap, half_width_m: float) -> bool:
+    """Whether a rover of this half width can drive the whole path on the map as known."""
     stride = max(1, round(evidence.base.resolution_m / STEP_M))
-    stops = [*range(0, len(route.points) - 1, stride), len(route.points) - 1]
+    stops = [*range(0, len(path.points) - 1, stride), len(path.points) - 1]
     for i, j in pairwise(stops):
-        here, there = route.point(i), route.point(j)
+        here, there = path.point(i), path.point(j)
         if look_along(evidence, here, there, half_width_m).clear_m < here.distance_m(there) - 1e-6:
             return False
     return True
 
 
-def advanced(route: Route, pose: Pose, window_m: float = 4.0) -> Route:
-    """The route with its progress moved to the point nearest to the rover, never back and not more than the window ahead."""
-    stop = min(len(route.points), route.progress + int(window_m / STEP_M) + 1)
-    ahead = route.points[route.progress : stop]
+def advanced(path: ReferencePath, pose: Pose, window_m: float = 4.0) -> ReferencePath:
+    """The path with its progress moved to the point nearest to the rover, never back and at most the window ahead."""
+    stop = min(len(path.points), path.progress + int(window_m / STEP_M) + 1)
+    ahead = path.points[path.progress : stop]
     nearest = int(np.argmin((ahead[:, 0] - pose.north_m) ** 2 + (ahead[:, 1] - pose.east_m) ** 2))
-    return Route(route.points, route.progress + nearest, route.speeds_m_s)
+    return ReferencePath(path.points, path.progress + nearest, path.speeds_m_s)
 
 
-def with_planned_speeds(route: Route, path: Path, resolution_m: float) -> Route:
-    """The route with the speeds of the path it follows, each at its share of the whole length; unchanged without any."""
-    if path.curve is None or path.speeds_fields_s is None or len(path.speeds_fields_s) == 0:
-        return route
-    ends = np.cumsum(np.hypot(*np.diff(path.curve, axis=0).T))
-    shares = np.linspace(0.0, 1.0, len(route.points))
+def with_planned_speeds(path: ReferencePath, planned: Path, resolution_m: float) -> ReferencePath:
+    """The path with the speeds of its plan, each at its share of the whole length; unchanged without any."""
+    if planned.curve is None or planned.speeds_fields_s is None or len(planned.speeds_fields_s) == 0:
+        return path
+    ends = np.cumsum(np.hypot(*np.diff(planned.curve, axis=0).T))
+    shares = np.linspace(0.0, 1.0, len(path.points))
     pieces = np.searchsorted(ends / max(float(ends[-1]), 1e-9), shares, side="right")
-    speeds = path.speeds_fields_s[np.minimum(pieces, len(path.speeds_fields_s) - 1)] * resolution_m
-    return Route(route.points, route.progress, np.asarray(speeds, np.float64))
+    speeds = planned.speeds_fields_s[np.minimum(pieces, len(planned.speeds_fields_s) - 1)] * resolution_m
+    return ReferencePath(path.points, path.progress, np.asarray(speeds, np.float64))
 
 
 def _densified(corners: Points) -> Points:

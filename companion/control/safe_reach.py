@@ -1,167 +1,139 @@
-"""How far the rover may be sent. What it is told may be the last that it is ever told, and it will follow that to its end.
+"""Safe reach: how far the rover may be sent, so that it can be left alone if the link fails after this message.
 
-So a place to drive to is one where it can be left alone: it comes to stand on ground that has been seen free, and nothing stands beside the
-way there. ``companion/control/setpoint_check.py`` asks the same once more of whatever is really sent.
+A setpoint may be the last that the autopilot receives, and it is followed to its end. So a place to drive to is one
+where the rover comes to stand on ground that has been seen free, with nothing beside the way there.
+``setpoint_check`` asks the same once more of whatever is really sent.
+
+Nouns: safe reach.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 
 from companion.control.braking import blind_distance_m, farthest_m, fastest_blind_m_s, overshoot_m
-from companion.control.reference_path import STEP_M, Route
-from companion.core.frames import NedPoint, Pose, wrap_pi_rad
-from companion.core.rover_limits import RoverLimits
-from companion.mapping.arc_kernels import BLOCKED, UNSEEN, arc_clear, kept_room
-from companion.mapping.evidence_map import EvidenceMap, Unseen, ground_of, in_cells, look_along, unseen_beside
-from companion.settings import GuidanceSettings
+from companion.control.local_view import LocalView
+from companion.control.reference_path import STEP_M, ReferencePath
+from companion.core.frames import NedPoint, wrap_pi_rad
+from companion.mapping.map_queries import ArcQueries, Unseen, Until, look_along, unseen_beside, within_map_m
 
 BACK_LEAST_M_S = 0.2
-"""Where there is less room behind than this needs, it does not back out at all."""
+"""The rover does not back out at all where there is only room to do so slower than this."""
 ROLLED_M = 0.05
-"""So fine are targets chosen along the route, and so far may their front lie beyond seen ground: the steps in which it is looked along."""
+"""Targets along the path are chosen in steps of this; the rover's front may lie beyond seen ground by as much."""
 
 
-def farthest_clear(
-    route: Route, pose: Pose, speed_m_s: float, evidence: EvidenceMap, rover: RoverLimits, settings: GuidanceSettings
-) -> tuple[NedPoint, float, float]:
-    """The farthest route point in clear sight, how far away it is, and the room kept beside the rover on the way there.
+@dataclass(frozen=True, slots=True)
+class Reach:
+    """A place to drive to, straight: its distance, and the room that is kept beside the rover on the way there."""
 
-    Wide clearance where there is room; less only where that leads farther. A wall that thin beams have seen once stays in the map
-    where the position then was, and the position wanders: from such walls more distance is kept.
+    target: NedPoint
+    distance_m: float
+    room_m: float
+
+
+def farthest_clear(path: ReferencePath, view: LocalView) -> Reach:
+    """The farthest place of the path in clear sight.
+
+    With wide room where there is that much, with less only where that leads farther. From walls that thin beams
+    have seen more distance is kept: such a wall stays in the map where the position was wrong at that moment.
     """
-    best = (pose.point, 0.0, 0.0)
+    settings, here = view.settings.guidance, view.pose.point
+    best = Reach(here, 0.0, 0.0)
     for extra_m, enough_m in settings.clearances:
-        if rover.narrow_sight and extra_m < settings.narrow_clearance_m:
+        if view.rover.narrow_sight and extra_m < settings.narrow_clearance_m:
             break
-        target, reach_m = _farthest_with(route, pose, speed_m_s, evidence, rover, extra_m, settings)
-        if reach_m > best[1] + 0.5 or best[1] == 0.0:
-            best = (target, reach_m, extra_m)
-        if best[1] >= min(enough_m, pose.point.distance_m(route.end) - 0.1):
+        found = _farthest_with(path, view, extra_m)
+        if found.distance_m > best.distance_m + 0.5 or best.distance_m == 0.0:
+            best = found
+        if best.distance_m >= min(enough_m, here.distance_m(path.end) - 0.1):
             break
     return best
 
 
-def _farthest_with(
-    route: Route,
-    pose: Pose,
-    speed_m_s: float,
-    evidence: EvidenceMap,
-    rover: RoverLimits,
-    extra_m: float,
-    settings: GuidanceSettings,
-) -> tuple[NedPoint, float]:
-    def may(point: NedPoint, distance_m: float) -> bool:
-        return may_be_last(pose, point, distance_m, evidence, rover, extra_m, settings)
-
-    farthest = farthest_m(speed_m_s, settings)
-    last = min(len(route.points) - 1, route.progress + int(settings.horizon_m / STEP_M))
-    for index in range(last, route.progress, -2):  # in double steps, for speed
-        point = route.point(index)
-        distance_m = pose.point.distance_m(point)
-        if 0.05 <= distance_m <= farthest and may(point, distance_m):
-            return rolled_on(route, index, last, pose, farthest, may)
-    return pose.point, 0.0
+def _farthest_with(path: ReferencePath, view: LocalView, room_m: float) -> Reach:
+    settings, here = view.settings.guidance, view.pose.point
+    limit_m = farthest_m(view.speed_m_s, settings)
+    last = min(len(path.points) - 1, path.progress + int(settings.horizon_m / STEP_M))
+    for index in range(last, path.progress, -2):  # in double steps, for speed
+        target = path.point(index)
+        reach = Reach(target, here.distance_m(target), room_m)
+        if 0.05 <= reach.distance_m <= limit_m and may_be_last(view, reach):
+            return _moved_on(reach, [path.point(i) for i in (index + 1, index + 2) if i <= last], view, limit_m)
+    return Reach(here, 0.0, room_m)
 
 
-def rolled_on(
-    route: Route, index: int, last: int, pose: Pose, farthest: float, may: Callable[[NedPoint, float], bool]
-) -> tuple[NedPoint, float]:
-    """From a point that may be the target towards the next ones that may not, as near as ``ROLLED_M``; ``farthest``: metres.
+def _moved_on(reach: Reach, further: list[NedPoint], view: LocalView, limit_m: float) -> Reach:
+    """The target moved on towards the next points of the path, which are too far, in steps of ``ROLLED_M``.
 
-    The autopilot drives the faster the farther its target lies, so no decimetre is given away.
+    The farther the target, the faster the autopilot drives, so no decimetre is given away.
     """
-    point = route.point(index)
-    distance_m = pose.point.distance_m(point)
-    for further in (route.point(i) for i in (index + 1, index + 2) if i <= last):
-        bearing, left_m = point.bearing_rad(further), point.distance_m(further)
+    for point in further:
+        bearing, left_m = reach.target.bearing_rad(point), reach.target.distance_m(point)
         pieces = max(1, math.ceil(left_m / ROLLED_M - 1e-6))
         for _ in range(pieces):
-            nearer = point.moved(bearing, left_m / pieces)
-            nearer_m = pose.point.distance_m(nearer)
-            if not distance_m < nearer_m <= farthest or not may(nearer, nearer_m):
-                return point, distance_m
-            point, distance_m = nearer, nearer_m
-    return point, distance_m
+            target = reach.target.moved(bearing, left_m / pieces)
+            nearer = Reach(target, view.pose.point.distance_m(target), reach.room_m)
+            if not reach.distance_m < nearer.distance_m <= limit_m or not may_be_last(view, nearer):
+                return reach
+            reach = nearer
+    return reach
 
 
-def may_be_last(
-    pose: Pose,
-    point: NedPoint,
-    distance_m: float,
-    evidence: EvidenceMap,
-    rover: RoverLimits,
-    extra_m: float,
-    settings: GuidanceSettings,
-) -> bool:
-    """Whether the rover could be left alone with this target: it comes to stand there, or a little farther, on ground seen free.
+def may_be_last(view: LocalView, reach: Reach) -> bool:
+    """Whether the rover could be left alone with this target: it stops there, or a little farther, on ground seen free.
 
     Its front must come to lie on seen ground, too, and so must its flanks all the way.
     """
-    bearing = pose.point.bearing_rad(point)
-    over_m = overshoot_m(distance_m, settings)
-    line = look_along(evidence, pose.point, point, rover.radius_m + extra_m)
-    if line.clear_m < distance_m - 0.05 or line.seen_m < distance_m - 0.05:
+    evidence, here, radius_m = view.evidence, view.pose.point, view.rover.radius_m
+    bearing = here.bearing_rad(reach.target)
+    line = look_along(evidence, here, reach.target, radius_m + reach.room_m)
+    if line.clear_m < reach.distance_m - 0.05 or line.seen_m < reach.distance_m - 0.05:
         return False
-    stands = point.moved(bearing, _inside_m(evidence, point, bearing, over_m))
-    stands_m = pose.point.distance_m(stands)
-    if look_along(evidence, pose.point, stands, rover.radius_m).clear_m < stands_m - 0.05:
+    over_m = overshoot_m(reach.distance_m, view.settings.guidance)
+    stands = reach.target.moved(bearing, within_map_m(evidence, reach.target, bearing, over_m))
+    if look_along(evidence, here, stands, radius_m).clear_m < here.distance_m(stands) - 0.05:
         return False
-    front = stands.moved(bearing, _inside_m(evidence, stands, bearing, rover.radius_m))
+    front = stands.moved(bearing, within_map_m(evidence, stands, bearing, radius_m))
     if look_along(evidence, stands, front, 0.0).seen_m < stands.distance_m(front) - ROLLED_M:
         return False
-    return unseen_flank(pose, stands, evidence, rover) is None
+    return unseen_flank(view, stands) is None
 
 
-def _inside_m(evidence: EvidenceMap, point: NedPoint, bearing_rad: float, distance_m: float) -> float:
-    """So much of the distance from a place of the map as does not leave it: what lies beyond, nobody needs to have seen."""
-    grid = evidence.base
-    corner = grid.south_west
-    for from_m, size_m, step in (
-        (point.north_m - corner.north_m, grid.height * grid.resolution_m, math.cos(bearing_rad)),
-        (point.east_m - corner.east_m, grid.width * grid.resolution_m, math.sin(bearing_rad)),
-    ):
-        room_m = size_m - from_m if step > 0.0 else from_m
-        if abs(step) * distance_m > room_m - 0.01:
-            distance_m = max(room_m - 0.01, 0.0) / abs(step)
-    return distance_m
-
-
-def unseen_flank(pose: Pose, point: NedPoint, evidence: EvidenceMap, rover: RoverLimits) -> Unseen | None:
+def unseen_flank(view: LocalView, point: NedPoint) -> Unseen | None:
     """Where the rover's flanks would enter unseen ground on the way to a point."""
-    return unseen_beside(evidence, pose.point, point, rover.radius_m + 0.05, rover.radius_m + 0.2)
+    radius_m = view.rover.radius_m
+    return unseen_beside(view.evidence, view.pose.point, point, radius_m + 0.05, radius_m + 0.2)
 
 
-def arc_is_free(pose: Pose, target: NedPoint, evidence: EvidenceMap, rover: RoverLimits) -> bool:
+def arc_is_free(view: LocalView, target: NedPoint) -> bool:
     """Whether the arc on which the rover comes to the target, beginning as it points now, is clear and has been seen.
 
-    To a target behind there is none that it would drive.
+    False for a target behind the rover: it would not drive there on an arc.
     """
-    ground = ground_of(evidence, pose)
-    scale = 1.0 / evidence.evidence_m
-    x, y = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0].tolist()
-    distance = pose.point.distance_m(target) * scale
+    pose, radius_m, arcs = view.pose, view.rover.radius_m, ArcQueries(view.evidence, view.pose)
+    distance_m = pose.point.distance_m(target)
     aside_rad = wrap_pi_rad(pose.point.bearing_rad(target) - pose.heading_rad)
     if abs(aside_rad) > 0.5 * math.pi:
         return False
-    curvature = 2.0 * math.sin(aside_rad) / distance
-    length = distance / float(np.sinc(aside_rad / math.pi))
-    room = kept_room(ground, x, y, (rover.radius_m + 0.05) * scale, (rover.radius_m - 0.05) * scale)
-    return bool(arc_clear(ground, x, y, pose.heading_rad, curvature, room, length, UNSEEN) >= length - 1e-6)
+    curvature_per_m = 2.0 * math.sin(aside_rad) / distance_m
+    length_m = distance_m / float(np.sinc(aside_rad / math.pi))
+    room_m = arcs.kept_room_m(radius_m + 0.05, radius_m - 0.05)
+    return arcs.arc_is_clear(pose.heading_rad, curvature_per_m, room_m, length_m, Until.UNSEEN)
 
 
-def backing_speed_m_s(pose: Pose, evidence: EvidenceMap, radius_m: float, settings: GuidanceSettings) -> float:
-    """How fast a rover may be told to back off: it goes on until the velocity is forgotten, should nothing more be said.
+def backing_speed_m_s(view: LocalView) -> float:
+    """How fast the rover may be told to back off: without another message it goes on until the velocity is forgotten.
 
-    Closed fields count from the first one on that it does not stand in: a line looked along passes over those that begin close by.
+    Closed fields count from the first one on that it does not stand in; ``look_along`` passes over those that begin
+    close by.
     """
-    fastest_m_s, scale, ground = settings.back_out_speed_m_s, 1.0 / evidence.evidence_m, ground_of(evidence, pose)
+    pose, radius_m, settings = view.pose, view.rover.radius_m, view.settings.guidance
+    fastest_m_s, arcs = settings.back_out_speed_m_s, ArcQueries(view.evidence, pose)
     tail_rad, reach_m = pose.heading_rad + math.pi, blind_distance_m(fastest_m_s, settings)
-    line = look_along(evidence, pose.point, pose.point.moved(tail_rad, reach_m), radius_m + settings.clearance_m)
-    x, y = in_cells(np.array([[pose.north_m, pose.east_m]]), evidence)[0].tolist()
-    room = kept_room(ground, x, y, radius_m * scale, 0.0)
-    open_m = arc_clear(ground, x, y, tail_rad, 0.0, room, reach_m * scale, BLOCKED) / scale
+    line = look_along(view.evidence, pose.point, pose.point.moved(tail_rad, reach_m), radius_m + settings.clearance_m)
+    open_m = arcs.arc_clear_m(tail_rad, 0.0, arcs.kept_room_m(radius_m, 0.0), reach_m, Until.BLOCKED)
     return min(fastest_m_s, fastest_blind_m_s(min(line.clear_m, line.seen_m, open_m), settings))

@@ -77,6 +77,21 @@ class Grid:
             self.south_west.east_m + (cell.x + 0.5) * self.resolution_m,
         )
 
+    def places_of(self, fields: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Places given in fields as places in metres: shape (n, 2), from columns x, y to columns north, east.
+
+        In fields a whole number is the middle of a field.
+        """
+        north_m = self.south_west.north_m + (fields[:, 1] + 0.5) * self.resolution_m
+        east_m = self.south_west.east_m + (fields[:, 0] + 0.5) * self.resolution_m
+        return np.column_stack((north_m, east_m))
+
+    def in_fields(self, point: NedPoint) -> tuple[float, float]:
+        """A place in metres as x, y in fields, where a whole number is the middle of a field."""
+        x = (point.east_m - self.south_west.east_m) / self.resolution_m - 0.5
+        y = (point.north_m - self.south_west.north_m) / self.resolution_m - 0.5
+        return x, y
+
     def contains(self, cell: Cell) -> bool:
         """Whether the field is part of this grid."""
         return 0 <= cell.x < self.width and 0 <= cell.y < self.height

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
 class RoverLimits:
-    """The rover as guidance sees it."""
+    """The rover as the controllers see it."""
 
     radius_m: float
     cruise_speed_m_s: float
     sight_m: float
     """Valid range of the sensor."""
     narrow_sight: bool = False
-    """Whether it is single thin beams."""
+    """Whether the sensor is single thin beams."""
     turning_radius_m: float = 0.0
     """The tightest arc it can drive; 0: it turns on the spot."""
+    fastest_m_s: float = math.inf
+    """The highest speed that it is ever told on its present way, whatever is planned for a part of it."""

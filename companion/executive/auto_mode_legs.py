@@ -5,7 +5,7 @@ Nouns: legs of AUTO.
 
 from __future__ import annotations
 
-from companion.control.point_controller import STANDSTILL, ControlCommand, Motion
+from companion.control.controller import ControlCommand, Purpose
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_executor import MissionExecutor
@@ -51,11 +51,11 @@ class AutoModeLegs:
     def guide(self, wanted: ControlCommand, executor: MissionExecutor, slow_m_s: float) -> ControlCommand:
         """What to do. Once the target is reached, the autopilot may want the rover nearer (a small WP_RADIUS)."""
         progress = executor.progress
-        if self._leg is None or wanted != STANDSTILL or progress.phase is not MissionPhase.STAY:
+        if self._leg is None or wanted.purpose is not Purpose.STAND or progress.phase is not MissionPhase.STAY:
             return wanted
         if progress.statuses[progress.index] is not TargetStatus.REACHED:
             return wanted
-        return ControlCommand(Motion.DRIVE, GuidedPosition(progress.goal.point), slow_m_s)
+        return ControlCommand(Purpose.DRIVE, GuidedPosition(progress.goal.point), slow_m_s)
 
     def _begin(self, leg: GuidedLeg, executor: MissionExecutor) -> None:
         index = _index_of(leg.point, executor)

@@ -12,15 +12,14 @@ from pathlib import Path
 import numpy as np
 
 from companion.control.braking import for_link
+from companion.control.controller import ControlCommand
 from companion.control.local_view import LocalView
-from companion.control.point_controller import ControlCommand
-from companion.control.setpoint_check import Surroundings
 from companion.core.frames import GeoPoint, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
-from companion.executive.goal_driver import GoalDriver
+from companion.executive.goal_driver import GoalDriver, controller_for
 from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, from_home, lay_again
 from companion.executive.mission_progress import (
     MissionPhase,
@@ -118,18 +117,13 @@ class MissionExecutor:
             notifier.tell(text, Severity.WARNING)
         planner = make_planner(given.navigator.planner, given.planner)
         searcher = PathSearcher(planner, given.navigator, rng)
-        self.driver = GoalDriver(layout.evidence, self._limits, given, searcher, runner)
-        self._tracker = ObjectTracker(layout.evidence, given.traffic)
+        self.driver = GoalDriver(controller_for(self._limits), searcher, runner)
+        self._tracker = ObjectTracker(layout.evidence)
 
     @property
     def evidence(self) -> EvidenceMap:
         """The map."""
         return self.layout.evidence
-
-    @property
-    def surroundings(self) -> Surroundings:
-        """What is known of the ground, and the rover on it."""
-        return Surroundings(self.evidence, self._limits, self._in_force, self.layout.bounds)
 
     @property
     def reached(self) -> int:
@@ -173,10 +167,10 @@ class MissionExecutor:
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
-        self.driver = GoalDriver(self.evidence, self._limits, self._in_force, searcher, self._runner, seed)
+        self.driver = GoalDriver(controller_for(self._limits), searcher, self._runner, seed)
         self.driver.tally = before.tally
         self.driver.doubt_until(now_s + VERDICT_S)
-        self._tracker = ObjectTracker(self.evidence, self._settings.current.traffic)
+        self._tracker = ObjectTracker(self.evidence)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         return True
 
@@ -184,7 +178,7 @@ class MissionExecutor:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
         self.maps_begun += 1
-        self._tracker = ObjectTracker(self.evidence, self._settings.current.traffic)
+        self._tracker = ObjectTracker(self.evidence)
         self.driver.leave()
         self.driver.doubt_until(now_s + VERDICT_S)
 
@@ -241,7 +235,7 @@ class MissionExecutor:
 
     def decide(self, vehicle: VehicleState, now_s: float) -> Task:
         """What to do for the mission now, and where to; the leg to a new goal begins here."""
-        view = self._view(vehicle, now_s)
+        view = self.view(vehicle, now_s)
         self.trail.enter(self.evidence.base.cell_at(view.pose.point))
         waited = self.progress.phase is MissionPhase.WAIT
         self.progress = on_time(self.progress, now_s)
@@ -257,29 +251,28 @@ class MissionExecutor:
             if self._is_refused(now_s):
                 return Task.STAND
             self._notifier.tell(f"Heading for {self.progress.goal.name}", Severity.INFO)
-            self.driver.head_for(self.progress.goal, view.pose, self._way_back(view.pose))
+            self.driver.head_for(self.progress.goal, view, self._way_back(view.pose))
         self.phase = RunPhase.DRIVING
         return Task.DRIVE
 
-    def guide(self, task: Task, vehicle: VehicleState, now_s: float) -> ControlCommand:
+    def guide(self, task: Task, vehicle: VehicleState, view: LocalView) -> ControlCommand:
         """How to do it now: the setpoint and the speed."""
-        view = self._view(vehicle, now_s)
+        now_s = view.pose.time_s
         others = announced(vehicle, view.pose, self._mission.rover.radius_m, self._settings.current.traffic)
-        moving = merged(others, self._tracker.moving(now_s), now_s)
+        moving = merged(others, self._tracker.moving(now_s, view.settings.traffic), now_s)
         if task is Task.STAND:
-            return self.driver.standing(view.pose, view.speed_m_s, moving)
-        command, decision = self.driver.update(view.pose, view.speed_m_s, moving)
+            return self.driver.standing(view, moving)
+        command, decision = self.driver.update(view, moving)
         if decision is not None:
             self._take_decision(decision, now_s)
         return command
 
-    def _view(self, vehicle: VehicleState, now_s: float) -> LocalView:
+    def view(self, vehicle: VehicleState, now_s: float) -> LocalView:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
         pose = vehicle.pose_at(now_s)
         assert pose is not None
         self._in_force = for_link(self._settings.current, vehicle.latency_s)
-        self.driver.retune(self._in_force)
-        self._tracker.retune(self._settings.current.traffic)
+        self.driver.searcher.settings = self._in_force.navigator
         return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, self._in_force)
 
     def _is_refused(self, now_s: float) -> bool:

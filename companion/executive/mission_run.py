@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum, auto
 
-from companion.control.point_controller import STANDSTILL, ControlCommand
+from companion.control.controller import STANDSTILL, ControlCommand
 from companion.control.setpoint_check import SetpointCheck
 from companion.core.frames import Pose
 from companion.core.scan import RangeScan
@@ -130,11 +130,10 @@ class MissionRun:
             return COMMANDS[task]
         if task is Task.END or self.executor is None:
             return None
-        executor, pose = self.executor, self.vehicle.pose_at(now_s)
-        assert pose is not None
-        wanted = executor.guide(task, self.vehicle, now_s)
+        executor, view = self.executor, self.executor.view(self.vehicle, now_s)
+        wanted = executor.guide(task, self.vehicle, view)
         wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)
-        return self.setpoint_check.passed(wanted, pose, self.vehicle.speed_m_s, executor.surroundings)
+        return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
 
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:
         """Send it, if it is new or due again."""

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from companion.control.point_controller import STANDSTILL, ControlCommand
+from companion.control.controller import STANDSTILL, ControlCommand
 from companion.core.frames import wrap_pi_rad
 from companion.core.severity import Severity, TextSink
 from companion.mavlink.autopilot_link import AutopilotLink

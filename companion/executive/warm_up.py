@@ -12,14 +12,17 @@ from numba.core import event
 
 from companion.control.arc_controller import ArcController
 from companion.control.collision_avoidance import first_near, least_room_m
+from companion.control.local_view import LocalView
 from companion.control.motion_prediction import steered
-from companion.control.reference_path import Route
-from companion.control.setpoint_check import Output, Surroundings, velocity_stops_in_time
+from companion.control.reference_path import ReferencePath
+from companion.control.setpoint_check import velocity_stops_in_time
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
-from companion.mapping.evidence_map import clearance_m, integrate, look_along, new_map, penalise, unseen_beside
+from companion.mapping.evidence_map import integrate, new_map, penalise
+from companion.mapping.map_queries import clearance_m, look_along, unseen_beside
+from companion.mission.bounds import Bounds
 from companion.perception.object_tracker import ObjectTracker
 from companion.planning import registry
 from companion.settings import Settings
@@ -41,21 +44,21 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     unseen_beside(evidence, NedPoint(4.0, 4.0), NedPoint(6.0, 4.0), 0.3, 0.5)
     clearance_m(evidence, NedPoint(4.0, 4.0), 1.0)
     view = RangeScan(0.0, np.linspace(-0.5, 0.5, 8), np.full(8, 2.0), 0.2, 4.0, 0.1, "warm-up")
-    ObjectTracker(evidence, settings.traffic).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
+    ObjectTracker(evidence).take(Pose(4.0, 4.0, 0.0, 0.0), 0.0, view)
     places = np.zeros((2, 2))
     least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]), 5.0)
     steered(0.0, 0.0, 0.0, places, np.zeros(2), np.zeros(1))
     first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
-    known = Surroundings(evidence, RoverLimits(0.35, 2.0, 4.0), settings)
-    velocity_stops_in_time(Output(GuidedVelocity(0.2, 0.1), Pose(4.0, 4.0, 0.0, 0.0), 0.2), known)
+    at = LocalView(Pose(4.0, 4.0, 0.0, 0.0), 0.2, evidence, RoverLimits(0.35, 2.0, 4.0), settings)
+    velocity_stops_in_time(GuidedVelocity(0.2, 0.1), at, Bounds())
     if turning_radius_m > 0.0:
         _steer(settings)
 
 
 def settle() -> None:
-    """For a process that drives once: what lives now lives to the end.
+    """For a process that drives once: take what lives now out of garbage collection, since it lives to the end.
 
-    A collection that walks through it would stall a tick for a tenth of a second.
+    A collection that walked through it would stall a tick for a tenth of a second.
     """
     gc.collect()
     gc.freeze()
@@ -66,14 +69,14 @@ class _ColdError(Exception):
 
 
 class _NoCompiler(event.Listener):
-    """Is told by the compiler before it begins, and does not let it."""
+    """Stops the compiler before it begins."""
 
     def on_start(self, event: event.Event) -> None:
         """A kernel is not in the cache."""
         raise _ColdError
 
     def on_end(self, event: event.Event) -> None:
-        """It never comes to this."""
+        """Never called: no compilation begins."""
 
 
 def kernels_warm(settings: Settings, turning_radius_m: float = 0.0) -> bool:
@@ -87,10 +90,10 @@ def kernels_warm(settings: Settings, turning_radius_m: float = 0.0) -> bool:
 
 
 def _steer(settings: Settings) -> None:
-    """To a place behind, standing and rolling, as rovers do that cannot turn on the spot."""
+    """To a place behind, standing and rolling, with the controller of a rover that cannot turn on the spot."""
     evidence = new_map(empty_grid(16, 16), 0.35, settings.mapping)
-    route = Route(np.column_stack((np.linspace(8.0, 2.0, 25), np.full(25, 8.0))))
-    helm = ArcController(evidence, settings)
+    path = ReferencePath(np.column_stack((np.linspace(8.0, 2.0, 25), np.full(25, 8.0))))
+    controller, rover = ArcController(), RoverLimits(0.35, 2.0, 8.0, turning_radius_m=1.0)
     for tick in range(8):
-        rover = RoverLimits(0.35, 2.0, 8.0, turning_radius_m=1.0)
-        helm.guide(route, Pose(8.0 + 0.05 * tick, 8.0, 0.0, 0.05 * tick), 1.0 if tick > 4 else 0.0, rover)
+        pose, speed_m_s = Pose(8.0 + 0.05 * tick, 8.0, 0.0, 0.05 * tick), 1.0 if tick > 4 else 0.0
+        controller.follow(path, LocalView(pose, speed_m_s, evidence, rover, settings))

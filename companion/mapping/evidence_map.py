@@ -1,14 +1,18 @@
-"""From range readings to field weights.
+"""The evidence map: range readings become log-odds on a fine raster of cells, and these become field weights.
 
-Readings become log-odds evidence on a raster finer than the fields (a thin post must not be outvoted by the free
-ground beside it in the same field). A field is an obstacle when something was seen in it, or when the rover standing
-in its middle would touch something; beside obstacles the mission's own weight is raised (soft cost).
+The raster is finer than the fields, so that the free ground beside a thin post does not hide the post in the same
+field. A field is an obstacle when something was seen in it, or when the rover standing in its middle would touch
+something; beside obstacles the mission's own weight is raised (soft cost). What can be asked of the map is in
+``map_queries``.
+
+Nouns: evidence map, log-odds.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +20,8 @@ from numpy.typing import NDArray
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, Grid
 from companion.core.scan import RangeScan
-from companion.mapping.arc_kernels import Ground
-from companion.mapping.kernels import cast_scan, first_unseen, look, nearest, soften, weigh
+from companion.mapping.cell_frame import CellFrame
+from companion.mapping.kernels import InverseSensorModel, ScanInCells, cast_scan, soften, weigh
 from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 
@@ -30,10 +34,10 @@ MAX_SOFT_WEIGHT = 0.9
 class EvidenceMap:
     """What has been seen, on a raster of ``subdivisions`` cells along a field's side.
 
-    ``log_odds``: shape (height * subdivisions, width * subdivisions), indexed [y, x]: 0 unknown, below 0 seen free, from
-    ``settings.occupied_at`` on an obstacle. ``base`` holds the mission's own weights (obstacles in it are
-    never forgotten: they are fences or prior knowledge), ``penalty`` what experience adds.
-    The arrays belong to the map and are changed in place by ``integrate``; ``grid`` is always up to date.
+    ``log_odds``: shape (height * subdivisions, width * subdivisions), indexed [y, x]: 0 unknown, below 0 seen free,
+    from ``settings.occupied_at`` on an obstacle. ``base`` holds the mission's own weights (obstacles in it are
+    never forgotten: they are fences or prior knowledge), ``penalty`` what experience adds. The arrays belong to the
+    map and are changed in place by ``integrate``; ``grid`` is always up to date.
     """
 
     base: Grid
@@ -44,20 +48,17 @@ class EvidenceMap:
     subdivisions: int
     rover_radius_m: float
     settings: MappingSettings
-    witnesses: SensorAgreement = field(default_factory=SensorAgreement)
+    agreement: SensorAgreement = field(default_factory=SensorAgreement)
 
     @property
     def evidence_m(self) -> float:
         """Side of one evidence cell."""
         return self.base.resolution_m / self.subdivisions
 
-
-@dataclass(frozen=True, slots=True)
-class Line:
-    """What lies along a straight line: how far it is free of obstacles, and how far it has been seen."""
-
-    clear_m: float
-    seen_m: float
+    @cached_property
+    def frame(self) -> CellFrame:
+        """Where the evidence cells lie."""
+        return CellFrame(self.base.south_west, self.evidence_m)
 
 
 def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> EvidenceMap:
@@ -81,24 +82,40 @@ def new_map(base: Grid, rover_radius_m: float, settings: MappingSettings) -> Evi
 
 
 def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) -> None:
-    """Take one scan into the map; ``stamp`` must differ from scan to scan.
+    """Add one scan to the map; ``stamp`` must differ from scan to scan.
 
-    A beam frees the cells it passed and hardens the one it ended in; in one scan a hit outweighs any number of passes, and
-    each cell changes once; what another sensor has just seen it does not free. The ground under the rover is free.
+    A beam frees the cells it passed and hardens the one it ended in. In one scan a hit outweighs any number of
+    passes, and each cell changes once. A cell in which another sensor has just seen something is not freed. The
+    ground under the rover is free.
     """
-    settings = evidence.settings
-    scale = 1.0 / evidence.evidence_m
-    x0 = (pose.east_m - evidence.base.south_west.east_m) * scale
-    y0 = (pose.north_m - evidence.base.south_west.north_m) * scale
-    witnessed = evidence.witnesses.others(scan)
+    settings, frame = evidence.settings, evidence.frame
+    x, y = frame.xy(pose.point)
+    kept_m = settings.narrow_kept_m if scan.is_narrow else 0.0
     cast_scan(
-        evidence.log_odds, evidence.stamps, np.int32(stamp), x0, y0, pose.heading_rad,
-        scan.bearing_rad, scan.range_m * scale, scan.min_range_m * scale, scan.max_range_m * scale, scan.beam_width_rad,
-        witnessed, settings.hit_depth_m * scale, settings.narrow_kept_m * scale if scan.is_narrow else 0.0,
-        evidence.rover_radius_m * scale,
-        settings.hit, settings.miss, settings.limit, settings.free_limit,
-    )  # fmt: skip
-    evidence.witnesses.note(scan, _hit_cells(evidence, pose, scan))
+        evidence.log_odds,
+        evidence.stamps,
+        np.int32(stamp),
+        ScanInCells(
+            x,
+            y,
+            pose.heading_rad,
+            scan.bearing_rad,
+            scan.range_m * frame.cells(1.0),
+            frame.cells(scan.max_range_m),
+            scan.beam_width_rad,
+        ),
+        InverseSensorModel(
+            settings.hit,
+            settings.miss,
+            settings.limit,
+            settings.free_limit,
+            frame.cells(settings.hit_depth_m),
+            frame.cells(kept_m),
+        ),
+        evidence.agreement.others(scan),
+        frame.cells(evidence.rover_radius_m),
+    )
+    evidence.agreement.note(scan, _hit_cells(evidence, pose, scan))
     reach = math.ceil(scan.max_range_m / evidence.base.resolution_m) + 1 + _soft_reach(evidence)
     cell = evidence.base.cell_at(pose.point)
     _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
@@ -116,7 +133,7 @@ def forget(evidence: EvidenceMap) -> None:
     """Drop all that was seen (the local frame has moved under it); fences and prior knowledge stay."""
     evidence.log_odds.fill(0.0)
     evidence.penalty.fill(0.0)
-    evidence.witnesses.clear()
+    evidence.agreement.clear()
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
 
 
@@ -137,15 +154,13 @@ def restore(evidence: EvidenceMap, log_odds: NDArray[np.float32], penalty: NDArr
 def doubt(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
     """Forget, before giving up, what may be an error of sensor or position, so that it is looked at again.
 
-    That is weak evidence of obstacles anywhere (below ``settings.sure_at``), any evidence of obstacles within ``reach_m`` of the
-    place, and all penalties. Returns whether there was any.
+    That is weak evidence of obstacles anywhere (below ``settings.sure_at``), any evidence of obstacles within
+    ``reach_m`` of the place, and all penalties. Returns whether there was any.
     """
     occupied = evidence.log_odds >= evidence.settings.occupied_at
     doubtful = occupied & (evidence.log_odds < evidence.settings.sure_at)
-    scale = 1.0 / evidence.evidence_m
-    x = (point.east_m - evidence.base.south_west.east_m) * scale
-    y = (point.north_m - evidence.base.south_west.north_m) * scale
-    reach = reach_m * scale
+    x, y = evidence.frame.xy(point)
+    reach = evidence.frame.cells(reach_m)
     window = np.s_[
         max(0, int(y - reach)) : max(0, int(y + reach) + 1), max(0, int(x - reach)) : max(0, int(x + reach) + 1)
     ]
@@ -168,80 +183,6 @@ def look_again(evidence: EvidenceMap, since_stamp: int) -> None:
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
 
 
-def look_along(evidence: EvidenceMap, start: NedPoint, end: NedPoint, half_width_m: float) -> Line:
-    """How far a rover of this half width could drive straight from start towards end (up to its distance).
-
-    ``clear_m`` ends at the first evidence of an obstacle within the half width or the first field that is an obstacle by mission or
-    penalty; ``seen_m`` ends where the middle of the line has not been seen yet.
-    """
-    scale = 1.0 / evidence.evidence_m
-    corner = evidence.base.south_west
-    clear, seen = look(
-        evidence.log_odds, evidence.base.weights, evidence.penalty, evidence.subdivisions,
-        (start.east_m - corner.east_m) * scale, (start.north_m - corner.north_m) * scale,
-        (end.east_m - corner.east_m) * scale, (end.north_m - corner.north_m) * scale,
-        half_width_m * scale, evidence.rover_radius_m * scale, evidence.settings.occupied_at,
-    )  # fmt: skip
-    return Line(clear / scale, seen / scale)
-
-
-@dataclass(frozen=True, slots=True)
-class Unseen:
-    """The nearest place beside a line that has not been seen, and how far along the line it lies."""
-
-    along_m: float
-    place: NedPoint
-
-
-def unseen_beside(
-    evidence: EvidenceMap, start: NedPoint, end: NedPoint, offset_m: float, near_m: float
-) -> Unseen | None:
-    """Where the rover's flanks, ``offset_m`` beside the line, would enter ground nobody has looked at; None if nowhere.
-
-    Nearer than ``near_m`` does not count: no sensor sees the ground right beside the rover.
-    """
-    scale = 1.0 / evidence.evidence_m
-    corner = evidence.base.south_west
-    along, x, y = first_unseen(
-        evidence.log_odds,
-        (start.east_m - corner.east_m) * scale, (start.north_m - corner.north_m) * scale,
-        (end.east_m - corner.east_m) * scale, (end.north_m - corner.north_m) * scale,
-        offset_m * scale, near_m * scale,
-    )  # fmt: skip
-    if along / scale >= start.distance_m(end) - 1e-6:
-        return None
-    return Unseen(along / scale, NedPoint(corner.north_m + y / scale, corner.east_m + x / scale))
-
-
-def clearance_m(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> float:
-    """Distance from a place to the nearest evidence of an obstacle, at most ``reach_m``."""
-    scale = 1.0 / evidence.evidence_m
-    corner = evidence.base.south_west
-    distance = nearest(
-        evidence.log_odds,
-        (point.east_m - corner.east_m) * scale,
-        (point.north_m - corner.north_m) * scale,
-        reach_m * scale,
-        evidence.settings.occupied_at,
-    )
-    return float(distance) / scale
-
-
-def ground_of(evidence: EvidenceMap, pose: Pose) -> Ground:
-    """The map for the compiled loops."""
-    cell = evidence.base.cell_at(pose.point)
-    weights, settings = evidence.base.weights, evidence.settings
-    return Ground(
-        evidence.log_odds, weights, evidence.penalty, evidence.subdivisions, settings.occupied_at, cell.x, cell.y
-    )
-
-
-def in_cells(points: NDArray[np.float64], evidence: EvidenceMap) -> NDArray[np.float64]:
-    """North and east in metres as x and y in evidence cells."""
-    corner, scale = evidence.base.south_west, 1.0 / evidence.evidence_m
-    return np.column_stack(((points[:, 1] - corner.east_m) * scale, (points[:, 0] - corner.north_m) * scale))
-
-
 def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
     """Shape (height, width): True where at least one evidence cell of the field has been seen."""
     s = evidence.subdivisions
@@ -254,7 +195,7 @@ def _hit_cells(evidence: EvidenceMap, pose: Pose, scan: RangeScan) -> NDArray[np
     hit = np.isfinite(scan.range_m)
     angle_rad, end_m = pose.heading_rad + scan.bearing_rad[hit], scan.range_m[hit] + evidence.settings.hit_depth_m
     ends = np.column_stack((pose.north_m + end_m * np.cos(angle_rad), pose.east_m + end_m * np.sin(angle_rad)))
-    cells = np.floor(in_cells(ends, evidence)).astype(np.int64)
+    cells = np.floor(evidence.frame.xys(ends)).astype(np.int64)
     height, width = evidence.log_odds.shape
     return cells[np.all((cells >= 0) & (cells < (width, height)), axis=1)]
 
@@ -272,6 +213,6 @@ def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
         return  # the rover is off the map, and sees nothing of it
     weights, reach = evidence.grid.weights, settings.soft_reach_m / base.resolution_m
     radius = evidence.rover_radius_m / evidence.evidence_m
-    penalty, s = evidence.penalty, evidence.subdivisions
-    weigh(evidence.log_odds, base.weights, penalty, weights, s, x0, y0, x1, y1, settings.occupied_at, radius)
-    soften(weights, x0, y0, x1, y1, reach, settings.soft_cost, MAX_SOFT_WEIGHT)
+    window = (x0, y0, x1, y1)
+    weigh(evidence.log_odds, base.weights, evidence.penalty, weights, window, settings.occupied_at, radius)
+    soften(weights, window, reach, settings.soft_cost, MAX_SOFT_WEIGHT)

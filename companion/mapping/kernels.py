@@ -1,11 +1,13 @@
-"""Compiled loops over the evidence raster; ``mapping`` gives them their meaning.
+"""Compiled loops over the evidence raster: scans to log-odds, log-odds to field weights, looks along lines.
 
 All rasters are indexed [y, x], y north. Log-odds: 0 unknown, negative free, from ``occupied_at`` on an obstacle.
+Lengths and places are in evidence cells; ``evidence_map`` and ``map_queries`` convert from metres.
 """
 
 # mypy: disable-error-code="no-untyped-def"
 
 import math
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -13,34 +15,63 @@ from numba import njit
 DIAGONAL = math.sqrt(2.0)
 
 
-@njit(cache=True, nogil=True)
-def cast_scan(
-    log_odds, stamps, stamp, x0, y0, heading_rad, bearing_rad, range_cells, min_cells, max_cells, width_rad,
-    witnessed, depth_cells, kept_cells, radius_cells, hit, miss, limit, free_limit,
-):  # fmt: skip
-    """Add one scan to the evidence. Lengths are in evidence cells, (x0, y0) is the sensor, headings clockwise from north.
+class ScanInCells(NamedTuple):
+    """One scan from a sensor at (x, y); headings clockwise from north. Lengths in evidence cells.
 
-    The last ``kept_cells`` before a hit are not freed, nor are the cells ``witnessed``: shape (n, 2), x and y, all of the map.
+    ``bearing_rad`` and ``range_cells`` have shape (n,); a range of inf means nothing seen up to ``max_cells``, nan
+    nothing known.
+    """
+
+    x: float
+    y: float
+    heading_rad: float
+    bearing_rad: Any
+    range_cells: Any
+    max_cells: float
+    beam_width_rad: float
+
+
+class InverseSensorModel(NamedTuple):
+    """How readings change the log-odds. Lengths in evidence cells.
+
+    A beam ends ``depth_cells`` behind its range. The last ``kept_cells`` before a hit are not freed.
+    """
+
+    hit: float
+    miss: float
+    limit: float
+    free_limit: float
+    depth_cells: float
+    kept_cells: float
+
+
+@njit(cache=True, nogil=True)
+def cast_scan(log_odds, stamps, stamp, scan, model, protected, radius_cells):
+    """Add one scan to the evidence, and free the cells within ``radius_cells`` of the sensor, where the rover stands.
+
+    The cells ``protected`` are not freed: shape (n, 2), x and y, all of them on the map.
     """
     height, width = log_odds.shape
+    x0, y0, heading_rad, width_rad = scan.x, scan.y, scan.heading_rad, scan.beam_width_rad
+    bearing_rad, range_cells = scan.bearing_rad, scan.range_cells
     # Hits first: a cell stamped by a hit cannot be freed by another beam of the same scan.
     for i in range(bearing_rad.size):
         r = range_cells[i]
         if not np.isfinite(r):
             continue
         angle = heading_rad + bearing_rad[i]
-        x = int(math.floor(x0 + (r + depth_cells) * math.sin(angle)))
-        y = int(math.floor(y0 + (r + depth_cells) * math.cos(angle)))
+        x = int(math.floor(x0 + (r + model.depth_cells) * math.sin(angle)))
+        y = int(math.floor(y0 + (r + model.depth_cells) * math.cos(angle)))
         if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
             stamps[y, x] = stamp
-            log_odds[y, x] = min(log_odds[y, x] + hit, limit)
-    for i in range(witnessed.shape[0]):
-        stamps[witnessed[i, 1], witnessed[i, 0]] = stamp
+            log_odds[y, x] = min(log_odds[y, x] + model.hit, model.limit)
+    for i in range(protected.shape[0]):
+        stamps[protected[i, 1], protected[i, 0]] = stamp
     for i in range(bearing_rad.size):
         r = range_cells[i]
         if math.isnan(r):
             continue
-        reach = max_cells if math.isinf(r) else r - 0.5 - kept_cells
+        reach = scan.max_cells if math.isinf(r) else r - 0.5 - model.kept_cells
         rays = max(1, int(math.ceil(reach * width_rad)))
         for k in range(rays):
             angle = heading_rad + bearing_rad[i] + width_rad * ((k + 0.5) / rays - 0.5)
@@ -53,18 +84,20 @@ def cast_scan(
                 d += 0.7
                 if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
                     stamps[y, x] = stamp
-                    log_odds[y, x] = max(log_odds[y, x] - miss, -free_limit)
+                    log_odds[y, x] = max(log_odds[y, x] - model.miss, -model.free_limit)
     r = int(math.ceil(radius_cells))
     for y in range(max(0, int(y0) - r), min(height, int(y0) + r + 1)):
         for x in range(max(0, int(x0) - r), min(width, int(x0) + r + 1)):
             if math.hypot(x + 0.5 - x0, y + 0.5 - y0) <= radius_cells:
-                log_odds[y, x] = -free_limit
+                log_odds[y, x] = -model.free_limit
 
 
 @njit(cache=True, nogil=True)
-def weigh(log_odds, base, penalty, weights, s, x0, y0, x1, y1, occupied_at, radius_cells):
-    """Weights of the fields x0 <= x < x1, y0 <= y < y1, obstacles among them. ``s``: evidence cells along a field."""
+def weigh(log_odds, base, penalty, weights, window, occupied_at, radius_cells):
+    """Weights of the fields x0 <= x < x1, y0 <= y < y1 of a window (x0, y0, x1, y1); obstacles among them."""
     height, width = base.shape
+    x0, y0, x1, y1 = window
+    s = log_odds.shape[0] // height  # evidence cells along the side of a field
     for fy in range(y0, y1):
         for fx in range(x0, x1):
             weights[fy, fx] = min(base[fy, fx] + penalty[fy, fx], 1.0)
@@ -80,12 +113,13 @@ def weigh(log_odds, base, penalty, weights, s, x0, y0, x1, y1, occupied_at, radi
 
 
 @njit(cache=True, nogil=True)
-def soften(weights, x0, y0, x1, y1, soft_reach, soft_cost, max_soft):
-    """Raise the weights of the free fields x0 <= x < x1, y0 <= y < y1 near obstacles; reach in fields.
+def soften(weights, window, soft_reach, soft_cost, max_soft):
+    """Raise the weights of free fields near obstacles in a window (x0, y0, x1, y1) as in ``weigh``; reach in fields.
 
-    Two sweeps of a chamfer mask give the distances; beyond the window what was known before counts.
+    Two sweeps of a chamfer mask give the distances; beyond the window the present weights count.
     """
     height, width = weights.shape
+    x0, y0, x1, y1 = window
     n = int(math.ceil(soft_reach))
     left = max(0, x0 - n)
     low = max(0, y0 - n)
@@ -114,9 +148,12 @@ def soften(weights, x0, y0, x1, y1, soft_reach, soft_cost, max_soft):
 
 
 @njit(cache=True, nogil=True)
-def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, radius, occupied_at):
-    """How far a disc of this half width can go from (x0, y0) towards (x1, y1), and how far the line has been seen; in cells."""
+def look(log_odds, base, penalty, start, end, half_width, radius, occupied_at):
+    """How far a disc of this half width can go from start (x, y) towards end, and how far the line has been seen."""
     height, width = log_odds.shape
+    s = height // base.shape[0]  # evidence cells along the side of a field
+    x0, y0 = start
+    x1, y1 = end
     length = math.hypot(x1 - x0, y1 - y0)
     if length < 1e-9:
         return 0.0, 0.0
@@ -152,7 +189,7 @@ def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, radius, occupie
             py = y + 0.5 - y0
             along = px * dx + py * dy
             across = abs(px * dy - py * dx)
-            # What is nearer than the wanted room already must not come nearer still (so the rover can leave a wall), and
+            # An obstacle nearer than the wanted room must not come nearer still (so the rover can leave a wall), and
             # nothing may come within its radius.
             room = max(min(half_width, math.hypot(px, py) - 0.1), radius)
             if across >= room or along <= 0.0:
@@ -166,7 +203,7 @@ def look(log_odds, base, penalty, s, x0, y0, x1, y1, half_width, radius, occupie
 
 @njit(cache=True, nogil=True)
 def nearest(log_odds, x0, y0, reach, occupied_at):
-    """Distance in cells from (x0, y0) to the nearest obstacle evidence, at most ``reach``."""
+    """Distance from (x0, y0) to the nearest evidence of an obstacle, at most ``reach``."""
     height, width = log_odds.shape
     best = reach
     r = int(math.ceil(reach + 0.5))
@@ -178,12 +215,14 @@ def nearest(log_odds, x0, y0, reach, occupied_at):
 
 
 @njit(cache=True, nogil=True)
-def first_unseen(log_odds, x0, y0, x1, y1, offset, near):
-    """The nearest unseen place on the two lines ``offset`` beside the line to (x1, y1), from distance ``near`` on.
+def first_unseen(log_odds, start, end, offset, near):
+    """The nearest unseen place on the two lines ``offset`` beside a line, from distance ``near`` on.
 
     Returns its distance along the line and its place (x, y); the length of the line and its end when all has been seen.
     """
     height, width = log_odds.shape
+    x0, y0 = start
+    x1, y1 = end
     length = math.hypot(x1 - x0, y1 - y0)
     if length < 1e-9:
         return 0.0, x1, y1

@@ -70,7 +70,7 @@ def load_map(path: Path, resolution_m: float | None = None) -> Grid:
 
 
 def save_ros_map(grid: Grid, path_without_suffix: Path, known: NDArray[np.bool_] | None = None) -> None:
-    """Write ``<path>.yaml`` and ``<path>.pgm`` (P5) for map_server; loading it gives the same obstacles in the same place.
+    """Write ``<path>.yaml`` and ``<path>.pgm`` (P5) for map_server; loading it gives the same obstacles in place.
 
     ``known``: shape (height, width), which fields have been seen; others that are no obstacles are written as unknown.
     Without it every field that is no obstacle is written as free. Raises MapError when the files cannot be written.

@@ -1,4 +1,7 @@
-"""What each range sensor has just seen, so that no other one makes it free: who sees nothing does not outvote who sees something."""
+"""Sensor agreement: the cells in which a sensor has just seen something, which no other sensor may free.
+
+Nouns: sensor agreement.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,7 @@ from numpy.typing import NDArray
 from companion.core.scan import RangeScan
 
 BELIEVED_S = 1.0
-"""So long after a reading only its own sensor may say that nothing stands there any more: the slowest that are driven with send once a second."""
+"""For this long after a reading only its own sensor may free the cell again: the slowest in use send once a second."""
 NONE = np.empty((0, 2), np.int64)
 
 Cells = NDArray[np.int64]
@@ -18,7 +21,7 @@ Cells = NDArray[np.int64]
 
 
 class SensorAgreement:
-    """The hits of the newest second, by who has seen them."""
+    """The hits of the newest second, by the sensor that saw them."""
 
     def __init__(self) -> None:
         self._seen: deque[tuple[float, tuple[int, str], Cells]] = deque()
@@ -37,5 +40,5 @@ class SensorAgreement:
         return np.concatenate(cells) if cells else NONE
 
     def clear(self) -> None:
-        """What has been seen lies elsewhere now."""
+        """Forget all: what has been seen lies elsewhere now."""
         self._seen.clear()

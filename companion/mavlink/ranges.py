@@ -26,7 +26,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.scan import RangeScan
 from companion.mavlink.framing import AUTOPILOT
-from companion.perception.newest_scans import MOST_SCANS, Sensor, sensor_of
+from companion.perception.scan_filter import MOST_SCANS, Sensor, sensor_of
 
 MESSAGES = (mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE)
 FORGOTTEN_S = 5.0

@@ -1,7 +1,9 @@
-"""What moves round the rover: where it will be, as guidance asks, and as planners are told.
+"""Moving obstacles round the rover: where each will be, for collision avoidance and for planners.
 
-Announced things (other vehicles, ADS-B, AIS) and those that the range sensors track are the same here: a disc that goes on as it
-does now.
+Announced ones (other vehicles, ADS-B, AIS) and those that the range sensors track are the same here: a disc that
+goes on as it does now.
+
+Nouns: moving obstacle.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from companion.vehicle.events import OtherSeen
 from companion.vehicle.state import VehicleState
 
 SAME_M = 1.2
-"""What is seen so near to where somebody says he is, is he."""
+"""A thing that is seen this near to an announced place is the one that was announced."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,9 +49,9 @@ class Moving:
 def announced(
     vehicle: VehicleState, pose: Pose, rover_radius_m: float, settings: TrafficSettings
 ) -> tuple[Moving, ...]:
-    """Who has told of itself lately, is on our level, and comes near enough within the horizon to matter.
+    """The vehicles announced lately that are on our level and come near enough within the horizon to matter.
 
-    What claims to be where the rover itself is, is the rover: its own transponder, heard again.
+    One that claims to be where the rover itself is, is the rover: its own transponder, heard again.
     """
     if vehicle.origin is None:
         return ()
@@ -66,13 +68,13 @@ def announced(
 
 
 def merged(told: tuple[Moving, ...], seen: tuple[Moving, ...], now_s: float) -> tuple[Moving, ...]:
-    """All that moves; what is seen where somebody announces himself is he, and he knows his motion better."""
+    """All that moves; of a thing both seen and announced the announcement counts, which knows its motion better."""
     alone = [one for one in seen if all(one.at(now_s).distance_m(other.at(now_s)) > SAME_M for other in told)]
     return (*told, *alone)
 
 
 def motion_changed(planned: tuple[Moving, ...], now: tuple[Moving, ...], settings: TrafficSettings) -> bool:
-    """Whether a plan made among the ``planned`` is out of date: something new moves, or goes another way than it did."""
+    """Whether a plan made among ``planned`` is out of date: something new moves, or moves otherwise than it did."""
     before = {one.name: one for one in planned}
     for one in now:
         then = before.get(one.name)
@@ -92,20 +94,14 @@ def planners_movers(
     return tuple(
         ObstacleTrajectory(
             (one.radius_m + rover_radius_m) / grid.resolution_m,
-            np.array([_row(one.at(now_s + ahead_s), grid, ahead_s) for ahead_s in (0.0, settings.horizon_s)]),
+            np.array([(ahead_s, *grid.in_fields(one.at(now_s + ahead_s))) for ahead_s in (0.0, settings.horizon_s)]),
         )
         for one in moving
     )
 
 
-def _row(point: NedPoint, grid: Grid, ahead_s: float) -> tuple[float, float, float]:
-    x = (point.east_m - grid.south_west.east_m) / grid.resolution_m - 0.5
-    y = (point.north_m - grid.south_west.north_m) / grid.resolution_m - 0.5
-    return ahead_s, x, y
-
-
 def _on_our_level(other: OtherSeen, vehicle: VehicleState, settings: TrafficSettings) -> bool:
-    """Not in the air above us; whoever does not tell its height might be beside us."""
+    """Not in the air above us; one that does not tell its height might be beside us."""
     own_m = None if vehicle.global_position is None else vehicle.global_position.altitude_m
     if own_m is None or other.altitude_m is None:
         return True

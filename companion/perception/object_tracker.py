@@ -1,8 +1,10 @@
-"""Which of the things that the range sensors see are moving, and where to.
+"""Object tracker: which of the things that the range sensors see are moving, and where to.
 
-What stands was never seen free. So only readings count that end on ground which had been seen free all round; such readings that lie together are one
-thing, and a thing whose place changes evenly from scan to scan moves. The map knows nothing of this: there it is evidence like any
-other, and is forgotten behind it.
+Ground on which something stands was never seen free. So only readings count that end on ground that had been seen
+free all round. Such readings that lie together are one thing, and a thing whose place changes evenly from scan to
+scan moves. The map does not use this: there a moving thing is evidence like any other, and is freed behind it.
+
+Nouns: object tracker.
 """
 
 from __future__ import annotations
@@ -25,11 +27,11 @@ Points = NDArray[np.float64]
 FREE_AT = -0.5
 """Log-odds from which ground counts as seen free."""
 ROUND_M = 0.7
-"""Ground must have been free so far round a reading, and half the beam's width more: neither is where it seems to be."""
+"""Ground must have been free this far round a reading, and half a beam's width more: neither is exact."""
 TOGETHER_M = 0.8
-"""Readings nearer to each other than this are of one thing; a thing is found again within this of where it is expected."""
+"""Readings nearer to each other than this are of one thing; it is found again this near to where it is expected."""
 WIDEST_M = 3.0
-"""What is wider is no thing that moves but ground seen askew."""
+"""Anything wider is not a thing that moves but ground with an error of position."""
 WINDOW_S = 1.0
 LEAST_S = 0.5
 LEAST_SIGHTINGS = 5
@@ -38,9 +40,9 @@ LEAST_RADIUS_M = 0.4
 STRAY_M = 0.15
 """Sightings of a thing that moves evenly lie this near to a line, on average, and half a beam's width more."""
 SURE = 2.5
-"""A velocity counts when it is so many times its own standard error."""
+"""A velocity counts from this many times its own standard error on."""
 DOUBT_M = 0.25
-"""Added to the radius of what is only seen: neither its place nor its size is exact."""
+"""Added to the radius of a thing that is only seen: neither its place nor its size is exact."""
 LEAST_BEAMS = 8
 """A few thin beams cannot tell what moves from what the rover passes."""
 MAX_YAW_RATE_RAD_S = math.radians(45.0)
@@ -49,15 +51,15 @@ MAX_YAW_RATE_RAD_S = math.radians(45.0)
 
 @njit(cache=True, nogil=True)
 def free_all_round(free: NDArray[np.bool_], places: Points, reaches: Points) -> NDArray[np.bool_]:
-    """Which places (rows of row and column, in cells) have nothing but free cells round them, in eight directions and on the way there."""
+    """Which places (rows of x and y, in cells) have only free cells round them: in eight directions, and on the way."""
     height, width = free.shape
     result = np.ones(len(places), np.bool_)
     for i in range(len(places)):
         for k in range(25):
             reach = reaches[i] * ((k + 7) // 8) / 3.0
             angle = k * 0.25 * math.pi
-            row = math.floor(places[i, 0] + reach * math.cos(angle))
-            column = math.floor(places[i, 1] + reach * math.sin(angle))
+            row = math.floor(places[i, 1] + reach * math.cos(angle))
+            column = math.floor(places[i, 0] + reach * math.sin(angle))
             if not (0 <= row < height and 0 <= column < width and free[row, column]):
                 result[i] = False
                 break
@@ -83,7 +85,7 @@ class Track:
     sightings: tuple[Sighting, ...]
 
     def motion(self) -> tuple[Moving, bool] | None:
-        """Its place and velocity by least squares, and whether that is to be believed; None before it has been seen long enough."""
+        """Its place and velocity by least squares, and whether they are significant; None if seen too briefly."""
         time_s = np.array([one.time_s for one in self.sightings])
         if len(time_s) < LEAST_SIGHTINGS or time_s[-1] - time_s[0] < LEAST_S:
             return None
@@ -104,19 +106,14 @@ class Track:
 class ObjectTracker:
     """Remembers which ground has been seen free, and follows what enters it."""
 
-    def __init__(self, evidence: EvidenceMap, settings: TrafficSettings) -> None:
+    def __init__(self, evidence: EvidenceMap) -> None:
         self._evidence = evidence
-        self._settings = settings
         self._free = np.zeros(evidence.log_odds.shape, np.bool_)
         self._tracks: tuple[Track, ...] = ()
         self._numbers = 0
 
-    def retune(self, settings: TrafficSettings) -> None:
-        """Other settings from now on."""
-        self._settings = settings
-
     def take(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
-        """Look through a scan that has not been taken into the map yet."""
+        """Look through a scan that has not been added to the map yet."""
         if abs(yaw_rate_rad_s) > MAX_YAW_RATE_RAD_S or len(scan.bearing_rad) < LEAST_BEAMS:
             return
         ends, range_m = _ends(pose, scan)
@@ -125,36 +122,34 @@ class ObjectTracker:
             self._follow(pose.time_s, _things(hits, pose, scan.beam_width_rad))
 
     def remember(self, pose: Pose, reach_m: float) -> None:
-        """Note what a scan just taken into the map has shown to be free."""
+        """Note what a scan just added to the map has shown to be free."""
         rows, columns = self._window(pose, reach_m)
         self._free[rows, columns] |= self._evidence.log_odds[rows, columns] <= FREE_AT
 
-    def moving(self, now_s: float) -> tuple[Moving, ...]:
+    def moving(self, now_s: float, settings: TrafficSettings) -> tuple[Moving, ...]:
         """What moves now."""
         found = []
         for track in self._tracks:
             motion = track.motion()
             if motion is not None and now_s - motion[0].time_s <= LOST_S:
                 moving, believed = motion
-                if believed and moving.speed_m_s >= self._settings.moving_m_s:
+                if believed and moving.speed_m_s >= settings.moving_m_s:
                     found.append(moving)
         return tuple(found)
 
     def _window(self, pose: Pose, reach_m: float) -> tuple[slice, slice]:
-        corner, cell_m = self._evidence.base.south_west, self._evidence.evidence_m
-        row = math.floor((pose.north_m - corner.north_m) / cell_m)
-        column = math.floor((pose.east_m - corner.east_m) / cell_m)
-        reach = math.ceil(reach_m / cell_m) + 1
+        frame = self._evidence.frame
+        x, y = frame.xy(pose.point)
+        row, column, reach = math.floor(y), math.floor(x), math.ceil(frame.cells(reach_m)) + 1
         return slice(max(row - reach, 0), max(row + reach, 0)), slice(max(column - reach, 0), max(column + reach, 0))
 
     def _on_free_ground(self, points: Points, round_m: Points) -> Points:
         """Those with ground round them that had all been seen free."""
-        corner, scale = self._evidence.base.south_west, 1.0 / self._evidence.evidence_m
-        cells = (points - (corner.north_m, corner.east_m)) * scale
-        return points[free_all_round(self._free, cells, round_m * scale)]
+        frame = self._evidence.frame
+        return points[free_all_round(self._free, frame.xys(points), round_m * frame.cells(1.0))]
 
     def _follow(self, time_s: float, things: list[Sighting]) -> None:
-        """Give every thing to the track that expects it nearest; what nobody expects begins a new one."""
+        """Give each thing to the track that expects it nearest; a thing that no track expects begins a new one."""
         tracks = []
         for track in self._tracks:
             expected = _expected(track, time_s)

@@ -111,13 +111,13 @@ class DecisionExplainer(ReplayObserver):
         self._scene = None
 
     def _noted(self, companion: Companion) -> _Scene | None:
-        driver, pose = companion.driver, companion.status().pose
+        driver, evidence, pose = companion.driver, companion.evidence, companion.status().pose
         state = None if driver is None else driver.leg[0]
-        if driver is None or state is None or pose is None:
+        if evidence is None or state is None or pose is None:
             return None
-        grid = driver.evidence.grid.with_weights(driver.evidence.grid.weights.copy())
+        grid = evidence.grid.with_weights(evidence.grid.weights.copy())
         weighed = with_turning_cost(grid, pose, self._settings.guidance, self._turning_radius_m)
-        return _Scene(pose, state, driver.evidence.base, grid, weighed, known_fields(driver.evidence))
+        return _Scene(pose, state, evidence.base, grid, weighed, known_fields(evidence))
 
     def _add(self, candidate: Candidate) -> None:
         if self._scene is not None:

@@ -9,7 +9,7 @@ from collections import deque
 from collections.abc import Iterable
 from typing import Protocol
 
-from companion.perception.scan_watch import ScanWatch
+from companion.perception.scan_filter import ScanWatch
 from companion.safety.reasons import Doubt, Reason
 from companion.settings import SafetySettings
 from companion.settings.live_settings import LiveSettings

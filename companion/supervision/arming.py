@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass
 
 from companion.checkpoint.resume import PreviousRun, ResumePermission, resume_permission, resumed_layout, same_boot
-from companion.control.point_controller import STANDSTILL
+from companion.control.controller import STANDSTILL
 from companion.core.severity import Severity
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import MissionProgress, plan_progress

@@ -13,7 +13,7 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.figures import Telemetry
 from companion.operator.notifications import Notifier
 from companion.operator.parameter_server import ParameterServer
-from companion.perception.newest_scans import newest_ranges
+from companion.perception.scan_filter import newest_ranges
 from companion.safety.mode_latch import LatchState, latched
 from companion.safety.watchdogs import ScanMonitor
 from companion.supervision.localization_monitor import LocalizationMonitor

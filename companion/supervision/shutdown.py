@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from companion.control.point_controller import STANDSTILL
+from companion.control.controller import STANDSTILL
 from companion.core.clock import Clock
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_run import MissionRun

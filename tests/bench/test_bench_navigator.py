@@ -77,7 +77,7 @@ def test_searches_of_a_known_map_of_eight_million_fields(name):
     (case,) = (case for case in paper_cases(MAPS, (LARGE,)) if case.name == name)
     free, weights, rng = np.argwhere(case.weights < OBSTACLE), case.weights, np.random.default_rng(0)
     height, width = weights.shape
-    soften(weights, 0, 0, width, height, settings.mapping.soft_reach_m, settings.mapping.soft_cost, MAX_SOFT_WEIGHT)
+    soften(weights, (0, 0, width, height), settings.mapping.soft_reach_m, settings.mapping.soft_cost, MAX_SOFT_WEIGHT)
     searcher = PathSearcher(make_planner("hybrid", settings.planner), settings.navigator, rng)
     grid, seconds = Grid(weights), []
     for y, x in free[rng.integers(len(free), size=LARGE_SEARCHES)].tolist():

@@ -62,7 +62,7 @@ class Writer:
 
 
 @dataclass
-class Searcher:
+class PathSearcher:
     rng: np.random.Generator = field(default_factory=lambda: np.random.default_rng(7))
 
 
@@ -72,7 +72,7 @@ class Driver:
     state: NavState
     planning: bool = False
     tally: Tally = field(default_factory=lambda: Tally(5, 2, 1))
-    searcher: Searcher = field(default_factory=Searcher)
+    searcher: PathSearcher = field(default_factory=PathSearcher)
 
     @property
     def leg(self) -> tuple[NavState, int, int]:

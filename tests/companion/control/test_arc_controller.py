@@ -1,18 +1,19 @@
-"""Guidance of a rover that cannot turn on the spot: arcs it can drive, over ground it knows, and never a turn on the spot."""
+"""The controller of a rover that cannot turn on the spot: arcs that it can drive, over ground that it knows."""
 
 import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
 from companion.control.arc_controller import ArcController
 from companion.control.braking import braking_distance_m
-from companion.control.collision_avoidance import yielded
-from companion.control.manoeuvre import Leg, Manoeuvre, Try, find_manoeuvre, tries
-from companion.control.point_controller import ControlCommand, Motion
-from companion.control.reference_path import Route
+from companion.control.collision_avoidance import avoided
+from companion.control.controller import ControlCommand, Purpose
+from companion.control.local_view import LocalView
+from companion.control.manoeuvre import ArcSegment, Manoeuvre, Try, find_manoeuvre, tries
+from companion.control.reference_path import ReferencePath
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -47,40 +48,44 @@ def ground(boxes: Boxes = (), unseen: Boxes = ()) -> EvidenceMap:  # type: ignor
     return evidence
 
 
-def route(*corners: tuple[float, float]) -> Route:
+def path(*corners: tuple[float, float]) -> ReferencePath:
     """North and east of the middle."""
     points = np.array(corners) + MIDDLE
     lengths = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))))
     along = np.linspace(0.0, lengths[-1], math.ceil(lengths[-1] / 0.25) + 1)
-    return Route(np.column_stack([np.interp(along, lengths, points[:, axis]) for axis in (0, 1)]))
+    return ReferencePath(np.column_stack([np.interp(along, lengths, points[:, axis]) for axis in (0, 1)]))
 
 
 def pose(heading_deg: float = 0.0, north_m: float = 0.0, east_m: float = 0.0, time_s: float = 0.0) -> Pose:
     return Pose(MIDDLE + north_m, MIDDLE + east_m, math.radians(heading_deg), time_s)
 
 
+def view(evidence: EvidenceMap, at: Pose, speed_m_s: float = 0.0) -> LocalView:
+    return LocalView(at, speed_m_s, evidence, ROVER, SETTINGS)
+
+
 class Car:
     """A rover that does at once what it is told, as far as it can: for loops without a simulator."""
 
-    def __init__(self, evidence: EvidenceMap, way: Route, start: Pose) -> None:
+    def __init__(self, evidence: EvidenceMap, way: ReferencePath, start: Pose) -> None:
         self.evidence, self.way, self.pose = evidence, way, start
-        self.helm = ArcController(evidence, SETTINGS)
+        self.controller = ArcController()
         self.speed_m_s = 0.0
         self.curvature = 0.0
         self.poses = [start]
-        self.guides: list[ControlCommand] = []
+        self.commands: list[ControlCommand] = []
 
     def tick(self) -> ControlCommand:
         north, east = self.way.points.T
         ahead = slice(self.way.progress, self.way.progress + 17)
         nearest = int(np.argmin(np.hypot(north[ahead] - self.pose.north_m, east[ahead] - self.pose.east_m)))
-        self.way = Route(self.way.points, self.way.progress + nearest)
-        now = self.helm.guide(self.way, self.pose, abs(self.speed_m_s), ROVER)
+        self.way = ReferencePath(self.way.points, self.way.progress + nearest)
+        now = self.controller.follow(self.way, view(self.evidence, self.pose, abs(self.speed_m_s)))
         told = now.setpoint
         assert isinstance(told, GuidedVelocity), "it is never told a heading, and never a place"
         change = TICK_S * 1.0
         self.speed_m_s += min(max(told.forward_m_s - self.speed_m_s, -change), change)
-        # As ArduRover: up to 1 m/s the wheels are turned for the turn rate as if at 1 m/s; they need 0.6 s to full lock.
+        # As ArduRover: below 1 m/s the wheels turn for the turn rate as if at 1 m/s; they need 0.6 s to full lock.
         wanted = told.yaw_rate_rad_s / max(abs(self.speed_m_s), 1.0) * (-1.0 if self.speed_m_s < 0.0 else 1.0)
         wanted = min(max(wanted, -1.0 / RADIUS_M), 1.0 / RADIUS_M)
         most = TICK_S / 0.6 / RADIUS_M
@@ -94,7 +99,7 @@ class Car:
             self.pose.time_s + TICK_S,
         )
         self.poses.append(self.pose)
-        self.guides.append(now)
+        self.commands.append(now)
         return now
 
     def drive(self, seconds: float) -> None:
@@ -119,39 +124,39 @@ class Car:
         return self.pose.point.distance_m(self.way.end) < 0.5
 
 
-def driven(evidence: EvidenceMap, way: Route, start: Pose, seconds: float = 120.0) -> Car:
+def driven(evidence: EvidenceMap, way: ReferencePath, start: Pose, seconds: float = 120.0) -> Car:
     car = Car(evidence, way, start)
     car.drive(seconds)
     return car
 
 
 def test_straight_on_at_full_speed() -> None:
-    car = driven(ground(), route((0, 0), (15, 0)), pose())
+    car = driven(ground(), path((0, 0), (15, 0)), pose())
     assert car.reached
-    assert car.helm.manoeuvre is None
-    assert max(guide.speed_m_s for guide in car.guides) == ROVER.cruise_speed_m_s
-    assert max(abs(guide.setpoint.yaw_rate_rad_s) for guide in car.guides) < 0.05  # type: ignore[union-attr]
+    assert car.controller.manoeuvre is None
+    assert max(command.speed_m_s for command in car.commands) == ROVER.cruise_speed_m_s
+    assert max(abs(command.setpoint.yaw_rate_rad_s) for command in car.commands) < 0.05  # type: ignore[union-attr]
 
 
 @pytest.mark.parametrize("bearing_deg", [45, 90, 135, 180, -90, -160])
 def test_a_place_anywhere_around_is_reached_on_arcs(bearing_deg: float) -> None:
     there = (12.0 * math.cos(math.radians(bearing_deg)), 12.0 * math.sin(math.radians(bearing_deg)))
-    car = driven(ground(), route((0, 0), there), pose())
+    car = driven(ground(), path((0, 0), there), pose())
     assert car.reached
-    assert Motion.LOOK not in {guide.motion for guide in car.guides}
+    assert Purpose.LOOK not in {command.purpose for command in car.commands}
 
 
 def test_it_turns_in_three_moves_where_there_is_no_room_for_a_circle() -> None:
     walls = [(0.0, 16.5, 40.0, 17.0), (0.0, 23.0, 40.0, 23.5)]
-    car = driven(ground(walls), route((0, 0), (-14, 0)), pose())
+    car = driven(ground(walls), path((0, 0), (-14, 0)), pose())
     assert car.reached
     assert car.least_room_m > 0.0
-    assert min(guide.setpoint.forward_m_s for guide in car.guides) < 0.0  # type: ignore[union-attr]
+    assert min(command.setpoint.forward_m_s for command in car.commands) < 0.0  # type: ignore[union-attr]
 
 
 def test_in_a_lane_too_narrow_to_turn_it_goes_back_tail_first() -> None:
     walls = [(0.0, 17.5, 40.0, 18.8), (0.0, 21.2, 40.0, 22.5), (24.0, 17.5, 25.0, 22.5)]
-    car = driven(ground(walls), route((0, 0), (-8, 0)), pose())
+    car = driven(ground(walls), path((0, 0), (-8, 0)), pose())
     assert car.reached
     assert car.least_room_m > 0.0
     assert abs(car.pose.heading_rad) < math.radians(40.0)
@@ -159,16 +164,16 @@ def test_in_a_lane_too_narrow_to_turn_it_goes_back_tail_first() -> None:
 
 def test_walled_in_it_stands_and_says_so() -> None:
     walls = [(18.8, 18.8, 21.2, 19.2), (18.8, 20.8, 21.2, 21.2), (18.8, 18.8, 19.2, 21.2), (20.8, 18.8, 21.2, 21.2)]
-    car = driven(ground(walls), route((0, 0), (0, 8)), pose(), 10.0)
+    car = driven(ground(walls), path((0, 0), (0, 8)), pose(), 10.0)
     assert car.least_room_m > 0.0
-    assert car.guides[-1].motion is Motion.BLOCKED
+    assert car.commands[-1].purpose is Purpose.BLOCKED
     assert car.pose.point.distance_m(pose().point) < 0.6
 
 
 def test_it_never_goes_backwards_over_ground_it_has_not_seen() -> None:
     behind_unseen = [(0.0, 0.0, 19.4, 40.0)]
     car = Car(ground([(23.0, 17.0, 23.5, 23.0), (19.5, 17.0, 23.0, 18.5), (19.5, 21.5, 23.0, 23.0)], behind_unseen),
-              route((0, 0), (-10, 0)), pose(time_s=1.0))  # fmt: skip
+              path((0, 0), (-10, 0)), pose(time_s=1.0))  # fmt: skip
     car.drive(20.0)
     assert min(p.north_m for p in car.poses) > 19.4 - 0.3
     assert car.least_room_m > 0.0
@@ -176,7 +181,7 @@ def test_it_never_goes_backwards_over_ground_it_has_not_seen() -> None:
 
 def test_it_can_stop_within_what_it_has_seen() -> None:
     unseen_m = 25.0
-    car = Car(ground(unseen=[(unseen_m, 0.0, 40.0, 40.0)]), route((0, 0), (12, 0)), pose(time_s=1.0))
+    car = Car(ground(unseen=[(unseen_m, 0.0, 40.0, 40.0)]), path((0, 0), (12, 0)), pose(time_s=1.0))
     creep_m = braking_distance_m(SETTINGS.guidance.min_speed_m_s, SETTINGS.guidance)
     for _ in range(120):
         car.tick()
@@ -187,7 +192,7 @@ def test_it_can_stop_within_what_it_has_seen() -> None:
 
 def test_what_comes_up_on_its_arc_stops_it_on_that_arc() -> None:
     evidence = ground()
-    car = Car(evidence, route((0, 0), (3, 2.5), (3.5, 9)), pose(20.0, time_s=1.0))
+    car = Car(evidence, path((0, 0), (3, 2.5), (3.5, 9)), pose(20.0, time_s=1.0))
     for _ in range(35):
         car.tick()
     assert car.speed_m_s > 0.8
@@ -196,7 +201,7 @@ def test_what_comes_up_on_its_arc_stops_it_on_that_arc() -> None:
     y, x = round(there.north_m * 8), round(there.east_m * 8)
     evidence.log_odds[y - 1 : y + 2, x - 1 : x + 2] = 3.0
     now = car.tick()
-    assert now.motion is Motion.BRAKE
+    assert now.purpose is Purpose.BRAKE
     assert isinstance(now.setpoint, GuidedVelocity) and now.setpoint.forward_m_s == 0.0
     assert now.setpoint.yaw_rate_rad_s == pytest.approx(car.curvature * max(car.speed_m_s, 1.0), abs=0.15)
 
@@ -204,7 +209,7 @@ def test_what_comes_up_on_its_arc_stops_it_on_that_arc() -> None:
 def test_slow_arcs_are_told_as_if_at_one_metre_a_second() -> None:
     """Below MOT_SPD_SCA_BASE ArduRover drives only the share of a turn rate that the speed is of it."""
     turned = np.linspace(0.0, 4.0, 100)
-    car = Car(ground(), route(*zip(4.0 * np.sin(turned), 4.0 - 4.0 * np.cos(turned), strict=True)), pose(time_s=1.0))
+    car = Car(ground(), path(*zip(4.0 * np.sin(turned), 4.0 - 4.0 * np.cos(turned), strict=True)), pose(time_s=1.0))
     told = []
     for _ in range(80):
         now = car.tick()
@@ -220,23 +225,23 @@ def test_slow_arcs_are_told_as_if_at_one_metre_a_second() -> None:
 # Manoeuvres ----------------------------------------------------------------------------------------------------------
 
 
-def curvature_m(leg: Leg) -> float:
+def curvature_per_m(segment: ArcSegment) -> float:
     """The greatest, from the directions of the pieces."""
-    steps = np.diff(leg.points, axis=0)
+    steps = np.diff(segment.points, axis=0)
     lengths, turned = np.hypot(*steps.T), np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))
     return float(np.abs(np.diff(turned) / (0.5 * (lengths[1:] + lengths[:-1]))).max(initial=0.0))
 
 
 def is_joined(manoeuvre: Manoeuvre, start: Pose) -> bool:
-    """Each leg begins where the last one ended, in the same direction of the rover, and the first one at the rover."""
+    """Each segment begins where the last one ended, with the same heading, and the first one at the rover."""
     place, heading_rad = np.array([start.north_m, start.east_m]), start.heading_rad
-    for leg in manoeuvre.legs:
-        first = leg.points[1] - leg.points[0]
-        aside = math.atan2(first[1], first[0]) + (math.pi if leg.backwards else 0.0) - heading_rad
-        if np.hypot(*(leg.points[0] - place)) > 1e-6 or abs(math.remainder(aside, 2.0 * math.pi)) > 0.1:
+    for segment in manoeuvre.segments:
+        first = segment.points[1] - segment.points[0]
+        aside = math.atan2(first[1], first[0]) + (math.pi if segment.backwards else 0.0) - heading_rad
+        if np.hypot(*(segment.points[0] - place)) > 1e-6 or abs(math.remainder(aside, 2.0 * math.pi)) > 0.1:
             return False
-        last = leg.points[-1] - leg.points[-2]
-        place, heading_rad = leg.points[-1], math.atan2(last[1], last[0]) + (math.pi if leg.backwards else 0.0)
+        last = segment.points[-1] - segment.points[-2]
+        place, heading_rad = segment.points[-1], math.atan2(last[1], last[0]) + (math.pi if segment.backwards else 0.0)
     return True
 
 
@@ -251,6 +256,7 @@ places = st.floats(-7.0, 7.0)
     st.lists(st.tuples(places, places), max_size=4),
     st.sampled_from([-1, 0, 1]),
 )
+@example(heading_rad=-2.46875, posts=[], bearing_rad=1.0, dark=[(1.375, 0.0)], first=-1)  # across a cell's corner
 def test_every_manoeuvre_can_be_driven(
     heading_rad: float,
     posts: list[tuple[float, float]],
@@ -263,22 +269,22 @@ def test_every_manoeuvre_can_be_driven(
     unseen = [(MIDDLE + n, MIDDLE + e, MIDDLE + n + 2.0, MIDDLE + e + 2.0) for n, e in dark]
     evidence = ground(boxes, unseen)
     start = Pose(MIDDLE, MIDDLE, heading_rad, 0.0)
-    way = route((0, 0), (12 * math.cos(bearing_rad), 12 * math.sin(bearing_rad)))
+    way = path((0, 0), (12 * math.cos(bearing_rad), 12 * math.sin(bearing_rad)))
     found = None
     for wanted in tries(way, ROVER, SETTINGS.steering):
-        found = find_manoeuvre(way, start, evidence, ROVER, SETTINGS.steering, wanted, first)
+        found = find_manoeuvre(way, view(evidence, start), wanted, first)
         if found is not None:
             break
     assume(found is not None)
     assert found is not None and is_joined(found, start)
-    assert first == 0 or found.legs[0].backwards == (first < 0)
+    assert first == 0 or found.segments[0].backwards == (first < 0)
     taken = np.argwhere(evidence.log_odds >= SETTINGS.mapping.occupied_at) / 8 + 0.0625
-    for leg in found.legs:
-        assert curvature_m(leg) <= 1.01 / RADIUS_M
-        for point in leg.points:
+    for segment in found.segments:
+        assert curvature_per_m(segment) <= 1.01 / RADIUS_M
+        for point in segment.points:
             assert len(taken) == 0 or np.hypot(*(taken - point).T).min() > ROVER.radius_m
-        if leg.backwards:
-            cells = np.floor(leg.points[1:] * 8).astype(int)
+        if segment.backwards:
+            cells = np.floor(segment.points[1:] * 8).astype(int)
             assert (evidence.log_odds[cells[:, 0], cells[:, 1]] != 0.0).all()
     ahead = min(np.hypot(*(way.points - (found.end.north_m, found.end.east_m)).T))
     assert ahead <= SETTINGS.steering.join_within_m + 1e-6
@@ -286,8 +292,8 @@ def test_every_manoeuvre_can_be_driven(
 
 def test_more_is_tried_only_where_the_route_goes_on() -> None:
     far, near = (
-        tries(route((0, 0), (20, 0)), ROVER, SETTINGS.steering),
-        tries(route((0, 0), (2, 0)), ROVER, SETTINGS.steering),
+        tries(path((0, 0), (20, 0)), ROVER, SETTINGS.steering),
+        tries(path((0, 0), (2, 0)), ROVER, SETTINGS.steering),
     )
     assert {t.ahead_m for t in far} == {5.0, 3.0, 8.0}
     assert {t.ahead_m for t in near} == {5.0}
@@ -309,34 +315,34 @@ def test_the_planner_is_told_heading_and_radius() -> None:
             return planner.plan(problem, budget, rng)
 
     searcher = PathSearcher(Spy(), SETTINGS.navigator, np.random.default_rng(1))
-    driver = GoalDriver(ground(), ROVER, SETTINGS, searcher, InlineRunner())
-    start = pose(30.0)
+    driver = GoalDriver(ArcController(), searcher, InlineRunner())
+    start = view(ground(), pose(30.0))
     there = NedPoint(MIDDLE, MIDDLE + 10.0)
-    driver.head_for(ResolvedTarget("t", there, driver.evidence.base.cell_at(there), 0.0, OnBlocked.SKIP, None), start)
-    guide, _ = driver.update(start, 0.0)
+    driver.head_for(ResolvedTarget("t", there, start.evidence.base.cell_at(there), 0.0, OnBlocked.SKIP, None), start)
+    command, _ = driver.update(start)
     assert asked[0].motion.heading_rad == pytest.approx(math.radians(60.0)), "from east towards north"
     assert asked[0].motion.turning_radius_fields == pytest.approx(RADIUS_M * SETTINGS.steering.planned_radius)
-    assert isinstance(guide.setpoint, GuidedVelocity)
+    assert isinstance(command.setpoint, GuidedVelocity)
 
 
 def test_it_makes_way_on_arcs_and_never_turns_on_the_spot() -> None:
-    route_on = route((0, 0), (16, 0))
-    now = ControlCommand(Motion.DRIVE, GuidedVelocity(2.0, 0.0), 2.0)
+    path_on = path((0, 0), (16, 0))
+    now = ControlCommand(Purpose.DRIVE, GuidedVelocity(2.0, 0.0), 2.0)
     crossing = Moving("m", 0.0, NedPoint(MIDDLE + 4.0, MIDDLE - 3.0), 0.0, 1.2, 0.5)
-    way, aside_rad = yielded(now, route_on, pose(), 1.5, (crossing,), ground(), ROVER, SETTINGS)
-    assert isinstance(way.setpoint, GuidedVelocity) and way is not now and aside_rad is None
+    option = avoided(now, path_on, view(ground(), pose(), 1.5), (crossing,))
+    assert isinstance(option.command.setpoint, GuidedVelocity) and option.yields and option.aside_rad is None
     # Something comes straight on while it stands: out of its way on an arc, for straight back would not be enough.
     coming = Moving("m", 0.0, NedPoint(MIDDLE + 4.0, MIDDLE), -0.9, 0.0, 0.5)
-    way, _ = yielded(now, None, pose(), 0.0, (coming,), ground(), ROVER, SETTINGS)
+    way = avoided(now, None, view(ground(), pose()), (coming,)).command
     assert isinstance(way.setpoint, GuidedVelocity)
     assert way.setpoint.forward_m_s != 0.0 and way.setpoint.yaw_rate_rad_s != 0.0
     # With walls on both sides there is only straight back.
     lane = ground([(0.0, 18.0, 40.0, 19.0), (0.0, 21.0, 40.0, 22.0)])
-    way, _ = yielded(now, None, pose(), 0.0, (coming,), lane, ROVER, SETTINGS)
+    way = avoided(now, None, view(lane, pose()), (coming,)).command
     assert isinstance(way.setpoint, GuidedVelocity)
     assert way.setpoint.forward_m_s < 0.0 and way.setpoint.yaw_rate_rad_s == 0.0
     # Rolling backwards it is not asked to go forwards at once.
-    way, _ = yielded(now, None, pose(), 0.7, (coming,), ground(), ROVER, SETTINGS, backwards=True)
+    way = avoided(now, None, view(ground(), pose(), 0.7), (coming,), backwards=True).command
     assert isinstance(way.setpoint, GuidedVelocity) and way.setpoint.forward_m_s <= 0.0
 
 

@@ -7,9 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.control.collision_avoidance import CollisionAvoidance, first_near, least_room_m, yielded
-from companion.control.point_controller import ControlCommand, Motion
-from companion.control.reference_path import Route
+from companion.control.collision_avoidance import CollisionAvoidance, Option, avoided, first_near, least_room_m
+from companion.control.controller import ControlCommand, Purpose
+from companion.control.local_view import LocalView
+from companion.control.reference_path import ReferencePath
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -22,8 +23,8 @@ from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 SETTINGS = Settings()
 ROVER = RoverLimits(0.35, 2.0, 8.0)
 HERE = Pose(20.0, 20.0, 0.0, 100.0)
-ROUTE = Route(np.column_stack((np.linspace(20.0, 36.0, 65), np.full(65, 20.0))))
-DRIVE = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(28.0, 20.0)), 2.0)
+PATH = ReferencePath(np.column_stack((np.linspace(20.0, 36.0, 65), np.full(65, 20.0))))
+DRIVE = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(28.0, 20.0)), 2.0)
 
 
 def open_ground(walls_m: float = math.inf) -> EvidenceMap:
@@ -37,52 +38,59 @@ def open_ground(walls_m: float = math.inf) -> EvidenceMap:
     return evidence
 
 
+def goes_on(option: Option) -> bool:
+    return not option.yields and option.command == DRIVE
+
+
 def crossing(east_m: float, east_m_s: float, north_m: float = 24.0) -> Moving:
     return Moving("m", 100.0, NedPoint(north_m, 20.0 + east_m), 0.0, east_m_s, 0.5)
 
 
+def view(speed_m_s: float, evidence: EvidenceMap | None = None, pose: Pose = HERE) -> LocalView:
+    return LocalView(pose, speed_m_s, open_ground() if evidence is None else evidence, ROVER, SETTINGS)
+
+
 def made(
     moving: Moving, speed_m_s: float = 1.5, ground: EvidenceMap | None = None, now: ControlCommand = DRIVE
-) -> ControlCommand:
-    evidence = ground if ground is not None else open_ground()
-    return yielded(now, ROUTE, HERE, speed_m_s, (moving,), evidence, ROVER, SETTINGS)[0]
+) -> Option:
+    return avoided(now, PATH, view(speed_m_s, ground), (moving,))
 
 
 def test_it_stops_before_the_way_of_what_crosses() -> None:
     # Both would be 4 m ahead at the same time.
-    assert made(crossing(-3.0, 1.2)).setpoint == GuidedVelocity(0.0, 0.0)
+    assert made(crossing(-3.0, 1.2)).command.setpoint == GuidedVelocity(0.0, 0.0)
 
 
 def test_it_goes_on_while_it_can_still_stop_later() -> None:
     far = Moving("m", 100.0, NedPoint(32.0, 12.0), 0.0, 1.2, 0.5)
-    assert made(far) is DRIVE
+    assert goes_on(made(far))
 
 
 def test_it_goes_on_when_the_other_has_passed() -> None:
-    assert made(crossing(2.0, 1.2), 0.0) is DRIVE
+    assert goes_on(made(crossing(2.0, 1.2), 0.0))
 
 
 @pytest.mark.parametrize("moving", [crossing(0.5, 0.0), crossing(-30.0, 1.0), crossing(-3.0, -1.2)])
 def test_what_stands_is_far_or_goes_away_is_no_reason(moving: Moving) -> None:
-    assert made(moving) is DRIVE
+    assert goes_on(made(moving))
 
 
 def test_it_moves_aside_for_what_comes_straight_at_it() -> None:
     towards = Moving("m", 100.0, NedPoint(26.0, 20.0), -1.0, 0.0, 0.5)
-    standing = ControlCommand(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
-    guide, aside_rad = yielded(standing, ROUTE, HERE, 0.0, (towards,), open_ground(), ROVER, SETTINGS)
-    assert guide.motion is Motion.LOOK and aside_rad is not None
-    assert abs(math.sin(aside_rad)) > 0.6
+    standing = ControlCommand(Purpose.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
+    option = made(towards, 0.0, now=standing)
+    assert option.yields and option.command.purpose is Purpose.LOOK and option.aside_rad is not None
+    assert abs(math.sin(option.aside_rad)) > 0.6
     # And it keeps to the side it has chosen.
-    again = yielded(standing, ROUTE, HERE, 0.0, (towards,), open_ground(), ROVER, SETTINGS, aside_rad)
-    assert again[1] == aside_rad
+    again = avoided(standing, PATH, view(0.0), (towards,), aside_rad=option.aside_rad)
+    assert again.aside_rad == option.aside_rad
 
 
 def test_it_backs_off_between_walls() -> None:
     towards = Moving("m", 100.0, NedPoint(22.0, 20.0), -0.35, 0.0, 0.5)
-    standing = ControlCommand(Motion.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
-    guide = made(towards, 0.0, open_ground(1.0), standing)
-    assert isinstance(guide.setpoint, GuidedVelocity) and guide.setpoint.forward_m_s < 0.0
+    standing = ControlCommand(Purpose.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0)
+    setpoint = made(towards, 0.0, open_ground(1.0), standing).command.setpoint
+    assert isinstance(setpoint, GuidedVelocity) and setpoint.forward_m_s < 0.0
 
 
 @given(
@@ -104,7 +112,7 @@ def test_room_is_what_is_left_at_the_nearest_moment(
 
 
 def test_a_plan_of_meeting_by_chance_is_never_driven_into() -> None:
-    """Played through: whatever crosses the rover's straight way at an even speed, a rover that obeys is never touched."""
+    """Played through: whatever crosses the straight way at an even speed, a rover that obeys is never touched."""
     chance = np.random.default_rng(7)
     ground = open_ground()
     for _ in range(60):
@@ -113,9 +121,9 @@ def test_a_plan_of_meeting_by_chance_is_never_driven_into() -> None:
         north_m, speed_m_s, gaps = 20.0, 1.5, []
         for tick in range(200):
             pose = Pose(north_m, 20.0, 0.0, 100.0 + 0.05 * tick)
-            route = Route(ROUTE.points, min(round((north_m - 20.0) / 0.25), 64))
-            guide = yielded(DRIVE, route, pose, speed_m_s, (moving,), ground, ROVER, SETTINGS)[0]
-            wanted_m_s = 2.0 if guide is DRIVE else 0.0
+            path = ReferencePath(PATH.points, min(round((north_m - 20.0) / 0.25), 64))
+            option = avoided(DRIVE, path, view(speed_m_s, ground, pose), (moving,))
+            wanted_m_s = 0.0 if option.yields else 2.0
             speed_m_s += min(max(wanted_m_s - speed_m_s, -0.8 * 0.05), 0.8 * 0.05)
             north_m = min(north_m + speed_m_s * 0.05, 36.0)
             gaps.append(moving.at(pose.time_s).distance_m(NedPoint(north_m, 20.0)) - 0.85)
@@ -123,7 +131,7 @@ def test_a_plan_of_meeting_by_chance_is_never_driven_into() -> None:
 
 
 def test_it_looks_where_it_really_drives_and_not_where_the_route_is() -> None:
-    """The route goes round the other one, the place that the rover is told lies behind it: straight there they would meet."""
+    """The path goes round the other; the place told to the rover lies behind it: straight there they would meet."""
     round_it = np.vstack(
         (
             np.column_stack((np.full(16, 20.0), np.arange(20.0, 24.0, 0.25))),
@@ -132,17 +140,16 @@ def test_it_looks_where_it_really_drives_and_not_where_the_route_is() -> None:
     )
     other = Moving("m", 100.0, NedPoint(23.5, 22.2), -0.4, 0.0, 0.5)
 
-    def then(told: NedPoint) -> ControlCommand:
-        now = ControlCommand(Motion.DRIVE, GuidedPosition(told), 1.5)
-        made = yielded(now, Route(round_it), HERE, 1.0, (other,), open_ground(), ROVER, SETTINGS)[0]
-        return DRIVE if made is now else made
+    def yields(told: NedPoint) -> bool:
+        now = ControlCommand(Purpose.DRIVE, GuidedPosition(told), 1.5)
+        return avoided(now, ReferencePath(round_it), view(1.0), (other,)).yields
 
-    assert then(NedPoint(20.0, 22.0)) is DRIVE
-    assert then(NedPoint(25.0, 24.0)) is not DRIVE
+    assert not yields(NedPoint(20.0, 22.0))
+    assert yields(NedPoint(25.0, 24.0))
 
 
 def test_who_makes_way_is_patient_for_a_while_and_anew_each_time() -> None:
-    giver = CollisionAvoidance(open_ground(), ROVER)
+    giver = CollisionAvoidance()
     assert not giver.is_patient(0.0, 30.0, yields=False)
     assert all(giver.is_patient(now_s, 30.0, yields=True) for now_s in (1.0, 10.0, 30.9))
     assert not giver.is_patient(31.0, 30.0, yields=True)

@@ -6,14 +6,16 @@ import numpy as np
 import pytest
 from numpy.random import Generator
 
-from companion.control.point_controller import Motion
+from companion.control.controller import Purpose
+from companion.control.local_view import LocalView
+from companion.control.point_controller import PointController
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.executive.goal_driver import GoalDriver
 from companion.executive.setpoint_sender import SentSetpoints
-from companion.mapping.evidence_map import integrate, new_map
+from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.search_budget import PathSearcher
@@ -46,36 +48,43 @@ class Straight:
         return PlanResult(PlanStatus.FOUND, path, self.name)
 
 
-def driver(planner: Straight) -> GoalDriver:
+def seen_map() -> EvidenceMap:
     evidence = new_map(empty_grid(40, 40, FIELDS_M), 0.35, SETTINGS.mapping)
     bearings = np.radians(np.arange(0.0, 360.0, 5.0))
     scan = RangeScan(0.0, bearings, np.full(72, np.inf), 0.1, 8.0, np.radians(5.0), "test")
     for stamp in (1, 2, 3):
-        integrate(evidence, at(0.0), scan, stamp)
+        integrate(evidence, Pose(10.25, 10.25, 0.0, 0.0), scan, stamp)
+    return evidence
+
+
+SEEN = seen_map()
+
+
+def driver_with(planner: Straight) -> GoalDriver:
     searcher = PathSearcher(planner, SETTINGS.navigator, np.random.default_rng(1))
-    result = GoalDriver(evidence, RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, InlineRunner())
-    result.head_for(GOAL, at(0.0))
-    return result
+    driver = GoalDriver(PointController(), searcher, InlineRunner())
+    driver.head_for(GOAL, at(0.0))
+    return driver
 
 
-def at(time_s: float, north_m: float = 10.25) -> Pose:
-    return Pose(north_m, 10.25, 0.0, time_s)
+def at(time_s: float, speed_m_s: float = 1.0) -> LocalView:
+    return LocalView(Pose(10.25, 10.25, 0.0, time_s), speed_m_s, SEEN, RoverLimits(0.35, 2.0, 8.0), SETTINGS)
 
 
 @pytest.mark.parametrize(("planned_fields_s", "told_m_s"), [(2.4, 1.2), (1.6, 0.8), (9.0, 2.0), (0.2, 0.5)])
 def test_the_lower_of_planned_speed_and_guidances_limit_reaches_the_autopilot(
     planned_fields_s: float, told_m_s: float
 ) -> None:
-    guide, _ = driver(Straight(planned_fields_s)).update(at(0.0), 1.0)
-    assert guide.motion is Motion.DRIVE
-    commands = SentSetpoints().due(guide, 0.0, SETTINGS.guidance, confirmed=None)
+    command, _ = driver_with(Straight(planned_fields_s)).update(at(0.0))
+    assert command.purpose is Purpose.DRIVE
+    commands = SentSetpoints().due(command, 0.0, SETTINGS.guidance, confirmed=None)
     assert ChangeSpeed(pytest.approx(told_m_s)) in commands
 
 
 def test_the_planner_is_told_what_moves_and_how_fast_the_rover_goes() -> None:
     planner = Straight(2.0)
     cart = Moving("cart", 0.0, NedPoint(15.25, 2.25), 0.0, 0.1, 0.65)
-    driver(planner).update(at(0.0), 1.0, (cart,))
+    driver_with(planner).update(at(0.0), (cart,))
     (problem,) = planner.asked
     assert problem.motion.speeds_fields_s == pytest.approx((1.0, 4.0))
     assert problem.movers[0].radius_fields == pytest.approx(2.0)
@@ -84,16 +93,16 @@ def test_the_planner_is_told_what_moves_and_how_fast_the_rover_goes() -> None:
 
 def test_it_plans_anew_when_something_moves_otherwise_and_not_while_it_does_not() -> None:
     planner = Straight(2.0)
-    driving = driver(planner)
+    driving = driver_with(planner)
 
     def cart(time_s: float, east_m_s: float) -> tuple[Moving, ...]:
         return (Moving("cart", time_s, NedPoint(19.0, 2.0), 0.0, east_m_s, 0.5),)
 
     for tick in range(60):
-        driving.update(at(0.05 * tick), 1.0, cart(0.05 * tick, -1.0))
+        driving.update(at(0.05 * tick), cart(0.05 * tick, -1.0))
     # The first plan, and one when the cart was first heard of.
     assert len(planner.asked) <= 2
     before = len(planner.asked)
     for tick in range(60, 70):
-        driving.update(at(0.05 * tick), 1.0, cart(0.05 * tick, 0.6))
+        driving.update(at(0.05 * tick), cart(0.05 * tick, 0.6))
     assert len(planner.asked) == before + 1

@@ -11,31 +11,34 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from companion.control.braking import fastest_within_m, stopping_distance_m
-from companion.control.point_controller import ControlCommand, Motion, guide
+from companion.control.controller import ControlCommand, Purpose
+from companion.control.local_view import LocalView
+from companion.control.point_controller import PointController
 from companion.control.reference_path import (
     STEP_M,
-    Route,
+    ReferencePath,
     advanced,
-    route_along_cells,
-    route_along_curve,
-    route_is_clear,
+    path_along_curve,
+    path_along_fields,
+    path_is_clear,
 )
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.core.grid import Cell, empty_grid
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.evidence_map import look_along
-from companion.settings import GuidanceSettings
+from companion.mapping.map_queries import look_along
+from companion.settings import Settings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from tests.companion.mapping.test_evidence_map import HERE, Ground, Post, scan
 
-SETTINGS = GuidanceSettings()
+ALL_SETTINGS = Settings()
+SETTINGS = ALL_SETTINGS.guidance
 ROVER = RoverLimits(radius_m=0.35, cruise_speed_m_s=2.0, sight_m=8.0)
 NORTH = tuple(Cell(10, y) for y in range(10, 19))
 END = NedPoint(18.5, 10.5)
 
 
-def northward(ground: Ground, start: NedPoint = HERE.point) -> Route:
-    return route_along_cells(ground.map.base, NORTH, start, END)
+def northward(ground: Ground, start: NedPoint = HERE.point) -> ReferencePath:
+    return path_along_fields(ground.map.base, NORTH, start, END)
 
 
 def looked(posts: list[Post] | None = None, times: int = 10) -> Ground:
@@ -44,59 +47,65 @@ def looked(posts: list[Post] | None = None, times: int = 10) -> Ground:
     return ground
 
 
-def told(ground: Ground, pose: Pose = HERE, speed_m_s: float = 0.0, route: Route | None = None) -> ControlCommand:
-    route = northward(ground) if route is None else route
-    return guide(route, pose, speed_m_s, ground.map, ROVER, SETTINGS)
+def view(
+    ground: Ground, pose: Pose = HERE, speed_m_s: float = 0.0, rover: RoverLimits = ROVER, **guidance: float
+) -> LocalView:
+    settings = ALL_SETTINGS.model_copy(update={"guidance": SETTINGS.model_copy(update=guidance)})
+    return LocalView(pose, speed_m_s, ground.map, rover, settings)
 
 
-# --- routes ----------------------------------------------------------------------------------------------------------
+def told(
+    ground: Ground, pose: Pose = HERE, speed_m_s: float = 0.0, path: ReferencePath | None = None
+) -> ControlCommand:
+    return PointController().follow(northward(ground) if path is None else path, view(ground, pose, speed_m_s))
 
 
-def test_a_route_goes_through_the_middles_of_the_fields_in_small_steps():
+# --- paths -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_path_goes_through_the_middles_of_the_fields_in_small_steps():
     grid = empty_grid(20, 20)
     cells = (Cell(2, 2), Cell(3, 3), Cell(4, 3), Cell(5, 3))
-    route = route_along_cells(grid, cells, NedPoint(2.3, 2.6), NedPoint(3.7, 5.9))
-    assert route.point(0) == NedPoint(2.3, 2.6) and route.end == NedPoint(3.7, 5.9)
-    steps = np.hypot(*np.diff(route.points, axis=0).T)
+    path = path_along_fields(grid, cells, NedPoint(2.3, 2.6), NedPoint(3.7, 5.9))
+    assert path.point(0) == NedPoint(2.3, 2.6) and path.end == NedPoint(3.7, 5.9)
+    steps = np.hypot(*np.diff(path.points, axis=0).T)
     assert steps.max() <= STEP_M + 1e-9
     middle = grid.centre_of(Cell(3, 3))
-    assert min(middle.distance_m(route.point(i)) for i in range(len(route.points))) < STEP_M
+    assert min(middle.distance_m(path.point(i)) for i in range(len(path.points))) < STEP_M
 
 
 @pytest.mark.parametrize("end", [None, NedPoint(2.1, 2.2)])
-def test_a_route_within_one_field(end):
-    route = route_along_cells(empty_grid(5, 5), (Cell(2, 2),), NedPoint(2.9, 2.8), end)
-    assert route.point(0) == NedPoint(2.9, 2.8) and route.end == (end or NedPoint(2.9, 2.8))
+def test_a_path_within_one_field(end):
+    path = path_along_fields(empty_grid(5, 5), (Cell(2, 2),), NedPoint(2.9, 2.8), end)
+    assert path.point(0) == NedPoint(2.9, 2.8) and path.end == (end or NedPoint(2.9, 2.8))
 
 
-def test_a_route_follows_the_planners_curve_in_fields():
+def test_a_path_follows_the_planners_curve_in_fields():
     curve = np.array([[1.0, 1.0], [2.0, 3.0], [4.0, 4.0]])
     grid = empty_grid(10, 10, 2.0, NedPoint(-10.0, 100.0))
-    route = route_along_curve(grid, curve, grid.centre_of(Cell(1, 1)), None)
-    assert route.end.distance_m(grid.centre_of(Cell(4, 4))) < 1e-9
-    assert min(grid.centre_of(Cell(2, 3)).distance_m(route.point(i)) for i in range(len(route.points))) < STEP_M
+    path = path_along_curve(grid, curve, grid.centre_of(Cell(1, 1)), None)
+    assert path.end.distance_m(grid.centre_of(Cell(4, 4))) < 1e-9
+    assert min(grid.centre_of(Cell(2, 3)).distance_m(path.point(i)) for i in range(len(path.points))) < STEP_M
 
 
 def test_progress_moves_forward_and_only_within_its_window():
-    route = northward(Ground())
-    ahead = advanced(route, Pose(13.0, 10.7, 0.0, 0.0))
+    path = northward(Ground())
+    ahead = advanced(path, Pose(13.0, 10.7, 0.0, 0.0))
     assert ahead.point(ahead.progress).distance_m(NedPoint(13.0, 10.5)) <= STEP_M
     assert advanced(ahead, HERE).progress == ahead.progress, "never back"
-    far = advanced(route, Pose(18.5, 10.5, 0.0, 0.0), window_m=2.0)
+    far = advanced(path, Pose(18.5, 10.5, 0.0, 0.0), window_m=2.0)
     assert far.point(far.progress).north_m <= 10.5 + 2.0 + STEP_M
     assert ahead.left_m == pytest.approx(5.5, abs=STEP_M)
     assert ahead.point_ahead(1.0).north_m == pytest.approx(14.0, abs=STEP_M)
     assert ahead.point_ahead(99.0) == END
 
 
-def test_a_route_is_clear_until_something_stands_in_it():
-    assert route_is_clear(northward(looked()), looked().map, 0.35)
+def test_a_path_is_clear_until_something_stands_in_it():
+    assert path_is_clear(northward(looked()), looked().map, 0.35)
     blocked = looked([(14.5, 10.6, 0.2)])
-    assert not route_is_clear(northward(blocked), blocked.map, 0.35)
+    assert not path_is_clear(northward(blocked), blocked.map, 0.35)
     beside = looked([(14.5, 11.6, 0.2)])
-    assert route_is_clear(northward(beside), beside.map, 0.35) and not route_is_clear(
-        northward(beside), beside.map, 1.2
-    )
+    assert path_is_clear(northward(beside), beside.map, 0.35) and not path_is_clear(northward(beside), beside.map, 1.2)
 
 
 # --- the setpoint ----------------------------------------------------------------------------------------------------
@@ -104,7 +113,7 @@ def test_a_route_is_clear_until_something_stands_in_it():
 
 def test_on_clear_ground_the_target_is_rolled_far_ahead_at_cruise_speed():
     answer = told(looked())
-    assert answer.motion is Motion.DRIVE and answer.speed_m_s == 2.0
+    assert answer.purpose is Purpose.DRIVE and answer.speed_m_s == 2.0
     assert isinstance(answer.setpoint, GuidedPosition)
     assert 6.0 < HERE.point.distance_m(answer.setpoint.point) <= SETTINGS.horizon_m + STEP_M
 
@@ -119,27 +128,27 @@ def test_ground_that_nobody_has_seen_is_looked_at_first():
     south = Pose(HERE.north_m, HERE.east_m, math.pi, 0.0)
     ground = Ground()
     answer = told(ground, south)
-    assert answer.motion is Motion.LOOK and isinstance(answer.setpoint, GuidedHeading)
+    assert answer.purpose is Purpose.LOOK and isinstance(answer.setpoint, GuidedHeading)
     assert abs(wrap_pi_rad(answer.setpoint.heading_rad)) < math.radians(45.0), "towards the route"
 
 
 def test_a_rolling_rover_brakes_before_it_turns_on_the_spot():
     answer = told(Ground(), Pose(HERE.north_m, HERE.east_m, math.pi, 0.0), speed_m_s=1.5)
-    assert answer.motion is Motion.BRAKE and answer.setpoint == GuidedVelocity(0.0, 0.0)
+    assert answer.purpose is Purpose.BRAKE and answer.setpoint == GuidedVelocity(0.0, 0.0)
 
 
 def test_it_brakes_for_what_it_would_touch():
     ground = looked([(12.0, 10.5, 0.3)])
-    assert told(ground, speed_m_s=2.0).motion is Motion.BRAKE
-    assert told(looked(), speed_m_s=2.0).motion is Motion.DRIVE
+    assert told(ground, speed_m_s=2.0).purpose is Purpose.BRAKE
+    assert told(looked(), speed_m_s=2.0).purpose is Purpose.DRIVE
 
 
 def test_a_wall_right_ahead_is_blocked():
     ground = Ground()
     wall = [(11.2, 8.0 + 0.1 * i, 0.05) for i in range(51)]
     ground.look_round(Pose(9.5, 10.5, 0.0, 0.0), wall, 10)
-    answer = told(ground, Pose(10.6, 10.5, 0.0, 0.0), route=northward(ground, NedPoint(10.6, 10.5)))
-    assert answer.motion is Motion.BLOCKED and answer.setpoint == GuidedVelocity(0.0, 0.0)
+    answer = told(ground, Pose(10.6, 10.5, 0.0, 0.0), path=northward(ground, NedPoint(10.6, 10.5)))
+    assert answer.purpose is Purpose.BLOCKED and answer.setpoint == GuidedVelocity(0.0, 0.0)
 
 
 @pytest.mark.parametrize("post_m", [1.45, 1.55, 1.65, 1.75])
@@ -150,12 +159,12 @@ def test_creeping_between_beams_it_is_told_no_place_behind_what_stands_farther_o
     post = NedPoint(pose.north_m + post_m, pose.east_m + 0.15)
     row, column = (int(metres * ground.map.subdivisions) for metres in (post.north_m, post.east_m))
     ground.map.log_odds[row, column] = ground.map.settings.limit
-    route, settings = northward(ground, pose.point), SETTINGS.model_copy(update={"least_reach_m": 0.6})
-    answer = guide(route, pose, 0.0, ground.map, ROVER, settings)
-    while answer.motion is Motion.LOOK:  # having turned, it sees nothing new
+    path, controller = northward(ground, pose.point), PointController()
+    answer = controller.follow(path, view(ground, pose, least_reach_m=0.6))
+    while answer.purpose is Purpose.LOOK:  # having turned, it sees nothing new
         pose = replace(pose, heading_rad=answer.setpoint.heading_rad)
-        answer = guide(route, pose, 0.0, ground.map, ROVER, settings, looking_rad=pose.heading_rad)
-    assert answer.motion is Motion.DRIVE and isinstance(answer.setpoint, GuidedPosition)
+        answer = controller.follow(path, view(ground, pose, least_reach_m=0.6))
+    assert answer.purpose is Purpose.DRIVE and isinstance(answer.setpoint, GuidedPosition)
     distance_m = pose.point.distance_m(answer.setpoint.point)
     assert 0.9 < distance_m < post_m
     assert look_along(ground.map, pose.point, answer.setpoint.point, ROVER.radius_m).clear_m >= distance_m - 0.01
@@ -164,29 +173,29 @@ def test_creeping_between_beams_it_is_told_no_place_behind_what_stands_farther_o
 def test_far_aside_it_turns_first():
     east = Pose(HERE.north_m, HERE.east_m, math.radians(120.0), 0.0)
     answer = told(looked(), east)
-    assert answer.motion is Motion.LOOK
+    assert answer.purpose is Purpose.LOOK
     assert abs(wrap_pi_rad(answer.setpoint.heading_rad)) < math.radians(10.0)
 
 
 def test_it_does_not_turn_while_rolling_into_what_stands_in_between():
     east = Pose(HERE.north_m, HERE.east_m, math.radians(90.0), 0.0)
-    assert told(looked(), east, speed_m_s=1.8).motion is Motion.LOOK
+    assert told(looked(), east, speed_m_s=1.8).purpose is Purpose.LOOK
     post = looked([(HERE.north_m + 1.2, HERE.east_m + 1.2, 0.15)])
-    assert told(post, east, speed_m_s=1.8).motion is Motion.BRAKE
-    assert told(post, east).motion is not Motion.BRAKE, "standing, it may turn"
+    assert told(post, east, speed_m_s=1.8).purpose is Purpose.BRAKE
+    assert told(post, east).purpose is not Purpose.BRAKE, "standing, it may turn"
 
 
 def test_obstacles_close_beside_slow_it_down_but_never_to_nothing():
     posts = [(north, 10.5 + side * 0.95, 0.1) for north in np.arange(9.0, 18.0, 0.3) for side in (-1.0, 1.0)]
     narrow = told(looked(posts, 20))
-    assert narrow.motion is Motion.DRIVE
+    assert narrow.purpose is Purpose.DRIVE
     assert SETTINGS.min_speed_m_s <= narrow.speed_m_s < told(looked()).speed_m_s
 
 
 def test_a_short_sighted_sensor_limits_the_speed():
     near = RoverLimits(0.35, cruise_speed_m_s=5.0, sight_m=2.0)
     ground = looked()
-    answer = guide(northward(ground), HERE, 0.0, ground.map, near, SETTINGS)
+    answer = PointController().follow(northward(ground), view(ground, rover=near))
     assert answer.speed_m_s < 5.0 and stopping_distance_m(answer.speed_m_s, SETTINGS) <= 2.0
 
 
@@ -199,7 +208,7 @@ def test_the_fastest_speed_stops_within_the_distance(distance_m):
 
 @pytest.mark.parametrize("seed", range(60))
 def test_whatever_stands_round_it_the_way_to_the_target_is_clear_and_seen(seed):
-    """Random posts, headings and speeds: no target beyond what was seen free plus stopping distance, none through a post."""
+    """Random posts, headings and speeds: no target beyond seen ground plus stopping distance, none through a post."""
     rng = np.random.default_rng(seed)
     posts = [
         (north, east, 0.25)
@@ -212,7 +221,7 @@ def test_whatever_stands_round_it_the_way_to_the_target_is_clear_and_seen(seed):
     speed_m_s = float(rng.uniform(0.0, 2.0))
     answer = told(ground, pose, speed_m_s)
     assert SETTINGS.min_speed_m_s <= answer.speed_m_s <= 2.0 or answer.speed_m_s == 0.0
-    if answer.motion in (Motion.BRAKE, Motion.BLOCKED):
+    if answer.purpose in (Purpose.BRAKE, Purpose.BLOCKED):
         assert answer.setpoint == GuidedVelocity(0.0, 0.0)
     elif isinstance(answer.setpoint, GuidedPosition):
         target = answer.setpoint.point
@@ -230,4 +239,4 @@ def test_whatever_stands_round_it_the_way_to_the_target_is_clear_and_seen(seed):
             )
             assert gaps.min() > radius_m + ROVER.radius_m - 0.05
     else:
-        assert answer.motion is Motion.LOOK
+        assert answer.purpose is Purpose.LOOK

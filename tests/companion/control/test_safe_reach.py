@@ -7,7 +7,8 @@ import math
 import numpy as np
 
 from companion.control.braking import blind_distance_m
-from companion.control.reference_path import STEP_M, Route
+from companion.control.local_view import LocalView
+from companion.control.reference_path import STEP_M, ReferencePath
 from companion.control.safe_reach import BACK_LEAST_M_S, arc_is_free, backing_speed_m_s, farthest_clear
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
@@ -19,7 +20,7 @@ SETTINGS = Settings()
 GUIDANCE = SETTINGS.guidance
 ROVER = RoverLimits(0.35, 2.0, 8.0)
 HERE = Pose(4.0, 10.0, 0.0, 0.0)
-NORTHWARD = Route(np.column_stack((np.arange(4.0, 18.0, STEP_M), np.full(56, 10.0))))
+NORTHWARD = ReferencePath(np.column_stack((np.arange(4.0, 18.0, STEP_M), np.full(56, 10.0))))
 
 
 def ground(seen_north_m: float = 20.0) -> EvidenceMap:
@@ -34,8 +35,12 @@ def put(evidence: EvidenceMap, north_m: float, east_m: float, value: float = 2.0
     evidence.log_odds[y : y + 2, x : x + 2] = value
 
 
+def view(evidence: EvidenceMap, pose: Pose = HERE, speed_m_s: float = 0.0) -> LocalView:
+    return LocalView(pose, speed_m_s, evidence, ROVER, SETTINGS)
+
+
 def reach_m(evidence: EvidenceMap, speed_m_s: float = 0.0) -> float:
-    return farthest_clear(NORTHWARD, HERE, speed_m_s, evidence, ROVER, GUIDANCE)[1]
+    return farthest_clear(NORTHWARD, view(evidence, speed_m_s=speed_m_s)).distance_m
 
 
 def test_the_target_leaves_room_for_front_and_overshoot_before_what_was_not_seen() -> None:
@@ -53,30 +58,29 @@ def test_a_flank_that_was_not_seen_ends_it_however_far_away() -> None:
 
 
 def test_at_the_edge_of_the_map_nothing_more_needs_to_be_seen() -> None:
-    route = Route(np.column_stack((np.arange(4.0, -0.01, -STEP_M) + 0.5, np.full(17, 10.0))))
+    path = ReferencePath(np.column_stack((np.arange(4.0, -0.01, -STEP_M) + 0.5, np.full(17, 10.0))))
     pose = Pose(4.5, 10.0, math.pi, 0.0)
-    target, _, _ = farthest_clear(route, pose, 0.0, ground(), ROVER, GUIDANCE)
-    assert target.north_m < 0.8
+    assert farthest_clear(path, view(ground(), pose)).target.north_m < 0.8
 
 
 def test_the_arc_to_a_target_aside_is_looked_along() -> None:
     evidence, aside = ground(), NedPoint(8.0, 12.0)
-    assert arc_is_free(HERE, aside, evidence, ROVER)
+    assert arc_is_free(view(evidence), aside)
     put(evidence, 6.0, 10.2)  # not on the straight line, but where the rover swings out to
-    assert not arc_is_free(HERE, aside, evidence, ROVER)
-    assert not arc_is_free(Pose(4.0, 10.0, math.pi, 0.0), aside, ground(), ROVER), "behind"
-    assert arc_is_free(Pose(4.0, 10.0, HERE.point.bearing_rad(aside), 0.0), aside, evidence, ROVER)
+    assert not arc_is_free(view(evidence), aside)
+    assert not arc_is_free(view(ground(), Pose(4.0, 10.0, math.pi, 0.0)), aside), "behind"
+    assert arc_is_free(view(evidence, Pose(4.0, 10.0, HERE.point.bearing_rad(aside), 0.0)), aside)
 
 
 def test_backing_off_is_as_slow_as_the_room_behind_asks_for() -> None:
     pose, evidence = Pose(10.0, 10.0, 0.0, 0.0), ground()
-    assert backing_speed_m_s(pose, evidence, 0.35, GUIDANCE) == GUIDANCE.back_out_speed_m_s
+    assert backing_speed_m_s(view(evidence, pose)) == GUIDANCE.back_out_speed_m_s
     put(evidence, 8.4, 10.0)
-    near_m_s = backing_speed_m_s(pose, evidence, 0.35, GUIDANCE)
+    near_m_s = backing_speed_m_s(view(evidence, pose))
     assert BACK_LEAST_M_S < near_m_s < GUIDANCE.back_out_speed_m_s
     assert blind_distance_m(near_m_s, GUIDANCE) < 1.6 - 0.35
     put(evidence, 9.2, 10.0)
-    assert backing_speed_m_s(pose, evidence, 0.35, GUIDANCE) < BACK_LEAST_M_S
+    assert backing_speed_m_s(view(evidence, pose)) < BACK_LEAST_M_S
 
 
 def test_looking_again_forgets_only_what_was_not_just_seen() -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +14,10 @@ from hypothesis import settings as runs
 from hypothesis import strategies as st
 
 from companion.control.braking import farthest_m
-from companion.control.point_controller import STOP, ControlCommand, Motion
+from companion.control.controller import STOP, ControlCommand, Purpose
+from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
-from companion.control.setpoint_check import Output, SetpointCheck, Surroundings, fault_of, inside_borders
+from companion.control.setpoint_check import SetpointCheck, fault_of, inside_borders
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -40,8 +41,21 @@ def open_ground() -> EvidenceMap:
     return evidence
 
 
-def surroundings(evidence: EvidenceMap) -> Surroundings:
-    return Surroundings(evidence, RoverLimits(RADIUS_M, 2.0, 8.0), SETTINGS)
+@dataclass(frozen=True)
+class Output:
+    """A setpoint that is about to be sent, and the rover at this moment."""
+
+    setpoint: Setpoint
+    pose: Pose
+    speed_m_s: float
+
+
+def view(evidence: EvidenceMap, pose: Pose, speed_m_s: float = 0.0) -> LocalView:
+    return LocalView(pose, speed_m_s, evidence, RoverLimits(RADIUS_M, 2.0, 8.0), SETTINGS)
+
+
+def fault(output: Output, evidence: EvidenceMap, *bounds: Bound) -> str:
+    return fault_of(output.setpoint, view(evidence, output.pose, output.speed_m_s), Bounds(bounds))
 
 
 def patched(evidence: EvidenceMap, north_m: float, east_m: float, size_m: float, value: float) -> None:
@@ -87,7 +101,7 @@ def test_a_position_that_passes_is_near_and_the_way_there_clear_and_seen(evidenc
     assert isinstance(output.setpoint, GuidedPosition)
     pose, there = output.pose, output.setpoint.point
     standing, unseen = places_of(evidence, True), places_of(evidence, False)
-    if gap_m(standing, pose.north_m, pose.east_m) < RADIUS_M + 0.2 or fault_of(output, surroundings(evidence)):
+    if gap_m(standing, pose.north_m, pose.east_m) < RADIUS_M + 0.2 or fault(output, evidence):
         return
     distance_m = pose.point.distance_m(there)
     assert distance_m <= farthest_m(output.speed_m_s, SETTINGS.guidance) + 0.1
@@ -108,15 +122,15 @@ def test_a_velocity_that_passes_can_be_stopped_on_its_arc(evidence: EvidenceMap,
     assert isinstance(output.setpoint, GuidedVelocity)
     pose, speed_m_s = output.pose, output.setpoint.forward_m_s
     standing = places_of(evidence, True)
-    if gap_m(standing, pose.north_m, pose.east_m) < RADIUS_M + 0.3 or fault_of(output, surroundings(evidence)):
+    if gap_m(standing, pose.north_m, pose.east_m) < RADIUS_M + 0.3 or fault(output, evidence):
         return
     north_m, east_m = pose.north_m, pose.east_m
     course_rad = pose.heading_rad + (math.pi if speed_m_s < 0.0 else 0.0)
-    curvature_m = output.setpoint.yaw_rate_rad_s / max(output.speed_m_s, 1.0)
+    curvature_per_m = output.setpoint.yaw_rate_rad_s / max(output.speed_m_s, 1.0)
     alone_m = abs(speed_m_s) * 3.25 + speed_m_s**2 / 1.6
     for _ in np.arange(0.0, alone_m - 0.1 - evidence.evidence_m, 0.02):
         north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
-        course_rad += 0.02 * curvature_m
+        course_rad += 0.02 * curvature_per_m
         assert gap_m(standing, north_m, east_m) > RADIUS_M - 0.05 - evidence.evidence_m
 
 
@@ -131,13 +145,13 @@ def test_backing_out_asks_for_nothing_that_is_refused(
     """Neither fences nor what stands there: also where the rover stands close beside closed fields, or in one."""
     for x, y in closed:
         evidence.base.weights[y, x] = 1.0
-    speed_m_s = backing_speed_m_s(output.pose, evidence, RADIUS_M, SETTINGS.guidance)
+    speed_m_s = backing_speed_m_s(view(evidence, output.pose, output.speed_m_s))
     back = replace(output, setpoint=GuidedVelocity(-speed_m_s, 0.0))
-    assert speed_m_s < BACK_LEAST_M_S or fault_of(back, surroundings(evidence)) == ""
+    assert speed_m_s < BACK_LEAST_M_S or fault(back, evidence) == ""
 
 
 def test_on_open_ground_it_backs_out_as_fast_as_it_may() -> None:
-    back_m_s = backing_speed_m_s(Pose(MIDDLE, MIDDLE, 0.7, 0.0), open_ground(), RADIUS_M, SETTINGS.guidance)
+    back_m_s = backing_speed_m_s(view(open_ground(), Pose(MIDDLE, MIDDLE, 0.7, 0.0)))
     assert back_m_s == SETTINGS.guidance.back_out_speed_m_s
 
 
@@ -148,27 +162,28 @@ def test_on_open_ground_that_was_seen_only_distance_and_the_edge_of_the_map_coun
     there = output.setpoint.point
     distance_m = output.pose.point.distance_m(there)
     inside = 0.0 < there.north_m < SIDE and 0.0 < there.east_m < SIDE
-    fault = fault_of(output, surroundings(open_ground()))
     if inside:
-        assert bool(fault) == (distance_m > farthest_m(output.speed_m_s, SETTINGS.guidance) + 0.1)
+        assert bool(fault(output, open_ground())) == (
+            distance_m > farthest_m(output.speed_m_s, SETTINGS.guidance) + 0.1
+        )
 
 
 @pytest.mark.parametrize("setpoint", [STOP, GuidedVelocity(0.0, 0.5), GuidedHeading(1.0)])
 def test_standing_and_turning_on_the_spot_always_pass(setpoint: Setpoint) -> None:
     evidence = open_ground()
     patched(evidence, MIDDLE - 1.0, MIDDLE - 1.0, 2.0, 2.0)
-    assert fault_of(Output(setpoint, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), surroundings(evidence)) == ""
+    assert fault(Output(setpoint, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), evidence) == ""
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_what_is_not_a_number_does_not_pass(value: float) -> None:
-    known, pose = surroundings(open_ground()), Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
     for setpoint in (
         GuidedPosition(NedPoint(value, 1.0)),
         GuidedVelocity(value, 0.0),
         GuidedVelocity(1.0, value),
     ):
-        assert fault_of(Output(setpoint, pose, 0.0), known)
+        assert fault(Output(setpoint, pose, 0.0), open_ground())
 
 
 def test_the_faults_have_names() -> None:
@@ -176,28 +191,31 @@ def test_the_faults_have_names() -> None:
     ahead = Output(GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), pose, 0.0)
     evidence = open_ground()
     patched(evidence, MIDDLE + 2.0, MIDDLE - 1.0, 2.0, 0.0)
-    assert fault_of(ahead, surroundings(evidence)) == "target on ground not seen"
+    assert fault(ahead, evidence) == "target on ground not seen"
     patched(evidence, MIDDLE + 2.0, MIDDLE - 1.0, 2.0, 2.0)
-    assert fault_of(ahead, surroundings(evidence)) == "target behind something"
+    assert fault(ahead, evidence) == "target behind something"
     fast = Output(GuidedVelocity(2.0, 0.0), pose, 2.0)
-    assert fault_of(fast, surroundings(evidence)) == "velocity leads into something"
+    assert fault(fast, evidence) == "velocity leads into something"
 
 
 def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
     said: list[str] = []
-    check, known = SetpointCheck(lambda text, severity: said.append(text)), surroundings(open_ground())
-    pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
-    good = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), 1.0)
-    assert check.passed(good, pose, 0.0, known) is good and not said and not check.refused
-    far = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
-    assert check.passed(far, pose, 0.0, known).setpoint == STOP
+    check, at = (
+        SetpointCheck(lambda text, severity: said.append(text)),
+        view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0)),
+    )
+    good = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), 1.0)
+    assert check.passed(good, at, Bounds()) == good and not said and not check.refused
+    far = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
+    assert check.passed(far, at, Bounds()).setpoint == STOP
     assert said == ["Stopping: target farther away than the horizon"] and check.refused.total() == 1
 
 
 def test_a_rule_more_is_asked_like_the_others() -> None:
-    check = SetpointCheck(lambda text, severity: None, (lambda output, known: "not on Sundays",))
-    drive = ControlCommand(Motion.LOOK, GuidedHeading(0.0), 0.5)
-    assert check.passed(drive, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0, surroundings(open_ground())).setpoint == STOP
+    check = SetpointCheck(lambda text, severity: None, (lambda setpoint, at, bounds: "not on Sundays",))
+    drive = ControlCommand(Purpose.LOOK, GuidedHeading(0.0), 0.5)
+    at = view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0))
+    assert check.passed(drive, at, Bounds()).setpoint == STOP
     assert check.refused == {"not on Sundays": 1}
 
 
@@ -207,7 +225,7 @@ def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None
     rig.until_driven(2.0)
     driver = rig.companion.driver
     assert driver is not None
-    through = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(0.0, 7.0)), 2.0)
+    through = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(0.0, 7.0)), 2.0)
     driver.update = lambda *_: (through, None)  # type: ignore[method-assign]
     since_s = rig.now_s()
     rig.run_for(10.0)
@@ -221,10 +239,6 @@ def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None
 # --- borders ---------------------------------------------------------------------------------------------------------
 
 
-def bordered(*bounds: Bound) -> Surroundings:
-    return Surroundings(open_ground(), RoverLimits(RADIUS_M, 2.0, 8.0), SETTINGS, Bounds(bounds))
-
-
 def inner(side_m: float) -> Bound:
     """A square in the middle of the ground that the rover must not leave."""
     corner = MIDDLE - side_m / 2.0
@@ -236,7 +250,7 @@ def inner(side_m: float) -> Bound:
 @given(st.one_of(POSITIONS, VELOCITIES), st.floats(5.0, 12.0))
 def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, side_m: float) -> None:
     bound = inner(side_m)
-    if fault_of(output, bordered(bound)):
+    if fault(output, open_ground(), bound):
         return
     here, setpoint = output.pose, output.setpoint
     if isinstance(setpoint, GuidedPosition):
@@ -247,18 +261,18 @@ def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, 
         if setpoint.forward_m_s == 0.0:
             return
         course_rad = here.heading_rad + (math.pi if setpoint.forward_m_s < 0.0 else 0.0)
-        curvature_m = setpoint.yaw_rate_rad_s / max(output.speed_m_s, SETTINGS.steering.scale_base_m_s)
+        curvature_per_m = setpoint.yaw_rate_rad_s / max(output.speed_m_s, SETTINGS.steering.scale_base_m_s)
         north_m, east_m, points = here.north_m, here.east_m, []
         for _ in np.arange(0.0, fastest_m_s * 0.25 + fastest_m_s**2 / 1.6, 0.02):
             points.append((east_m, north_m))
             north_m, east_m = north_m + 0.02 * math.cos(course_rad), east_m + 0.02 * math.sin(course_rad)
-            course_rad += 0.02 * curvature_m
+            course_rad += 0.02 * curvature_per_m
         way = shapely.LineString([(here.east_m, here.north_m), *points, (east_m, north_m)])
     assert bound.shape.buffer(0.02).covers(way)
 
 
 @pytest.mark.parametrize(
-    ("setpoint", "heading_rad", "fault"),
+    ("setpoint", "heading_rad", "refused"),
     [
         (GuidedPosition(NedPoint(MIDDLE + 2.0, MIDDLE)), 0.0, False),
         (GuidedPosition(NedPoint(MIDDLE + 3.5, MIDDLE)), 0.0, True),
@@ -270,20 +284,21 @@ def test_what_passes_keeps_the_rovers_middle_inside_its_borders(output: Output, 
         (GuidedHeading(0.0), 0.0, False),
     ],
 )
-def test_positions_and_velocities_before_a_border(setpoint: Setpoint, heading_rad: float, fault: bool) -> None:
+def test_positions_and_velocities_before_a_border(setpoint: Setpoint, heading_rad: float, refused: bool) -> None:
     """3 m from the middle: from 2 m/s the rover needs 3 m, from 1.5 m/s 1.8 m, and its body is 0.35 m."""
-    found = inside_borders(Output(setpoint, Pose(MIDDLE, MIDDLE, heading_rad, 0.0), 0.0), bordered(inner(6.0)))
-    assert found == ("setpoint leads over the border of the yard" if fault else "")
+    at = view(open_ground(), Pose(MIDDLE, MIDDLE, heading_rad, 0.0))
+    found = inside_borders(setpoint, at, Bounds((inner(6.0),)))
+    assert found == ("setpoint leads over the border of the yard" if refused else "")
 
 
 def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path) -> None:
-    """The map and its rules out of the way: the shapes alone keep the rover inside the autopilot's fence, and it is said."""
+    """Without the map and its rules the shapes alone keep the rover inside the autopilot's fence, and it is said."""
     rig = Rig(yard(tmp_path), prepare=stored(box(KEEP_IN, -6.0, -2.4, 6.5, 20.0), **POLYGONS, FENCE_MARGIN=0.0))
     rig.until_driven(1.0)
     driver, bounds = rig.companion.driver, rig.companion.executor.layout.bounds  # type: ignore[union-attr]
     assert driver is not None and len(bounds) == 1
-    rig.companion.mission_run.setpoint_check = SetpointCheck(rig.companion._notifier.tell, (inside_borders,))
-    out = ControlCommand(Motion.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
+    rig.companion.output_check = SetpointCheck(rig.companion._tell, (inside_borders,))
+    out = ControlCommand(Purpose.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
     driver.update = lambda *_: (out, None)  # type: ignore[method-assign]
     rig.run_for(15.0)
     assert any("setpoint leads over the border of the autopilot's fence" in text for text in rig.texts())

@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.control.point_controller import STANDSTILL, STOP, ControlCommand, Motion
+from companion.control.controller import STANDSTILL, STOP, Purpose
+from companion.control.point_controller import ControlCommand
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.core.severity import Severity
 from companion.executive.auto_mode_legs import AutoModeLegs
@@ -152,7 +153,7 @@ def test_a_leg_that_was_reached_before_auto_ends_it_stays_reached(tmp_path: Path
     served.executor.progress = on_reached(progress, 10.0)
     nearer = served.legs.guide(STANDSTILL, served.executor, 0.5)
     assert nearer.setpoint == GuidedPosition(progress.goal.point) and nearer.speed_m_s == 0.5
-    braking = ControlCommand(Motion.BRAKE, STOP, 0.0)
+    braking = ControlCommand(Purpose.BRAKE, STOP, 0.0)
     assert served.legs.guide(braking, served.executor, 0.5) == braking, "it makes way"
     assert served.follow(replace(live, state=LegState.OVER))
     assert served.executor.progress.statuses == (TargetStatus.REACHED,)

@@ -4,7 +4,9 @@ from threading import Event
 
 import numpy as np
 
-from companion.control.point_controller import Motion
+from companion.control.controller import ControlCommand, Purpose
+from companion.control.local_view import LocalView
+from companion.control.point_controller import PointController
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -64,67 +66,77 @@ def seen_map(pose: Pose) -> EvidenceMap:
     return evidence
 
 
-def driver(runner: StepRunner, pose: Pose) -> GoalDriver:
-    planner = make_planner("hybrid", SETTINGS.planner)
-    searcher = PathSearcher(planner, SETTINGS.navigator, np.random.default_rng(1))
-    return GoalDriver(seen_map(pose), RoverLimits(0.35, 2.0, 8.0), SETTINGS, searcher, runner)
+class Drive:
+    """A goal driver on one map that the rover stands on."""
 
+    def __init__(self, runner: StepRunner) -> None:
+        planner = make_planner("hybrid", SETTINGS.planner)
+        searcher = PathSearcher(planner, SETTINGS.navigator, np.random.default_rng(1))
+        self.driver = GoalDriver(PointController(), searcher, runner)
+        self.evidence = seen_map(Pose(20.5, 20.5, 0.0, 0.0))
 
-def at(time_s: float, heading_rad: float = 0.0) -> Pose:
-    return Pose(20.5, 20.5, heading_rad, time_s)
+    def at(self, time_s: float, speed_m_s: float = 0.0) -> LocalView:
+        pose = Pose(20.5, 20.5, 0.0, time_s)
+        return LocalView(pose, speed_m_s, self.evidence, RoverLimits(0.35, 2.0, 8.0), SETTINGS)
+
+    def head_for(self, goal: ResolvedTarget, time_s: float = 0.0) -> None:
+        self.driver.head_for(goal, self.at(time_s))
+
+    def update(self, time_s: float, speed_m_s: float = 0.0) -> tuple[ControlCommand, Decision | None]:
+        return self.driver.update(self.at(time_s, speed_m_s))
 
 
 def test_the_rover_stands_until_the_first_decision() -> None:
     runner = LateRunner()
-    drive = driver(runner, at(0.0))
-    drive.head_for(target(30.5, 20.5), at(0.0))
-    assert drive.update(at(0.05), 0.0)[0].setpoint == GuidedVelocity(0.0, 0.0)
+    drive = Drive(runner)
+    drive.head_for(target(30.5, 20.5))
+    assert drive.update(0.05)[0].setpoint == GuidedVelocity(0.0, 0.0)
     runner.ready = True
-    guide, decision = drive.update(at(0.1), 0.0)
+    command, decision = drive.update(0.1)
     assert decision is not None
-    assert isinstance(guide.setpoint, GuidedPosition)
-    assert guide.setpoint.point.north_m > 22.0
+    assert isinstance(command.setpoint, GuidedPosition)
+    assert command.setpoint.point.north_m > 22.0
 
 
 def test_a_step_begun_for_the_last_leg_does_not_steer_the_next_one() -> None:
     runner = LateRunner()
-    drive = driver(runner, at(0.0))
-    drive.head_for(target(30.5, 20.5), at(0.0))
-    drive.update(at(0.05), 0.0)
+    drive = Drive(runner)
+    drive.head_for(target(30.5, 20.5))
+    drive.update(0.05)
     assert runner.busy
-    drive.leave()
-    drive.head_for(target(10.5, 20.5), at(0.1))
+    drive.driver.leave()
+    drive.head_for(target(10.5, 20.5), 0.1)
     runner.ready = True
-    assert drive.update(at(0.15), 0.0)[1] is None
-    drive.update(at(0.2), 0.0)
+    assert drive.update(0.15)[1] is None
+    drive.update(0.2)
     runner.ready = True
-    _, decision = drive.update(at(0.25), 0.0)
+    _, decision = drive.update(0.25)
     assert decision is not None
     assert decision.path[-1].y == 10
 
 
 def test_a_rover_that_does_not_get_on_backs_out_and_plans_anew() -> None:
-    drive = driver(InlineRunner(), at(0.0))
-    drive.head_for(target(30.5, 20.5), at(0.0))
-    setpoints = [drive.update(at(0.05 * tick), 0.0)[0].setpoint for tick in range(300)]
+    drive = Drive(InlineRunner())
+    drive.head_for(target(30.5, 20.5))
+    setpoints = [drive.update(0.05 * tick)[0].setpoint for tick in range(300)]
     backwards = [s for s in setpoints if isinstance(s, GuidedVelocity) and s.forward_m_s < 0.0]
     assert backwards
-    assert drive.tally.stuck >= 1
+    assert drive.driver.tally.stuck >= 1
     assert isinstance(setpoints[20], GuidedPosition)
     assert drive.evidence.penalty.max() > 0.0
 
 
 def test_the_thread_gives_the_same_decision() -> None:
-    inline = driver(InlineRunner(), at(0.0))
-    inline.head_for(target(30.5, 20.5), at(0.0))
-    _, wanted = inline.update(at(0.05), 0.0)
+    inline = Drive(InlineRunner())
+    inline.head_for(target(30.5, 20.5))
+    _, wanted = inline.update(0.05)
     runner = ThreadRunner()
     try:
-        threaded = driver(runner, at(0.0))
-        threaded.head_for(target(30.5, 20.5), at(0.0))
+        threaded = Drive(runner)
+        threaded.head_for(target(30.5, 20.5))
         decision = None
         for _ in range(3000):
-            decision = threaded.update(at(0.05), 0.0)[1]
+            decision = threaded.update(0.05)[1]
             if decision is not None:
                 break
             Event().wait(0.01)
@@ -136,10 +148,10 @@ def test_the_thread_gives_the_same_decision() -> None:
 
 
 def test_a_rover_faster_than_it_may_be_is_braked() -> None:
-    one = driver(InlineRunner(), at(0.0))
-    one.head_for(target(32.5, 20.5), at(0.0))
-    assert one.update(at(0.0), 0.0)[0].motion is Motion.DRIVE
-    assert one.update(at(0.1), 2.2)[0].motion is Motion.DRIVE
-    surging, _ = one.update(at(0.2), 2.4)
-    assert (surging.motion, surging.setpoint) == (Motion.BRAKE, GuidedVelocity(0.0, 0.0))
-    assert one.update(at(0.3), 2.2)[0].motion is Motion.DRIVE
+    one = Drive(InlineRunner())
+    one.head_for(target(32.5, 20.5))
+    assert one.update(0.0, 0.0)[0].purpose is Purpose.DRIVE
+    assert one.update(0.1, 2.2)[0].purpose is Purpose.DRIVE
+    surging, _ = one.update(0.2, 2.4)
+    assert (surging.purpose, surging.setpoint) == (Purpose.BRAKE, GuidedVelocity(0.0, 0.0))
+    assert one.update(0.3, 2.2)[0].purpose is Purpose.DRIVE

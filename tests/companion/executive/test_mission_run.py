@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from companion.control.point_controller import STANDSTILL, ControlCommand
+from companion.control.controller import STANDSTILL
+from companion.control.point_controller import ControlCommand
 from companion.executive.mission_executor import Task
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.mission_run import LocatedScan, MissionRun, Order

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import pytest
 
-from companion.control.point_controller import STOP, ControlCommand, Motion
+from companion.control.controller import STOP, ControlCommand, Purpose
 from companion.core.frames import NedPoint
 from companion.executive.setpoint_sender import SentSetpoints, SetpointSender
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -25,11 +25,11 @@ SETTINGS = GuidanceSettings()
 
 
 def drive(north_m: float, speed_m_s: float = 2.0) -> ControlCommand:
-    return ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(north_m, 0.0)), speed_m_s)
+    return ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(north_m, 0.0)), speed_m_s)
 
 
 def look(heading_deg: float) -> ControlCommand:
-    return ControlCommand(Motion.LOOK, GuidedHeading(math.radians(heading_deg)), 0.5)
+    return ControlCommand(Purpose.LOOK, GuidedHeading(math.radians(heading_deg)), 0.5)
 
 
 def times_sent(guides, confirmed: bool | None = True, kind: type = GuidedPosition) -> list[float]:
@@ -68,11 +68,11 @@ def test_what_the_autopilot_does_not_follow_is_said_again_sooner(confirmed, coun
 
 def test_stopping_goes_out_at_once_and_is_kept_alive():
     """The autopilot stops by itself 3 s after the last velocity."""
-    times_s = times_sent([(t, ControlCommand(Motion.BRAKE, STOP, 0.0)) for t in ticks(2.0)], kind=GuidedVelocity)
+    times_s = times_sent([(t, ControlCommand(Purpose.BRAKE, STOP, 0.0)) for t in ticks(2.0)], kind=GuidedVelocity)
     assert times_s[0] == 0.0 and max(b - a for a, b in pairwise(times_s)) < 1.0
     sent = SentSetpoints()
     sent.due(drive(8.0), 0.0, SETTINGS, confirmed=True)
-    assert sent.due(ControlCommand(Motion.BRAKE, STOP, 0.0), 0.05, SETTINGS, confirmed=True) == [STOP]
+    assert sent.due(ControlCommand(Purpose.BRAKE, STOP, 0.0), 0.05, SETTINGS, confirmed=True) == [STOP]
     assert GuidedPosition(NedPoint(8.0, 0.0)) in sent.due(drive(8.0), 0.1, SETTINGS, confirmed=True), (
         "and so does driving on"
     )
@@ -80,9 +80,9 @@ def test_stopping_goes_out_at_once_and_is_kept_alive():
 
 def test_a_changed_velocity_goes_out_at_once():
     sent = SentSetpoints()
-    sent.due(ControlCommand(Motion.BRAKE, STOP, 0.0), 0.0, SETTINGS, confirmed=None)
+    sent.due(ControlCommand(Purpose.BRAKE, STOP, 0.0), 0.0, SETTINGS, confirmed=None)
     back = GuidedVelocity(-0.4, 0.0)
-    assert sent.due(ControlCommand(Motion.DRIVE, back, 0.0), 0.05, SETTINGS, confirmed=None) == [back]
+    assert sent.due(ControlCommand(Purpose.DRIVE, back, 0.0), 0.05, SETTINGS, confirmed=None) == [back]
 
 
 def test_headings_are_repeated_slowly_and_followed_when_they_turn():
@@ -108,7 +108,7 @@ def test_speed_goes_with_positions_when_it_changes_and_now_and_then():
     assert slower == [(0.0, 2.0), (1.0, 0.8)]
     trembling = speeds([(t, drive(8.0, 2.0 + 0.1 * (i % 2))) for i, t in enumerate(ticks(2.0))])
     assert len(trembling) == 1
-    assert not speeds([(0.0, look(10.0)), (0.1, ControlCommand(Motion.BRAKE, STOP, 0.0))])
+    assert not speeds([(0.0, look(10.0)), (0.1, ControlCommand(Purpose.BRAKE, STOP, 0.0))])
 
 
 def test_after_a_reset_everything_is_new():
@@ -119,7 +119,7 @@ def test_after_a_reset_everything_is_new():
     assert sent.due(drive(8.0), 0.2, SETTINGS, confirmed=True) == [GuidedPosition(NedPoint(8.0, 0.0)), ChangeSpeed(2.0)]
 
 
-AHEAD = ControlCommand(Motion.DRIVE, GuidedPosition(NedPoint(8.0, 0.0)), 2.0)
+AHEAD = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(8.0, 0.0)), 2.0)
 
 
 @pytest.mark.parametrize("origin", [True, False])

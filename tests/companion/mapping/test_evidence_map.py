@@ -13,15 +13,14 @@ from companion.core.grid import BASE_WEIGHT, Cell, Grid, empty_grid
 from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import (
     EvidenceMap,
-    clearance_m,
     doubt,
     forget,
     integrate,
     known_fields,
-    look_along,
     new_map,
     penalise,
 )
+from companion.mapping.map_queries import clearance_m, look_along
 from companion.mapping.sensor_agreement import BELIEVED_S
 from companion.settings import MappingSettings
 

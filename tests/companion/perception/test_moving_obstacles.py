@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.control.reference_path import Route, with_planned_speeds
+from companion.control.reference_path import ReferencePath, with_planned_speeds
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.mavlink.codec import Codec
@@ -152,7 +152,7 @@ def test_a_change_of_motion_is_noticed_and_jitter_is_not() -> None:
 
 
 def test_planned_speeds_lie_along_the_route() -> None:
-    route = Route(np.column_stack((np.linspace(0.0, 20.0, 81), np.zeros(81))))
+    route = ReferencePath(np.column_stack((np.linspace(0.0, 20.0, 81), np.zeros(81))))
     curve = np.array([[0.0, 0.0], [0.0, 2.0], [0.0, 10.0]])
     planned = with_planned_speeds(route, Path((), 1.0, curve, np.array([0.5, 0.8])), 2.0)
     assert planned.speeds_m_s is not None

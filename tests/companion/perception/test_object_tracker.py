@@ -26,7 +26,7 @@ class Watcher:
         assert lidar is not None
         self.world, self.lidar, self.speed_m_s = world, lidar, speed_m_s
         self.evidence: EvidenceMap = new_map(empty_grid(40, 40), 0.35, SETTINGS.mapping)
-        self.tracker = ObjectTracker(self.evidence, SETTINGS.traffic)
+        self.tracker = ObjectTracker(self.evidence)
         self.chance = np.random.default_rng(seed)
         self.scans = 0
 
@@ -42,7 +42,7 @@ class Watcher:
         self.tracker.take(pose, 0.0, scan)
         integrate(self.evidence, pose, scan, self.scans)
         self.tracker.remember(pose, lidar.max_m)
-        return self.tracker.moving(time_s)
+        return self.tracker.moving(time_s, SETTINGS.traffic)
 
 
 def ground(*movers: Mover) -> World:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from companion.control.point_controller import STOP
+from companion.control.controller import STOP
 from companion.core.severity import Severity
 from companion.safety.mode_latch import Control, LatchState
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase

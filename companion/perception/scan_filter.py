@@ -1,37 +1,80 @@
-"""Notices a range sensor that repeats itself: the same readings again and again although the rover moves."""
+"""Scan filter: of a flood of scans the newest of each sensor, and notice of a sensor that repeats itself.
+
+Of range data that piles up within one tick only the newest of each sensor is taken in, so that a flood does not
+cost a tick its time. A sensor repeats itself when it sends the same readings again and again although the rover
+moves.
+
+Nouns: scan filter.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from companion.core.scan import RangeScan
+from companion.vehicle.events import (
+    Event,
+    RangeSeen,
+)
 from companion.vehicle.state import VehicleState
 
+MOST_SCANS = 20
+"""In one tick, and of this many sensors at most: eight sectors, as many beams, and lidars."""
+SAME = 3
+"""Of one sensor this many are still taken in: two sensors that nothing tells apart may send the same message."""
+
+Sensor = tuple[int, str, int]
+"""What tells sensors apart: the sender, the kind of message, and the eighth of a circle in which its readings begin."""
+
 STUCK_S = 0.5
-"""Many drivers send faster than their sensor measures: the same readings for less than this are nothing."""
+"""Many drivers send faster than their sensor measures: the same readings for less than this mean nothing."""
 STUCK_M = 0.25
 STUCK_RAD = math.radians(10.0)
-"""The rover must have come so far, or turned by so much, with one and the same readings."""
+"""The rover must have come this far, or turned by this much, with one and the same readings."""
 FEW_M = 1.0
 """The same for a scan with few different ranges, which a wall beside the way may well give for a while."""
 STALE_SHARE = 0.2
-"""From this share of it on what is repeated no longer fits the place, and is not put on the map."""
+"""From this share of it on a repeated scan no longer fits the place, and is not put on the map."""
 MOVES_M_S, TURNS_RAD_S = 0.2, math.radians(5.0)
-"""Slower than this counts as standing: velocities are noisy, and a rover that stands may well see the same all day."""
+"""Slower than this counts as standing: velocities are noisy, and a rover that stands may see the same all day."""
 OWN_BODY_M = 0.6
-"""A mast in the sensor's way gives the same reading for ever; so near, readings say nothing of the world."""
+"""A mast in front of the sensor gives the same reading for ever; readings this near say nothing of the world."""
 DISTINCT = 5
-"""So many different ranges do not repeat by chance, not even rounded to centimetres between parallel walls."""
+"""This many different ranges do not repeat by chance, not even rounded to centimetres between parallel walls."""
 THIN_RAD = math.radians(10.0)
 """A beam no wider than this looks along one line: what it hits straight ahead comes nearer as the rover does."""
 AHEAD_RAD = math.radians(15.0)
 NEAREST_OF_ALL = "rangefinder"
-"""RANGEFINDER: the nearest of all sensors, whichever way that one looks."""
+"""RANGEFINDER: the reading of the nearest of all sensors, whichever way that one looks."""
 FORGOTTEN_S = 5.0
-"""A sensor that has fallen silent for so long is no longer held against anybody: then its silence counts."""
+"""A sensor that has been silent for this long is no longer reported as repeating itself: then its silence counts."""
+
+
+def newest_ranges(events: Sequence[Event]) -> list[Event]:
+    """The events without range data that newer data of the same sensor in the same tick has overtaken; order kept.
+
+    Of each sensor the newest comes first, then of each the second, so that one that floods takes no other's place.
+    """
+    heard: dict[Sensor, int] = {}
+    turns: list[tuple[int, int]] = []
+    for place in range(len(events) - 1, -1, -1):
+        event = events[place]
+        if isinstance(event, RangeSeen):
+            sensor = sensor_of(event.scan)
+            heard[sensor] = turn = heard.get(sensor, 0) + 1
+            if turn <= SAME:
+                turns.append((turn, place))
+    kept = {place for _, place in sorted(turns, key=lambda one: (one[0], -one[1]))[:MOST_SCANS]}
+    return [event for place, event in enumerate(events) if place in kept or not isinstance(event, RangeSeen)]
+
+
+def sensor_of(scan: RangeScan) -> Sensor:
+    """The sensor that a scan comes from."""
+    return *scan.voice, round(math.degrees(float(scan.bearing_rad[0])) / 45.0) % 8
 
 
 @dataclass(slots=True)
@@ -46,7 +89,7 @@ class _Repeats:
 
 
 class ScanWatch:
-    """One record for every sensor, by its sender and the name that its scans bear."""
+    """Watches each sensor, by its sender and the name that its scans bear, for readings that repeat themselves."""
 
     def __init__(self) -> None:
         self._last: dict[tuple[int, str], _Repeats] = {}
@@ -62,7 +105,7 @@ class ScanWatch:
         return None
 
     def take(self, scan: RangeScan, vehicle: VehicleState) -> bool:
-        """Take note of a scan. Returns whether it fits the place where the rover is now."""
+        """Note a scan. Returns whether it fits the place where the rover is now."""
         self._move(scan.time_s, vehicle)
         self._newest_s = scan.time_s
         last = self._last.get(scan.voice)
@@ -77,7 +120,7 @@ class ScanWatch:
         return not (last.stuck or last.moved_m > STALE_SHARE * by_way_m or turned_rad > STALE_SHARE * by_turn_rad)
 
     def _move(self, now_s: float, vehicle: VehicleState) -> None:
-        """By the velocities, not by the position, which wanders while the rover stands."""
+        """Add up way and turn from the velocities, since the position wanders while the rover stands."""
         before_s, self._moved_s = self._moved_s, now_s
         if before_s is None or vehicle.attitude is None:
             return
@@ -93,9 +136,9 @@ def _same(one: RangeScan, other: RangeScan) -> bool:
 
 
 def _telling(scan: RangeScan) -> tuple[float, float]:
-    """How far the rover may drive, and by how much turn, while these readings stay as they are; inf: as it likes.
+    """How far the rover may drive, and by how much turn, while these readings stay as they are; inf: without limit.
 
-    Readings need not change where nothing was seen, beside a wall that the rover follows, and in the round of a wide sonar.
+    Readings need not change where nothing was seen, beside a wall that the rover follows, and round a wide sonar.
     """
     seen = np.isfinite(scan.range_m) & (scan.range_m > OWN_BODY_M)
     different = len(set(scan.range_m[seen].tolist()))

@@ -1,0 +1,196 @@
+"""Map queries, in metres: what lies along a line or an arc, the nearest obstacle, how a line would be followed.
+
+Nouns: map queries.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+from companion.core.frames import NedPoint, Pose
+from companion.mapping import arc_kernels
+from companion.mapping.arc_kernels import Following, Ground, Start, arc_clear, follow, kept_room, pursue
+from companion.mapping.cell_frame import Points
+from companion.mapping.evidence_map import EvidenceMap
+from companion.mapping.kernels import first_unseen, look, nearest
+
+
+@dataclass(frozen=True, slots=True)
+class Line:
+    """What lies along a straight line: how far it is free of obstacles, and how far it has been seen."""
+
+    clear_m: float
+    seen_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Unseen:
+    """The nearest place beside a line that has not been seen, and how far along the line it lies."""
+
+    along_m: float
+    place: NedPoint
+
+
+class Until(IntEnum):
+    """Where to end an arc: at the first place that is not to be entered, or already at the first not seen."""
+
+    UNSEEN = arc_kernels.UNSEEN
+    BLOCKED = arc_kernels.BLOCKED
+
+
+@dataclass(frozen=True, slots=True)
+class FollowLimits:
+    """How a rover follows a line by pure pursuit.
+
+    ``steering_per_m2``: greatest change of curvature over a metre. ``lookahead_m``: how far ahead on the line it
+    steers for. ``room_m``: kept clear round its middle. ``flank_m``: so far beside the middle the ground must have
+    been seen, from ``near_m`` ahead on. ``astray_m``: farther beside the line it is lost.
+    """
+
+    backwards: bool
+    sharpest_per_m: float
+    steering_per_m2: float
+    lookahead_m: float
+    room_m: float
+    flank_m: float
+    near_m: float
+    astray_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class Followed:
+    """How following a line goes: how far it can be driven, how far it has been seen, what to steer now.
+
+    Both lengths are inf where nothing ends them as far as was looked.
+    """
+
+    clear_m: float
+    seen_m: float
+    curvature_per_m: float
+
+
+def look_along(evidence: EvidenceMap, start: NedPoint, end: NedPoint, half_width_m: float) -> Line:
+    """How far a rover of this half width could drive straight from start towards end (up to its distance).
+
+    ``clear_m`` ends at the first evidence of an obstacle within the half width or the first field that is an
+    obstacle by mission or penalty; ``seen_m`` ends where the middle of the line has not been seen yet.
+    """
+    frame = evidence.frame
+    clear, seen = look(
+        evidence.log_odds, evidence.base.weights, evidence.penalty, frame.xy(start), frame.xy(end),
+        frame.cells(half_width_m), frame.cells(evidence.rover_radius_m), evidence.settings.occupied_at,
+    )  # fmt: skip
+    return Line(frame.metres(clear), frame.metres(seen))
+
+
+def unseen_beside(
+    evidence: EvidenceMap, start: NedPoint, end: NedPoint, offset_m: float, near_m: float
+) -> Unseen | None:
+    """Where the rover's flanks, ``offset_m`` beside a line, would enter ground that has not been seen, if anywhere.
+
+    Nearer than ``near_m`` does not count: no sensor sees the ground right beside the rover.
+    """
+    frame = evidence.frame
+    along, x, y = first_unseen(
+        evidence.log_odds, frame.xy(start), frame.xy(end), frame.cells(offset_m), frame.cells(near_m)
+    )
+    if frame.metres(along) >= start.distance_m(end) - 1e-6:
+        return None
+    return Unseen(frame.metres(along), frame.point(x, y))
+
+
+def clearance_m(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> float:
+    """Distance from a place to the nearest evidence of an obstacle, at most ``reach_m``."""
+    frame = evidence.frame
+    x, y = frame.xy(point)
+    return frame.metres(float(nearest(evidence.log_odds, x, y, frame.cells(reach_m), evidence.settings.occupied_at)))
+
+
+def within_map_m(evidence: EvidenceMap, point: NedPoint, bearing_rad: float, distance_m: float) -> float:
+    """The part of a distance from a place of the map that does not leave it, up to 1 cm before its edge."""
+    grid = evidence.base
+    corner = grid.south_west
+    for from_m, size_m, step in (
+        (point.north_m - corner.north_m, grid.height * grid.resolution_m, math.cos(bearing_rad)),
+        (point.east_m - corner.east_m, grid.width * grid.resolution_m, math.sin(bearing_rad)),
+    ):
+        room_m = size_m - from_m if step > 0.0 else from_m
+        if abs(step) * distance_m > room_m - 0.01:
+            distance_m = max(room_m - 0.01, 0.0) / abs(step)
+    return distance_m
+
+
+def ground_at(evidence: EvidenceMap, pose: Pose) -> Ground:
+    """The map for the compiled loops, with the field that the rover stands in."""
+    cell = evidence.base.cell_at(pose.point)
+    weights, settings = evidence.base.weights, evidence.settings
+    return Ground(
+        evidence.log_odds, weights, evidence.penalty, evidence.subdivisions, settings.occupied_at, cell.x, cell.y
+    )
+
+
+class ArcQueries:
+    """Questions about arcs and lines that begin at one pose, to the map as it is now. Curvatures are in 1/m."""
+
+    def __init__(self, evidence: EvidenceMap, pose: Pose) -> None:
+        self._frame = evidence.frame
+        self._pose = pose
+        self._ground = ground_at(evidence, pose)
+        self._x, self._y = self._frame.xy(pose.point)
+
+    def kept_room_m(self, wanted_m: float, least_m: float) -> float:
+        """The room to keep round the rover's middle: as wanted, or what there is now, but not less than ``least_m``."""
+        wanted, least = self._frame.cells(wanted_m), self._frame.cells(least_m)
+        return self._frame.metres(kept_room(self._ground, self._x, self._y, wanted, least))
+
+    def arc_clear_m(
+        self, course_rad: float, curvature_per_m: float, room_m: float, length_m: float, until: Until
+    ) -> float:
+        """How far the rover can go on an arc with so much room round its middle, at most ``length_m``.
+
+        ``course_rad``: direction of travel. ``curvature_per_m``: clockwise positive, as seen in the direction of
+        travel.
+        """
+        frame = self._frame
+        curvature, room, length = frame.per_cell(curvature_per_m), frame.cells(room_m), frame.cells(length_m)
+        return frame.metres(arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, length, int(until)))
+
+    def arc_is_clear(
+        self, course_rad: float, curvature_per_m: float, room_m: float, length_m: float, until: Until
+    ) -> bool:
+        """Whether the rover can go the whole length of an arc."""
+        return self.arc_clear_m(course_rad, curvature_per_m, room_m, length_m, until) >= length_m - 1e-6
+
+    def follow(self, points: Points, curvature_per_m: float, limits: FollowLimits, length_m: float) -> Followed:
+        """Play through how the rover, which drives this curvature now, follows a line for at most ``length_m``."""
+        frame = self._frame
+        following = Following(
+            backwards=limits.backwards,
+            sharpest=frame.per_cell(limits.sharpest_per_m),
+            steering=frame.per_cell(frame.per_cell(limits.steering_per_m2)),
+            lookahead=frame.cells(limits.lookahead_m),
+            room=frame.cells(limits.room_m),
+            flank=frame.cells(limits.flank_m),
+            near=frame.cells(limits.near_m),
+            astray=frame.cells(limits.astray_m),
+        )
+        start = Start(self._x, self._y, self._pose.heading_rad, frame.per_cell(curvature_per_m))
+        _, clear, seen, curvature = follow(self._ground, following, frame.xys(points), start, frame.cells(length_m))
+        return Followed(frame.metres(clear), frame.metres(seen), frame.per_m(curvature))
+
+    def progress_along(self, points: Points, progress: int, course_rad: float, step_m: float) -> tuple[int, float]:
+        """Where on a line the rover is (an index, never before ``progress``), and the length that is left, in metres.
+
+        ``step_m``: the distance of its points. Beyond the end, as seen in the direction of travel, nothing is left.
+        """
+        line, here = self._frame.xys(points), np.array((self._x, self._y))
+        at, _, aside = pursue(line, progress, self._x, self._y, course_rad, self._frame.cells(step_m))
+        if at == len(line) - 1:
+            beyond = abs(aside) > 0.5 * math.pi
+            return at, 0.0 if beyond else self._frame.metres(float(np.hypot(*(line[-1] - here))))
+        rest = line[at:] - np.vstack((here, line[at:-1]))
+        return at, self._frame.metres(float(np.hypot(*rest.T).sum()))

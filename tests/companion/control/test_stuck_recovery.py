@@ -1,0 +1,104 @@
+"""Stuck recovery: when a rover counts as stuck, how it backs out, and what it remembers of the place."""
+
+import math
+from dataclasses import replace
+
+import pytest
+
+from companion.control.controller import STANDSTILL, ControlCommand, Purpose, stop_for
+from companion.control.local_view import LocalView
+from companion.control.stuck_recovery import FRESH_PENALTY, MOVED_M, TRIES_AT_ONE_PLACE, TURNED_RAD, StuckRecovery
+from companion.core.frames import NedPoint, Pose
+from companion.core.grid import empty_grid
+from companion.core.rover_limits import RoverLimits
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.settings import Settings
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+
+SETTINGS = Settings()
+LIMIT_S = SETTINGS.guidance.stuck_after_s
+DRIVE = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(14.0, 10.5)), 1.0)
+BLOCKED = stop_for(Purpose.BLOCKED)
+AHEAD = NedPoint(11.5, 10.5)
+
+
+def seen_map() -> EvidenceMap:
+    evidence = new_map(empty_grid(20, 20), 0.35, SETTINGS.mapping)
+    evidence.log_odds.fill(-1.0)
+    return evidence
+
+
+def view(time_s: float, evidence: EvidenceMap | None = None, north_m: float = 10.5, turned: float = 0.0) -> LocalView:
+    pose = Pose(north_m, 10.5, turned, time_s)
+    return LocalView(pose, 0.0, seen_map() if evidence is None else evidence, RoverLimits(0.35, 2.0, 8.0), SETTINGS)
+
+
+def watching() -> StuckRecovery:
+    recovery = StuckRecovery()
+    recovery.begin(view(0.0).pose)
+    return recovery
+
+
+@pytest.mark.parametrize(("command", "limit_s"), [(DRIVE, LIMIT_S), (BLOCKED, LIMIT_S / 3.0)])
+def test_a_rover_that_stays_where_it_is_is_stuck_and_sooner_where_it_is_blocked(
+    command: ControlCommand, limit_s: float
+) -> None:
+    assert not watching().is_stuck(view(limit_s - 0.01), command)
+    assert watching().is_stuck(view(limit_s), command)
+
+
+def test_moving_on_counts_from_anew_and_turning_counts_for_a_while() -> None:
+    recovery = watching()
+    assert not recovery.is_stuck(view(LIMIT_S, north_m=10.5 + MOVED_M), DRIVE)
+    assert not recovery.is_stuck(view(2.0 * LIMIT_S - 0.1, north_m=10.5 + MOVED_M), DRIVE)
+    assert recovery.is_stuck(view(2.0 * LIMIT_S, north_m=10.5 + MOVED_M), DRIVE)
+    turning, ticks = watching(), [i * 0.5 * LIMIT_S for i in range(1, 7)]
+    stuck = [turning.is_stuck(view(time_s, turned=i % 2 * TURNED_RAD), DRIVE) for i, time_s in enumerate(ticks, 1)]
+    assert stuck == [False] * 5 + [True], "turning to and fro is no progress in the end"
+
+
+def test_a_pause_does_not_count() -> None:
+    recovery = watching()
+    recovery.pause()
+    assert not recovery.is_stuck(view(10.0 * LIMIT_S), DRIVE)
+    assert recovery.is_stuck(view(11.0 * LIMIT_S), DRIVE), "it counts again from then on"
+
+
+def test_it_backs_out_as_far_as_the_settings_say() -> None:
+    recovery, evidence = watching(), seen_map()
+    assert recovery.backing(view(1.0, evidence)) is None
+    recovery.back_out(view(1.0, evidence), AHEAD)
+    guidance = SETTINGS.guidance
+    ends_s = 1.0 + guidance.back_out_m / guidance.back_out_speed_m_s
+    command = recovery.backing(view(1.0, evidence))
+    assert command is not None and command.purpose is Purpose.LOOK
+    assert command.setpoint == GuidedVelocity(-guidance.back_out_speed_m_s, 0.0)
+    assert recovery.backing(view(ends_s - 0.01, evidence)) is not None
+    assert recovery.backing(view(ends_s, evidence)) is None
+
+
+def test_without_room_behind_it_stands_and_that_is_all() -> None:
+    recovery, evidence = watching(), seen_map()
+    evidence.log_odds[:78] = 2.0
+    recovery.back_out(view(1.0, evidence), AHEAD)
+    assert recovery.backing(view(1.0, evidence)) == STANDSTILL
+    assert recovery.backing(view(1.05, evidence)) is None
+
+
+def test_the_settings_of_the_moment_hold() -> None:
+    patient = SETTINGS.model_copy(
+        update={"guidance": SETTINGS.guidance.model_copy(update={"stuck_after_s": 100.0 * LIMIT_S})}
+    )
+    assert not watching().is_stuck(replace(view(2.0 * LIMIT_S), settings=patient), DRIVE)
+
+
+def test_a_place_grows_costly_and_in_the_end_closed() -> None:
+    recovery, evidence = watching(), seen_map()
+    field = evidence.base.cell_at(AHEAD)
+    for tries in range(1, TRIES_AT_ONE_PLACE):
+        recovery.back_out(view(float(tries), evidence), AHEAD)
+        assert evidence.penalty[field.y, field.x] == pytest.approx(tries * FRESH_PENALTY)
+        assert not evidence.grid.is_obstacle(field)
+    recovery.back_out(view(9.0, evidence), AHEAD)
+    assert evidence.grid.is_obstacle(field)
+    assert math.isclose(float(evidence.penalty.sum()), float(evidence.penalty[field.y, field.x])), "it alone"
