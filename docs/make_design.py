@@ -1,7 +1,7 @@
-"""Writes the layout and the noun table of ``design.md`` from the modules' docstrings: ``.venv/bin/python docs/make_design.py``.
+"""Writes layout and nouns of ``design.md`` from the modules' docstrings: ``.venv/bin/python docs/make_design.py``.
 
-A module says what is in it in the first sentence of its docstring. The nouns whose home it is stand in the docstring's last
-paragraph, ``Nouns: one, another.`` A test compares the page with the modules, so neither can change alone.
+A module says what is in it in the first sentence of its docstring. The last paragraph of the docstring, ``Nouns: one,
+another.``, lists the nouns whose home it is. A test compares the page with the modules, so neither can change alone.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Module:
 
 
 def modules(root: Path = ROOT) -> list[Module]:
-    """All modules of both programs, packages before what is in them, in the order of their paths. Raises DesignError."""
+    """All modules of both programs, packages before what is in them, ordered by path. Raises DesignError."""
     found = []
     for package in PACKAGES:
         files = sorted((root / package).rglob("*.py"), key=lambda file: (file.parent, file.name != "__init__.py", file))

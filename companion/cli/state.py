@@ -66,7 +66,7 @@ class StateFiles:
 class RunState:
     """The mission state that a run resumes and writes.
 
-    Raises StateDirectoryError if a directory was named or --resume given and it cannot be used; otherwise ``say`` reports
+    Raises StateDirectoryError if a directory was named, or --resume given, and it cannot be used; else ``say`` reports
     that.
     """
 

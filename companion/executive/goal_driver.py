@@ -223,7 +223,7 @@ class GoalDriver:
         movers, motion = self._movers(view), motion_of(pose, rover, self._fastest_m_s(view), settings, resolution_m)
 
         def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
-            return self.searcher.search(weights, kind, start, target, movers, motion, navigator)
+            return self.searcher.search(weights, kind, start, target, navigator, movers, motion)
 
         if cell != state.past[-1]:
             self.tally.steps += 1

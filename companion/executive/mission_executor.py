@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.control.braking import for_link
+from companion.control.braking import counted_s, for_link
 from companion.control.controller import ControlCommand
 from companion.control.local_view import LocalView
 from companion.core.frames import GeoPoint, NedPoint, Pose
@@ -48,6 +48,7 @@ from companion.perception.object_tracker import ObjectTracker
 from companion.planning.registry import make_planner
 from companion.recording.recorder import RunLog
 from companion.safety.reasons import RunPhase
+from companion.settings import Settings
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.state import VehicleState
 
@@ -94,8 +95,9 @@ class MissionExecutor:
         """Grows whenever what had been mapped is worth nothing any more."""
         self._mission = mission
         self._settings = settings
-        self._in_force = settings.current
-        """Those of this tick, with the link's latency counted in."""
+        self._counted_for: tuple[int, float] | None = None
+        self._counted = settings.current
+        """The settings with the link's latency counted in, and what they were made from."""
         self._runner = runner
         self._log = log
         self._notifier = notifier
@@ -116,7 +118,7 @@ class MissionExecutor:
             text = "Single beams see too little for a rover that turns in arcs: give it a lidar"
             notifier.tell(text, Severity.WARNING)
         planner = make_planner(given.navigator.planner, given.planner)
-        searcher = PathSearcher(planner, given.navigator, rng)
+        searcher = PathSearcher(planner, rng)
         self.driver = GoalDriver(controller_for(self._limits), searcher, runner)
         self._tracker = ObjectTracker(layout.evidence)
 
@@ -271,9 +273,15 @@ class MissionExecutor:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
         pose = vehicle.pose_at(now_s)
         assert pose is not None
-        self._in_force = for_link(self._settings.current, vehicle.latency_s)
-        self.driver.searcher.settings = self._in_force.navigator
-        return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, self._in_force)
+        settings = self._settings_for_link(vehicle.latency_s)
+        return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, settings)
+
+    def _settings_for_link(self, link_s: float) -> Settings:
+        """The settings in force for a link that takes this long, there and back."""
+        made_from = (self._settings.changes, counted_s(link_s))
+        if made_from != self._counted_for:
+            self._counted_for, self._counted = made_from, for_link(self._settings.current, link_s)
+        return self._counted
 
     def _is_refused(self, now_s: float) -> bool:
         """Whether the next target lies behind the autopilot's fence: then it is not tried, and the next one comes."""

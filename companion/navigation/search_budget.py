@@ -44,7 +44,6 @@ class PathSearcher:
     """Calls the planner with the budget for each kind of search. ``seconds``: how long each search took."""
 
     planner: Planner
-    settings: NavigatorSettings
     rng: Generator
     seconds: list[float] = field(default_factory=list)
 
@@ -54,20 +53,18 @@ class PathSearcher:
         kind: SearchKind,
         start: Cell,
         target: Cell,
+        settings: NavigatorSettings,
         moving_obstacles: tuple[ObstacleTrajectory, ...] = (),
         motion: VehicleMotion = VehicleMotion(),  # noqa: B008 - frozen
-        settings: NavigatorSettings | None = None,
     ) -> PlanResult:
         """One search over ``weights``, which are not changed.
 
-        The start is treated as free even if the map has an obstacle there, because the rover is in it. ``settings``:
-        those at the beginning of the step, which may run in a thread; None: the present ones.
+        The start is treated as free even if the map has an obstacle there, because the rover is in it.
         """
         began_s = stopwatch_s()
         if weights[start.y, start.x] >= OBSTACLE:
             weights = np.array(weights)
             weights[start.y, start.x] = START_WEIGHT
-        settings = settings or self.settings
         budget = budget_of(settings.thorough if kind is SearchKind.THOROUGH else settings.quick)
         result = self.planner.plan(
             PlanningProblem(weights, start, target, moving_obstacles=moving_obstacles, motion=motion), budget, self.rng

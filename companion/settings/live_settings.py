@@ -13,6 +13,8 @@ class LiveSettings:
 
     def __init__(self, settings: Settings) -> None:
         self._current = settings
+        self.changes = 0
+        """How often they have been replaced: what is derived from them is made anew when this number has grown."""
 
     @property
     def current(self) -> Settings:
@@ -22,3 +24,4 @@ class LiveSettings:
     def replace(self, settings: Settings) -> None:
         """Use other settings from now on."""
         self._current = settings
+        self.changes += 1

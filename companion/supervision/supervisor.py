@@ -1,4 +1,4 @@
-"""The supervisor: decides in each tick whether mission, arming or shutdown goes on; begins the mission and ends the run.
+"""The supervisor: decides each tick whether mission, arming or shutdown goes on; begins the mission, ends the run.
 
 Nouns: supervisor.
 """

@@ -107,7 +107,8 @@ class FieldRobot:
         self.run = FieldRun(seed, track=[start])
         rng = np.random.default_rng(seed)
         planner = make_planner(settings.navigator.planner, settings.planner)
-        self._searcher = PathSearcher(planner, settings.navigator, rng)
+        self._searcher = PathSearcher(planner, rng)
+        self._navigator = settings.navigator
         self._state = initial_state(start, target, int(rng.integers(2**63)), settings.navigator.better_every_fields)
         self._heading = (int(np.sign(target.x - start.x)), int(np.sign(target.y - start.y)))
 
@@ -137,7 +138,7 @@ class FieldRobot:
         """The step function on the map as known now."""
 
         def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
-            return self._searcher.search(self.known.weights, kind, start, target)
+            return self._searcher.search(self.known.weights, kind, start, target, self._navigator)
 
         began_s = stopwatch_s()
         self._state, decision = step(self._state, self.known, self.cell, search)

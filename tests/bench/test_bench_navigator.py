@@ -78,13 +78,13 @@ def test_searches_of_a_known_map_of_eight_million_fields(name):
     free, weights, rng = np.argwhere(case.weights < OBSTACLE), case.weights, np.random.default_rng(0)
     height, width = weights.shape
     soften(weights, (0, 0, width, height), settings.mapping.soft_reach_m, settings.mapping.soft_cost, MAX_SOFT_WEIGHT)
-    searcher = PathSearcher(make_planner("hybrid", settings.planner), settings.navigator, rng)
+    searcher = PathSearcher(make_planner("hybrid", settings.planner), rng)
     grid, seconds = Grid(weights), []
     for y, x in free[rng.integers(len(free), size=LARGE_SEARCHES)].tolist():
         pose = Pose(y + 0.5, x + 0.5, rng.uniform(-np.pi, np.pi), 0.0)
         began_s = stopwatch_s()
         turned = with_turning_cost(grid, pose, settings.guidance)
-        result = searcher.search(turned.weights, SearchKind.THOROUGH, Cell(x, y), case.ends[0][1])
+        result = searcher.search(turned.weights, SearchKind.THOROUGH, Cell(x, y), case.ends[0][1], settings.navigator)
         seconds.append(stopwatch_s() - began_s)
         assert result.status is not PlanStatus.BUDGET_SPENT
     times_ms = 1e3 * np.array(seconds)

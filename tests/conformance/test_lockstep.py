@@ -41,7 +41,7 @@ NO_FMA = {"GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX2,-FMA,-FMA4"} if X86 else {}
 
 
 def another_machine() -> dict[str, str]:
-    """The environment that makes this x86-64 machine another one, as far as arithmetic goes; it has kernels of its own."""
+    """The environment that makes this x86-64 machine another one in its arithmetic; it has kernels of its own."""
     if not X86:
         return {}
     units = "AVX2 FMA3 AVX512F AVX512CD AVX512_SKX AVX512_CLX AVX512_CNL AVX512_ICL AVX512_SPR"

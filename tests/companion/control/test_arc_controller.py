@@ -314,7 +314,7 @@ def test_the_planner_is_told_heading_and_radius() -> None:
             asked.append(problem)
             return planner.plan(problem, budget, rng)
 
-    searcher = PathSearcher(Spy(), SETTINGS.navigator, np.random.default_rng(1))
+    searcher = PathSearcher(Spy(), np.random.default_rng(1))
     driver = GoalDriver(ArcController(), searcher, InlineRunner())
     start = view(ground(), pose(30.0))
     there = NedPoint(MIDDLE, MIDDLE + 10.0)

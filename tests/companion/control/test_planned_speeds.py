@@ -61,7 +61,7 @@ SEEN = seen_map()
 
 
 def driver_with(planner: Straight) -> GoalDriver:
-    searcher = PathSearcher(planner, SETTINGS.navigator, np.random.default_rng(1))
+    searcher = PathSearcher(planner, np.random.default_rng(1))
     driver = GoalDriver(PointController(), searcher, InlineRunner())
     driver.head_for(GOAL, at(0.0))
     return driver

@@ -71,7 +71,7 @@ class Drive:
 
     def __init__(self, runner: StepRunner) -> None:
         planner = make_planner("hybrid", SETTINGS.planner)
-        searcher = PathSearcher(planner, SETTINGS.navigator, np.random.default_rng(1))
+        searcher = PathSearcher(planner, np.random.default_rng(1))
         self.driver = GoalDriver(PointController(), searcher, runner)
         self.evidence = seen_map(Pose(20.5, 20.5, 0.0, 0.0))
 

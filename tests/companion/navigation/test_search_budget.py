@@ -30,11 +30,11 @@ class Spy:
         return NOTHING_FOUND
 
 
-def asked(kind=SearchKind.THOROUGH, weights=None, settings=None, **more):
+def asked(kind=SearchKind.THOROUGH, weights=None, settings=SETTINGS.navigator, **more):
     spy = Spy()
     weights = np.full((5, 8), BASE_WEIGHT) if weights is None else weights
-    searcher = PathSearcher(spy, SETTINGS.navigator, RNG)
-    result = searcher.search(weights, kind, Cell(1, 2), Cell(7, 3), settings=settings, **more)
+    searcher = PathSearcher(spy, RNG)
+    result = searcher.search(weights, kind, Cell(1, 2), Cell(7, 3), settings, **more)
     assert result is NOTHING_FOUND
     assert len(searcher.seconds) == 1 and searcher.seconds[0] >= 0.0
     return spy
@@ -54,7 +54,7 @@ def test_a_budget_has_all_of_its_settings():
         assert getattr(budget, name) == getattr(settings, name)
 
 
-def test_settings_of_the_step_go_before_the_present_ones():
+def test_the_budget_is_that_of_the_settings_given():
     other = NavigatorSettings.model_validate({"thorough": {"population": 77}})
     assert asked(settings=other).budget == budget_of(other.thorough) != budget_of(SETTINGS.navigator.thorough)
 
