@@ -218,7 +218,7 @@ def test_an_errand_is_driven_though_the_target_after_it_is_refused(tmp_path: Pat
     target = '[[target]]\nname = "far"\nfield = [19, 7]\non_blocked = "wait"\n'
     prepare = stored(box(KEEP_IN, -6.0, -2.4, 7.0, 21.4), **POLYGONS, FENCE_MARGIN=0.0)
     options = parse_settings({"navigator": {"wait_retry_s": 10.0, "wait_limit_s": 20.0}}, "test")
-    rig = Asker(yard(tmp_path, target), options, prepare=prepare)
+    rig = Asker(yard(tmp_path, target), options, prepare=prepare, late_s=0.0)
     rig.until_driven(2.0)
     smaller = [*box(KEEP_IN, -6.0, -2.4, 7.0, 12.0), (CIRCLE_IN, 0.0, 0.0, 90.0)]
     if when == "before the errand":
