@@ -17,7 +17,7 @@ from companion.control.braking import farthest_m
 from companion.control.controller import STOP, ControlCommand, Purpose
 from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
-from companion.control.setpoint_check import SetpointCheck, fault_of, inside_borders
+from companion.control.setpoint_check import WARNING, SetpointCheck, fault_of, inside_borders
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -198,17 +198,31 @@ def test_the_faults_have_names() -> None:
     assert fault(fast, evidence) == "velocity leads into something"
 
 
+@pytest.mark.parametrize(("speed_m_s", "refused"), [(0.0, True), (2.0, False)])
+def test_the_arc_of_a_turn_rate_is_as_wide_as_the_speed_makes_it(speed_m_s: float, refused: bool) -> None:
+    """At 0.8 rad/s a post stands on the arc of 1 m/s or less; at 2 m/s the rover passes it on a wider arc."""
+    evidence, pose = open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    post = pose.point.moved(0.5 * 0.8 * 1.8, 1.8 * float(np.sinc(0.4 * 1.8 / math.pi)))
+    patched(evidence, post.north_m, post.east_m, 0.1, 2.0)
+    turning = Output(GuidedVelocity(0.7, 0.8), pose, speed_m_s)
+    assert bool(fault(turning, evidence)) is refused
+
+
 def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
-    said: list[str] = []
+    said: list[tuple[str, int]] = []
     check, at = (
-        SetpointCheck(lambda text, severity: said.append(text)),
+        SetpointCheck(lambda text, severity: said.append((text, severity))),
         view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0)),
     )
     good = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), 1.0)
     assert check.passed(good, at, Bounds()) == good and not said and not check.refused
     far = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
     assert check.passed(far, at, Bounds()).setpoint == STOP
-    assert said == ["Stopping: target farther away than the horizon"] and check.refused.total() == 1
+    assert (
+        said == [("Stopping: target farther away than the horizon", WARNING)]
+        and WARNING == 4
+        and check.refused.total() == 1
+    )
 
 
 def test_a_rule_more_is_asked_like_the_others() -> None:
