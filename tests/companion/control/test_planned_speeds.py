@@ -87,8 +87,8 @@ def test_the_planner_is_told_what_moves_and_how_fast_the_rover_goes() -> None:
     driver_with(planner).update(at(0.0), (cart,))
     (problem,) = planner.asked
     assert problem.motion.speeds_fields_s == pytest.approx((1.0, 4.0))
-    assert problem.movers[0].radius_fields == pytest.approx(2.0)
-    assert problem.movers[0].track[0] == pytest.approx([0.0, 4.0, 30.0])
+    assert problem.moving_obstacles[0].radius_fields == pytest.approx(2.0)
+    assert problem.moving_obstacles[0].track[0] == pytest.approx([0.0, 4.0, 30.0])
 
 
 def test_it_plans_anew_when_something_moves_otherwise_and_not_while_it_does_not() -> None:

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import settings as runs
 from hypothesis import strategies as st
 
-from companion.control.braking import farthest_m
+from companion.control.braking import braking_distance_m, farthest_m
 from companion.control.controller import STOP, ControlCommand, Purpose
 from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
@@ -196,6 +196,15 @@ def test_the_faults_have_names() -> None:
     assert fault(ahead, evidence) == "target behind something"
     fast = Output(GuidedVelocity(2.0, 0.0), pose, 2.0)
     assert fault(fast, evidence) == "velocity leads into something"
+
+
+@pytest.mark.parametrize(("beyond_m", "refused"), [(-0.05, False), (0.05, False), (0.25, True)])
+def test_a_position_may_lie_beyond_seen_ground_by_the_way_of_the_slowest_rover(beyond_m: float, refused: bool) -> None:
+    evidence, pose = open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    evidence.log_odds[round((MIDDLE + 3.0) / evidence.evidence_m) :] = 0.0
+    creep_m = braking_distance_m(SETTINGS.guidance.min_speed_m_s, SETTINGS.guidance)
+    there = NedPoint(MIDDLE + 3.0 + creep_m + beyond_m, MIDDLE)
+    assert bool(fault(Output(GuidedPosition(there), pose, 0.0), evidence)) is refused
 
 
 @pytest.mark.parametrize(("speed_m_s", "refused"), [(0.0, True), (2.0, False)])
