@@ -17,10 +17,11 @@ from companion.control.braking import braking_distance_m, farthest_m
 from companion.control.controller import STOP, ControlCommand, Purpose
 from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
-from companion.control.setpoint_check import WARNING, SetpointCheck, fault_of, inside_borders
+from companion.control.setpoint_check import SetpointCheck, fault_of, inside_borders
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
+from companion.core.severity import Severity
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.bounds import Bound, Bounds
 from companion.settings import Settings
@@ -228,8 +229,8 @@ def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> N
     far = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
     assert check.passed(far, at, Bounds()).setpoint == STOP
     assert (
-        said == [("Stopping: target farther away than the horizon", WARNING)]
-        and WARNING == 4
+        said == [("Stopping: target farther away than the horizon", Severity.WARNING)]
+        and Severity.WARNING == 4
         and check.refused.total() == 1
     )
 
