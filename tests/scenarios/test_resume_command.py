@@ -112,7 +112,7 @@ def test_sigterm_is_obeyed_within_a_second_by_a_run_whose_disk_hangs(tmp_path: P
         (
             "damaged",
             2,
-            r"mission\.state: damaged \(its checksum is wrong\); kept as mission\.state\.damaged; the next start",
+            r"mission\.state: damaged \(wrong checksum\); kept as mission\.state\.damaged; the next start",
         ),
         ("ended", 0, "Yard was driven to its end: 1 of 1 targets reached"),
     ],

@@ -321,7 +321,7 @@ def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path
     rig.until_driven(1.0)
     driver, bounds = rig.companion.driver, rig.companion.executor.layout.bounds  # type: ignore[union-attr]
     assert driver is not None and len(bounds) == 1
-    rig.companion.output_check = SetpointCheck(rig.companion._tell, (inside_borders,))
+    rig.companion.mission_run.setpoint_check = SetpointCheck(rig.companion._notifier.tell, (inside_borders,))
     out = ControlCommand(Purpose.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
     driver.update = lambda *_: (out, None)  # type: ignore[method-assign]
     rig.run_for(15.0)
