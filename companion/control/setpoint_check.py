@@ -64,7 +64,7 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
     forward_m_s, yaw_rate_rad_s = setpoint.forward_m_s, setpoint.yaw_rate_rad_s
     if not math.isfinite(forward_m_s) or not math.isfinite(yaw_rate_rad_s):
         return "velocity is not a number"
-    base_m_s = max(abs(view.speed_m_s), view.settings.steering.scale_base_m_s)
+    base_m_s = max(view.speed_m_s, view.settings.steering.scale_base_m_s)
     reach_m = blind_distance_m(abs(forward_m_s), view.settings.guidance)
     arcs = ArcQueries(view.evidence, view.pose)
     room_m = arcs.kept_room_m(view.evidence.rover_radius_m - NEARER_M, 0.0)

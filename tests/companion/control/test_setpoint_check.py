@@ -208,14 +208,24 @@ def test_a_position_may_lie_beyond_seen_ground_by_the_way_of_the_slowest_rover(b
     assert bool(fault(Output(GuidedPosition(there), pose, 0.0), evidence)) is refused
 
 
-@pytest.mark.parametrize(("speed_m_s", "refused"), [(0.0, True), (2.0, False)])
-def test_the_arc_of_a_turn_rate_is_as_wide_as_the_speed_makes_it(speed_m_s: float, refused: bool) -> None:
-    """At 0.8 rad/s a post stands on the arc of 1 m/s or less; at 2 m/s the rover passes it on a wider arc."""
+@pytest.mark.parametrize(("speed_m_s", "refused"), [(0.0, (True, False)), (1.0, (True, False)), (2.0, (False, True))])
+def test_the_arc_of_a_turn_rate_is_as_wide_as_the_speed_makes_it(speed_m_s: float, refused: tuple[bool, bool]) -> None:
+    """At 0.8 rad/s: a post on the arc of 1 m/s, which is that of slower ones, too; and one on the arc of 2 m/s."""
+    pose, found = Pose(MIDDLE, MIDDLE, 0.0, 0.0), []
+    for curvature_per_m in (0.8, 0.4):
+        evidence, half_rad = open_ground(), 0.5 * curvature_per_m * 1.9
+        post = pose.point.moved(half_rad, 1.9 * float(np.sinc(half_rad / math.pi)))
+        patched(evidence, post.north_m, post.east_m, 0.1, 2.0)
+        found.append(bool(fault(Output(GuidedVelocity(0.7, 0.8), pose, speed_m_s), evidence)))
+    assert tuple(found) == refused
+
+
+def test_any_velocity_but_zero_is_looked_along() -> None:
     evidence, pose = open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0)
-    post = pose.point.moved(0.5 * 0.8 * 1.8, 1.8 * float(np.sinc(0.4 * 1.8 / math.pi)))
-    patched(evidence, post.north_m, post.east_m, 0.1, 2.0)
-    turning = Output(GuidedVelocity(0.7, 0.8), pose, speed_m_s)
-    assert bool(fault(turning, evidence)) is refused
+    patched(evidence, MIDDLE - 1.0, MIDDLE - 1.0, 0.1, 2.0)
+    evidence.log_odds[: round((MIDDLE - 0.9) / evidence.evidence_m)] = 2.0
+    for forward_m_s in (-1.0, -0.5):
+        assert fault(Output(GuidedVelocity(forward_m_s, 0.0), pose, 0.0), evidence)
 
 
 def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
@@ -313,6 +323,27 @@ def test_positions_and_velocities_before_a_border(setpoint: Setpoint, heading_ra
     at = view(open_ground(), Pose(MIDDLE, MIDDLE, heading_rad, 0.0))
     found = inside_borders(setpoint, at, Bounds((inner(6.0),)))
     assert found == ("setpoint leads over the border of the yard" if refused else "")
+
+
+@pytest.mark.parametrize(
+    ("north_m", "east_m", "yaw_rate_rad_s", "refused"),
+    [
+        (2.9, 9.0, 0.0, True),
+        (2.75, 9.0, 0.8, False),
+        (2.6, 9.0, 0.8, True),
+        (9.0, 2.05, 0.8, False),
+        (9.0, 1.85, 0.8, True),
+        (9.0, 1.0, -0.8, False),
+    ],
+)
+def test_a_turn_stops_on_the_arc_of_its_speed(
+    north_m: float, east_m: float, yaw_rate_rad_s: float, refused: bool
+) -> None:
+    """From 2 m/s the rover comes 3 m far straight on; on the arc of 0.8 rad/s 2.33 m north and 1.6 m east."""
+    yard_shape = shapely.box(-9.0, -9.0, MIDDLE + east_m, MIDDLE + north_m)
+    bounds = Bounds((Bound("the yard", yard_shape, True, RADIUS_M, RADIUS_M),))
+    at = view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0), 2.0)
+    assert bool(inside_borders(GuidedVelocity(2.0, yaw_rate_rad_s), at, bounds)) is refused
 
 
 def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path) -> None:
