@@ -1,4 +1,7 @@
-"""The companion: one tick is one field step."""
+"""The companion: one tick of its loop, 20 times a second, is the field step.
+
+Nouns: companion, tick.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Collision avoidance: before a command is used, the next seconds are played through with everything that moves.
+"""Collision avoidance (yielding): before a command is used, the next seconds are played through with all that moves.
 
 Several options are played through: go on, go on a little and then stop, stop at once, turn and move aside, back
 off, drive off on an arc. The first that keeps its distance is taken; if none does, the one that leaves the most
@@ -7,7 +7,7 @@ others, since going on is allowed only while there still is somewhere to stop; a
 safe again. Each option says what the autopilot would be told and where the rover would then be at each moment; the
 ground there must be clear and seen.
 
-Nouns: collision avoidance.
+Nouns: collision avoidance, yielding.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The only place that reads time. Everything else is handed a clock, or the time itself."""
+"""The only place that reads time. Everything else is handed a clock, or the time itself.
+
+Nouns: clock.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 Frames: *geo* is WGS-84 latitude and longitude in degrees; *NED* is the autopilot's local frame, metres north
 and east of the EKF origin. Headings are clockwise from north.
+
+Nouns: NedPoint, GeoPoint, Pose, local frame.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 Weights are the paper's (Kwasniewski & Gosiewski 2018, section 2): 1 is an obstacle, 0.5 the base value, 0 preferred
 ground, anything between is the cost of passing. Field (0, 0) lies in the south-west corner, x grows east,
 y grows north; arrays are indexed ``[y, x]``.
+
+Nouns: grid, field, weight.
 """
 
 from __future__ import annotations

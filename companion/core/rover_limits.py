@@ -1,4 +1,7 @@
-"""What limits a rover: its size, speed, sight and turning."""
+"""What limits a rover: its size, speed, sight and turning.
+
+Nouns: rover limits.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""One set of range readings, whatever message it came from."""
+"""One set of range readings, whatever message it came from.
+
+Nouns: scan.
+"""
 
 from __future__ import annotations
 

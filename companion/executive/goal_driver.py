@@ -18,7 +18,7 @@ from companion.control.stuck_recovery import StuckRecovery
 from companion.core.frames import NedPoint
 from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.evidence_map import doubt
+from companion.mapping.evidence_map import forget_weak_evidence
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import (
     Action,
@@ -265,7 +265,7 @@ class GoalDriver:
         giving_up = decision.action is Action.UNREACHABLE or (decision.part is Part.RETURN and decision.proved)
         if not giving_up or view.pose.time_s < self._sure_from_s:
             return giving_up
-        if self._doubts_left == 0 or not doubt(view.evidence, view.pose.point, DOUBT_REACH_M):
+        if self._doubts_left == 0 or not forget_weak_evidence(view.evidence, view.pose.point, DOUBT_REACH_M):
             return False
         self._doubts_left -= 1
         return True

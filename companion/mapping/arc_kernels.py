@@ -2,6 +2,8 @@
 
 Lengths and places are in evidence cells, x east and y north; headings are clockwise from north; a curvature is per
 cell, clockwise positive as seen in the direction of travel. The map comes as the tuple ``Ground``.
+
+Nouns: pure pursuit, curvature.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ field. A field is an obstacle when something was seen in it, or when the rover s
 something; beside obstacles the mission's own weight is raised (soft cost). What can be asked of the map is in
 ``map_queries``.
 
-Nouns: evidence map, log-odds.
+Nouns: evidence map.
 """
 
 from __future__ import annotations
@@ -151,7 +151,7 @@ def restore(evidence: EvidenceMap, log_odds: NDArray[np.float32], penalty: NDArr
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
 
 
-def doubt(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
+def forget_weak_evidence(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> bool:
     """Forget, before giving up, what may be an error of sensor or position, so that it is looked at again.
 
     That is weak evidence of obstacles anywhere (below ``settings.sure_at``), any evidence of obstacles within

@@ -1,7 +1,9 @@
-"""Compiled loops over the evidence raster: scans to log-odds, log-odds to field weights, looks along lines.
+"""Compiled loops over the evidence raster: scans to log-odds, field weights (inflation by the rover's radius), lines.
 
 All rasters are indexed [y, x], y north. Log-odds: 0 unknown, negative free, from ``occupied_at`` on an obstacle.
 Lengths and places are in evidence cells; ``evidence_map`` and ``map_queries`` convert from metres.
+
+Nouns: log-odds, inflation.
 """
 
 # mypy: disable-error-code="no-untyped-def"

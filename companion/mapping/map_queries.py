@@ -1,6 +1,6 @@
 """Map queries, in metres: what lies along a line or an arc, the nearest obstacle, how a line would be followed.
 
-Nouns: map queries.
+Nouns: map queries, clearance.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""STATUSTEXT: long texts are sent and received as chunks of 50 bytes (MAVLink definition of STATUSTEXT)."""
+"""STATUSTEXT: long texts are sent and received as chunks of 50 bytes (MAVLink definition of STATUSTEXT).
+
+Nouns: STATUSTEXT.
+"""
 
 from __future__ import annotations
 

@@ -1,12 +1,14 @@
 """The navigator's decision in each field entered: follow, replan or go back (Kwasniewski & Gosiewski 2018, section 4).
 
-``step`` is a pure function. Part A goes back along the past path and searches every second or third field. Part B
-follows the current path and searches for a better one every few fields. Part C searches thoroughly when the current
-path is blocked or missing (figures 10 to 14).
+``step`` is a pure function. Part A goes back out of a dead end, along the past path, and searches every second or
+third field. Part B follows the current path and searches for a better one every few fields. Part C searches thoroughly
+when the current path is blocked or missing (figures 10 to 14).
 
 Where the paper leaves a choice: the retraced end of the past path is dropped while returning, so it is always a walk
 from the start to here. "Better" compares with the rest of the current path. A blocked past path is repaired by a search
 for the nearest past field that can still be reached. At the start a last thorough search precedes "unreachable".
+
+Nouns: navigator, part, decision, dead end.
 """
 
 from __future__ import annotations

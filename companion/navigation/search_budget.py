@@ -1,4 +1,7 @@
-"""Calls of the planner by the navigator: the budget for each kind of search, the rover's motion, the time they took."""
+"""Calls of the planner by the navigator: the budget for each kind of search, the rover's motion, the time they took.
+
+Nouns: path searcher.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,8 @@
 """Runs the navigator's step: at once (lock-step) or in a thread of its own (real time).
 
 A search on a large map may take long. Heartbeats, watchdogs and stop commands must not wait for it.
+
+Nouns: step runner.
 """
 
 from __future__ import annotations

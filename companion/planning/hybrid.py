@@ -1,4 +1,7 @@
-"""The default planner: a genetic algorithm's smooth curve where it is good enough, else a graph search."""
+"""The default planner: a genetic algorithm's smooth curve where it is good enough, else a graph search.
+
+Nouns: hybrid.
+"""
 
 from __future__ import annotations
 

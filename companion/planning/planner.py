@@ -1,4 +1,7 @@
-"""The interface of all planners, and what the complete ones and the random ones have in common."""
+"""The interface of all planners, and what the complete ones and the random ones have in common.
+
+Nouns: planner, capabilities.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""A planning problem (grid, start, target, vehicle, moving obstacles), a budget, and a planner's result."""
+"""A planning problem (grid, start, target, vehicle, moving obstacles), a budget, and a planner's result.
+
+Nouns: planning problem, budget, path.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""The registered planners by name, how to make one, and how to compile their kernels before a drive."""
+"""The registered planners by name, how to make one, and how to compile their kernels before a drive.
+
+Nouns: planners by name.
+"""
 
 from __future__ import annotations
 

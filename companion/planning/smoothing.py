@@ -3,6 +3,8 @@
 At every sharp bend a rover must stop and turn on the spot. So the staircase of a graph search is first pulled straight
 wherever the straight line costs no more than the fields it replaces. The corners that remain are rounded by a B-spline
 of degree 2, as widely as the ground beside them allows.
+
+Nouns: smoothing.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The settings in force during a run: one holder, changed by one owner and read by all others."""
+"""The settings in force during a run: one holder, changed by one owner and read by all others.
+
+Nouns: live settings.
+"""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Mission limits: what keeps a mission from beginning and what breaks it off (fence, batteries, borders).
 
-Nouns: mission limits.
+Nouns: mission limits, low battery, borders.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Commands and messages to the autopilot and ground stations, as plain values; the codec makes packets of them."""
+"""Commands and messages to the autopilot and ground stations, as plain values; the codec makes packets of them.
+
+Nouns: setpoint, command.
+"""
 
 from __future__ import annotations
 

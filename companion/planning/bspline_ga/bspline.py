@@ -4,6 +4,8 @@ Compiled.
 
 ``n`` control points make ``n - 2`` knot spans of equal length. The curve begins in the first control point and ends in
 the last. At any place only three basis functions differ from zero, so a basis is stored as three values and an index.
+
+Nouns: B-spline.
 """
 
 from __future__ import annotations

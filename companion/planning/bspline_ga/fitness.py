@@ -2,6 +2,8 @@
 
 A chromosome has shape (control points, 2), columns x and y in whole fields. Its first and last row are start and
 target.
+
+Nouns: fitness.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""Initial population, crossover and mutation (Kwasniewski & Gosiewski 2018, sections 3.3, 3.6 and 3.7). Compiled."""
+"""Initial population, crossover and mutation (Kwasniewski & Gosiewski 2018, sections 3.3, 3.6 and 3.7). Compiled.
+
+Nouns: crossover, mutation.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 Only the selected part is kept, in order of fitness: nothing else ever has descendants. For the same reason a
 chromosome's fitness is summed only until it is no better than the last one selected so far or, where nothing has
 descendants any more, than the best. Neither changes a result.
+
+Nouns: population, epoch.
 """
 
 from __future__ import annotations

@@ -6,6 +6,8 @@ Costs themselves are not quantised, and a field that turns out to be cheaper is 
 affects the time only.
 
 Where the ground is even and corners are not cut, most of the work is skipped: see ``astar_kernel``.
+
+Nouns: A*.
 """
 
 from __future__ import annotations

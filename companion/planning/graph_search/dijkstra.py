@@ -3,6 +3,8 @@
 The open list is a circular bucket queue (Dial 1969). A bucket is as wide as the cheapest step, so fields in one bucket
 cannot improve each other and their order in it does not matter. Only the queue is quantised; the costs stay exact.
 Internally the map has a border of obstacles and its fields are numbered row after row.
+
+Nouns: Dijkstra.
 """
 
 from __future__ import annotations

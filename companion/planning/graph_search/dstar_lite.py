@@ -3,6 +3,8 @@
 Koenig & Likhachev 2002. The planner remembers its last search. While target, map size and rules stay the same, it works
 in only what has changed in the map and how the start has moved; otherwise it searches anew. The cost of a path does not
 depend on earlier plans, but which of several equally cheap paths is found may.
+
+Nouns: D* Lite.
 """
 
 from __future__ import annotations

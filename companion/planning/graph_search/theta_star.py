@@ -7,6 +7,8 @@ neighbour becomes the predecessor.
 
 In the paper ground is free or blocked. Here it has weights, so a straight line costs its length times the mean weight
 of the fields under it, and is used only where that is no costlier.
+
+Nouns: Theta*.
 """
 
 from __future__ import annotations

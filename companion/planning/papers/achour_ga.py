@@ -1,4 +1,7 @@
-"""The genetic algorithm of Achour & Chaalal 2011: a path grows by segments, each the fittest of a small population."""
+"""The genetic algorithm of Achour & Chaalal 2011: a path grows by segments, each the fittest of a small population.
+
+Nouns: Achour.
+"""
 
 from __future__ import annotations
 

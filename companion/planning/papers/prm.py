@@ -1,4 +1,7 @@
-"""PRM: a probabilistic roadmap queried with Lazy A*, the reference planner of Achour & Chaalal 2011 (section IV)."""
+"""PRM: a probabilistic roadmap queried with Lazy A*, the reference planner of Achour & Chaalal 2011 (section IV).
+
+Nouns: PRM.
+"""
 
 from __future__ import annotations
 

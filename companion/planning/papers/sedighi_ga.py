@@ -2,6 +2,8 @@
 
 ``geisler``: by rows only. ``hermanu``: by rows or by columns, one flag for the whole path. ``sedighi``: both in one
 path, with up to two switches.
+
+Nouns: Sedighi.
 """
 
 from __future__ import annotations

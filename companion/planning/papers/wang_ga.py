@@ -2,6 +2,8 @@
 
 ``vertex++`` is the paper's planner. ``vertex`` is its predecessor for static environments: no speeds, no moving
 obstacles, shortest path. To replan on the way, plan anew from the robot's place with the obstacles' new tracks.
+
+Nouns: Wang.
 """
 
 from __future__ import annotations

@@ -13,8 +13,8 @@ from companion.core.grid import BASE_WEIGHT, Cell, Grid, empty_grid
 from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import (
     EvidenceMap,
-    doubt,
     forget,
+    forget_weak_evidence,
     integrate,
     known_fields,
     new_map,
@@ -182,7 +182,7 @@ def test_what_the_mission_closed_is_never_forgotten():
     ground = Ground(base)
     ground.look_round(HERE, [], times=100)
     forget(ground.map)
-    doubt(ground.map, HERE.point, 10.0)
+    forget_weak_evidence(ground.map, HERE.point, 10.0)
     assert {(x, 13) for x in range(8, 13)} <= ground.obstacles()
 
 
@@ -289,10 +289,10 @@ def test_doubt_forgets_weak_evidence_anywhere_and_strong_evidence_nearby():
     ground.look_round(HERE, [far, near], times=30)
     ground.look_round(HERE, [far, near, weak], times=3)
     assert {(10, 17), (12, 10), (4, 10)} <= ground.obstacles()
-    assert doubt(ground.map, HERE.point, 3.0)
+    assert forget_weak_evidence(ground.map, HERE.point, 3.0)
     assert (10, 17) in ground.obstacles() and not {(12, 10), (4, 10)} & ground.obstacles()
     forget(ground.map)
-    assert not doubt(ground.map, HERE.point, 3.0), "nothing left to doubt"
+    assert not forget_weak_evidence(ground.map, HERE.point, 3.0), "nothing left to doubt"
 
 
 # --- along a line ----------------------------------------------------------------------------------------------------
