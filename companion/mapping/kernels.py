@@ -167,7 +167,8 @@ def look(log_odds, base, penalty, start, end, half_width, radius, occupied_at):
         x = int(math.floor(x0 + d * dx))
         y = int(math.floor(y0 + d * dy))
         if not (0 <= x < width and 0 <= y < height):
-            return min(d, seen), min(d, seen)
+            length = min(d, seen)
+            break
         if base[y // s, x // s] + penalty[y // s, x // s] >= 1.0 and d > s * 0.75:
             length = d
             break

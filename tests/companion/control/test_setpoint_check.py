@@ -228,6 +228,14 @@ def test_any_velocity_but_zero_is_looked_along() -> None:
         assert fault(Output(GuidedVelocity(forward_m_s, 0.0), pose, 0.0), evidence)
 
 
+@pytest.mark.parametrize("beyond_m", [-0.05, 0.05])
+def test_what_stands_before_the_edge_of_the_map_counts_for_a_target_beyond_it(beyond_m: float) -> None:
+    evidence = open_ground()
+    patched(evidence, MIDDLE + 3.0, MIDDLE - 0.5, 1.0, 2.0)
+    there = GuidedPosition(NedPoint(SIDE + beyond_m, MIDDLE))
+    assert fault(Output(there, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.5), evidence) == "target behind something"
+
+
 def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
     said: list[tuple[str, int]] = []
     check, at = (
