@@ -89,6 +89,8 @@ $(ALL_KERNELS): $(TOOLS) $(SOURCES)
 	@$(BIN)/python -m sitl.cli.compile --all
 	@touch $(KERNELS) $(ALL_KERNELS)
 
+# With the kernels in the user's cache: after it, everything is made from nothing.
 clean:
 	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
+	rm -rf "$${XDG_CACHE_HOME:-$$HOME/.cache}/rover-companion"
 	find companion sitl tests missions -name __pycache__ -prune -exec rm -rf {} +

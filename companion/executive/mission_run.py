@@ -58,7 +58,8 @@ COMMANDS: dict[Order, ControlCommand | Command | None] = {
 class MissionRun:
     """What all parts of the companion share of a run.
 
-    The listener writes ``vehicle``, the judge ``latch`` and ``stopped``, the supervisor ``end``.
+    The listener writes ``vehicle`` (after an error, the shutdown), listener and judge ``latch``, the judge ``stopped``,
+    the shutdown ``end``. ``activity`` is written by whichever part has the rover in this tick.
     """
 
     def __init__(

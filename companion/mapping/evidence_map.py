@@ -5,7 +5,7 @@ field. A field is an obstacle when something was seen in it, or when the rover s
 something; beside obstacles the mission's own weight is raised (soft cost). What can be asked of the map is in
 ``map_queries``.
 
-Nouns: evidence map.
+Nouns: evidence map, evidence.
 """
 
 from __future__ import annotations

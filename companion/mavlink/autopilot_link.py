@@ -1,4 +1,7 @@
-"""The link to the autopilot: heartbeat, requests, commands and their confirmation, and incoming events."""
+"""The link to the autopilot: heartbeat, requests, commands and their confirmation, and incoming events.
+
+Nouns: link.
+"""
 
 from __future__ import annotations
 

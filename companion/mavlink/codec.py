@@ -1,4 +1,7 @@
-"""Codec between MAVLink packets and the companion's events and commands."""
+"""Codec between MAVLink packets and the companion's events and commands.
+
+Nouns: codec.
+"""
 
 from __future__ import annotations
 

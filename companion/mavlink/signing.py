@@ -1,4 +1,7 @@
-"""Message signing (MAVLink guide, "Message Signing"): signs packets with a key and a timestamp, and verifies them."""
+"""Message signing (MAVLink guide, "Message Signing"): signs packets with a key and a timestamp, and verifies them.
+
+Nouns: signed packet.
+"""
 
 from __future__ import annotations
 

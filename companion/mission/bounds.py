@@ -1,6 +1,8 @@
 """Borders of the mission's and the autopilot's fences: which fields they close, and which lines cross them.
 
 The planner uses the closed fields. Before a target is sent, the line to it is checked with the exact shapes.
+
+Nouns: bounds.
 """
 
 from __future__ import annotations

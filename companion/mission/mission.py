@@ -1,4 +1,7 @@
-"""A mission as plain values: targets in order, grid, fences, weighted ground, rover, and the simulator's table."""
+"""A mission as plain values: targets in order, grid, fences, weighted ground, rover, and the simulator's table.
+
+Nouns: mission, target.
+"""
 
 from __future__ import annotations
 

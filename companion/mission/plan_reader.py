@@ -1,4 +1,7 @@
-"""Reader of QGroundControl's ``.plan`` files: JSON with mission items, geofence and rally points."""
+"""Reader of QGroundControl's ``.plan`` files: JSON with mission items, geofence and rally points.
+
+Nouns: .plan.
+"""
 
 from __future__ import annotations
 

@@ -3,6 +3,8 @@
 A header line, then one item a line: index, current, frame, command, p1 to p4, latitude, longitude, altitude,
 autocontinue, separated by tabs or spaces. Item 0 is home if it is a waypoint. Mission Planner saves fences and rally
 points as separate files of the same form; here they may also follow the mission's items.
+
+Nouns: waypoints.
 """
 
 from __future__ import annotations

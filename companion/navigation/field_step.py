@@ -8,7 +8,7 @@ Where the paper leaves a choice: the retraced end of the past path is dropped wh
 from the start to here. "Better" compares with the rest of the current path. A blocked past path is repaired by a search
 for the nearest past field that can still be reached. At the start a last thorough search precedes "unreachable".
 
-Nouns: navigator, part, decision, dead end.
+Nouns: navigator, part, decision, dead end, past path.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A planning problem (grid, start, target, vehicle, moving obstacles), a budget, and a planner's result.
 
-Nouns: planning problem, budget, path.
+Nouns: planning problem, budget, path, problem.
 """
 
 from __future__ import annotations

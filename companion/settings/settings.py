@@ -1,4 +1,7 @@
-"""Settings of the companion: groups, defaults, bounds and descriptions (see docs/settings.md)."""
+"""Settings of the companion: groups, defaults, bounds and descriptions (see docs/settings.md).
+
+Nouns: settings.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Settings that a ground station may change during a drive, as MAVLink parameters: names, bounds, and their file."""
+"""Settings that a ground station may change during a drive, as MAVLink parameters: names, bounds, and their file.
+
+Nouns: tunable settings.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,8 @@
 
 A pipe would make the program wait and a device has no end: only ordinary files are opened. A file is replaced in three
 steps: written under another name, synced, renamed.
+
+Nouns: file.
 """
 
 from __future__ import annotations

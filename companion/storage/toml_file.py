@@ -1,4 +1,7 @@
-"""TOML files read and validated: whatever is wrong becomes one line that names file, place and remedy."""
+"""TOML files read and validated: whatever is wrong becomes one line that names file, place and remedy.
+
+Nouns: TOML.
+"""
 
 from __future__ import annotations
 

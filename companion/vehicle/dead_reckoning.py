@@ -2,6 +2,8 @@
 
 This shows jumps, a position that is frozen, and one that drifts: a bad GPS that the EKF follows so slowly that none of
 its own checks fails.
+
+Nouns: dead reckoning.
 """
 
 from __future__ import annotations

@@ -1,6 +1,8 @@
 """Events from the link, as plain values: what the autopilot, ground stations and other vehicles have sent.
 
 ``time_s`` is the time of arrival by the companion's clock.
+
+Nouns: event.
 """
 
 from __future__ import annotations

@@ -3,6 +3,8 @@
 ArduPilot answers a TIMESYNC with the sender's time and its own: the round trip is the time between an observation and
 the arrival of a stop. The boot time in every position report shows a delay on the way to the companion before the next
 answer does.
+
+Nouns: latency.
 """
 
 from __future__ import annotations

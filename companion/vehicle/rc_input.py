@@ -2,6 +2,8 @@
 
 ArduRover in GUIDED ignores the sticks: it follows its target, and more than half throttle only raises the speed
 (`Mode::calc_speed_nudge`). So that a pilot can take over with the sticks, the companion gives the rover up.
+
+Nouns: sticks.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""State of the vehicle: ``fold`` adds one event to it."""
+"""State of the vehicle: ``fold`` adds one event to it.
+
+Nouns: vehicle state.
+"""
 
 from __future__ import annotations
 

@@ -98,3 +98,16 @@ def test_every_module_that_moves_the_rover_has_a_unit_test_beside_it(package: st
     )
     modules = [path.stem for path in (ROOT / "companion" / package).glob("*.py") if path.stem != "__init__"]
     assert [name for name in modules if f"companion.{package}.{name} " not in tests] == []
+
+
+def test_the_nouns_of_the_concepts_have_a_home(made: dict[str, Any]) -> None:
+    homes = {noun for module in made["modules"]() for noun in module.nouns}
+    rows = (ROOT / "docs" / "concepts.md").read_text(encoding="utf-8").partition("| noun |")[2].splitlines()[2:]
+    nouns = [noun.strip() for row in rows if row.startswith("|") for noun in row.split("|")[1].split(",")]
+    assert len(nouns) > 10 and {noun.lower() for noun in nouns} <= {home.lower() for home in homes}
+
+
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=lambda page: page.name)
+def test_file_names_alone_are_those_of_files(page: Path) -> None:
+    names = {path.name for folder in ("companion", "sitl", "tests", "docs") for path in (ROOT / folder).rglob("*.py")}
+    assert set(re.findall(r"`([a-z_0-9]+\.py)`", page.read_text(encoding="utf-8"))) <= names | {"mavlogdump.py"}
