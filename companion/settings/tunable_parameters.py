@@ -1,4 +1,4 @@
-"""Settings that a ground station may change during a drive, as MAVLink parameters: names, bounds, and their file.
+"""Tunable settings: those that a ground station may change during a drive, as MAVLink parameters; bounds, their file.
 
 Nouns: tunable settings.
 """
