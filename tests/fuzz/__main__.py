@@ -138,21 +138,22 @@ def main() -> None:
     FOUND.mkdir(parents=True, exist_ok=True)
     clean = True
     if names:
-        clean = readers_are_clean(names, share * given.seconds, [f"-runs={given.runs}", f"-seed={given.seed}"])
+        clean = readers_are_clean(names, share * given.seconds, given.runs, given.seed)
     if PROPERTIES in given.targets:
         clean = properties_hold(share * given.seconds) and clean
     sys.exit(0 if clean else 1)
 
 
-def readers_are_clean(names: list[str], seconds: float, limits: list[str]) -> bool:
-    """Fuzz one reader after the other, each for its share of the time; whether nothing was found."""
+def readers_are_clean(names: list[str], seconds: float, runs: int, seed: int) -> bool:
+    """Fuzz one reader after the other, each ``runs`` times or (-1) for its share of the time. True: nothing found."""
     if importlib.util.find_spec("atheris") is None:
         sys.exit("atheris is not installed; there are builds of it for Linux on x86-64 only: pip install -e '.[fuzz]'")
     known = watched_targets()
     names = list(known) if names == ["all"] else names
     if unknown := sorted(set(names) - known.keys()):
         sys.exit(f"{unknown[0]}: no such target; there are {', '.join(known)}, {PROPERTIES}")
-    limits = [f"-max_total_time={max(1, round(seconds / len(names)))}", *limits]
+    limit = f"-runs={runs}" if runs >= 0 else f"-max_total_time={max(1, round(seconds / len(names)))}"
+    limits = [limit, f"-seed={seed}"]
     results = [is_clean(name, known[name], limits) for name in names]
     return all(results)
 

@@ -81,8 +81,8 @@ def test_a_firmware_drives_and_starts_again_and_the_physics_ends_cleanly(tmp_pat
     assert said == [
         f"start the firmware with --model JSON:127.0.0.1 --home 53.1325000,23.1688000,0,90 --defaults {file}",
         "the firmware has started and is answered",
-        "something that is no frame of ArduPilot's JSON interface came; ignored, like all that follow",
-        "the firmware has started again: the rover stands at its start, the time is 0",
+        "a datagram was no frame of ArduPilot's JSON interface; ignored, like all that follow",
+        "the firmware has started again: the rover is back at its start, the time is 0",
         "stopped; 420 steps, 1 not frames; since the firmware's last start 0 s and 0 collisions",
     ]
 
@@ -194,7 +194,7 @@ def test_bad_input_gets_one_line(tmp_path: Path) -> None:
     assert "cannot be read" in refused(MISSION, "--params", tmp_path / "none.parm")
     many = tmp_path / "many.toml"
     many.write_text("[[beam]]\norientation = 0\nmin_m = 0.2\nmax_m = 6.0\n" * 7, encoding="utf-8")
-    assert "7 rangefinders: the firmware takes 6 at most; describe fewer beams" in refused(MISSION, "--sensors", many)
+    assert "7 rangefinders: the firmware accepts at most 6" in refused(MISSION, "--sensors", many)
     assert "cannot be written" in refused(MISSION, "--write-params", tmp_path)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", 0))

@@ -9,6 +9,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
+from companion.safety.reasons import Doubt
 from companion.settings.tunable_parameters import TABLE
 from tests.support.rig import Rig, yard
 from tests.support.served import mission_path
@@ -65,11 +66,12 @@ def test_a_change_counts_wherever_settings_are_read(tmp_path: Path) -> None:
     put(rig, "CMP_SPD_MAX", 1.5)
     executor = rig.companion.executor
     assert executor is not None
-    assert executor.surroundings.settings.guidance.max_speed_m_s == 1.5
+    view = executor.view(rig.companion.vehicle, rig.now_s())
+    assert view.settings.guidance.max_speed_m_s == 1.5
     put(rig, "CMP_JUMP", 8.0)
     rig.change = Shifted(3.0)
     rig.run_for(1.0)
-    assert not rig.was_stopped, "3 m is no jump any more"
+    assert not rig.gave(Doubt.POSITION_JUMPED), "3 m is no jump any more"
 
 
 class Shifted:

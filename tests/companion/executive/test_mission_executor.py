@@ -39,7 +39,7 @@ def step(desk: Desk, after_s: float = 0.05) -> Task:
     desk.stand(position.north_m, position.east_m)
     task = desk.executor.decide(desk.run.vehicle, desk.now_s)
     if task is not Task.END:
-        desk.executor.guide(task, desk.run.vehicle, desk.now_s)
+        desk.executor.guide(task, desk.run.vehicle, desk.executor.view(desk.run.vehicle, desk.now_s))
     return task
 
 
@@ -119,4 +119,4 @@ def test_settings_count_from_the_tick_after_they_were_replaced(desk: Desk) -> No
     step(desk)
     desk.settings.replace(Settings.model_validate({"guidance": {"max_speed_m_s": 0.7}}))
     step(desk)
-    assert desk.executor.surroundings.settings.guidance.max_speed_m_s == 0.7
+    assert desk.executor.view(desk.run.vehicle, desk.now_s).settings.guidance.max_speed_m_s == 0.7

@@ -132,7 +132,7 @@ def test_no_more_than_may_be_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyP
     with path.open("wb") as file:
         file.truncate(3_000_000_000)
     monkeypatch.setattr(Path, "read_bytes", lambda _: pytest.fail("all of it has been read"))
-    with pytest.raises(ParameterFileError, match=f"more than {MOST_BYTES} bytes"):
+    with pytest.raises(ParameterFileError, match=f"larger than {MOST_BYTES} bytes"):
         load_parameters(path)
 
 

@@ -50,7 +50,8 @@ def test_faults_are_of_every_kind_and_come_while_it_drives() -> None:
     plans = [soak_faults.plan_of(np.random.default_rng(seed)) for seed in range(200)]
     faults = [fault for plan in plans for fault in plan.faults]
     assert {len(plan.faults) for plan in plans} == set(range(soak_faults.MOST + 1))
-    assert len({(type(fault), getattr(fault, "what", "")) for fault in faults}) == len(soak_faults.FAULTS)
+    kinds = {(type(fault), getattr(fault, "effect", None), getattr(fault, "defect", None)) for fault in faults}
+    assert len(kinds) == len(soak_faults.FAULTS)
     assert all(fault.since == "driving" and fault.end_s > fault.start_s for fault in faults)
     assert plans[7] == soak_faults.plan_of(np.random.default_rng(7))
 
