@@ -220,6 +220,29 @@ def test_the_arc_of_a_turn_rate_is_as_wide_as_the_speed_makes_it(speed_m_s: floa
     assert tuple(found) == refused
 
 
+def test_a_velocity_may_lead_past_a_thing_closer_than_the_room_that_controllers_keep_but_not_into_it() -> None:
+    pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    for aside_m, refused in ((0.25, True), (0.42, False)):
+        evidence = open_ground()
+        evidence.log_odds[
+            round((MIDDLE + 1.0) / evidence.evidence_m), int((MIDDLE + aside_m) / evidence.evidence_m)
+        ] = 2.0
+        assert bool(fault(Output(GuidedVelocity(0.5, 0.0), pose, 0.0), evidence)) is refused
+
+
+def test_a_rover_at_a_wall_may_leave_it() -> None:
+    evidence = open_ground()
+    evidence.log_odds[: round(MIDDLE / evidence.evidence_m)] = 2.0
+    assert fault(Output(GuidedVelocity(0.5, 0.0), Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), evidence) == ""
+
+
+def test_a_target_at_the_farthest_distance_passes() -> None:
+    for beyond_m, refused in ((0.0, False), (0.2, True)):
+        pose = Pose(0.5, MIDDLE, 0.0, 0.0)
+        there = GuidedPosition(NedPoint(0.5 + farthest_m(0.0, SETTINGS.guidance) + beyond_m, MIDDLE))
+        assert bool(fault(Output(there, pose, 0.0), open_ground())) is refused
+
+
 def test_any_velocity_but_zero_is_looked_along() -> None:
     evidence, pose = open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0)
     patched(evidence, MIDDLE - 1.0, MIDDLE - 1.0, 0.1, 2.0)
@@ -352,6 +375,13 @@ def test_a_turn_stops_on_the_arc_of_its_speed(
     bounds = Bounds((Bound("the yard", yard_shape, True, RADIUS_M, RADIUS_M),))
     at = view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0), 2.0)
     assert bool(inside_borders(GuidedVelocity(2.0, yaw_rate_rad_s), at, bounds)) is refused
+
+
+@pytest.mark.parametrize(("forward_m_s", "refused"), [(0.0, False), (1.0, True), (-1.0, True)])
+def test_close_before_a_border_only_standing_still_is_left(forward_m_s: float, refused: bool) -> None:
+    """At 2 m/s with borders 0.5 m ahead and behind: to be told to stand is never wrong."""
+    at = view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0), 2.0)
+    assert bool(inside_borders(GuidedVelocity(forward_m_s, 0.0), at, Bounds((inner(1.0),)))) is refused
 
 
 def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path) -> None:
