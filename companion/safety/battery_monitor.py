@@ -48,8 +48,6 @@ def with_battery(state: BatteryState, seen: BatterySeen) -> BatteryState:
 
 def judged(state: BatteryState, now_s: float, settings: PowerSettings) -> BatteryState:
     """The state at this moment: a level is reached when a reading has asked for it for ``after_s`` without a break."""
-    if not state.batteries:
-        return state
     reasons = {level: _reason(level, _known(state.batteries, now_s), settings) for level in (Level.RETURN, Level.HOLD)}
     since_s = {level: state.since_s.get(level, now_s) for level, reason in reasons.items() if reason is not None}
     state = replace(state, since_s=since_s)

@@ -16,6 +16,10 @@ class Notices:
     def tell(self, text: str, severity: Severity) -> None:
         self.told.append((text, severity))
 
+    def once(self, text: str) -> None:
+        if text not in self.texts:
+            self.tell(text, Severity.WARNING)
+
     @property
     def texts(self) -> list[str]:
         return [text for text, _ in self.told]

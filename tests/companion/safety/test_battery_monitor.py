@@ -6,13 +6,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from companion.safety.battery_monitor import STALE_S, BatteryMonitor, BatteryState, Level, judged, with_battery
+from companion.safety.battery_monitor import BatteryMonitor, BatteryState, Level, judged, with_battery
 from companion.safety.reasons import PowerReason, Reason, WaitReason
 from companion.settings import PowerSettings
-from companion.vehicle.events import BatterySeen
+from companion.vehicle.events import BatterySeen, EkfStatusSeen
 from companion.vehicle.state import VehicleState
 
-SETTINGS = PowerSettings(return_percent=20.0, hold_percent=10.0, return_volts=11.0, hold_volts=10.0, after_s=5.0)
+SETTINGS = PowerSettings(return_percent=20.0, hold_percent=10.0, return_volts=11.0, hold_volts=10.5, after_s=5.0)
 
 
 def fed(readings: list[tuple[float, int | None, float | None]], settings: PowerSettings = SETTINGS) -> BatteryState:
@@ -37,7 +37,8 @@ def steady(
         (50, 10.9, Level.RETURN, PowerReason.VOLTAGE),
         (10, 12.0, Level.RETURN, PowerReason.CHARGE),
         (9, 12.0, Level.HOLD, PowerReason.CHARGE),
-        (None, 9.9, Level.HOLD, PowerReason.VOLTAGE),
+        (None, 10.5, Level.RETURN, PowerReason.VOLTAGE),
+        (None, 10.4, Level.HOLD, PowerReason.VOLTAGE),
         (0, 12.0, Level.HOLD, PowerReason.CHARGE),
         (None, None, Level.FINE, None),
     ],
@@ -65,9 +66,22 @@ def test_a_level_never_goes_back_but_a_rover_that_has_not_begun_may() -> None:
     assert power.awaited(7.0) is None
 
 
-def test_a_reading_that_has_grown_old_says_nothing() -> None:
+def test_the_reason_is_the_reading_that_led_to_the_level() -> None:
+    state = fed([*steady(15, 12.0, 5.0), (5.5, 14, 12.0)])
+    assert state.reason == Reason(PowerReason.CHARGE, ("battery", 15))
+    assert fed(steady(None, 10.94)).reason == Reason(PowerReason.VOLTAGE, ("battery", 10.9))
+
+
+def test_a_rover_without_a_battery_report_may_drive() -> None:
+    power = BatteryMonitor(SETTINGS)
+    power.take(EkfStatusSeen(0.0, 0), VehicleState())
+    assert power.level(10.0) is Level.FINE and power.reason is None and power.awaited(10.0) is None
+
+
+@pytest.mark.parametrize(("age_s", "level"), [(10.0, Level.RETURN), (10.1, Level.FINE)])
+def test_a_reading_that_has_grown_old_says_nothing(age_s: float, level: Level) -> None:
     state = fed(steady(15, 12.0, 4.0))
-    assert judged(state, 4.0 + STALE_S + 0.1, SETTINGS).level is Level.FINE
+    assert judged(state, 4.0 + age_s, SETTINGS).level is level
 
 
 def test_the_short_form_counts_only_where_there_is_no_other() -> None:
@@ -86,15 +100,26 @@ def test_any_of_several_batteries_counts_and_is_named() -> None:
 
 
 @pytest.mark.parametrize(
-    ("charge_state", "level"),
-    [(0, Level.FINE), (1, Level.FINE), (2, Level.RETURN), (3, Level.HOLD), (5, Level.HOLD), (6, Level.FINE)],
+    ("charge_state", "level", "kind"),
+    [
+        (0, Level.FINE, None),
+        (1, Level.FINE, None),
+        (2, Level.RETURN, PowerReason.LOW),
+        (3, Level.HOLD, PowerReason.CRITICAL),
+        (5, Level.HOLD, PowerReason.CRITICAL),
+        (6, Level.FINE, None),
+    ],
 )
-def test_the_autopilots_own_failsafe_counts_unless_switched_off(charge_state: int, level: Level) -> None:
+def test_the_autopilots_own_failsafe_counts_unless_switched_off(
+    charge_state: int, level: Level, kind: PowerReason | None
+) -> None:
     for heed in (True, False):
-        settings = SETTINGS.model_copy(update={"heed_autopilot": heed})
-        state = with_battery(BatteryState(), BatterySeen(0.0, 0, 12.0, 80, charge_state))
-        state = judged(judged(state, 0.0, settings), 5.0, settings)
-        assert state.level is (level if heed else Level.FINE)
+        power = BatteryMonitor(SETTINGS.model_copy(update={"heed_autopilot": heed}))
+        power.take(BatterySeen(0.0, 0, 12.0, 80, charge_state), VehicleState())
+        reason = None if kind is None or not heed else Reason(kind, ("battery",))
+        assert power.awaited(0.0) == (None if reason is None else Reason(WaitReason.CHARGED_BATTERY, (reason,)))
+        assert power.level(0.0) is Level.FINE
+        assert (power.level(5.0), power.reason) == (level if heed else Level.FINE, reason)
 
 
 def test_zero_switches_a_threshold_off() -> None:

@@ -135,6 +135,15 @@ def test_a_hold_that_was_lost_is_sent_again_when_the_vehicle_is_heard_again():
     assert (watch, verdict.reaction) == (THEIRS, Reaction.SILENT)
 
 
+@pytest.mark.parametrize(("after_s", "reaction"), [(1.9, Reaction.SILENT), (2.0, Reaction.HOLD)])
+def test_a_heartbeat_in_guided_two_seconds_after_hold_means_that_it_was_lost(after_s, reaction):
+    watch, _ = check(OURS, vehicle(), 10.0, SETTINGS, Reason(Doubt.STICKS_MOVED))
+    watch, verdict = check(watch, vehicle(10.0 + after_s), 13.0, SETTINGS, None)
+    lost = reaction is Reaction.HOLD
+    assert verdict == Verdict(reaction, Reason(LatchReason.HOLD_LOST if lost else LatchReason.HOLD_SENT))
+    assert watch.hold_s == (13.0 if lost else 10.0)
+
+
 def test_any_doubt_stops_and_holds():
     watch, verdict = check(OURS, vehicle(), 10.0, SETTINGS, JUMPED)
     assert verdict == Verdict(Reaction.STOP, JUMPED)

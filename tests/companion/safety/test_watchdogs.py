@@ -20,6 +20,7 @@ from companion.safety.watchdogs import (
     DataMonitor,
     LoopMonitor,
     ScanMonitor,
+    data_doubt,
     first_doubt,
 )
 from companion.settings import SafetySettings, Settings
@@ -30,6 +31,7 @@ from companion.vehicle.events import (
     LocalPositionSeen,
     RangeSeen,
 )
+from companion.vehicle.link_latency import Latency
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import doubt_of, vehicle
 
@@ -152,6 +154,22 @@ def test_what_is_missing_or_old_is_doubted(name: str):
 )
 def test_the_ekf_must_have_a_position(flags: int, ok: bool):
     assert doubt_of(vehicle(ekf=flags), 10.0) is (None if ok else Doubt.EKF_INCOMPLETE)
+
+
+def test_after_a_jump_of_the_autopilots_clock_the_rover_stands_for_a_while():
+    seen = replace(vehicle(10.0), latency=Latency(jumped_s=9.75))
+    settings = SETTINGS.model_copy(update={"settle_s": 0.5})
+    assert data_doubt(seen, 10.0, settings) == Reason(Doubt.CLOCK_JUMPED)
+    assert data_doubt(seen, 10.25, settings) is None
+
+
+@pytest.mark.parametrize(
+    ("round_trips_s", "late"), [((1.0, 1.0, 1.0), False), ((1.1, 1.1, 1.1), True), ((9.0,), False)]
+)
+def test_a_link_that_is_late_again_and_again_is_doubted(round_trips_s: tuple[float, ...], late: bool):
+    seen = replace(vehicle(10.0), latency=Latency(round_trips_s=round_trips_s))
+    settings = SETTINGS.model_copy(update={"latency_s": 1.0})
+    assert data_doubt(seen, 10.0, settings) == (Reason(Doubt.LINK_LATE, (1.0,)) if late else None)
 
 
 def test_contradictions_are_doubted_after_the_age_of_the_data():
