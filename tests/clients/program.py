@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.forked import Forked
 from tests.support.served import PATIENCE_S
 
 
@@ -28,16 +29,8 @@ def installed(module: str, package: str) -> None:
 class Program:
     """A running process; ``output`` is all it has said, standard error included."""
 
-    def __init__(self, command: list[str], folder: Path) -> None:
-        environment = {**os.environ, "PYTHONUNBUFFERED": "1", "HOME": str(folder)}
-        self.child = subprocess.Popen(
-            command,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            cwd=folder,
-            env=environment,
-        )
+    def __init__(self, child: subprocess.Popen[bytes] | Forked) -> None:
+        self.child = child
         self.output = ""
         self._since = 0
         self._silent = False
@@ -86,22 +79,46 @@ class Program:
 
     def end(self, number: int = signal.SIGTERM) -> int:
         """Close its input and end it; killed if it does not go."""
-        assert self.child.stdin is not None and self.child.stdout is not None
-        self.child.stdin.close()
+        assert self.child.stdout is not None
+        if self.child.stdin is not None:
+            self.child.stdin.close()
         self.child.send_signal(number)
         try:
             code = self.ended(30.0)
         except subprocess.TimeoutExpired:
             self.child.kill()
             code = self.ended()
-        self.child.stdout.close()
+        for stream in (self.child.stdout, self.child.stderr):
+            if stream is not None:
+                stream.close()
         return code
 
 
 @contextmanager
 def program(folder: Path, *command: object) -> Iterator[Program]:
     """A Python program (the interpreter's arguments), ended in the end."""
-    running = Program([sys.executable, *map(str, command)], folder)
+    child = subprocess.Popen(
+        [sys.executable, *map(str, command)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        cwd=folder,
+        env={**os.environ, "PYTHONUNBUFFERED": "1", "HOME": str(folder)},
+    )
+    with _ended(Program(child)) as running:
+        yield running
+
+
+@contextmanager
+def ours(folder: Path, module: str, *arguments: object) -> Iterator[Program]:
+    """``rover-companion`` (module companion) or ``rover-sitl`` (module sitl), ended in the end."""
+    environment = {**os.environ, "HOME": str(folder)}
+    with _ended(Program(Forked(module, arguments, environment, folder, merged=True))) as running:
+        yield running
+
+
+@contextmanager
+def _ended(running: Program) -> Iterator[Program]:
     try:
         yield running
     finally:

@@ -14,9 +14,7 @@ from typing import Any
 import pytest
 from pymavlink import mavutil
 
-from companion.executive.warm_up import warm_up
-from companion.settings import Settings
-from tests.clients.program import Program, program
+from tests.clients.program import Program, ours
 from tests.sitl.network.test_server import free_port
 from tests.support.rig import GUIDED, yard
 from tests.support.served import PATIENCE_S, PATIENT, mission_path
@@ -145,13 +143,12 @@ def scene(folder: Path, companion_on: str, *options: object) -> Iterator[Scene]:
     listen = [f"tcp:127.0.0.1:{tcp}", f"udpout:127.0.0.1:{udp}"]
     sitl = ["serve", path, "--listen", listen[0], "--listen", listen[1], "--speedup", SPEEDUP]
     url = {"tcp": f"tcp:127.0.0.1:{tcp}", "udp": f"udpin:127.0.0.1:{udp}"}[companion_on]
-    warm_up(Settings())  # where nothing is compiled yet, the companion would take a minute
-    with program(folder, "-c", "from sitl.cli.main import main; main()", *sitl) as serve:
+    with ours(folder, "sitl", *sitl) as serve:
         serve.says(f"sending to {listen[1]}")
         (folder / "patient.toml").write_text(PATIENT)
         kept = ("--state", folder / "state", "--settings", folder / "patient.toml")
         run = ["run", path, "--connect", url, *kept, *options]
-        with program(folder, "-c", "from companion.cli.main import main; main()", *run) as companion:
+        with ours(folder, "companion", *run) as companion:
             witness = Witness(tcp)
             try:
                 yield Scene(tcp, udp, serve, companion, witness)

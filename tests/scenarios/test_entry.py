@@ -12,6 +12,7 @@ import pytest
 import typer
 
 from companion.cli.entry import StoppedError, start
+from tests.support.forked import run
 from tests.support.served import PATIENCE_S, finished, process, slowness
 
 SCRIPTS = {"rover-companion": "companion", "rover-sitl": "sitl"}
@@ -36,9 +37,10 @@ def command(name: str, *arguments: str) -> list[str]:
     ],
 )
 def test_wrong_usage_gets_one_line_and_exit_code_2(arguments: tuple[str, ...], what: str) -> None:
-    done = subprocess.run(command(*arguments), capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 2
-    assert done.stdout == "" and done.stderr.count("\n") == 1 and what in done.stderr
+    name, *rest = arguments
+    code, out, err = run(SCRIPTS[name], *rest)
+    assert (code, out) == (2, "")
+    assert err.count("\n") == 1 and what in err
 
 
 def test_sigterm_ends_a_command_like_an_interrupt(capsys: pytest.CaptureFixture[str]) -> None:
@@ -52,10 +54,9 @@ def test_sigterm_ends_a_command_like_an_interrupt(capsys: pytest.CaptureFixture[
     assert signal.getsignal(signal.SIGTERM) == before
 
 
-@pytest.mark.parametrize("name", SCRIPTS)
-def test_an_interrupt_while_it_loads_is_no_traceback(name: str) -> None:
+def test_an_interrupt_while_it_loads_is_no_traceback() -> None:
     quiet = 0
-    for delay_s in (0.15, 0.3, 0.45):
+    for name, delay_s in (("rover-companion", 0.15), ("rover-sitl", 0.3), ("rover-companion", 0.45)):
         arguments = command(name, "--help")
         with subprocess.Popen(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
             time.sleep(delay_s * slowness())
@@ -99,7 +100,7 @@ def test_an_interrupted_drive_says_what_was_stopped_and_where_its_record_is(
     # A shell's job in the background would ignore Ctrl-C, and all that it starts.
     heeded = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
     with process("sitl", *command, first=heeded) as child:
-        assert child.stdout is not None and child.stdout.readline().startswith("Rooms")
+        assert child.stdout.readline().startswith("Rooms")
         child.send_signal(number)
         code, _, errors = finished(child)
     assert code == 130 and errors.count("\n") == 1

@@ -184,7 +184,6 @@ def test_the_command_drives_what_auto_hands_over(tmp_path: Path) -> None:
     with served(yard(tmp_path)) as world:
         upload(world.url, stored([(GUIDED_ENABLE, ON, (6, 9)), (WAYPOINT, NONE, (3, 9))]))
         with process("companion", "run", "--from-autopilot", "--connect", world.url) as run:
-            assert run.stderr is not None
             assert any("a person to arm and to set AUTO" in line for line in iter(run.stderr.readline, ""))
             world.pilot(ARM, 1)
             wait_until(lambda: world.simulator.vehicle.armed)

@@ -49,7 +49,6 @@ def line(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Line]:
     made = Line(folder)
     mission = mission_path(yard(folder))
     with process("sitl", "serve", mission, *made.arguments, "--speedup", 20) as child:
-        assert child.stdout is not None
         for url in made.listen:
             assert child.stdout.readline() == f"listening on {url}\n"
         yield made

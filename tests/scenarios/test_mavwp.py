@@ -21,7 +21,6 @@ def link() -> Iterator[Any]:
     """A mavutil connection to a simulator in a process of its own, ten times as fast as real time."""
     port = free_port()
     with process("sitl", "serve", OPEN, "--listen", f"tcp:127.0.0.1:{port}", "--speedup", 10) as child:
-        assert child.stdout is not None
         assert "listening" in child.stdout.readline()
         connection = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", source_system=255)
         assert connection.wait_heartbeat(timeout=PATIENCE_S) is not None

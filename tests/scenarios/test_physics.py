@@ -5,7 +5,6 @@ from __future__ import annotations
 import re
 import signal
 import socket
-import subprocess
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +20,7 @@ from sitl.firmware.physics_server import received
 from sitl.scenario import scenario_from_mission, with_sensors
 from tests.sitl.network.test_server import free_port
 from tests.support.firmware import Firmware, frame
+from tests.support.forked import Forked
 from tests.support.served import process
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -44,19 +44,17 @@ def asking(port: int) -> Iterator[Callable[[bytes], bytes]]:
 
 
 @contextmanager
-def physics(*options: object) -> Iterator[tuple[subprocess.Popen[str], int]]:
+def physics(*options: object) -> Iterator[tuple[Forked, int]]:
     """The process, once it listens, and its port."""
     port = free_port()
     with process("sitl", "physics", MISSION, "--port", port, *options) as child:
-        assert child.stdout is not None
         line = child.stdout.readline()
         assert line == f"listening on udp 127.0.0.1:{port}\n", child.communicate()
         yield child, port
 
 
-def stopped(child: subprocess.Popen[str], number: signal.Signals) -> list[str]:
+def stopped(child: Forked, number: signal.Signals) -> list[str]:
     """What it still says after a signal; it ends with exit code 0 and no complaint."""
-    assert child.stdout is not None and child.stderr is not None
     child.send_signal(number)
     said = child.stdout.read().splitlines()
     assert (child.wait(10.0), child.stderr.read()) == (0, "")

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -36,6 +34,7 @@ from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission, with_faults
 from tests.support.records import unclosed, with_meta
 from tests.support.rig import Rig, kept_in, yard
+from tests.support.served import finished, process
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 FILES = ("link.tlog", "rounds.bin", "decisions.jsonl")
@@ -72,20 +71,20 @@ def assert_same(record: Path) -> Record:
     return loaded
 
 
+NO_SOCKETS = """
+import sys
+def hook(event, arguments):
+    if event.startswith("socket.") and event != "socket.gethostname":
+        raise SystemExit(f"{event} {arguments}")
+sys.addaudithook(hook)
+"""
+
+
 def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) -> None:
-    code = (
-        "import sys\n"
-        "def hook(event, arguments):\n"
-        "    if event.startswith('socket.') and event != 'socket.gethostname':\n"
-        "        raise SystemExit(f'{event} {arguments}')\n"
-        "sys.addaudithook(hook)\n"
-        "from companion.cli.main import main\n"
-        "main()\n"
-    )
-    command = [sys.executable, "-c", code, "replay", str(record)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
-    assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout.startswith("gate: reached\n") and done.stdout.endswith("differences: none\n")
+    with process("companion", "replay", record, first=NO_SOCKETS) as child:
+        code, out, err = finished(child)
+    assert (code, err) == (0, "")
+    assert out.startswith("gate: reached\n") and out.endswith("differences: none\n")
 
 
 @pytest.mark.parametrize(

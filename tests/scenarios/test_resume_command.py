@@ -62,7 +62,6 @@ def test_sigterm_stops_the_rover_saves_and_is_gone_within_a_second(tmp_path: Pat
         state, rasters = decode_state((tmp_path / "state" / "mission.state").read_bytes())
         assert state.released and not state.ended and rasters["log_odds"].any()
         with process("companion", *run_it, "--connect", world.url, "--resume") as run:
-            assert run.stderr is not None
             assert any("Resumed with its map" in line for line in iter(run.stderr.readline, ""))
             run.send_signal(signal.SIGTERM)
             assert finished(run)[0] == 130

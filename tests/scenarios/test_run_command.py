@@ -106,7 +106,6 @@ def test_a_peer_that_is_not_there_is_waited_for_until_ctrl_c(tmp_path: Path) -> 
         closed.bind(("127.0.0.1", 0))  # bound, not listening: connections are refused
         url = f"tcp:127.0.0.1:{closed.getsockname()[1]}"
         with process("companion", "run", path, "--connect", url) as run:
-            assert run.stderr is not None
             line = run.stderr.readline()
             while "waiting" not in line:
                 assert line
@@ -172,7 +171,6 @@ def test_a_companion_that_is_killed_leaves_the_rover_on_ground_it_had_seen(tmp_p
 def test_the_pilot_wins_and_the_autopilot_is_quoted(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     with served(mission) as world, process("companion", "run", mission_path(mission), "--connect", world.url) as run:
-        assert run.stderr is not None
         lines = iter(run.stderr.readline, "")
         assert any("a person to arm" in line for line in lines)
         world.pilot(ARM, 1)
@@ -213,7 +211,6 @@ def test_whoever_reads_its_messages_may_go_away(tmp_path: Path) -> None:
         served(load_mission(path)) as world,
         process("companion", "run", path, "--connect", world.url, "--arm") as run,
     ):
-        assert run.stderr is not None and run.stdout is not None
         assert "waiting" in run.stderr.readline()
         run.stderr.close()
         assert run.stdout.read() == "gate: unreachable\n"

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import os
-import subprocess
-import sys
 import tempfile
 import threading
 import time
@@ -22,6 +20,7 @@ from sitl.network.server import serve
 from sitl.scenario import scenario_from_mission
 from sitl.simulator import Simulator
 from tests.sitl.network.test_server import free_port
+from tests.support.forked import Forked
 
 READY_S = 45.0
 PATIENCE_S = 180.0
@@ -100,38 +99,28 @@ def slowness() -> float:
 
 
 @contextmanager
-def process(
-    module: str, *arguments: object, first: str = "", watchdogs: bool = False
-) -> Iterator[subprocess.Popen[str]]:
+def process(module: str, *arguments: object, first: str = "", watchdogs: bool = False) -> Iterator[Forked]:
     """Runs ``rover-companion`` (module companion) or ``rover-sitl`` (module sitl), and kills it at the end.
 
     ``first``: code that the process runs before anything else. A companion that drives has PATIENT settings, unless it
     has others or ``watchdogs`` asks for the default ones.
     """
-    code = f"{first}\nfrom {module}.cli.main import main; main()"
-    command = [sys.executable, "-c", code, *map(str, arguments)]
     with tempfile.TemporaryDirectory() as folder:
         if module == "companion" and arguments[0] == "run" and not watchdogs and "--settings" not in arguments:
             patient = Path(folder) / "patient.toml"
             patient.write_text(PATIENT)
-            command += ["--settings", str(patient)]
-        with subprocess.Popen(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, "XDG_STATE_HOME": folder},
-        ) as child:
+            arguments = (*arguments, "--settings", patient)
+        with Forked(module, arguments, {**os.environ, "XDG_STATE_HOME": folder}, first=first) as child:
             try:
                 yield child
             finally:
                 child.kill()
 
 
-def finished(child: subprocess.Popen[str]) -> tuple[int, str, str]:
+def finished(child: Forked) -> tuple[int, str, str]:
     """Exit code, stdout and stderr of a process that has ended or will."""
     out, err = child.communicate(timeout=PATIENCE_S)
-    return child.returncode, out, err
+    return child.wait(), out, err
 
 
 @contextmanager
