@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from enum import Enum, StrEnum
+from enum import Enum, StrEnum, auto
 
 from companion.safety.reasons import Doubt, LatchReason, Reason, WaitReason
 from companion.safety.watchdogs import data_doubt
@@ -39,13 +39,13 @@ class LatchState:
     """When HOLD was sent."""
 
 
-class Reaction(StrEnum):
+class Reaction(Enum):
     """What the companion does in this tick."""
 
-    SILENT = "silent"
-    DRIVE = "drive"
-    STOP = "stop"
-    HOLD = "hold"
+    SILENT = auto()
+    DRIVE = auto()
+    STOP = auto()
+    HOLD = auto()
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +74,7 @@ def check(
     control = latched(latch.control, vehicle)
     heartbeat = vehicle.heartbeat
     if heartbeat is None or control is not Control.COMPANION:
-        return LatchState(control), Verdict(Reaction.SILENT, None if control is Control.NOBODY else other_mode(vehicle))
+        return LatchState(control), Verdict(Reaction.SILENT, None if control is Control.NOBODY else _not_ours(vehicle))
     if latch.hold_sent:
         # The heartbeat may still show GUIDED just after our own HOLD: wait until it has left GUIDED.
         if heartbeat.armed and heartbeat.time_s >= latch.hold_s + HOLD_AGAIN_S:
@@ -113,9 +113,10 @@ def awaited(vehicle: VehicleState, now_s: float, settings: SafetySettings) -> Re
     return person if data is None else Reason(WaitReason.GOOD_DATA_AND, (data, person))
 
 
-def other_mode(vehicle: VehicleState) -> Reason[LatchReason]:
-    """Why the companion must not steer, by the mode."""
+def _not_ours(vehicle: VehicleState) -> Reason[LatchReason]:
+    """Why the companion must not steer a vehicle that is not ours, by the mode."""
     heartbeat = vehicle.heartbeat
-    if vehicle.in_auto and heartbeat is not None and heartbeat.mode == vehicle.own_mode:
+    if heartbeat is not None and heartbeat.mode == vehicle.own_mode:
+        # In GUIDED the rover would be ours: this is AUTO.
         return Reason(LatchReason.BETWEEN_LEGS)
     return Reason(LatchReason.OTHER_MODE, (vehicle.own_mode.name,))

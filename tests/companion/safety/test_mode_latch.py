@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from companion.core.frames import GeoPoint
 from companion.core.scan import RangeScan
-from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched, other_mode
+from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
 from companion.safety.reasons import Doubt, LatchReason, Reason, WaitReason
 from companion.safety.watchdogs import DataMonitor, SticksMonitor, first_doubt
 from companion.settings import SafetySettings, Settings
@@ -179,6 +179,17 @@ def test_a_short_gap_stops_and_does_not_hold():
         assert verdict.reaction is reaction, now_s
 
 
+def test_doubts_before_disarming_do_not_count_afterwards():
+    watch, verdict = checked(LONG_STOPPED, vehicle(armed=False, ekf=0), 10.0)
+    assert verdict == Verdict(Reaction.SILENT, Reason(LatchReason.DISARMED))
+    watch, verdict = checked(watch, UNSAFE, 10.1)
+    assert verdict.reaction is Reaction.STOP and watch.unsafe_since_s == 10.1
+
+
+def test_the_words_by_which_a_state_file_names_who_drives():
+    assert [str(control) for control in Control] == ["nobody", "companion", "person"]
+
+
 @given(st.lists(st.tuples(st.sampled_from([0, 4, 10, 11, 15]), st.booleans(), st.booleans()), max_size=40))
 def test_whatever_happens_setpoints_go_out_only_while_guided_and_armed(story):
     watch = LatchState()
@@ -191,29 +202,43 @@ def test_whatever_happens_setpoints_go_out_only_while_guided_and_armed(story):
             assert good
 
 
+SETS_GUIDED = Reason(WaitReason.PERSON_SETS_MODE, ("GUIDED",))
+
+
 @pytest.mark.parametrize(
-    ("seen", "now_s", "awaited_kind"),
+    ("seen", "now_s", "expected"),
     [
         (vehicle(), 10.0, None),
-        (vehicle(), 10.0 + SETTINGS.heartbeat_s + 0.1, WaitReason.AUTOPILOT_HEARD),
-        (vehicle(mode=HOLD), 10.0, WaitReason.PERSON_SETS_MODE),
-        (vehicle(armed=False), 10.0, WaitReason.PERSON_ARMS_AGAIN),
-        (vehicle(mode=HOLD, armed=False), 10.0, WaitReason.PERSON_SETS_MODE_AND_ARMS),
-        (vehicle(mode=HOLD, ekf=0), 10.0, WaitReason.GOOD_DATA_AND),
+        (VehicleState(), 10.0, Reason(WaitReason.AUTOPILOT_HEARD)),
+        (vehicle(), 10.0 + SETTINGS.heartbeat_s, None),
+        (vehicle(), 10.0 + SETTINGS.heartbeat_s + 0.1, Reason(WaitReason.AUTOPILOT_HEARD)),
+        (vehicle(mode=HOLD), 10.0, SETS_GUIDED),
+        (replace(vehicle(mode=HOLD), in_auto=True), 10.0, Reason(WaitReason.PERSON_SETS_MODE, ("AUTO",))),
+        (vehicle(armed=False), 10.0, Reason(WaitReason.PERSON_ARMS_AGAIN)),
+        (vehicle(mode=HOLD, armed=False), 10.0, Reason(WaitReason.PERSON_SETS_MODE_AND_ARMS, ("GUIDED",))),
+        (
+            vehicle(mode=HOLD, ekf=0),
+            10.0,
+            Reason(WaitReason.GOOD_DATA_AND, (Reason(Doubt.EKF_INCOMPLETE, ("position",)), SETS_GUIDED)),
+        ),
     ],
 )
-def test_what_a_silent_companion_waits_for(seen, now_s, awaited_kind):
-    found = awaited(seen, now_s, SETTINGS)
-    assert (None if found is None else found.kind) is awaited_kind
+def test_what_a_silent_companion_waits_for(seen, now_s, expected):
+    assert awaited(seen, now_s, SETTINGS) == expected
 
 
 @pytest.mark.parametrize(
-    ("in_auto", "mode", "kind"),
+    ("seen", "reason"),
     [
-        (False, HOLD, LatchReason.OTHER_MODE),
-        (True, HOLD, LatchReason.OTHER_MODE),
-        (True, RoverMode.AUTO, LatchReason.BETWEEN_LEGS),
+        (VehicleState(), Reason(LatchReason.OTHER_MODE, ("GUIDED",))),
+        (vehicle(mode=HOLD), Reason(LatchReason.OTHER_MODE, ("GUIDED",))),
+        (replace(vehicle(mode=HOLD), in_auto=True), Reason(LatchReason.OTHER_MODE, ("AUTO",))),
+        (replace(vehicle(mode=RoverMode.AUTO), in_auto=True), Reason(LatchReason.BETWEEN_LEGS)),
     ],
 )
-def test_a_mode_that_is_not_ours_is_named(in_auto, mode, kind):
-    assert other_mode(replace(vehicle(mode=mode), in_auto=in_auto)).kind is kind
+def test_a_mode_that_is_not_ours_is_named(seen, reason):
+    assert check(THEIRS, seen, 10.0, SETTINGS, None) == (THEIRS, Verdict(Reaction.SILENT, reason))
+
+
+def test_before_anybody_has_had_the_rover_there_is_nothing_to_name():
+    assert check(NOBODY, vehicle(mode=HOLD), 10.0, SETTINGS, None) == (NOBODY, Verdict(Reaction.SILENT))
