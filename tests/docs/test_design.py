@@ -84,20 +84,65 @@ def test_only_the_field_step_stands_at_the_root_of_the_companion() -> None:
     assert {path.name for path in (ROOT / "companion").glob("*.py")} == {"__init__.py", "app.py"}
 
 
-@pytest.mark.parametrize("program", ["companion", "sitl"])
-def test_the_tests_mirror_the_packages(program: str) -> None:
-    packages = {path.parent.name for path in (ROOT / program).glob("*/__init__.py")}
-    folders = {path.name for path in (ROOT / "tests" / program).iterdir() if path.is_dir() and path.name[0] != "_"}
-    assert folders <= packages
+def unmirrored(root: Path) -> list[str]:
+    """Folders with modules whose mirror below tests/ has no test file, and folders of tests with nothing to mirror."""
+    packages, tests = set(), set()
+    for program in ("companion", "sitl"):
+        found = (path for path in (root / program).rglob("*.py") if path.name != "__init__.py")
+        packages |= {path.parent.relative_to(root) for path in found}
+        tests |= {path.parent.relative_to(root / "tests") for path in (root / "tests" / program).rglob("test_*.py")}
+    strange = [f"tests/{folder} mirrors no package" for folder in sorted(tests - packages)]
+    return [f"no test file in tests/{folder}" for folder in sorted(packages - tests)] + strange
 
 
-@pytest.mark.parametrize("package", ["control", "executive", "safety", "supervision"])
-def test_every_module_that_moves_the_rover_has_a_unit_test_beside_it(package: str) -> None:
-    tests = "\n".join(
-        path.read_text(encoding="utf-8") for path in (ROOT / "tests" / "companion" / package).glob("*.py")
-    )
-    modules = [path.stem for path in (ROOT / "companion" / package).glob("*.py") if path.stem != "__init__"]
-    assert [name for name in modules if f"companion.{package}.{name} " not in tests] == []
+def imported(file: Path) -> set[str]:
+    """Full names of all modules that a file imports, and of what it takes from them."""
+    names = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module} | {f"{node.module}.{alias.name}" for alias in node.names}
+        elif isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+    return names
+
+
+def untested(root: Path, package: str) -> list[str]:
+    """The modules of a package without a test file of their name in its mirror that imports them."""
+    missing = []
+    for module in sorted(path.stem for path in (root / "companion" / package).glob("*.py")):
+        test, name = Path("tests", "companion", package, f"test_{module}.py"), f"companion.{package}.{module}"
+        if module != "__init__" and not ((root / test).is_file() and name in imported(root / test)):
+            missing.append(f"{test} must be there and import {name}")
+    return missing
+
+
+def test_the_tests_mirror_the_packages() -> None:
+    assert unmirrored(ROOT) == []
+
+
+@pytest.mark.parametrize("package", ["control", "executive", "operator", "safety", "supervision"])
+def test_every_module_that_moves_the_rover_has_a_unit_test_of_its_name_beside_it(package: str) -> None:
+    assert untested(ROOT, package) == []
+
+
+def test_what_has_no_test_beside_it_is_named_in_one_line(tmp_path: Path) -> None:
+    for name, text in {
+        "companion/a/__init__.py": "",
+        "companion/a/one.py": "",
+        "companion/a/two.py": "",
+        "companion/a/three.py": "",
+        "companion/a/deep/four.py": "",
+        "tests/companion/a/test_one.py": "from companion.a import one",
+        "tests/companion/a/test_two.py": "import companion.a.one",
+        "tests/companion/b/test_three.py": "from companion.a.three import nothing",
+    }.items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text)
+    assert untested(tmp_path, "a") == [
+        "tests/companion/a/test_three.py must be there and import companion.a.three",
+        "tests/companion/a/test_two.py must be there and import companion.a.two",
+    ]
+    assert unmirrored(tmp_path) == ["no test file in tests/companion/a/deep", "tests/companion/b mirrors no package"]
 
 
 def test_the_nouns_of_the_concepts_have_a_home(made: dict[str, Any]) -> None:

@@ -11,7 +11,7 @@ from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.random_numbers import seeded
 from companion.settings import PlannerSettings
 from sitl.experiments.experiment import START, TARGET, load_maps
-from tests.companion.planning.test_bspline_ga import TUNING
+from tests.companion.planning.bspline_ga.test_bspline_ga import TUNING
 from tests.support.planning_maps import one_obstacle
 
 ADAPTIVE = TUNING._replace(adaptive=True, most_control_points=7, number_probability=1.0)

@@ -1,0 +1,101 @@
+"""The listener: what becomes of events, and the answers to operators."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from companion.core.severity import Severity
+from companion.executive.mission_run import LocatedScan
+from companion.operator.notifications import News
+from companion.safety.mode_latch import Control
+from companion.supervision.listener import Listener
+from companion.vehicle.commands import (
+    AnswerTarget,
+    ParameterValue,
+)
+from companion.vehicle.events import (
+    Event,
+    HeartbeatSeen,
+    ParameterAsked,
+    TextSeen,
+)
+from tests.companion.safety.test_mode_latch import GUIDED, HOLD
+from tests.support.desk import Desk
+from tests.support.whole import Whole
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> Whole:
+    return Whole(tmp_path)
+
+
+def test_ground_stations_are_answered_and_the_autopilots_warnings_shown(whole: Whole) -> None:
+    answers = whole.tick(ParameterAsked(100.0, "CMP_STALE", -1), TextSeen(100.0, 3, "Bad battery"))
+    assert [answer.name for answer in answers if isinstance(answer, ParameterValue)] == ["CMP_STALE"]
+    assert not any(isinstance(answer, AnswerTarget) for answer in answers)
+    assert whole.companion.status().news == (News(Severity.ERROR, "autopilot: Bad battery"),)
+    whole.tick()
+    assert whole.companion.status().news == ()
+
+
+class Heard:
+    """A listener with what it hands events to."""
+
+    def __init__(self, folder: Path, *, begun: bool = True) -> None:
+        self.desk, self.taken, self.noted = Desk(folder), [], []
+        self.scans, self.localization = SimpleNamespace(fits=True), SimpleNamespace(position_doubted=False)
+        notifier: Any = SimpleNamespace(news=["old"], note=lambda text, severity: self.noted.append((text, severity)))
+        parameters: Any = SimpleNamespace(take=lambda event, vehicle: self.taken.append("parameters"))
+        one, other = (
+            SimpleNamespace(take=lambda event, vehicle, name=name: self.taken.append(name)) for name in ("one", "other")
+        )
+        link: Any = self.desk.autopilot
+        telemetry: Any = None
+        parts: Any = ((one, other), self.scans, self.localization)
+        self.listener, self.notifier = Listener(self.desk.run, link, notifier, parameters, telemetry, *parts), notifier
+        if begun:
+            self.desk.begin()
+
+    def listen(self, *events: Event) -> list[LocatedScan]:
+        self.desk.autopilot.events = list(events)
+        return self.listener.listen(self.desk.now_s)
+
+
+def test_every_event_is_folded_and_handed_on_in_order(tmp_path: Path) -> None:
+    heard = Heard(tmp_path)
+    assert heard.listen(HeartbeatSeen(11.0, HOLD, False, 1)) == []
+    heartbeat = heard.desk.run.vehicle.heartbeat
+    assert heartbeat is not None and heartbeat.time_s == 11.0
+    assert heard.taken == ["parameters", "one", "other"] and heard.notifier.news == []
+
+
+@pytest.mark.parametrize(("severity", "shown"), [(3, True), (4, True), (5, False)])
+def test_only_warnings_of_the_autopilot_are_shown(tmp_path: Path, severity: int, shown: bool) -> None:
+    heard = Heard(tmp_path)
+    heard.listen(TextSeen(10.0, severity, "Bad battery"))
+    assert heard.noted == ([("autopilot: Bad battery", Severity(severity))] if shown else [])
+
+
+def test_who_drives_is_followed_from_heartbeat_to_heartbeat_before_the_mission(tmp_path: Path) -> None:
+    heard = Heard(tmp_path, begun=False)
+    heard.listen(HeartbeatSeen(11.0, GUIDED, False, 1), HeartbeatSeen(11.0, HOLD, False, 1))
+    assert heard.desk.run.latch.control is Control.PERSON
+
+
+@pytest.mark.parametrize("missing", ["", "begun", "fits", "position", "attitude"])
+def test_a_scan_goes_on_the_map_only_where_it_was_taken(tmp_path: Path, missing: str) -> None:
+    heard = Heard(tmp_path, begun=missing != "begun")
+    heard.scans.fits = missing != "fits"
+    heard.localization.position_doubted = missing == "position"
+    seen = heard.desk.stand(2.0, 3.0)
+    if missing == "attitude":
+        heard.desk.run.vehicle = replace(seen, attitude=None)
+    assert seen.scan is not None
+    found = heard.listen(seen.scan)
+    assert len(found) == (0 if missing else 1)
+    assert missing or ((found[0].pose.north_m, found[0].pose.east_m) == (2.0, 3.0) and found[0].scan is seen.scan.scan)

@@ -1,0 +1,121 @@
+"""The position: jumps, an origin that moves, and a position that wanders."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from companion.core.frames import LocalFrame, NedPoint
+from companion.safety.reasons import Doubt
+from companion.settings import Settings
+from companion.supervision.localization_monitor import (
+    ASK_PLACES_S,
+    CALM_S,
+    ONCE_S,
+    SETTLED_S,
+    WANDERINGS,
+    LocalizationMonitor,
+)
+from companion.vehicle.dead_reckoning import Drift
+from companion.vehicle.events import (
+    HomeSeen,
+    LocalPositionSeen,
+    OriginSeen,
+)
+from companion.vehicle.state import VehicleState
+from tests.companion.safety.test_mode_latch import PLACE, vehicle
+from tests.support.desk import Desk
+
+# The position ---------------------------------------------------------------------------------------------------------
+
+
+class Located(Desk):
+    """A monitor of the position of a mission under way."""
+
+    def __init__(self, folder: Path, *, begun: bool = True) -> None:
+        super().__init__(folder)
+        link: Any = self.autopilot
+        self.monitor = LocalizationMonitor(self.run, link, self.settings, self.notices)
+        if begun:
+            self.begin()
+
+    def report(self, **state: Any) -> VehicleState:
+        position = LocalPositionSeen(self.now_s, self.now_s, 0.0, 0.0, 0.0, 0.0)
+        seen = replace(vehicle(self.now_s), position=position, **state)
+        self.monitor.take(position, seen)
+        return seen
+
+    def hear_origin(self, by_m: float = 0.0) -> None:
+        origin = LocalFrame(PLACE).to_geo(NedPoint(by_m, 0.0))
+        self.monitor.take(OriginSeen(self.now_s, origin), self.run.vehicle)
+
+    @property
+    def doubt(self) -> Doubt | None:
+        found = self.monitor.doubt(self.now_s)
+        return None if found is None else found.kind
+
+
+def test_a_jump_is_doubted_until_the_origin_is_heard_again(tmp_path: Path) -> None:
+    located = Located(tmp_path)
+    located.report(jump_m=0.1)
+    assert located.doubt is None and not located.monitor.position_doubted
+    for _ in range(2):
+        located.report(jump_m=5.0)
+    assert located.doubt is Doubt.POSITION_JUMPED and len(located.notices.told) == 1
+    located.monitor.service(located.now_s)
+    located.monitor.service(located.now_s + ASK_PLACES_S / 2.0)
+    assert located.autopilot.places_asked == 1
+    located.hear_origin()
+    assert located.doubt is Doubt.POSITION_JUMPED, "that answer may be older than the jump"
+    located.clock.time_s += SETTLED_S + 0.01
+    located.hear_origin()
+    assert located.doubt is None and located.executor.maps_begun == 1
+
+
+def test_how_far_a_jump_is_follows_the_settings(tmp_path: Path) -> None:
+    located = Located(tmp_path)
+    located.settings.replace(Settings.model_validate({"safety": {"jump_m": 8.0}}))
+    located.report(jump_m=5.0)
+    assert located.doubt is None
+
+
+def test_an_origin_that_moves_is_doubted_until_the_next_answer(tmp_path: Path) -> None:
+    located = Located(tmp_path)
+    located.hear_origin(10.0)
+    assert located.doubt is Doubt.ORIGIN_MOVED
+    located.clock.time_s += SETTLED_S + 0.01
+    located.hear_origin(10.0)
+    assert located.doubt is None and located.executor.maps_begun == 2
+
+
+def test_a_position_that_wanders_again_and_again_is_not_driven_by(tmp_path: Path) -> None:
+    located = Located(tmp_path)
+    for number in range(WANDERINGS):
+        located.clock.time_s += ONCE_S + 0.1
+        located.report(wander=Drift(off_m=2.0))
+        assert located.doubt is (Doubt.POSITION_WANDERS if number == WANDERINGS - 1 else Doubt.POSITION_WANDERED)
+        located.clock.time_s += SETTLED_S + 0.01
+        located.hear_origin()
+    assert located.doubt is Doubt.POSITION_WANDERS
+    located.clock.time_s += CALM_S
+    assert located.doubt is None
+
+
+def test_a_loop_that_stood_still_settles_first(tmp_path: Path) -> None:
+    located = Located(tmp_path)
+    located.monitor.stalled(located.now_s)
+    assert located.doubt is Doubt.LOOP_STOOD_STILL and not located.monitor.position_doubted
+    located.clock.time_s += SETTLED_S + 0.01
+    assert located.doubt is None
+
+
+def test_before_the_mission_there_is_no_map_to_doubt_and_home_is_told_once(tmp_path: Path) -> None:
+    located = Located(tmp_path, begun=False)
+    located.report(jump_m=5.0)
+    assert located.doubt is None and located.notices.told == []
+    located.begin()
+    away = LocalFrame(PLACE).to_geo(NedPoint(3.0, 0.0))
+    for _ in range(2):
+        located.monitor.take(HomeSeen(10.0, away), located.run.vehicle)
+    assert len(located.notices.told) == 1 and located.doubt is None

@@ -1,0 +1,31 @@
+"""The speed of simulated time."""
+
+import pytest
+
+from sitl.cli.pace import Pace
+
+
+class StillClock:
+    """Time passes only by sleeping."""
+
+    def __init__(self) -> None:
+        self.time_s = 100.0
+
+    def now_s(self) -> float:
+        return self.time_s
+
+    def sleep_until_s(self, time_s: float) -> None:
+        self.time_s = max(self.time_s, time_s)
+
+
+def test_a_pace_counts_from_its_first_moment_and_catches_up() -> None:
+    clock = StillClock()
+    pace, free = Pace(10.0, clock), Pace(None, clock)
+    pace.wait(5.0)
+    free.wait(50.0)
+    assert clock.time_s == 100.0
+    pace.wait(25.0)
+    assert clock.time_s == pytest.approx(102.0)
+    clock.time_s = 110.0
+    pace.wait(30.0)
+    assert clock.time_s == 110.0
