@@ -143,8 +143,6 @@ class LoopMonitor:
         self._late_s += late_s
         while self._ticks[0][0] < now_s - WINDOW_S:
             self._late_s -= self._ticks.popleft()[1]
-        if len(self._ticks) == 1:
-            self._late_s = late_s  # rounding errors do not add up
 
 
 class ScanMonitor:

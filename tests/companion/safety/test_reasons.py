@@ -120,6 +120,7 @@ SETS_MODE = Reason(WaitReason.PERSON_SETS_MODE, ("GUIDED",))
     [
         (Activity(RunPhase.CONNECTING), "connecting"),
         (Activity(RunPhase.WAITING, awaited=Reason(WaitReason.ARMING)), "waiting for arming"),
+        (Activity(RunPhase.WAITING), "waiting for "),
         (Activity(RunPhase.DRIVING), "driving"),
         (Activity(RunPhase.HOLDING), "holding"),
         (Activity(RunPhase.WAY_BLOCKED), "waiting for the way to clear"),

@@ -20,6 +20,7 @@ from companion.safety.watchdogs import (
     DataMonitor,
     LoopMonitor,
     ScanMonitor,
+    SticksMonitor,
     data_doubt,
     first_doubt,
 )
@@ -32,6 +33,7 @@ from companion.vehicle.events import (
     RangeSeen,
 )
 from companion.vehicle.link_latency import Latency
+from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import doubt_of, vehicle
 
@@ -86,6 +88,43 @@ def test_a_loop_that_is_in_time_again_is_believed_again():
     assert watch.doubt(7.0) is None
 
 
+def ticked(watch: LoopMonitor, ticks: list[tuple[float, float]]) -> list[Reason[Doubt] | None]:
+    """What it says after each tick (when, how late)."""
+    told = []
+    for now_s, late_s in ticks:
+        watch.tick(now_s, late_s, planner_works=False)
+        told.append(watch.doubt(now_s))
+    return told
+
+
+def test_late_for_more_than_two_of_the_last_four_seconds_is_too_slow():
+    """The first tick has no time before it; of a tick that is late all the time since the one before it counts."""
+    watch = LoopMonitor(30.0)
+    assert watch.doubt(100.0) is None
+    slow = ticked(watch, [(100.0 + 0.125 * i, 0.125) for i in range(18)])
+    assert slow == [None] * 17 + [Reason(Doubt.LOOP_LATE)]
+    again = ticked(watch, [(102.125 + 0.125 * i, 0.0) for i in range(1, 18)])
+    assert again == [Reason(Doubt.LOOP_LATE)] * 16 + [None]
+
+
+@pytest.mark.parametrize(("late_s", "slow"), [(0.1, False), (0.105, True)])
+def test_up_to_a_tenth_of_a_second_is_not_late(late_s: float, slow: bool):
+    told = ticked(LoopMonitor(30.0), [(0.125 * i, late_s) for i in range(40)])
+    assert (told[-1] is not None) is slow
+
+
+def test_a_stall_counts_for_a_second_however_long_it_was():
+    told = ticked(LoopMonitor(30.0), [(1.25 * i, 9.0) for i in range(4)])
+    assert told == [None, None, None, Reason(Doubt.LOOP_LATE)]
+
+
+def test_a_step_that_is_under_way_at_the_first_tick_has_just_begun():
+    watch = LoopMonitor(3.0)
+    for now_s, long in ((100.0, False), (103.0, False), (103.1, True)):
+        watch.tick(now_s, 0.0, planner_works=True)
+        assert watch.doubt(now_s) == (Reason(Doubt.PLANNING_LONG, (3.0,)) if long else None)
+
+
 def test_a_step_that_does_not_end_is_noticed_and_ends():
     watch = LoopMonitor(3.0)
     doubts = []
@@ -135,6 +174,27 @@ def test_the_first_monitor_that_doubts_is_heard():
     assert first_doubt((), 0.0) is None and first_doubt((quiet,), 0.0) is None
     assert first_doubt((quiet, jumped, late), 0.0) == Reason(Doubt.POSITION_JUMPED)
     assert first_doubt((late, jumped), 0.0) == Reason(Doubt.LOOP_LATE)
+
+
+def test_sticks_are_doubted_from_the_event_that_moved_them():
+    sticks = SticksMonitor()
+    assert sticks.doubt(0.0) is None
+    sticks.take(EkfStatusSeen(0.0, 0), replace(vehicle(), sticks=Sticks((1500, 1500), 9)))
+    assert sticks.doubt(0.0) == Reason(Doubt.STICKS_MOVED)
+    sticks.take(EkfStatusSeen(0.0, 0), vehicle())
+    assert sticks.doubt(0.0) is None
+
+
+def test_what_is_missing_is_named_one_after_the_other():
+    monitor, seen = DataMonitor(LiveSettings(Settings())), VehicleState()
+    assert monitor.doubt(10.0) == Reason(Doubt.DATA_MISSING, ("autopilot heartbeat",)), "nothing was heard"
+    named = []
+    for name in ("heartbeat", "position", "attitude", "scan_ahead", "ekf"):
+        seen = replace(seen, **{name: getattr(vehicle(10.0), name)})
+        monitor.take(EkfStatusSeen(10.0, 0), seen)
+        named.append(monitor.doubt(10.0))
+    words = ("position", "attitude", "range data ahead", "EKF status")
+    assert named == [*(Reason(Doubt.DATA_MISSING, (word,)) for word in words), None]
 
 
 @pytest.mark.parametrize("name", ["heartbeat", "position", "attitude", "scan_ahead", "ekf"])
@@ -190,11 +250,12 @@ def test_settings_that_are_replaced_count_at_once():
 def test_scans_are_doubted_by_the_name_of_their_sensor():
     scans, moving = ScanMonitor(), replace(vehicle(), position=LocalPositionSeen(0.0, 0.0, 0.0, 0.0, 1.0, 0.0))
     seen = RangeScan(0.0, np.linspace(-0.5, 0.5, 9), np.linspace(2.0, 5.0, 9), 0.1, 8.0, 0.1, "lidar")
-    fits = []
+    fits = [scans.fits]
+    assert scans.doubt(0.0) is None
     for tick in range(20):
         scans.take(RangeSeen(0.1 * tick, replace(seen, time_s=0.1 * tick)), moving)
         fits.append(scans.fits)
-    assert fits[0] and not fits[-1]
+    assert fits[0] and fits[1] and not fits[-1]
     assert scans.doubt(2.0) == Reason(Doubt.SCAN_REPEATED, ("lidar",))
     scans.take(EkfStatusSeen(2.0, 0), moving)
     assert not scans.fits, "only a scan changes that"

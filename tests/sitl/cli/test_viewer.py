@@ -120,7 +120,7 @@ class Stopped(io.StringIO):
 def test_a_stopped_terminal_does_not_hold_up_who_shows() -> None:
     stream = Stopped()
     one = a_view(scene(ROOM))
-    with Viewer(Console(file=stream, force_terminal=True, width=80, height=24)) as viewer:
+    with Viewer(Console(file=stream, force_terminal=True, color_system="truecolor", width=80, height=24)) as viewer:
         stream.going.clear()
         viewer.show(one)
         assert stream.reached.wait(10.0)
@@ -139,7 +139,10 @@ def test_pictures_are_due_five_times_a_second() -> None:
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
 def test_an_error_gives_the_terminal_back(error: type[BaseException]) -> None:
     stream = io.StringIO()
-    with pytest.raises(error), Viewer(Console(file=stream, force_terminal=True, width=80, height=24)) as viewer:
+    with (
+        pytest.raises(error),
+        Viewer(Console(file=stream, force_terminal=True, color_system="truecolor", width=80, height=24)) as viewer,
+    ):
         viewer.show(a_view(scene(ROOM)))
         raise error
     assert stream.getvalue().rindex(LEAVE.decode()) > stream.getvalue().rindex(ENTER.decode())
