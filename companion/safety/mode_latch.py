@@ -85,11 +85,9 @@ def check(
         return replace(latch, unsafe_since_s=None), Verdict(Reaction.SILENT, Reason(LatchReason.DISARMED))
     if doubt is None:
         return replace(latch, unsafe_since_s=None), Verdict(Reaction.DRIVE)
-    if doubt.kind is Doubt.STICKS_MOVED:
-        return LatchState(Control.PERSON, None, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, doubt)
     since_s = now_s if latch.unsafe_since_s is None else latch.unsafe_since_s
-    if now_s - since_s >= settings.hold_after_s:
-        return LatchState(Control.PERSON, since_s, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, doubt)
+    if doubt.kind is Doubt.STICKS_MOVED or now_s - since_s >= settings.hold_after_s:
+        return LatchState(Control.PERSON, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, doubt)
     return replace(latch, unsafe_since_s=since_s), Verdict(Reaction.STOP, doubt)
 
 

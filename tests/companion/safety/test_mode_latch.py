@@ -69,7 +69,7 @@ NOBODY, OURS, THEIRS = LatchState(), LatchState(Control.COMPANION), LatchState(C
 STOPPED = LatchState(Control.COMPANION, unsafe_since_s=9.0)
 LONG_STOPPED = LatchState(Control.COMPANION, unsafe_since_s=8.0)
 JUMPED = Reason(Doubt.POSITION_JUMPED)
-HELD = LatchState(Control.PERSON, 7.0, hold_sent=True)
+HELD = LatchState(Control.PERSON, hold_sent=True)
 
 
 @pytest.mark.parametrize(
