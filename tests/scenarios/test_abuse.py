@@ -17,8 +17,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.executive.mission_executor import MissionExecutor
 from companion.vehicle.state import PARAMETERS_KEPT
+from tests.support.forked import Forked
 from tests.support.rig import Rig, yard
-from tests.support.served import mission_path, served
+from tests.support.served import finished, mission_path, served
 
 MEMORY_BYTES = 600_000_000
 """What a program may take beyond its libraries, which reserve much more than they use."""
@@ -288,11 +289,11 @@ def test_another_vehicle_under_the_rovers_own_ids_is_not_heeded_and_told_once(tm
 
 WATCHER = """
 import os, sys
-allowed = tuple(os.path.realpath(place) + os.sep for place in sys.argv[1].split(':')) + ('/dev/', '/proc/')
+allowed = tuple(os.path.realpath(place) + os.sep for place in {places!r}) + ('/dev/', '/proc/')
 WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
-NAMED = {'os.mkdir': (0,), 'os.remove': (0,), 'os.rmdir': (0,), 'os.rename': (0, 1), 'os.link': (0, 1),
+NAMED = {{'os.mkdir': (0,), 'os.remove': (0,), 'os.rmdir': (0,), 'os.rename': (0, 1), 'os.link': (0, 1),
          'os.symlink': (0, 1), 'os.truncate': (0,), 'os.chmod': (0,), 'shutil.copyfile': (1,),
-         'tempfile.mkstemp': (0,), 'tempfile.mkdtemp': (0,)}
+         'tempfile.mkstemp': (0,), 'tempfile.mkdtemp': (0,)}}
 def hook(event, arguments):
     if event in ('open', 'os.mkdir') and os.path.isdir(arguments[0]):
         return  # no file, or one without a name: with that the compiler's cache tries whether it could be written
@@ -309,9 +310,6 @@ def hook(event, arguments):
             print('WRITTEN', event, os.fsdecode(place), file=sys.stderr, flush=True)
             os._exit(66)
 sys.addaudithook(hook)
-from companion.cli.main import main
-sys.argv[:] = ['rover-companion', *sys.argv[2:]]
-main()
 """
 
 
@@ -324,12 +322,12 @@ def tree(folder: Path) -> dict[str, tuple[int, int]]:
     return found
 
 
-def watched(place: Path, allowed: list[Path], *arguments: object) -> subprocess.CompletedProcess[str]:
+def watched(place: Path, allowed: list[Path], *arguments: object) -> tuple[int, str, str]:
     """A command in a read-only directory; its interpreter ends it when it writes elsewhere than allowed."""
-    command = [sys.executable, "-B", "-c", WATCHER, ":".join(map(str, allowed)), *map(str, arguments)]
-    home = place / "home"
-    environment = {**os.environ, "HOME": str(home), "XDG_STATE_HOME": str(allowed[-1])}
-    return subprocess.run(command, cwd=place, env=environment, capture_output=True, text=True, timeout=110, check=False)
+    environment = {**os.environ, "HOME": str(place / "home"), "XDG_STATE_HOME": str(allowed[-1])}
+    first = WATCHER.format(places=[str(path) for path in allowed])
+    with Forked("companion", arguments, environment, place, first) as child:
+        return finished(child)
 
 
 def test_no_file_is_written_outside_of_record_and_state(tmp_path: Path) -> None:
@@ -343,10 +341,10 @@ def test_no_file_is_written_outside_of_record_and_state(tmp_path: Path) -> None:
             done = watched(
                 place, [record, state], "run", "yard.toml", "--connect", world.url, "--arm", "--record", record
             )
-        assert done.returncode == 0, done.stderr
-        assert "gate: reached" in done.stdout
+        assert done[0] == 0, done[2]
+        assert "gate: reached" in done[1]
         again = watched(place, [record, state], "replay", record, "--why", "2")
-        assert again.returncode == 0, again.stderr
+        assert again[0] == 0, again[2]
     finally:
         os.chmod(place, 0o755)
     assert tree(place) == before
@@ -355,8 +353,8 @@ def test_no_file_is_written_outside_of_record_and_state(tmp_path: Path) -> None:
 
 def test_the_watcher_sees_what_is_written_elsewhere(tmp_path: Path) -> None:
     mission = yard(tmp_path)
-    done = watched(
+    code, _, said = watched(
         tmp_path, [tmp_path / "record"], "plan", "yard.png", "--start", "1,1", "--target", "3,3", "--image", "p.png"
     )
     assert mission.source is not None
-    assert done.returncode == 66 and "WRITTEN open" in done.stderr
+    assert code == 66 and "WRITTEN open" in said

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +9,7 @@ import pytest
 from companion.checkpoint.state_directory import StateDirectory, StateDirectoryError, default_directory
 from companion.checkpoint.state_format import MAGIC
 from companion.mission.mission import Mission
+from tests.support.forked import Forked
 from tests.support.rig import yard
 from tests.support.states import leave_state, sealed
 
@@ -86,11 +85,14 @@ def test_one_directory_is_for_one_run_at_a_time(tmp_path: Path) -> None:
 
 
 def test_a_run_that_was_killed_keeps_nobody_out(tmp_path: Path) -> None:
-    code = (
-        "import os, pathlib, sys; from companion.checkpoint.state_directory import StateDirectory; "
-        "place = StateDirectory(pathlib.Path(sys.argv[1])); os.abort()"
+    killed = (
+        "import os, pathlib\n"
+        "from companion.checkpoint.state_directory import StateDirectory\n"
+        f"place = StateDirectory(pathlib.Path({str(tmp_path)!r}))\n"
+        "os.abort()"
     )
-    assert subprocess.run([sys.executable, "-c", code, tmp_path], timeout=60, check=False).returncode < 0
+    with Forked("companion", (), first=killed) as child:
+        assert child.wait(60.0) < 0
     StateDirectory(tmp_path).close()
 
 
