@@ -68,7 +68,7 @@ def run(name: str, target: Target, corpus: Path, limits: list[str]) -> None:
     for number, example in enumerate(target.examples):
         (corpus / f"{number}").write_bytes(example)
         target.read(example)  # compiles what has to be; later it would count as a hang
-    always = ["-timeout=10", "-rss_limit_mb=2500", "-max_len=65536", "-print_final_stats=1"]
+    always = [f"-timeout={target.most_s}", "-rss_limit_mb=2500", "-max_len=65536", "-print_final_stats=1"]
 
     def read(data: bytes) -> None:
         try:
