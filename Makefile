@@ -26,7 +26,7 @@ test: $(TOOLS)
 
 # One worker more than processors: many tests wait for real time.
 pytest: $(ALL_KERNELS)
-	$(BIN)/python -m pytest -n 3 --dist loadgroup
+	$(BIN)/python -m pytest -n 3 --dist worksteal
 
 lint: $(TOOLS)
 	$(BIN)/ruff check .

@@ -30,9 +30,6 @@ def test_crossing_is_driven_without_a_collision(planner: str, suite: str) -> Non
     run = driven(planner, suite, 0)
     assert run.simulator.collisions == ()
     assert run.report.exit_code == 0
-    if (planner, suite) == ("vertex++", "lidar-90"):  # the same seed meets the same traffic
-        again = driven(planner, suite, 0)
-        assert again.report.track == run.report.track
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])
