@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from companion.app import Companion, Status
@@ -21,6 +21,7 @@ from companion.mavlink.codec import Codec
 from companion.mavlink.transport import MemoryLink
 from companion.mission.mission import Mission
 from companion.navigation.step_runner import InlineRunner
+from companion.operator.notifications import News
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from sitl.scenario import Scenario
@@ -132,6 +133,7 @@ class Drive:
 
     def __post_init__(self) -> None:
         self.report = Report(self.seed)
+        self._news: list[News] = []
         began_s = stopwatch_s()
         warm_up(self.settings, self.mission.rover.turning_radius_m)
         self.simulator = self.scenario.simulator(self.seed)
@@ -150,14 +152,20 @@ class Drive:
         next_track_s = 0.0
         while not self.companion.done and self.simulator.time_s < self.time_limit_s:
             self.companion.tick()
+            self._news += self.companion.status().news
             if self.simulator.time_s >= next_track_s:
                 next_track_s += TRACK_PERIOD_S
                 self._note_track()
-                observe(self.companion.status())
+                observe(self.take_status())
         self._note_track()
         self.report.wall_time_s = stopwatch_s() - began_s
         self._sum_up()
         return self.report
+
+    def take_status(self) -> Status:
+        """The companion's status, with all that has been said since the last call."""
+        news, self._news = tuple(self._news), []
+        return replace(self.companion.status(), news=news)
 
     def _note_track(self) -> None:
         truth = self.simulator.truth

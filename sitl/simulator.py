@@ -89,9 +89,12 @@ class Simulator:
         self._player = FaultPlayer(faults or FaultPlan(), seed)
         self._has_faults = faults is not None and bool(faults.faults)
         self._off_until_s = 0.0
+        self.boots = 0
+        """How often the autopilot has booted."""
         self._boot()
 
     def _boot(self) -> None:
+        self.boots += 1
         rover = self._rover[0]
         here = (float(rover["north_m"]), float(rover["east_m"]))
         origin = geodesy.moved(self._geo_start, here[0] - self._start.north_m, here[1] - self._start.east_m)

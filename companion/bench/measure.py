@@ -15,7 +15,7 @@ from companion.bench.contestants import Contestant, Found
 from companion.core.clock import stopwatch_s
 from companion.core.grid import OBSTACLE
 from companion.planning.problem import Budget, PlanningProblem
-from companion.planning.raster import FAULTS, CellArray, cells_cost, first_fault, plain
+from companion.planning.raster import FAULTS, CellArray, PathFault, cells_cost, first_fault, plain
 from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
 
@@ -50,7 +50,7 @@ class Entry:
     found: int
     times_ms: tuple[float, ...]
     ratios: tuple[float, ...]
-    faults: tuple[str, ...]
+    faults: tuple[PathFault, ...]
     memory_mb: float | None
 
     @property
@@ -109,7 +109,7 @@ def _entry(contestant: Contestant, case: Case, optima: list[float], limits: Limi
     order = spread_order(len(case.ends))
     times_ms: list[float] = []
     ratios: list[float] = []
-    faults: set[str] = set()
+    faults: set[PathFault] = set()
     memory_mb, found = _with_memory(
         contestant, case, limits.first_seed
     )  # and what it loads the first time is loaded now
@@ -148,14 +148,14 @@ def spread_order(count: int) -> list[int]:
     return [at * step % count for at in range(count)]
 
 
-def _faults(case: Case, cells: CellArray, ends: tuple[tuple[int, int], tuple[int, int]]) -> set[str]:
+def _faults(case: Case, cells: CellArray, ends: tuple[tuple[int, int], tuple[int, int]]) -> set[PathFault]:
     """What is wrong with a path by our own rules."""
     number, _ = first_fault(plain(case.weights), cells, corner_cutting=False)
     if tuple(cells[0]) != tuple(ends[0]) or tuple(cells[-1]) != tuple(ends[1]):
-        return {"wrong ends"}
-    if FAULTS[number] == "corner cut" and (case.weights[cells[:, 1], cells[:, 0]] >= OBSTACLE).any():
-        return {"corner cut", "obstacle"}
-    return {FAULTS[number]} - {"none"}
+        return {PathFault.WRONG_ENDS}
+    if FAULTS[number] is PathFault.CORNER_CUT and (case.weights[cells[:, 1], cells[:, 0]] >= OBSTACLE).any():
+        return {PathFault.CORNER_CUT, PathFault.OBSTACLE}
+    return {FAULTS[number]} - {PathFault.NONE}
 
 
 # --- memory ----------------------------------------------------------------------------------------------------------

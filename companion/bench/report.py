@@ -10,9 +10,12 @@ from os import cpu_count
 from companion.bench.cases import Case
 from companion.bench.contestants import Contestant
 from companion.bench.measure import DETERMINISTIC_RUNS, Entry, Limits
+from companion.planning.raster import PathFault
 from companion.settings import Settings
 from companion.settings.versions import made_with
 
+REMARKS = {PathFault.CORNER_CUT: "cuts corners", PathFault.OBSTACLE: "touches obstacles"}
+"""Other words for a fault, where there are some."""
 PACKAGES = (
     "rover-companion",
     "numpy",
@@ -80,15 +83,11 @@ def rows(entries: list[Entry], contestants: list[Contestant], case: str, scales:
         ratios = " ".join("-" if e is None else "none" if e.ratio is None else f"{e.ratio:.3f}" for e in shown)
         found = " ".join(f"{e.found}/{e.runs}" if e else "-" for e in shown)
         memory = " ".join("-" if e is None or e.memory_mb is None else f"{e.memory_mb:.0f}" for e in shown)
-        faults = sorted({_fault_text(fault) for e in own.values() for fault in e.faults})
+        faults = sorted({REMARKS.get(fault, fault.value) for e in own.values() for fault in e.faults})
         remarks = "; ".join(([contestant.note] if contestant.note else []) + faults)
         first = next(e for e in shown if e)
         table.append((first.scale, first.median_ms, [contestant.name, *times, ratios, found, memory, remarks]))
     return [row for _, _, row in sorted(table, key=lambda entry: entry[:2])]
-
-
-def _fault_text(fault: str) -> str:
-    return {"corner cut": "cuts corners", "obstacle": "touches obstacles"}.get(fault, fault)
 
 
 def as_json(entries: list[Entry], cases: list[Case], limits: Limits, settings: Settings) -> dict[str, object]:

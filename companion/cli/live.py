@@ -15,7 +15,8 @@ from rich.status import Status as Spinner
 from companion.app import Status
 from companion.core.severity import Severity
 
-WORDS = ("error", "error", "error", "error", "warning", "notice", "info", "debug")
+LEVELS = {Severity.WARNING: "warning", Severity.NOTICE: "notice", Severity.INFO: "info", Severity.DEBUG: "debug"}
+"""Words for log files; all that is worse is an error."""
 
 
 class Reader(Enum):
@@ -37,14 +38,13 @@ def reader_of(descriptor: int, environment: Mapping[str, str]) -> Reader:
     return Reader.PERSON if os.isatty(descriptor) else Reader.LOG
 
 
-def levelled(text: str, severity: int, reader: Reader) -> str:
+def levelled(text: str, severity: Severity, reader: Reader) -> str:
     """The line: ``<4>text`` for the journal, ``warning: text`` in a log, the text alone for a person."""
-    severity = min(max(severity, 0), 7)
     match reader:
         case Reader.JOURNAL:
-            return f"<{severity}>{text}"
+            return f"<{severity.value}>{text}"
         case Reader.LOG:
-            return f"{WORDS[severity]}: {text}"
+            return f"{LEVELS.get(severity, 'error')}: {text}"
         case _:
             return text
 
@@ -110,7 +110,7 @@ class Live:
             self._updated_s = status.time_s
             self._spinner.update(_line(status))
 
-    def _print(self, text: str, severity: int) -> None:
+    def _print(self, text: str, severity: Severity) -> None:
         line = levelled(f"{self._name}: {text}", severity, self._reader)
         self._console.print(line, soft_wrap=True, markup=False, highlight=False)
 

@@ -20,6 +20,7 @@ from companion.core.frames import NedPoint
 from companion.core.severity import Severity
 from companion.mapping.map_queries import ArcQueries, Until, look_along
 from companion.mission.bounds import Bounds
+from companion.safety.reasons import Reason, SetpointFault
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity, Setpoint
 
 SLACK_M = 0.1
@@ -32,59 +33,61 @@ ARC_PIECES = 8
 Tell = Callable[[str, Severity], None]
 """Says a text with its severity to the people."""
 
-Rule = Callable[[Setpoint, LocalView, Bounds], str]
-"""What is wrong with a setpoint, in a few words without figures; empty for nothing. Pure."""
+Fault = Reason[SetpointFault]
+
+Rule = Callable[[Setpoint, LocalView, Bounds], Fault | None]
+"""What is wrong with a setpoint; None for nothing. Pure."""
 
 
-def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> str:
+def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault | None:
     """A guided position lies within horizon and stopping distance, and the straight way there is clear and seen.
 
     It may lie beyond seen ground by what the slowest rover needs to brake, which creeps where a look shows nothing.
     """
     if not isinstance(setpoint, GuidedPosition):
-        return ""
+        return None
     settings, evidence = view.settings.guidance, view.evidence
     here, there = view.pose.point, setpoint.point
     distance_m = here.distance_m(there)
     if not distance_m <= farthest_m(view.speed_m_s, settings) + SLACK_M:
-        return "target farther away than the horizon"
+        return Reason(SetpointFault.BEYOND_HORIZON)
     line = look_along(evidence, here, there, evidence.rover_radius_m)
     if line.clear_m < distance_m - SLACK_M:
-        return "target behind something"
+        return Reason(SetpointFault.BEHIND_OBSTACLE)
     beyond_m = braking_distance_m(settings.min_speed_m_s, settings)
     if line.seen_m + beyond_m < distance_m - SLACK_M:
-        return "target on ground not seen"
-    return ""
+        return Reason(SetpointFault.ON_UNSEEN_GROUND)
+    return None
 
 
-def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> str:
+def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault | None:
     """A guided velocity, if nothing more is told, ends on its arc before the rover touches anything that is known."""
     if not isinstance(setpoint, GuidedVelocity) or setpoint.forward_m_s == 0.0:
-        return ""
+        return None
     forward_m_s, yaw_rate_rad_s = setpoint.forward_m_s, setpoint.yaw_rate_rad_s
     if not math.isfinite(forward_m_s) or not math.isfinite(yaw_rate_rad_s):
-        return "velocity is not a number"
+        return Reason(SetpointFault.NOT_A_NUMBER)
     base_m_s = max(view.speed_m_s, view.settings.steering.scale_base_m_s)
     reach_m = blind_distance_m(abs(forward_m_s), view.settings.guidance)
     arcs = ArcQueries(view.evidence, view.pose)
     room_m = arcs.kept_room_m(view.evidence.rover_radius_m - NEARER_M, 0.0)
     course_rad = _course_rad(setpoint, view)
     if arcs.arc_clear_m(course_rad, yaw_rate_rad_s / base_m_s, room_m, reach_m, Until.BLOCKED) < reach_m - SLACK_M:
-        return "velocity leads into something"
-    return ""
+        return Reason(SetpointFault.INTO_OBSTACLE)
+    return None
 
 
-def inside_borders(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> str:
+def inside_borders(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault | None:
     """The straight way to a guided position, and the way on which a guided velocity ends, cross no border."""
     if len(bounds) == 0:
-        return ""
+        return None
     if isinstance(setpoint, GuidedPosition):
         name = bounds.fault((view.pose.point, setpoint.point))
     elif isinstance(setpoint, GuidedVelocity) and setpoint.forward_m_s != 0.0:
         name = bounds.fault(_stopping_way(setpoint, view))
     else:
-        return ""
-    return f"setpoint leads over the border of {name}" if name else ""
+        return None
+    return Reason(SetpointFault.OVER_BORDER, (name,)) if name else None
 
 
 def _course_rad(velocity: GuidedVelocity, view: LocalView) -> float:
@@ -106,27 +109,27 @@ def _stopping_way(velocity: GuidedVelocity, view: LocalView) -> list[NedPoint]:
 RULES: tuple[Rule, ...] = (position_in_sight, velocity_stops_in_time, inside_borders)
 
 
-def fault_of(setpoint: Setpoint, view: LocalView, bounds: Bounds, rules: tuple[Rule, ...] = RULES) -> str:
-    """What is wrong with a setpoint by the first rule that it breaks; empty for nothing."""
+def fault_of(setpoint: Setpoint, view: LocalView, bounds: Bounds, rules: tuple[Rule, ...] = RULES) -> Fault | None:
+    """What is wrong with a setpoint by the first rule that it breaks; None for nothing."""
     for rule in rules:
-        if fault := rule(setpoint, view, bounds):
+        if (fault := rule(setpoint, view, bounds)) is not None:
             return fault
-    return ""
+    return None
 
 
 class SetpointCheck:
-    """Stands between the controllers and what is sent. ``refused``: how often each rule was broken."""
+    """Stands between the controllers and what is sent. ``refused``: how often for each fault."""
 
     def __init__(self, tell: Tell, rules: tuple[Rule, ...] = RULES) -> None:
-        self.refused: Counter[str] = Counter()
+        self.refused: Counter[SetpointFault] = Counter()
         self._tell = tell
         self._rules = rules
 
     def passed(self, command: ControlCommand, view: LocalView, bounds: Bounds) -> ControlCommand:
         """The same command, or velocity zero in its place if its setpoint breaks a rule."""
         fault = fault_of(command.setpoint, view, bounds, self._rules)
-        if not fault:
+        if fault is None:
             return command
-        self.refused[fault] += 1
+        self.refused[fault.kind] += 1
         self._tell(f"Stopping: {fault}", Severity.WARNING)
         return stop_for(Purpose.BRAKE)

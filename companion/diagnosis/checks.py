@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.vehicle.events import RoverMode
-from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION
+from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfPart
 from companion.vehicle.survey import Survey
 
 FIRMWARE = (4, 7)
@@ -22,6 +22,8 @@ MAVLINK_SOURCE = 2
 """PRX1_TYPE that takes OBSTACLE_DISTANCE."""
 NEAR_M, SHORT_M, FAR_M, SLOW_HZ = 0.6, 2.0, 120.0, 3.0
 """Limits of unusual range sensors: minimum above NEAR_M, maximum below SHORT_M or above FAR_M, rate below SLOW_HZ."""
+ARMING_COMPLAINTS = ("PreArm:", "Arm:")
+"""How ArduPilot's texts about arming begin; MAVLink has no other sign of what a STATUSTEXT is about."""
 S_CURVES = 64
 """Bit of GUID_OPTIONS."""
 RADIUS_M = 2.0
@@ -148,7 +150,7 @@ def position(seen: Survey) -> Iterator[Finding]:
     if vehicle.ekf is None:
         says, remedy = "EKF_STATUS_REPORT does not come.", "look at the rates of this port"
         yield Finding("ekf", Level.STOP, says, remedy)
-    elif vehicle.ekf_lacks == "position":
+    elif vehicle.ekf_lacks is EkfPart.POSITION:
         flags = vehicle.ekf.flags
         why = "it only knows where it began" if flags & EKF_CONST_POSITION else "it has none"
         why = (
@@ -161,8 +163,8 @@ def position(seen: Survey) -> Iterator[Finding]:
         yield Finding(
             "ekf", Level.STOP, says, "wait for GPS under open sky (about 45 s), or set up another source of position"
         )
-    elif vehicle.ekf_lacks:
-        says = f"The EKF has no {vehicle.ekf_lacks}."
+    elif vehicle.ekf_lacks is not None:
+        says = f"The EKF has no {vehicle.ekf_lacks.value}."
         yield Finding(
             "ekf", Level.STOP, says, "let the rover stand until it has, and look at the messages of the autopilot"
         )
@@ -179,7 +181,7 @@ def position(seen: Survey) -> Iterator[Finding]:
 def arming(seen: Survey) -> Iterator[Finding]:
     """Whether it could be armed: earlier complaints do not count once its own checks pass."""
     beat, prearm = seen.vehicle.heartbeat, seen.vehicle.prearm
-    complaints = [text for text in seen.texts if text.startswith(("PreArm:", "Arm:"))]
+    complaints = [text for text in seen.texts if text.startswith(ARMING_COMPLAINTS)]
     refuses = bool(complaints) if prearm is None else not prearm.ok
     if refuses and not (beat is not None and beat.armed):
         reasons = "; ".join(text.partition(": ")[2] for text in complaints) or "it does not say why"
@@ -192,7 +194,7 @@ def arming(seen: Survey) -> Iterator[Finding]:
 
 def rates(seen: Survey) -> Iterator[Finding]:
     """Messages whose rate is too low. Without a position of the EKF, none can be sent."""
-    no_position = seen.vehicle.ekf is not None and seen.vehicle.ekf_lacks == "position"
+    no_position = seen.vehicle.ekf is not None and seen.vehicle.ekf_lacks is EkfPart.POSITION
     for message in seen.slow:
         if message.name == "LOCAL_POSITION_NED" and no_position:
             continue

@@ -2,10 +2,23 @@
 
 from __future__ import annotations
 
+import errno
+import termios
+
 import serial
 
 from companion.core.clock import Clock
 from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, LinkError, OutBuffer
+
+REASONS = {
+    errno.ENOENT: "there is no such device; check the cable and `ls /dev/tty*`",
+    errno.EISDIR: "it is a directory, no serial port; see `ls /dev/tty*`",
+    errno.EACCES: "no permission; add yourself to the group 'dialout'",
+    errno.EPERM: "no permission; add yourself to the group 'dialout'",
+    errno.EAGAIN: "another program uses it; stop that one",
+    errno.EBUSY: "another program uses it; stop that one",
+}
+"""Why a port cannot be opened, and the remedy."""
 
 
 class SerialLink:
@@ -94,17 +107,10 @@ class SerialLink:
 
 def _reason(error: Exception) -> str:
     """pyserial's error in words, with the remedy."""
-    text = str(error)
-    if isinstance(error, FileNotFoundError) or "No such file" in text:
-        return "there is no such device; check the cable and `ls /dev/tty*`"
-    if "Is a directory" in text:
-        return "it is a directory, no serial port; see `ls /dev/tty*`"
-    if isinstance(error, PermissionError) or "Permission denied" in text:
-        return "no permission; add yourself to the group 'dialout'"
-    if "lock" in text or "busy" in text.lower():
-        return "another program uses it; stop that one"
+    if isinstance(error, OSError) and error.errno in REASONS:
+        return REASONS[error.errno]
     if isinstance(error, ValueError | OverflowError):
-        return f"the port does not take this baud rate ({text})"
-    if "Could not configure port" in text:
+        return f"the port does not take this baud rate ({error})"
+    if isinstance(error.__context__, termios.error):  # pyserial hands on neither it nor its number
         return "it is no serial port; see `ls /dev/tty*`"
-    return f"{text}; check the device"
+    return f"{error}; check the device"

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import shapely
 from shapely.geometry.base import BaseGeometry
@@ -26,7 +26,6 @@ NEARER_M = 0.01
 """A rover that is too near must not come nearer; less than this does not count."""
 ROUND = 1.0 / math.cos(math.pi / (4 * CIRCLE_QUARTER))
 """The factor by which a polygon must grow to contain the circle that its corners lie on."""
-OURS = "the autopilot's fence"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -43,6 +42,8 @@ class Bound:
     keep_m: float
     body_m: float
     in_fields: bool = False
+    of_autopilot: bool = False
+    """It is of the autopilot's fence, which may change during the drive."""
 
     def closed(self, grid: Grid) -> Mask:
         """The fields that the rover's middle must not enter; shape (height, width)."""
@@ -122,21 +123,22 @@ def autopilot_bounds(fence: AutopilotFence, frame: LocalFrame, body_m: float) ->
     """The borders of the autopilot's fence, with the larger of its margin and the rover's radius."""
     places = Places(frame, NedPoint(0.0, 0.0), _no_fields)
     keep_m = max(fence.margin_m, body_m)
-    bounds = []
+    borders: list[tuple[str, BaseGeometry, bool]] = []
     for number, area in enumerate(fence.keep_out, start=1):
         grown = Area(area.places, None if area.radius_m is None else area.radius_m * ROUND)
-        shape = _sound(shape_of(grown, places))
-        bounds.append(Bound(f"{OURS} (exclusion area {number})", shape, False, keep_m, body_m))
+        borders.append((f"exclusion area {number}", _sound(shape_of(grown, places)), False))
     inside = [_sound(shape_of(area, places)) for area in fence.keep_in]
     if fence.any_of and len(inside) > 1:
-        bounds.append(Bound(f"{OURS} (inclusion areas)", shapely.union_all(inside), True, keep_m, body_m))
+        borders.append(("inclusion areas", shapely.union_all(inside), True))
     else:
-        names = (f"{OURS} (inclusion area {number})" for number in range(1, len(inside) + 1))
-        bounds += [Bound(name, shape, True, keep_m, body_m) for name, shape in zip(names, inside, strict=True)]
+        borders += [(f"inclusion area {number}", shape, True) for number, shape in enumerate(inside, start=1)]
     if fence.circle_m is not None and fence.home is not None:
         circle = shape_of(Area((fence.home,), fence.circle_m), places)
-        bounds.append(Bound(f"{OURS} (circle of {fence.circle_m:g} m round home)", circle, True, keep_m, body_m))
-    return bounds
+        borders.append((f"circle of {fence.circle_m:g} m round home", circle, True))
+    return [
+        Bound(f"the autopilot's fence ({which})", shape, keeps_in, keep_m, body_m, of_autopilot=True)
+        for which, shape, keeps_in in borders
+    ]
 
 
 def _place(point: NedPoint) -> tuple[float, float]:
@@ -166,7 +168,7 @@ def _widened(bound: Bound, resolution_m: float) -> Bound:
     if not bound.in_fields or not bound.keeps_in:
         return bound
     shape = bound.shape.buffer(resolution_m / 2.0, join_style="mitre")
-    return Bound(bound.name, shape, bound.keeps_in, bound.keep_m, bound.body_m, bound.in_fields)
+    return replace(bound, shape=shape)
 
 
 def _roomy(bound: Bound) -> BaseGeometry:

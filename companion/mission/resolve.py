@@ -13,7 +13,7 @@ from companion.core.grid import OBSTACLE, Cell, Grid, empty_grid
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.areas import Mask, Places, shape_of, touched
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
-from companion.mission.bounds import OURS, Bound, Bounds, autopilot_bounds, mission_bounds
+from companion.mission.bounds import Bound, Bounds, autopilot_bounds, mission_bounds
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.mission.mission import Mission, MissionError, OnBlocked
 from companion.mission.prior_map import stamp_prior
@@ -227,7 +227,7 @@ def _refusal(what: str, cell: Cell, shut: list[_Shut]) -> str:
             where = "outside (or within a field of the edge of)" if bound.keeps_in else "in (or within a field of)"
             margin = f", {bound.keep_m:g} m kept to it" if bound.keep_m > 0.0 else ""
             text = f"{what}: lies {where} {bound.name}{margin}"
-            if not bound.name.startswith(OURS):
+            if not bound.of_autopilot:
                 raise MissionError(text)
             return text
     return ""

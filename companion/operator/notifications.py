@@ -36,6 +36,8 @@ class News:
 
     severity: Severity
     text: str
+    own: bool = True
+    """Whether the companion says it; otherwise the autopilot does."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +88,7 @@ class Notifier:
         self._followed_s = clock.now_s()
         self._slow_since_s: dict[int, float] = {}
         self._faults_told: set[str] = set()
+        self._warned: set[str] = set()
 
     def tell(self, text: str, severity: Severity) -> None:
         """Say it, unless it is what was said last."""
@@ -93,17 +96,18 @@ class Notifier:
             return
         self.said.append(text)
         del self.said[:-SAID_KEPT]
-        self.note(text, severity)
+        self.news.append(News(severity, text))
         self._autopilot.send(StatusText(severity, text), self._clock.now_s())
 
     def once(self, text: str) -> None:
         """Warn of what stays so, the first time only."""
-        if text not in self.said:
+        if text not in self._warned:
+            self._warned.add(text)
             self.tell(text, Severity.WARNING)
 
     def note(self, text: str, severity: Severity) -> None:
-        """Keep a text for the terminal only."""
-        self.news.append(News(severity, text))
+        """Keep a text of the autopilot's for the terminal."""
+        self.news.append(News(severity, text, own=False))
 
     def tell_faults(self, run: MissionRun, now_s: float, problem: str) -> None:
         """Faults that stop nothing, each told once. ``problem``: of the record or the state file."""

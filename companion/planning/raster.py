@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from enum import StrEnum
 
 import numpy as np
 from numba import njit
@@ -127,7 +128,19 @@ def cells_cost(weights: Weights, cells: CellArray) -> float:
     return cost
 
 
-FAULTS = ("none", "outside the map", "obstacle", "not adjacent", "corner cut")
+class PathFault(StrEnum):
+    """What can be wrong with a row of fields."""
+
+    NONE = "none"
+    OUTSIDE_MAP = "outside the map"
+    OBSTACLE = "obstacle"
+    NOT_ADJACENT = "not adjacent"
+    CORNER_CUT = "corner cut"
+    WRONG_ENDS = "wrong ends"
+    """Its ends are not start and target, which ``first_fault`` does not know."""
+
+
+FAULTS = tuple(PathFault)
 """The faults that ``first_fault`` can find, by number."""
 
 

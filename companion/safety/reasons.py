@@ -1,8 +1,9 @@
-"""Reasons and run phases as enums: why the rover must not move, what is awaited, what the run does, why it ended.
+"""Reasons and run phases as enums: why the rover must not move, what is awaited,
+what is wrong with a setpoint, what the run does, why it ended.
 
 The program compares the enums; people, records and the autopilot get the texts, which are made here and nowhere else.
 
-Nouns: doubt, wait reason, end reason, refusal, run phase, activity.
+Nouns: doubt, setpoint fault, wait reason, end reason, refusal, run phase, activity.
 """
 
 from __future__ import annotations
@@ -38,6 +39,17 @@ class Doubt(Enum):
     BEYOND_BORDER = "the rover is beyond the border of {}"
     WAITED_TOO_LONG = "waited too long for {}"
     """Of a rover that an earlier run left armed in GUIDED."""
+
+
+class SetpointFault(Enum):
+    """What is wrong with a setpoint, so that it is not sent."""
+
+    BEYOND_HORIZON = "target farther away than the horizon"
+    BEHIND_OBSTACLE = "target behind something"
+    ON_UNSEEN_GROUND = "target on ground not seen"
+    NOT_A_NUMBER = "velocity is not a number"
+    INTO_OBSTACLE = "velocity leads into something"
+    OVER_BORDER = "setpoint leads over the border of {}"
 
 
 class LatchReason(Enum):

@@ -97,8 +97,8 @@ def data_doubt(vehicle: VehicleState, now_s: float, settings: SafetySettings) ->
             return Reason(Doubt.DATA_MISSING, (name,))
         if now_s - event.time_s > limit_s:
             return Reason(Doubt.DATA_OLD, (name, limit_s))
-    if vehicle.ekf_lacks:
-        return Reason(Doubt.EKF_INCOMPLETE, (vehicle.ekf_lacks,))
+    if vehicle.ekf_lacks is not None:
+        return Reason(Doubt.EKF_INCOMPLETE, (vehicle.ekf_lacks.value,))
     if now_s - vehicle.latency.jumped_s < settings.settle_s:
         return Reason(Doubt.CLOCK_JUMPED)
     if vehicle.latency.lasting_s > settings.latency_s:

@@ -81,14 +81,17 @@ class BackgroundWriter:
         self.problem = ""
         """Why the last file could not be written; empty if it was."""
         self._disk = disk or OsDisk()
-        self._waiting: dict[Path, tuple[bytes, Job | None]] = {}
+        self._queued = 0
+        self._waiting: dict[Path, tuple[int, bytes, Job | None]] = {}
+        """By file: the number of its newest content, the content, what is called when it is written."""
         self._lock = threading.Lock()
         self._worker = BackgroundWorker("saver", budget)
 
     def save(self, path: Path, data: bytes, done: Job | None = None) -> None:
         """Queue a file; returns at once. ``done`` is called when it is on disk, or could not be written."""
         with self._lock:
-            self._waiting[path] = (data, done)
+            self._queued += 1
+            self._waiting[path] = (self._queued, data, done)
         self._worker.put(self._write)
 
     def close(self) -> None:
@@ -107,15 +110,15 @@ class BackgroundWriter:
             path = next(iter(self._waiting), None)
             if path is None:
                 return
-            entry = self._waiting[path]
+            number, data, done = self._waiting[path]
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            replace_file(self._disk, path, entry[0])
+            replace_file(self._disk, path, data)
             self.problem = ""
         except OSError as error:
             self.problem = f"{path}: cannot be written: {error.strerror or error}"
-        if entry[1] is not None:
-            entry[1]()
+        if done is not None:
+            done()
         with self._lock:
-            if self._waiting.get(path) is entry:
+            if self._waiting[path][0] == number:
                 del self._waiting[path]

@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from companion.core.frames import NedPoint
+from companion.core.severity import Severity
 from companion.vehicle.events import Asker, PlanKind, TargetAnswer, TargetForm
 
 
@@ -140,8 +141,7 @@ class NamedValue:
 class StatusText:
     """STATUSTEXT: a text for the people at the ground station."""
 
-    severity: int
-    """See ``core.severity``."""
+    severity: Severity
     text: str
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 from companion.core.frames import Pose
 from companion.vehicle.auto_leg import GuidedLeg, LegState, leg_after, leg_at_heartbeat
@@ -46,6 +47,14 @@ PARAMETERS_KEPT = frozenset(
 OTHERS_KEPT = 64
 OTHERS_FORGOTTEN_S = 30.0
 """Other vehicles are kept for this long after their last message, and no more than OTHERS_KEPT of them."""
+
+
+class EkfPart(Enum):
+    """A part of the EKF's estimate."""
+
+    POSITION = "position"
+    ATTITUDE = "attitude"
+    VELOCITY = "velocity"
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,19 +131,19 @@ class VehicleState:
         return self.latency.longest_s
 
     @property
-    def ekf_lacks(self) -> str:
-        """The part of its estimate that the autopilot does not trust, in a word; empty when the rover may drive."""
+    def ekf_lacks(self) -> EkfPart | None:
+        """The part of its estimate that the autopilot does not trust; None when the rover may drive."""
         flags = 0 if self.ekf is None else self.ekf.flags
         if not flags & EKF_POSITION or flags & EKF_CONST_POSITION:
-            return "position"
+            return EkfPart.POSITION
         if not flags & EKF_ATTITUDE:
-            return "attitude"
-        return "" if flags & EKF_VELOCITY else "velocity"
+            return EkfPart.ATTITUDE
+        return None if flags & EKF_VELOCITY else EkfPart.VELOCITY
 
     @property
     def ekf_ok(self) -> bool:
         """Whether the autopilot trusts its own estimate."""
-        return not self.ekf_lacks
+        return self.ekf_lacks is None
 
 
 def fold(state: VehicleState, event: Event) -> VehicleState:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.severity import Severity
 from sitl.autopilot.channel import Channel
 from sitl.autopilot.fence import run_fence
 from sitl.autopilot.links import close_channel, forward, open_channel
@@ -19,7 +20,7 @@ from sitl.autopilot.start_up import HOME_S, ORIGIN_S, POSITION_S, TIMETABLE
 from sitl.autopilot.state import Mode
 from sitl.autopilot.streams import send_due
 from sitl.autopilot.telemetry import heartbeat
-from sitl.autopilot.vehicle import INFO, WARNING, Vehicle, parameter_message
+from sitl.autopilot.vehicle import Vehicle, parameter_message
 
 PARAMETERS_PER_LOOP = 5
 TIMESYNC_S = 10.0
@@ -103,7 +104,8 @@ class Autopilot:
                     channel.send(mavlink.MAVLink_mission_item_reached_message(0))
         if control[0]["timed_out"]:
             control["timed_out"] = 0
-            vehicle.say(WARNING, f"target not received last {vehicle.parameters['GUID_TIMEOUT']:.0f}secs, stopping")
+            limit_s = vehicle.parameters["GUID_TIMEOUT"]
+            vehicle.say(Severity.WARNING, f"target not received last {limit_s:.0f}secs, stopping")
 
     def _event_s(self) -> float:
         """Time of the next event of the start-up; some are delayed without GPS."""
@@ -116,7 +118,7 @@ class Autopilot:
             moment_s, texts = TIMETABLE[self._next_event]
             self._next_event += 1
             for text in texts:
-                vehicle.say(INFO, text)
+                vehicle.say(Severity.INFO, text)
             if moment_s == HOME_S:
                 keep_home(vehicle)
                 for channel in vehicle.channels.values():

@@ -8,6 +8,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.severity import Severity
 from sitl.autopilot.channel import Channel
 from sitl.autopilot.control.records import LOOP_HZ
 from sitl.autopilot.destination import change_speed, go_to, valid_place
@@ -18,7 +19,7 @@ from sitl.autopilot.modes import FORCE, arm, arming_faults, disarm, set_mode
 from sitl.autopilot.state import Mode
 from sitl.autopilot.streams import DEFAULT_INTERVAL_US, set_interval
 from sitl.autopilot.telemetry import MESSAGES, streamable
-from sitl.autopilot.vehicle import CRITICAL, INFO, Vehicle
+from sitl.autopilot.vehicle import Vehicle
 
 ACCEPTED, TRY_LATER, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 
@@ -81,7 +82,7 @@ def _arm_disarm(vehicle: Vehicle, channel: Channel, message: Any) -> int:
 def _set_interval(vehicle: Vehicle, channel: Channel, message: Any) -> int:
     number, interval_us = int(message.param1), int(message.param2)
     if not streamable(number):
-        vehicle.say(INFO, f"No ap_message for mavlink id ({number})")
+        vehicle.say(Severity.INFO, f"No ap_message for mavlink id ({number})")
         return DENIED
     if interval_us < -1:
         return DENIED
@@ -89,7 +90,7 @@ def _set_interval(vehicle: Vehicle, channel: Channel, message: Any) -> int:
         interval_us = DEFAULT_INTERVAL_US if number in MESSAGES else -1
     # The firmware's rule: the interval may not be shorter than 1.25 loops.
     elif interval_us > 0 and interval_us // 1000 * 800 < 1_000_000 // LOOP_HZ:
-        vehicle.say(INFO, f"Requested rate for message ID {number} too fast. Increase SCHED_LOOP_RATE")
+        vehicle.say(Severity.INFO, f"Requested rate for message ID {number} too fast. Increase SCHED_LOOP_RATE")
         return DENIED
     set_interval(channel, number, min(interval_us, LONGEST_US), vehicle.time_us)
     return ACCEPTED
@@ -191,7 +192,7 @@ def _check_arming(vehicle: Vehicle, channel: Channel, message: Any) -> int:
     if vehicle.armed:
         return TRY_LATER
     for fault in arming_faults(vehicle):
-        vehicle.say(CRITICAL, f"PreArm: {fault.text}")
+        vehicle.say(Severity.CRITICAL, f"PreArm: {fault.text}")
     return ACCEPTED
 
 

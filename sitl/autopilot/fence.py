@@ -10,9 +10,10 @@ from collections.abc import Callable, Sequence
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.severity import Severity
 from sitl.autopilot.mission_items import FENCE_CIRCLE_IN, FENCE_CIRCLE_OUT, FENCE_POLYGON_IN, FENCE_POLYGON_OUT, Item
 from sitl.autopilot.state import Mode
-from sitl.autopilot.vehicle import NOTICE, Vehicle
+from sitl.autopilot.vehicle import Vehicle
 from sitl.world import geodesy
 
 CIRCLE_FENCE, POLYGON_FENCE = 2, 4
@@ -128,7 +129,7 @@ def enable_fence(vehicle: Vehicle, action: int, spoken: bool = False) -> bool:
     if action == OFF:
         vehicle.fence.breached = 0
     if spoken and kinds:
-        vehicle.say(NOTICE, f"{fence_names(kinds)} {'enabled' if action == ON else 'disabled'}")
+        vehicle.say(Severity.NOTICE, f"{fence_names(kinds)} {'enabled' if action == ON else 'disabled'}")
     return True
 
 
@@ -175,7 +176,7 @@ def run_fence(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool], disarm
             return
         fence.recovering_since_s = None
     if fresh and vehicle.armed:
-        vehicle.say(NOTICE, f"{fence_names(fresh)} breached")
+        vehicle.say(Severity.NOTICE, f"{fence_names(fresh)} breached")
         _act(vehicle, beyond_m, set_mode, disarm)
 
 

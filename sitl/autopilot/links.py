@@ -6,11 +6,12 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.severity import Severity
 from sitl.autopilot.channel import Channel, new_channel
 from sitl.autopilot.routing import AUTOPILOT
 from sitl.autopilot.signing import ACCEPTED_UNSIGNED, SECURE_PORT, StoredKey
 from sitl.autopilot.streams import start_streams
-from sitl.autopilot.vehicle import ERROR, Vehicle, text_messages
+from sitl.autopilot.vehicle import Vehicle, text_messages
 
 MAVLINK_1 = 1
 """SERIALn_PROTOCOL."""
@@ -62,7 +63,7 @@ def _copy(vehicle: Vehicle, message: Any, channels: set[int]) -> None:
 def set_up_signing(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     """SETUP_SIGNING: a new key for all links; a key of zeros with timestamp 0 ends signing."""
     if vehicle.armed:
-        for text in text_messages(channel, ERROR, "ERROR: Won't setup signing when armed"):
+        for text in text_messages(channel, Severity.ERROR, "ERROR: Won't setup signing when armed"):
             channel.send(text)
         return
     vehicle.signing.stored = StoredKey(bytes(message.secret_key), message.initial_timestamp)

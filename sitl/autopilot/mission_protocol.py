@@ -13,6 +13,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.severity import Severity
 from sitl.autopilot.channel import Channel
 from sitl.autopilot.destination import go_to
 from sitl.autopilot.mission_items import (
@@ -27,7 +28,7 @@ from sitl.autopilot.mission_items import (
     rally_item,
 )
 from sitl.autopilot.state import FENCE, MISSION, RALLY, Mode, Upload
-from sitl.autopilot.vehicle import INFO, WARNING, Vehicle, text_messages
+from sitl.autopilot.vehicle import Vehicle, text_messages
 from sitl.world.geodesy import ALTITUDE_M
 
 MOST = {MISSION: 724, FENCE: 84, RALLY: 50}
@@ -52,7 +53,7 @@ def warn_once(vehicle: Vehicle, kind: int, text: str) -> None:
     """Send a complaint, once for each type of list."""
     if (kind, text) not in vehicle.complaints:
         vehicle.complaints.add((kind, text))
-        vehicle.say(WARNING, text)
+        vehicle.say(Severity.WARNING, text)
 
 
 def stored(vehicle: Vehicle, kind: int) -> list[Item]:
@@ -132,7 +133,7 @@ TOTALS = {MISSION: "MIS_TOTAL", FENCE: "FENCE_TOTAL", RALLY: "RALLY_TOTAL"}
 Handler = Callable[[Vehicle, Channel, Any], None]
 
 
-def _say(channel: Channel, severity: int, text: str) -> None:
+def _say(channel: Channel, severity: Severity, text: str) -> None:
     """Send a text on this channel alone."""
     for piece in text_messages(channel, severity, text):
         channel.send(piece)
@@ -168,7 +169,7 @@ def count(vehicle: Vehicle, channel: Channel, message: Any) -> None:
         return
     if message.count > MOST[kind]:
         acknowledge(channel, message, Result.NO_SPACE)
-        vehicle.say(WARNING, f"Only {MOST[kind]} items are supported")
+        vehicle.say(Severity.WARNING, f"Only {MOST[kind]} items are supported")
         return
     items = stored(vehicle, kind)
     if kind != FENCE and len(items) > message.count:
@@ -196,7 +197,7 @@ def write_partial(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     # The firmware takes a negative index for a very large one.
     if not 0 <= first <= last <= len(items):
         acknowledge(channel, message, Result.ERROR)
-        vehicle.say(WARNING, "Flight plan update rejected")
+        vehicle.say(Severity.WARNING, "Flight plan update rejected")
         return
     _begin(vehicle, channel, message, first, last, list(items) if kind == FENCE else [])
 
@@ -225,7 +226,7 @@ def run_uploads(vehicle: Vehicle) -> None:
             del vehicle.uploads[kind]
             channel = vehicle.channels.get(upload.channel)
             if channel is not None:
-                _say(channel, WARNING, TIMEOUT_TEXTS[kind])
+                _say(channel, Severity.WARNING, TIMEOUT_TEXTS[kind])
                 channel.send(
                     mavlink.MAVLink_mission_ack_message(upload.system, upload.component, int(Result.CANCELLED), kind)
                 )
@@ -320,14 +321,14 @@ def _finish(vehicle: Vehicle, channel: Channel, message: Any, kind: int, fence: 
         result = Result.ERROR
     acknowledge(channel, message, result)
     if kind in DONE_TEXTS:
-        _say(channel, INFO, DONE_TEXTS[kind])
+        _say(channel, Severity.INFO, DONE_TEXTS[kind])
 
 
 def _keep_fence(vehicle: Vehicle, items: list[Item]) -> bool:
     fault = fence_fault(items)
     if fault is not None:
-        vehicle.say(WARNING, fault)
-        vehicle.say(WARNING, "Fence validation failed")
+        vehicle.say(Severity.WARNING, fault)
+        vehicle.say(Severity.WARNING, "Fence validation failed")
         return False
     vehicle.storage.fence[:] = items
     _save_total(vehicle, FENCE)

@@ -10,6 +10,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.severity import Severity
 from sitl.autopilot import mission_items as items
 from sitl.autopilot.channel import Channel
 from sitl.autopilot.control.circle import begin_circle
@@ -21,7 +22,7 @@ from sitl.autopilot.mode_rtl import begin_return, run_return
 from sitl.autopilot.modes import set_mode
 from sitl.autopilot.state import GuidedTask, Mode, Submode
 from sitl.autopilot.telemetry import mission_current
-from sitl.autopilot.vehicle import CRITICAL, INFO, NOTICE, WARNING, Vehicle
+from sitl.autopilot.vehicle import Vehicle
 from sitl.world import geodesy
 from sitl.world.geodesy import ALTITUDE_M
 
@@ -49,7 +50,7 @@ class AutoRunner:
 
     def completed(self) -> None:
         """End of the mission: stop, or do what MIS_DONE_BEHAVE says."""
-        self.vehicle.say(NOTICE, "Mission Complete")
+        self.vehicle.say(Severity.NOTICE, "Mission Complete")
         behaviour = int(self.vehicle.parameters["MIS_DONE_BEHAVE"])
         self._stop()
         if behaviour == ACRO:
@@ -59,7 +60,7 @@ class AutoRunner:
 
     def jumped(self, index: int, times: int, of: int) -> None:
         """Report a jump."""
-        self.vehicle.say(INFO, f"Mission: {index} Jump {times}/{of}")
+        self.vehicle.say(Severity.INFO, f"Mission: {index} Jump {times}/{of}")
 
     def _stop(self) -> None:
         self.auto.submode = Submode.STOP
@@ -69,7 +70,7 @@ class AutoRunner:
 
     def start(self, index: int, item: Item) -> bool:
         """Begin a command."""
-        self.vehicle.say(INFO, f"Mission: {index} {NAMES.get(item.command, '?')}")
+        self.vehicle.say(Severity.INFO, f"Mission: {index} {NAMES.get(item.command, '?')}")
         command, first = item.command, item.params[0]
         if command in (items.WAYPOINT, items.LOITER_UNLIMITED, items.LOITER_TIME):
             self._go(index, item)
@@ -95,7 +96,7 @@ class AutoRunner:
         command, first = item.command, item.params[0]
         if command == items.CHANGE_SPEED:
             if change_speed(self.vehicle, item.params[1]):
-                self.vehicle.say(INFO, f"speed: {item.params[1]:.1f} m/s")
+                self.vehicle.say(Severity.INFO, f"speed: {item.params[1]:.1f} m/s")
         elif command == items.SET_HOME:
             place = self.vehicle.place() if first == 1.0 else item.place
             if place != (0, 0):
@@ -166,7 +167,7 @@ class AutoRunner:
         self._stop()
         self.auto.delay_since_s = self.vehicle.time_s
         self.auto.delay_s = max(item.params[0], 0.0)
-        self.vehicle.say(INFO, f"Delaying {int(self.auto.delay_s)} sec")
+        self.vehicle.say(Severity.INFO, f"Delaying {int(self.auto.delay_s)} sec")
 
     # Checking -------------------------------------------------------------------------------------------------------
 
@@ -187,7 +188,7 @@ class AutoRunner:
         if command == items.LOITER_TIME:
             done = self._there(index)
             if done:
-                self.vehicle.say(WARNING, "Finished active loiter")
+                self.vehicle.say(Severity.WARNING, "Finished active loiter")
             return done
         if command == items.RETURN:
             return arrived(self.vehicle)
@@ -204,7 +205,7 @@ class AutoRunner:
         if command == items.CONDITION_DISTANCE:
             return self._left_m() < auto.condition
         if command not in DONE_AT_ONCE:
-            self.vehicle.say(WARNING, f"Skipping invalid cmd #{command}")
+            self.vehicle.say(Severity.WARNING, f"Skipping invalid cmd #{command}")
         return True
 
     def _there(self, index: int) -> bool:
@@ -215,7 +216,7 @@ class AutoRunner:
         if not auto.reached:
             auto.reached, auto.loitering_since_s = True, self.vehicle.time_s
             stay = f". Loiter for {int(auto.loiter_s)} seconds" if auto.loiter_s > 0.0 else ""
-            self.vehicle.say(INFO, f"Reached waypoint #{index}{stay}")
+            self.vehicle.say(Severity.INFO, f"Reached waypoint #{index}{stay}")
         return self.vehicle.time_s - auto.loitering_since_s >= auto.loiter_s
 
     def _handed_back(self) -> bool:
@@ -262,7 +263,7 @@ def run_auto(vehicle: Vehicle) -> None:
         if _changed(vehicle) and auto.submode == Submode.WAYPOINT:
             done = mission.restart_current(runner)
             vehicle.say(
-                CRITICAL,
+                Severity.CRITICAL,
                 "Auto mission changed, restarted command"
                 if done
                 else "Auto mission changed but failed to restart command",

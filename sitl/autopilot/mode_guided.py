@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from companion.core.severity import Severity
 from sitl.autopilot.channel import Channel
 from sitl.autopilot.control.records import HEADING, TURN_RATE
 from sitl.autopilot.destination import go_to, valid_place
-from sitl.autopilot.vehicle import INFO, Vehicle
+from sitl.autopilot.vehicle import Vehicle
 from sitl.world import geodesy
 
 LOCAL_NED, LOCAL_OFFSET, BODY, BODY_OFFSET = 1, 7, 8, 9
@@ -30,7 +31,7 @@ def local_target(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     if not vehicle.in_guided or not vehicle.has_origin or frame not in LOCAL_FRAMES:
         return
     if not mask & NO_ACCELERATION:
-        vehicle.say(INFO, "Ignoring SET_POSITION_TARGET_LOCAL_NED; set ACC_IGNORE in mask")
+        vehicle.say(Severity.INFO, "Ignoring SET_POSITION_TARGET_LOCAL_NED; set ACC_IGNORE in mask")
         return
     if mask & NO_POSITION:
         _motion_target(vehicle, message, body=frame in (BODY, BODY_OFFSET))
@@ -50,7 +51,7 @@ def global_target(vehicle: Vehicle, channel: Channel, message: Any) -> None:
     if not vehicle.in_guided or message.coordinate_frame not in GLOBAL_FRAMES:
         return
     if not message.type_mask & NO_ACCELERATION:
-        vehicle.say(INFO, "Ignoring SET_POSITION_TARGET_GLOBAL_INT; set ACC_IGNORE in mask")
+        vehicle.say(Severity.INFO, "Ignoring SET_POSITION_TARGET_GLOBAL_INT; set ACC_IGNORE in mask")
         return
     if message.type_mask & NO_POSITION:
         _motion_target(vehicle, message, body=False)

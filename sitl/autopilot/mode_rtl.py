@@ -5,9 +5,10 @@ Nouns: ModeRTL, AP_Rally.
 
 from __future__ import annotations
 
+from companion.core.severity import Severity
 from sitl.autopilot.destination import arrived, begin_driving, drive_to
 from sitl.autopilot.fence import Place, allowed, distance_m, nearest
-from sitl.autopilot.vehicle import INFO, Vehicle
+from sitl.autopilot.vehicle import Vehicle
 
 
 def destination_of_rtl(vehicle: Vehicle) -> Place:
@@ -37,4 +38,4 @@ def run_return(vehicle: Vehicle) -> None:
     """Report the arrival, once."""
     if arrived(vehicle) and not vehicle.rtl_arrival_said:
         vehicle.rtl_arrival_said = True
-        vehicle.say(INFO, "Reached destination")
+        vehicle.say(Severity.INFO, "Reached destination")

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 
+from companion.core.severity import Severity
 from sitl.autopilot.control.records import STOP
 from sitl.autopilot.destination import arrived, begin_driving, drive_to, stand
 from sitl.autopilot.state import Mode, SmartRtl
-from sitl.autopilot.vehicle import INFO, Vehicle
+from sitl.autopilot.vehicle import Vehicle
 from sitl.world import geodesy
 
 SAVE_EVERY_US = 300_000
@@ -42,7 +43,7 @@ def run_smart_rtl(vehicle: Vehicle) -> None:
     if not path.points:
         path.done = True
         stand(vehicle)
-        vehicle.say(INFO, "Reached destination")
+        vehicle.say(Severity.INFO, "Reached destination")
         return
     north_m, east_m = path.points.pop()
     path.simplified = min(path.simplified, len(path.points))
@@ -87,7 +88,7 @@ def remember_path(vehicle: Vehicle) -> None:
 
 def _give_up(vehicle: Vehicle, path: SmartRtl) -> None:
     path.active = False
-    vehicle.say(4, "SmartRTL deactivated: buffer full")
+    vehicle.say(Severity.WARNING, "SmartRTL deactivated: buffer full")
 
 
 def _tolerance_m(vehicle: Vehicle) -> float:

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.severity import Severity
 from sitl.autopilot.battery import LOW, NAMES, OK, arming_complaint
 from sitl.autopilot.control.records import COAST, STOP
 from sitl.autopilot.control.servo_outputs import outputs_fault
@@ -16,7 +17,7 @@ from sitl.autopilot.mode_rtl import begin_return
 from sitl.autopilot.mode_smart_rtl import begin_smart_rtl, remember_start
 from sitl.autopilot.start_up import ARMABLE_S, PREARM_S
 from sitl.autopilot.state import AUTOPILOT_MODES, GuidedTask, Mode, Submode
-from sitl.autopilot.vehicle import CRITICAL, INFO, NOTICE, WARNING, Vehicle
+from sitl.autopilot.vehicle import Vehicle
 
 NOT_ARMABLE = {Mode.RTL, Mode.SMART_RTL, Mode.INITIALISING}
 
@@ -48,12 +49,12 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
     try:
         mode = Mode(number)
     except ValueError:
-        vehicle.say(WARNING, f"No such mode {number}")
+        vehicle.say(Severity.WARNING, f"No such mode {number}")
         return False
     if mode == vehicle.mode:
         return True
     if not _may_enter(vehicle, mode):
-        vehicle.say(WARNING, "Flight mode change failed")
+        vehicle.say(Severity.WARNING, "Flight mode change failed")
         return False
     if vehicle.mode == Mode.AUTO:
         vehicle.mission.stop()
@@ -69,10 +70,10 @@ def set_mode(vehicle: Vehicle, number: int) -> bool:
 
 def _may_enter(vehicle: Vehicle, mode: Mode) -> bool:
     if mode == Mode.AUTO and not vehicle.mission.present:
-        vehicle.say(NOTICE, "No Mission. Can't set AUTO.")
+        vehicle.say(Severity.NOTICE, "No Mission. Can't set AUTO.")
         return False
     if mode == Mode.DOCK:
-        vehicle.say(NOTICE, "Dock: target not acquired")
+        vehicle.say(Severity.NOTICE, "Dock: target not acquired")
         return False
     if mode in (Mode.FOLLOW, Mode.INITIALISING):
         return False
@@ -118,14 +119,14 @@ def arm(vehicle: Vehicle, force: bool = False) -> bool:
     if vehicle.mode in NOT_ARMABLE and not force:
         faults = [ArmingFault("Mode not armable")]
     for fault in faults:
-        vehicle.say(CRITICAL, f"{'PreArm' if fault.always_prearm else 'Arm'}: {fault.text}")
+        vehicle.say(Severity.CRITICAL, f"{'PreArm' if fault.always_prearm else 'Arm'}: {fault.text}")
     if faults:
         return False
     vehicle.armed = True
     vehicle.clocks.armed_s = vehicle.time_s
     vehicle.control["armed"] = 1
     remember_start(vehicle)
-    vehicle.say(INFO, "Throttle armed")
+    vehicle.say(Severity.INFO, "Throttle armed")
     return True
 
 
@@ -161,7 +162,7 @@ def disarm(vehicle: Vehicle) -> None:
         vehicle.control["armed"] = 0
         if vehicle.mode != Mode.AUTO:
             vehicle.mission.reset()
-        vehicle.say(INFO, "Throttle disarmed")
+        vehicle.say(Severity.INFO, "Throttle disarmed")
 
 
 def run_failsafes(vehicle: Vehicle) -> None:
@@ -172,13 +173,13 @@ def run_failsafes(vehicle: Vehicle) -> None:
     watched = vehicle.parameters["FS_GCS_ENABLE"] > 0 and seen_s is not None
     if watched and vehicle.armed and seen_s is not None and vehicle.time_s - seen_s >= GCS_SILENCE_S:
         vehicle.clocks.ground_station_s = None
-        vehicle.say(WARNING, "Radio Failsafe")
+        vehicle.say(Severity.WARNING, "Radio Failsafe")
         set_mode(vehicle, Mode.HOLD)
     due = vehicle.time_s - vehicle.clocks.prearm_text_s >= PREARM_TEXT_EVERY_S
     if not vehicle.armed and due:
         vehicle.clocks.prearm_text_s = vehicle.time_s
         for fault in arming_faults(vehicle)[:1]:
-            vehicle.say(CRITICAL, f"PreArm: {fault.text}")
+            vehicle.say(Severity.CRITICAL, f"PreArm: {fault.text}")
 
 
 def _watch_battery(vehicle: Vehicle) -> None:
@@ -190,7 +191,7 @@ def _watch_battery(vehicle: Vehicle) -> None:
     level = vehicle.battery.check(vehicle.parameters, volts, used_mah, vehicle.time_s)
     if level == OK:
         return
-    vehicle.say(WARNING, f"Battery 1 is {NAMES[level]} {volts:.2f}V used {used_mah:.0f} mAh")
+    vehicle.say(Severity.WARNING, f"Battery 1 is {NAMES[level]} {volts:.2f}V used {used_mah:.0f} mAh")
     _battery_action(vehicle, int(vehicle.parameters["BATT_FS_LOW_ACT" if level == LOW else "BATT_FS_CRT_ACT"]))
 
 
@@ -218,21 +219,21 @@ def report_ekf(vehicle: Vehicle, changes: list[Change]) -> None:
         if change is Change.FAILED:
             _ekf_failsafe(vehicle)
         elif change is Change.CLEARED:
-            vehicle.say(CRITICAL, "EKF failsafe cleared")
+            vehicle.say(Severity.CRITICAL, "EKF failsafe cleared")
         else:
-            vehicle.say(WARNING if change is Change.STOPPED_AIDING else INFO, change.value)
+            vehicle.say(Severity.WARNING if change is Change.STOPPED_AIDING else Severity.INFO, change.value)
 
 
 def _ekf_failsafe(vehicle: Vehicle) -> None:
     if vehicle.time_s - vehicle.clocks.variance_text_s > VARIANCE_TEXT_EVERY_S:
         vehicle.clocks.variance_text_s = vehicle.time_s
-        vehicle.say(CRITICAL, "EKF variance")
+        vehicle.say(Severity.CRITICAL, "EKF variance")
     action = int(vehicle.parameters["FS_EKF_ACTION"])
     if vehicle.mode not in AUTOPILOT_MODES or action == NO_EKF_ACTION:
         return
     if action != REPORT_ONLY:
         set_mode(vehicle, Mode.HOLD)
-    vehicle.say(CRITICAL, "EKF failsafe")
+    vehicle.say(Severity.CRITICAL, "EKF failsafe")
 
 
 def base_mode(vehicle: Vehicle) -> int:

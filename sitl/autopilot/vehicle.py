@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from companion.core.severity import Severity
 from sitl.autopilot.battery import Battery, rest_volts
 from sitl.autopilot.channel import Channel
 from sitl.autopilot.control.records import (
@@ -50,9 +51,6 @@ MOST_TEXTS = 30
 EKF_UNINITIALISED, EKF_CONSTANT_POSITION = 1024, 167
 """EKF_STATUS_REPORT flags during the start-up: not initialised; attitude and velocity with a constant position."""
 
-CRITICAL, ERROR, WARNING, NOTICE, INFO = 2, 3, 4, 5, 6
-"""MAV_SEVERITY."""
-
 
 class Vehicle:
     """State of the simulated ArduRover since it was booted."""
@@ -89,7 +87,7 @@ class Vehicle:
         self.router = Router()
         self.signing = Signing()
         self.clocks = Clocks()
-        self.texts: list[tuple[int, str]] = []
+        self.texts: list[tuple[Severity, str]] = []
         self.rebooting = False
         self.destination: tuple[int, int] = origin
         self.proximity = Proximity()
@@ -230,7 +228,7 @@ class Vehicle:
         """Estimated heading in hundredths of a degree, 0 to 35999."""
         return round(math.degrees(self.heading_rad()) * 100.0) % 36000
 
-    def say(self, severity: int, text: str) -> None:
+    def say(self, severity: Severity, text: str) -> None:
         """Queue a STATUSTEXT for every channel; it is sent after the answers of this moment."""
         self.texts.append((severity, text))
         del self.texts[:-MOST_TEXTS]
@@ -266,7 +264,7 @@ def parameter_message(table: Parameters, name: str, in_list: bool = False) -> An
     return mavlink.MAVLink_param_value_message(name.encode(), table[name], table.type_of(name), len(table), index)
 
 
-def text_messages(channel: Channel, severity: int, text: str) -> list[Any]:
+def text_messages(channel: Channel, severity: Severity, text: str) -> list[Any]:
     """A text as STATUSTEXT messages."""
     if len(text) <= 50:
         return [mavlink.MAVLink_statustext_message(severity, text.encode(), 0, 0)]

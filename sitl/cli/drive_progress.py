@@ -9,7 +9,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.app import Status
 from sitl.cli.pace import Pace
-from sitl.cli.said import Said
 from sitl.lockstep import Drive, Report
 
 LINE_EVERY_S = 60.0
@@ -43,13 +42,13 @@ class Telling:
 
     def __init__(self, run: Drive, console: Console) -> None:
         self._name = run.mission.name
-        self._said = Said(run)
         self._console = console
 
     def tell(self, status: Status) -> None:
         """Those said since the last call."""
-        for text in self._said.news():
-            self.line(f"{status.time_s:6.1f} s  {text}")
+        for news in status.news:
+            if news.own:
+                self.line(f"{status.time_s:6.1f} s  {news.text}")
 
     def line(self, text: str) -> None:
         """One line of this run."""
@@ -73,7 +72,7 @@ def run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:
             pace.wait(status.time_s)
 
         report = run.run(observe)
-        telling.tell(run.companion.status())
+        telling.tell(run.take_status())
         progress.update(task, total=1, completed=1, state=report.outcome)
     return report
 
@@ -92,7 +91,7 @@ def _run_with_lines(run: Drive, console: Console, pace: Pace) -> Report:
         pace.wait(status.time_s)
 
     report = run.run(observe)
-    telling.tell(run.companion.status())
+    telling.tell(run.take_status())
     return report
 
 

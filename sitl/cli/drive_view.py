@@ -12,8 +12,7 @@ from companion.core.clock import stopwatch_s
 from companion.core.grid import OBSTACLE
 from companion.executive.mission_progress import TargetStatus
 from companion.mapping.evidence_map import EvidenceMap, known_fields
-from companion.navigation.field_step import Decision, Part
-from sitl.cli.said import Said
+from companion.navigation.field_step import Part
 from sitl.cli.viewer import Viewer
 from sitl.lockstep import Drive, Report
 from sitl.view.sketch import Kind, Layer, Place, PlaceState, Scene
@@ -50,8 +49,8 @@ class DriveView:
         self._run = run
         self._viewer = viewer
         self._watching = Watching(run.mission.name, run.simulator)
-        self._decided: Decision | None = None
-        self._said = Said(run)
+        self._told_of = (-1, "")
+        """The step and the reason of the last decision that was told."""
 
     def observe(self, status: Status) -> None:
         """Take in a new moment of the run, and draw it if that is due."""
@@ -62,19 +61,18 @@ class DriveView:
 
     def _take_in(self, status: Status) -> None:
         self._watching.note()
-        texts = self._said.news()
-        # The status knows this tick's news only, but also the autopilot's texts.
-        for text in (*texts, *(news.text for news in status.news if news.text not in texts)):
-            self._watching.tell(f"{status.time_s:.0f} s: {text}")
+        for news in status.news:
+            self._watching.tell(f"{status.time_s:.0f} s: {news.text}")
         decision = status.decision
-        if decision is not None and decision is not self._decided and decision.part is not Part.EXPLORE:
-            # Following the path is not an event: the panel always shows it.
+        if decision is None or (status.steps, decision.reason) == self._told_of:
+            return
+        self._told_of = (status.steps, decision.reason)
+        if decision.part is not Part.EXPLORE:  # following the path is not an event: the panel always shows it
             self._watching.tell(f"{status.time_s:.0f} s: {decision.reason}")
-        self._decided = decision
 
     def finish(self) -> None:
         """Draw the last moment."""
-        status = self._run.companion.status()
+        status = self._run.take_status()
         self._take_in(status)
         self._viewer.show(self._view(status, stopwatch_s()))
 

@@ -42,7 +42,7 @@ class Viewer:
         self._live = Live(console=console, screen=True, auto_refresh=False)
         self._wake = threading.Condition()
         self._view: View | None = None
-        self._drawn: View | None = None
+        self._is_new = False
         self._ended = False
         self._due_s = -math.inf
         self._thread = threading.Thread(target=self._draw, name="view", daemon=True)
@@ -57,7 +57,7 @@ class Viewer:
     def show(self, view: View) -> None:
         """Draw this view next; returns at once."""
         with self._wake:
-            self._view = view
+            self._view, self._is_new = view, True
             self._wake.notify()
 
     def __enter__(self) -> Viewer:
@@ -91,7 +91,7 @@ class Viewer:
         self._console.set_alt_screen(True)
         self._console.show_cursor(False)
         with self._wake:
-            self._drawn = None
+            self._is_new = self._view is not None
             self._wake.notify()
 
     def print_last(self) -> None:
@@ -105,12 +105,12 @@ class Viewer:
         with contextlib.suppress(OSError):
             while True:
                 with self._wake:
-                    self._wake.wait_for(lambda: self._ended or self._view is not self._drawn)
+                    self._wake.wait_for(lambda: self._ended or self._is_new)
                     if self._ended:
                         return
-                    self._drawn = self._view
-                assert self._drawn is not None
-                self._live.update(self._rendered(self._drawn, self._console.height), refresh=True)
+                    view, self._is_new = self._view, False
+                assert view is not None
+                self._live.update(self._rendered(view, self._console.height), refresh=True)
 
     def _rendered(self, view: View, rows: int) -> RenderableType:
         colour = not self._console.no_color and self._console.color_system is not None

@@ -98,7 +98,6 @@ def load_maps(folder: Path | None, names: tuple[str, ...]) -> dict[str, Grid]:
     for name in names:
         file = given / f"{name}.png"
         if fault := why_no_file(file):
-            fault = fault.partition(";")[0]
             raise ExperimentError(f"{file}: {fault}; this experiment needs {', '.join(names)} (.png) in --maps")
         grid = load_map(file)
         for what, cell in (("start", START), ("target", TARGET)):

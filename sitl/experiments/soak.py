@@ -56,16 +56,25 @@ class Ended(StrEnum):
     UNFINISHED = "unfinished"
 
 
+class Policy(StrEnum):
+    """Why targets were missed on purpose."""
+
+    LOW_BATTERY = "it came back with a low battery"
+    NOT_ARMED = "the autopilot did not let it be armed"
+
+
 @dataclass(frozen=True, slots=True)
 class Soaked:
-    """One mission. ``policy``: why targets were missed on purpose."""
+    """One mission."""
 
     seed: int
     ground: str
     suite: str
     faults: tuple[str, ...] = ()
     ended: Ended = Ended.UNFINISHED
-    policy: str = ""
+    policy: Policy | None = None
+    why: str = ""
+    """In the words of companion or autopilot."""
     last_text: str = ""
     collisions: int = 0
     refused: int = 0
@@ -105,7 +114,7 @@ class Person:
         self._in_vain += 1
         if self._in_vain == PATIENCE:
             faults = "; ".join(fault.text for fault in arming_faults(vehicle))
-            self.gave_up = f"The autopilot does not let it be armed: {faults or 'GUIDED refused'}"
+            self.gave_up = faults or "GUIDED refused"
             drive.companion.stop()
 
 
@@ -132,14 +141,15 @@ def _driven(drive: Drive, result: Soaked) -> Soaked:
     report = drive.run(lambda status: person.look(drive, status.activity))
     missed = [name for name, status in report.targets if status is not TargetStatus.REACHED]
     broken_off = drive.companion.outcome.broken_off
-    policy = person.gave_up if broken_off is None else f"Returning: {broken_off}"
+    policy = Policy.LOW_BATTERY if broken_off is not None else Policy.NOT_ARMED if person.gave_up else None
     ended = Ended.REACHED if missed in ([], ["sealed"]) else Ended.POLICY if policy else Ended.UNFINISHED
     if not drive.companion.done:
-        ended, policy = Ended.UNFINISHED, ""
+        ended, policy = Ended.UNFINISHED, None
     return replace(
         result,
         ended=ended,
         policy=policy,
+        why="" if policy is None else person.gave_up if broken_off is None else str(broken_off),
         last_text=report.said[-1] if report.said else "",
         collisions=report.collisions,
         refused=report.refused,
@@ -221,7 +231,7 @@ class SoakReport:
 
     def _section(self) -> str:
         met = Counter(fault for run in self.runs for fault in run.faults)
-        policies = Counter(run.policy.partition(".")[0] for run in self.runs if run.ended is Ended.POLICY)
+        policies = Counter(run.policy for run in self.runs if run.policy is not None and run.ended is Ended.POLICY)
         by_policy = "; ".join(f"{text} ({count})" for text, count in sorted(policies.items())) or "none"
         return f"""## Soak
 

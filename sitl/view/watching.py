@@ -48,8 +48,8 @@ class Rates:
 class _AutopilotState:
     """The autopilot at a moment: which boot it is, its mode, and whether it is armed."""
 
-    def __init__(self, vehicle: Vehicle, is_off: bool) -> None:
-        self._vehicle = vehicle
+    def __init__(self, vehicle: Vehicle, boots: int, is_off: bool) -> None:
+        self._boots = boots
         self._is_off = is_off
         self._mode = vehicle.mode.name
         self._armed = "armed" if vehicle.armed else "disarmed"
@@ -59,7 +59,7 @@ class _AutopilotState:
         if self._is_off:
             if not was._is_off:
                 yield "the autopilot has lost power"
-        elif was._is_off or was._vehicle is not self._vehicle:
+        elif was._is_off or was._boots != self._boots:
             yield f"the autopilot has booted: {self._mode}, {self._armed}"
         else:
             if self._mode != was._mode:
@@ -114,7 +114,7 @@ class Watching:
         """Record the track, and changes of mode, arming and power; to be called often."""
         self._note_track()
         simulator = self.simulator
-        was, now = self._was, _AutopilotState(simulator.vehicle, simulator.is_off)
+        was, now = self._was, _AutopilotState(simulator.vehicle, simulator.boots, simulator.is_off)
         self._was = now
         for line in now.events_since(was) if was else ():
             self.tell(f"{simulator.time_s:.0f} s: {line}")

@@ -270,8 +270,7 @@ def _base(path: Path, table: WorldTable) -> tuple[Mask, float]:
     try:
         grid = load_map(path.parent / table.base, table.base_resolution_m)
     except MapError as error:
-        remedy = "" if ";" in str(error) else "; name a map that can be read"
-        raise MapError(f"{path}: base: {error}{remedy}") from error
+        raise MapError(f"{path}: base: it cannot be used: {error}") from error
     resolution_m = table.resolution_m or grid.resolution_m / math.ceil(grid.resolution_m / FINE_M - 1e-9)
     times = round(grid.resolution_m / resolution_m)
     if times < 1 or abs(times * resolution_m - grid.resolution_m) > 1e-9:

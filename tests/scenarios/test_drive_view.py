@@ -15,7 +15,6 @@ from companion.app import Status
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.cli.drive_view import DriveView
-from sitl.cli.said import new_texts
 from sitl.cli.viewer import Viewer
 from sitl.faults.plan import FaultPlan, PilotTakesOver, Reboot
 from sitl.lockstep import Drive
@@ -110,12 +109,6 @@ def test_the_news_tell_all_that_the_companion_said(driven: Driven) -> None:
     said = driven.run.companion.outcome.said
     assert len(said) > 5 and any("mode is not GUIDED" in text for text in said)
     assert [text for text in told if text in said] == said
-
-
-def test_texts_are_new_once_even_when_old_ones_are_forgotten() -> None:
-    assert new_texts(["a"], ["a", "b", "a"]) == ["b", "a"]
-    assert new_texts(["a", "b"], ["a", "b"]) == [] == new_texts([], [])
-    assert new_texts(["a", "b"], ["b", "c"]) == ["c"]
 
 
 @pytest.mark.parametrize(("columns", "rows"), [(80, 40), (140, 30)])

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from companion.cli.live import Reader, levelled, reader_of
 from companion.cli.service import Service
+from companion.core.severity import Severity
 from companion.operator.notifications import Status
 from companion.safety.reasons import Activity, RunPhase
 
@@ -64,6 +65,6 @@ def test_who_reads_is_known_and_gets_the_level_his_way() -> None:
     assert reader_of(terminal, {}) is Reader.PERSON
     for descriptor in (master, terminal, theirs):
         os.close(descriptor)
-    assert levelled("HOLD: no position", 4, Reader.JOURNAL) == "<4>HOLD: no position"
-    assert levelled("HOLD: no position", 4, Reader.LOG) == "warning: HOLD: no position"
-    assert levelled("HOLD: no position", 4, Reader.PERSON) == "HOLD: no position"
+    assert levelled("HOLD: no position", Severity.WARNING, Reader.JOURNAL) == "<4>HOLD: no position"
+    assert levelled("HOLD: no position", Severity.WARNING, Reader.LOG) == "warning: HOLD: no position"
+    assert levelled("HOLD: no position", Severity.WARNING, Reader.PERSON) == "HOLD: no position"

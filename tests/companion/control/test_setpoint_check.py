@@ -24,6 +24,7 @@ from companion.core.rover_limits import RoverLimits
 from companion.core.severity import Severity
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.bounds import Bound, Bounds
+from companion.safety.reasons import Reason, SetpointFault
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
 from tests.support.rig import Rig, yard
@@ -55,8 +56,9 @@ def view(evidence: EvidenceMap, pose: Pose, speed_m_s: float = 0.0) -> LocalView
     return LocalView(pose, speed_m_s, evidence, RoverLimits(RADIUS_M, 2.0, 8.0), SETTINGS)
 
 
-def fault(output: Output, evidence: EvidenceMap, *bounds: Bound) -> str:
-    return fault_of(output.setpoint, view(evidence, output.pose, output.speed_m_s), Bounds(bounds))
+def fault(output: Output, evidence: EvidenceMap, *bounds: Bound) -> SetpointFault | None:
+    found = fault_of(output.setpoint, view(evidence, output.pose, output.speed_m_s), Bounds(bounds))
+    return None if found is None else found.kind
 
 
 def patched(evidence: EvidenceMap, north_m: float, east_m: float, size_m: float, value: float) -> None:
@@ -148,7 +150,7 @@ def test_backing_out_asks_for_nothing_that_is_refused(
         evidence.base.weights[y, x] = 1.0
     speed_m_s = backing_speed_m_s(view(evidence, output.pose, output.speed_m_s))
     back = replace(output, setpoint=GuidedVelocity(-speed_m_s, 0.0))
-    assert speed_m_s < BACK_LEAST_M_S or fault(back, evidence) == ""
+    assert speed_m_s < BACK_LEAST_M_S or fault(back, evidence) is None
 
 
 def test_on_open_ground_it_backs_out_as_fast_as_it_may() -> None:
@@ -173,7 +175,7 @@ def test_on_open_ground_that_was_seen_only_distance_and_the_edge_of_the_map_coun
 def test_standing_and_turning_on_the_spot_always_pass(setpoint: Setpoint) -> None:
     evidence = open_ground()
     patched(evidence, MIDDLE - 1.0, MIDDLE - 1.0, 2.0, 2.0)
-    assert fault(Output(setpoint, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), evidence) == ""
+    assert fault(Output(setpoint, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), evidence) is None
 
 
 @pytest.mark.parametrize("value", [math.nan, math.inf])
@@ -192,11 +194,11 @@ def test_the_faults_have_names() -> None:
     ahead = Output(GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), pose, 0.0)
     evidence = open_ground()
     patched(evidence, MIDDLE + 2.0, MIDDLE - 1.0, 2.0, 0.0)
-    assert fault(ahead, evidence) == "target on ground not seen"
+    assert fault(ahead, evidence) is SetpointFault.ON_UNSEEN_GROUND
     patched(evidence, MIDDLE + 2.0, MIDDLE - 1.0, 2.0, 2.0)
-    assert fault(ahead, evidence) == "target behind something"
+    assert fault(ahead, evidence) is SetpointFault.BEHIND_OBSTACLE
     fast = Output(GuidedVelocity(2.0, 0.0), pose, 2.0)
-    assert fault(fast, evidence) == "velocity leads into something"
+    assert fault(fast, evidence) is SetpointFault.INTO_OBSTACLE
 
 
 @pytest.mark.parametrize(("beyond_m", "refused"), [(-0.05, False), (0.05, False), (0.25, True)])
@@ -233,7 +235,7 @@ def test_a_velocity_may_lead_past_a_thing_closer_than_the_room_that_controllers_
 def test_a_rover_at_a_wall_may_leave_it() -> None:
     evidence = open_ground()
     evidence.log_odds[: round(MIDDLE / evidence.evidence_m)] = 2.0
-    assert fault(Output(GuidedVelocity(0.5, 0.0), Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), evidence) == ""
+    assert fault(Output(GuidedVelocity(0.5, 0.0), Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.0), evidence) is None
 
 
 def test_a_target_at_the_farthest_distance_passes() -> None:
@@ -256,7 +258,7 @@ def test_what_stands_before_the_edge_of_the_map_counts_for_a_target_beyond_it(be
     evidence = open_ground()
     patched(evidence, MIDDLE + 3.0, MIDDLE - 0.5, 1.0, 2.0)
     there = GuidedPosition(NedPoint(SIDE + beyond_m, MIDDLE))
-    assert fault(Output(there, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.5), evidence) == "target behind something"
+    assert fault(Output(there, Pose(MIDDLE, MIDDLE, 0.0, 0.0), 0.5), evidence) is SetpointFault.BEHIND_OBSTACLE
 
 
 def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
@@ -277,11 +279,13 @@ def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> N
 
 
 def test_a_rule_more_is_asked_like_the_others() -> None:
-    check = SetpointCheck(lambda text, severity: None, (lambda setpoint, at, bounds: "not on Sundays",))
+    check = SetpointCheck(
+        lambda text, severity: None, (lambda setpoint, at, bounds: Reason(SetpointFault.NOT_A_NUMBER),)
+    )
     drive = ControlCommand(Purpose.LOOK, GuidedHeading(0.0), 0.5)
     at = view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0))
     assert check.passed(drive, at, Bounds()).setpoint == STOP
-    assert check.refused == {"not on Sundays": 1}
+    assert check.refused == {SetpointFault.NOT_A_NUMBER: 1}
 
 
 def test_guidance_that_has_gone_mad_does_not_get_past_it(tmp_path: Path) -> None:
@@ -353,7 +357,7 @@ def test_positions_and_velocities_before_a_border(setpoint: Setpoint, heading_ra
     """3 m from the middle: from 2 m/s the rover needs 3 m, from 1.5 m/s 1.8 m, and its body is 0.35 m."""
     at = view(open_ground(), Pose(MIDDLE, MIDDLE, heading_rad, 0.0))
     found = inside_borders(setpoint, at, Bounds((inner(6.0),)))
-    assert found == ("setpoint leads over the border of the yard" if refused else "")
+    assert found == (Reason(SetpointFault.OVER_BORDER, ("the yard",)) if refused else None)
 
 
 @pytest.mark.parametrize(

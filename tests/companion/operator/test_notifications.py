@@ -34,11 +34,13 @@ def test_nothing_is_told_twice_in_a_row_and_what_stays_so_once() -> None:
         one.tell(text, Severity.INFO)
     assert one.said == [news.text for news in one.news] == ["a", "b", "a"]
     assert [(m.severity, m.text) for m in messages(far.read())] == [(6, "a"), (6, "b"), (6, "a")]
-    one.once("b")
+    for text in ("c", "c"):
+        one.once(text)
+    one.tell("b", Severity.INFO)
     one.once("c")
-    assert one.said[3:] == ["c"] and one.news[-1] == News(Severity.WARNING, "c")
+    assert one.said[3:] == ["c", "b"] and one.news[-2] == News(Severity.WARNING, "c")
     one.note("autopilot: d", Severity.ERROR)
-    assert one.said[4:] == [] and one.news[-1] == News(Severity.ERROR, "autopilot: d")
+    assert one.said[5:] == [] and one.news[-1] == News(Severity.ERROR, "autopilot: d", own=False)
 
 
 def test_only_the_newest_texts_are_kept() -> None:

@@ -8,7 +8,7 @@ from scipy.ndimage import label
 
 from companion.core.grid import Cell
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus, path_cost
-from companion.planning.raster import FAULTS, first_fault, is_path, plain
+from companion.planning.raster import FAULTS, PathFault, first_fault, is_path, plain
 from companion.planning.registry import PLANNERS, make_planner
 from companion.settings import PlannerSettings
 
@@ -70,7 +70,7 @@ def test_contract(name, problem, seed):
     cells = result.path.cells
     assert cells[0] == problem.start and cells[-1] == problem.target
     number, index = first_fault(plain(problem.weights), result.path.cell_array, problem.corner_cutting)
-    assert FAULTS[number] == "none", f"{FAULTS[number]} at {index}"
+    assert FAULTS[number] is PathFault.NONE, f"{FAULTS[number]} at {index}"
     assert len(set(cells)) == len(cells)
     assert result.path.cost == pytest.approx(path_cost(problem.weights, cells), rel=1e-9)
     if result.path.curve is not None:

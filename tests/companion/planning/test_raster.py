@@ -10,6 +10,7 @@ from companion.core.grid import Cell, as_array, as_cells
 from companion.planning.problem import Path, path_cost
 from companion.planning.raster import (
     FAULTS,
+    PathFault,
     cells_cost,
     first_fault,
     is_path,
@@ -89,23 +90,23 @@ def test_compiled_cost_is_path_cost():
 @pytest.mark.parametrize(
     ("cells", "fault"),
     [
-        ([(0, 0), (1, 0), (2, 0)], "none"),
-        ([(0, 2), (1, 3)], "outside the map"),
-        ([(-1, 0), (0, 0)], "outside the map"),
-        ([(0, 1), (1, 1)], "obstacle"),
-        ([(0, 0), (2, 0)], "not adjacent"),
-        ([(0, 0), (0, 0)], "not adjacent"),
-        ([(0, 1), (1, 2)], "corner cut"),
-        ([(1, 0), (2, 1)], "corner cut"),
+        ([(0, 0), (1, 0), (2, 0)], PathFault.NONE),
+        ([(0, 2), (1, 3)], PathFault.OUTSIDE_MAP),
+        ([(-1, 0), (0, 0)], PathFault.OUTSIDE_MAP),
+        ([(0, 1), (1, 1)], PathFault.OBSTACLE),
+        ([(0, 0), (2, 0)], PathFault.NOT_ADJACENT),
+        ([(0, 0), (0, 0)], PathFault.NOT_ADJACENT),
+        ([(0, 1), (1, 2)], PathFault.CORNER_CUT),
+        ([(1, 0), (2, 1)], PathFault.CORNER_CUT),
     ],
 )
 def test_what_is_wrong_with_a_path(cells, fault):
     weights = drawn("...", ".#.", "...")
     number, index = first_fault(weights, np.array(cells), False)
-    assert FAULTS[number] == fault
-    assert (index >= 0) == (fault != "none")
-    assert is_path(weights, [Cell(*cell) for cell in cells]) == (fault == "none")
-    assert is_path(weights, [Cell(*cell) for cell in cells], True) == (fault in ("none", "corner cut"))
+    assert FAULTS[number] is fault
+    assert (index >= 0) == (fault is not PathFault.NONE)
+    assert is_path(weights, [Cell(*cell) for cell in cells]) == (fault is PathFault.NONE)
+    assert is_path(weights, [Cell(*cell) for cell in cells], True) == (fault in (PathFault.NONE, PathFault.CORNER_CUT))
 
 
 def test_plain_weights_are_passed_on_and_others_copied():

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from companion.core.grid import Cell
 from companion.planning.graph_search.theta_star import any_angle
 from companion.planning.problem import Budget, PlanningProblem
-from companion.planning.raster import FAULTS, cells_cost, first_fault, polyline
+from companion.planning.raster import FAULTS, PathFault, cells_cost, first_fault, polyline
 from companion.planning.registry import make_planner
 from companion.planning.smoothing import curve_cost, smooth, straightened, taut
 from companion.settings import PlannerSettings
@@ -51,7 +51,7 @@ def test_the_curve_is_a_path_between_the_same_ends_and_hardly_dearer(problem):
     assert tuple(curve[0]) == problem.start and tuple(curve[-1]) == problem.target
     under = fields_under(curve)
     number, at = first_fault(problem.weights, under, False)
-    assert FAULTS[number] == "none", f"{FAULTS[number]} at {at}"
+    assert FAULTS[number] is PathFault.NONE, f"{FAULTS[number]} at {at}"
 
 
 @given(grounds())

@@ -38,7 +38,7 @@ def test_ground_stations_are_answered_and_the_autopilots_warnings_shown(whole: W
     answers = whole.tick(ParameterAsked(100.0, "CMP_STALE", -1), TextSeen(100.0, 3, "Bad battery"))
     assert [answer.name for answer in answers if isinstance(answer, ParameterValue)] == ["CMP_STALE"]
     assert not any(isinstance(answer, AnswerTarget) for answer in answers)
-    assert whole.companion.status().news == (News(Severity.ERROR, "autopilot: Bad battery"),)
+    assert whole.companion.status().news == (News(Severity.ERROR, "autopilot: Bad battery", own=False),)
     whole.tick()
     assert whole.companion.status().news == ()
 

@@ -24,7 +24,7 @@ from companion.vehicle.events import (
     TargetSeen,
     TextSeen,
 )
-from companion.vehicle.state import PARAMETERS_KEPT, VehicleState, fold
+from companion.vehicle.state import PARAMETERS_KEPT, EkfPart, VehicleState, fold
 
 PLACE = GeoPoint(-35.0, 149.0)
 SCAN = RangeScan(1.0, np.full(1, np.pi), np.ones(1), 0.2, 8.0, 0.1, "behind")
@@ -131,23 +131,23 @@ def test_speed_over_ground() -> None:
 @pytest.mark.parametrize(
     ("flags", "lacks"),
     [
-        (None, "position"),
-        (0, "position"),
-        (1024, "position"),
-        (831, ""),
-        (1 | 2 | 8, ""),
-        (1 | 2 | 16, ""),
-        (831 & ~(8 | 16), "position"),
-        (831 | 128, "position"),
-        (167, "position"),
-        (831 & ~1, "attitude"),
-        (831 & ~2, "velocity"),
-        (831 | 32768, ""),
+        (None, EkfPart.POSITION),
+        (0, EkfPart.POSITION),
+        (1024, EkfPart.POSITION),
+        (831, None),
+        (1 | 2 | 8, None),
+        (1 | 2 | 16, None),
+        (831 & ~(8 | 16), EkfPart.POSITION),
+        (831 | 128, EkfPart.POSITION),
+        (167, EkfPart.POSITION),
+        (831 & ~1, EkfPart.ATTITUDE),
+        (831 & ~2, EkfPart.VELOCITY),
+        (831 | 32768, None),
     ],
 )
-def test_ekf_flags(flags: int | None, lacks: str) -> None:
+def test_ekf_flags(flags: int | None, lacks: EkfPart | None) -> None:
     state = VehicleState() if flags is None else fold(VehicleState(), EkfStatusSeen(1.0, flags))
-    assert state.ekf_lacks == lacks
+    assert state.ekf_lacks is lacks
 
 
 def test_driving_is_no_jump_but_a_reset_is() -> None:
