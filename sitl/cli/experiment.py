@@ -26,7 +26,7 @@ from sitl.experiments import (
     soak,
     wang_table4,
 )
-from sitl.experiments.experiment import Checked, Experiment, ExperimentError, Options, Report
+from sitl.experiments.experiment import Checked, Experiment, ExperimentError, ExperimentReport, Options
 
 EXPERIMENTS: dict[str, Experiment] = {
     adaptive_control_points.NAME: adaptive_control_points.run,
@@ -83,7 +83,7 @@ def experiment(
         made = EXPERIMENTS.get(name)
         if made is None:
             raise ExperimentError(f"experiment {name}: unknown; known are {', '.join(EXPERIMENTS)}")
-        # Report a file that cannot be written before the work, not after it.
+        # ExperimentReport a file that cannot be written before the work, not after it.
         writable(json_file)
         writable(docs and docs / "results.md")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
@@ -110,7 +110,7 @@ def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: 
         raise ExperimentError(f"--maps: {name} draws the paper's own environments, it reads no maps")
 
 
-def _with_progress(name: str, made: Experiment, options: Options, console: Console) -> Report:
+def _with_progress(name: str, made: Experiment, options: Options, console: Console) -> ExperimentReport:
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
         # The bar appears with the first progress, so that a bad folder of maps gives one line only.
@@ -122,7 +122,7 @@ def _with_progress(name: str, made: Experiment, options: Options, console: Conso
         return made(options, advance)
 
 
-def _put_out(report: Report, console: Console, json_file: Path | None, docs: Path | None) -> None:
+def _put_out(report: ExperimentReport, console: Console, json_file: Path | None, docs: Path | None) -> None:
     for table in report.tables():
         console.print(table)
     if json_file is not None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -28,8 +27,8 @@ from sitl.experiments.achour_trials import (
     make_trials,
     samples_of,
 )
-from sitl.experiments.experiment import Advance, Options, where_measured
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, where_measured
+from sitl.experiments.results_page import markdown_table, terminal_table
 
 NAME = "achour-table1"
 
@@ -102,9 +101,10 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class AchourReport:
-    """See ``experiment.Report``."""
+class AchourReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     problems: dict[str, PlanningProblem]
     entries: tuple[Entry, ...]
@@ -147,10 +147,13 @@ class AchourReport:
             ],
         }
 
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section and a picture of the environments with a path of each planner."""
-        picture = drawing.save(_drawn(self), folder / "images" / f"{NAME}.png")
-        return [picture, write_section(folder, NAME, _section(self))]
+    def pictures(self) -> dict[str, Figure]:
+        """See ``ExperimentReport``."""
+        return {NAME: _drawn(self)}
+
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
+        return _section(self)
 
 
 def run(options: Options, advance: Advance) -> AchourReport:
@@ -275,7 +278,7 @@ def _section(report: AchourReport) -> str:
     side_m = len(report.problems[last].weights) // FIELDS_A_METRE
     return f"""## Segment by segment (Achour & Chaalal 2011, table I)
 
-`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
+`{report.options.command(NAME)}`
 
 From {START_M} to {TARGET_M} through {side_m} m x {side_m} m, {FIELDS_A_METRE} fields a metre, with M =
 {SETTINGS.achour.samples} samples and B = {SETTINGS.achour.neighbours} neighbours, as the paper has it. "At once" counts

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,8 +16,8 @@ from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import make_planner, warm_up
 from companion.settings import PlannerSettings
 from sitl.experiments import drawing
-from sitl.experiments.experiment import START, TARGET, Advance, Options, load_maps, where_measured
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.experiment import START, TARGET, Advance, ExperimentReport, Options, load_maps, where_measured
+from sitl.experiments.results_page import markdown_table, terminal_table
 
 NAME = "adaptive-control-points"
 TITLES = {"known-1": "Map 1", "known-2": "Map 2", "known-3": "Map 3", "known-4": "Map 4"}
@@ -74,9 +74,10 @@ HEAD = ("control points", "found", "epochs", "p90", "number", "cost", "ms")
 
 
 @dataclass(frozen=True)
-class AdaptiveReport:
-    """See ``experiment.Report``."""
+class AdaptiveReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     entries: tuple[Entry, ...]
 
@@ -105,10 +106,13 @@ class AdaptiveReport:
             ],
         }
 
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section and the picture."""
-        picture = drawing.save(self._draw(), folder / "images" / f"{NAME}.png")
-        return [picture, write_section(folder, NAME, _section(self))]
+    def pictures(self) -> dict[str, Figure]:
+        """See ``ExperimentReport``."""
+        return {NAME: self._draw()}
+
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
+        return _section(self)
 
     def _rows(self, map_name: str) -> list[list[str]]:
         return [_row(entry) for entry in self.entries if entry.map_name == map_name]
@@ -171,7 +175,7 @@ def _section(report: AdaptiveReport) -> str:
     tables = "\n\n".join(f"{title}:\n\n{markdown_table(HEAD, report._rows(name))}" for name, title in TITLES.items())
     return f"""## Control points that adapt (our extension)
 
-`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
+`{report.options.command(NAME)}`
 
 The B-spline genetic algorithm from {tuple(START)} to {tuple(TARGET)} on the known maps, no corner cutting, population
 30, {EPOCHS} epochs in all: with 4 control points always; with {", ".join(map(str, NUMBERS))} in turn,

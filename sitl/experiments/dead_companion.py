@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -18,8 +18,8 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Mission, SitlSpec
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.experiments.experiment import Advance, Options, shipped_missions
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, shipped_missions
+from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 from sitl.simulator import Simulator
@@ -124,9 +124,10 @@ def watch_until_it_stands(simulator: Simulator) -> float:
 
 
 @dataclass(frozen=True)
-class DeadReport:
-    """See ``experiment.Report``."""
+class DeadReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     deaths: tuple[Death, ...]
 
@@ -145,10 +146,6 @@ class DeadReport:
         runs = [{name: getattr(death, name) for name in Death.__slots__} for death in self.deaths]
         return {"experiment": NAME, "seed": self.options.seed, "runs": self.options.runs, "deaths": runs}
 
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section."""
-        return [write_section(folder, NAME, self._section())]
-
     def _suites(self) -> list[str]:
         return list(dict.fromkeys(death.suite for death in self.deaths))
 
@@ -157,7 +154,8 @@ class DeadReport:
         names = dict.fromkeys(death.mission for death in own)
         return [_row(name, [d for d in own if d.mission == name]) for name in names] + [_row("all", own)]
 
-    def _section(self) -> str:
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
         tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in self._suites())
         touched, run_into = sum(d.touched for d in self.deaths), sum(d.run_into for d in self.deaths)
         return f"""## A companion that falls dead

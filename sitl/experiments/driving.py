@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -22,13 +22,14 @@ from sitl.experiments import drawing
 from sitl.experiments.experiment import (
     Advance,
     ExperimentError,
+    ExperimentReport,
     Options,
     planners_of,
     shipped_missions,
     where_measured,
 )
 from sitl.experiments.navigation import OURS, STEPS_FACTOR, STEPS_REFERENCE, settings_with
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive, DriveOutcome, Report
 from sitl.map_mission import mission_on_map
 from sitl.scenario import scenario_from_mission
@@ -99,9 +100,10 @@ HEAD = ("planner", "time s", "/ref", "metres", "steps", "back", "missed", "coll.
 
 
 @dataclass(frozen=True)
-class DrivingReport:
-    """See ``experiment.Report``."""
+class DrivingReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     series: tuple[Series, ...]
 
@@ -122,12 +124,9 @@ class DrivingReport:
             ],
         }
 
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section, and a picture of the driving times."""
-        return [
-            drawing.save(self._draw(), folder / "images" / f"{NAME}.png"),
-            write_section(folder, NAME, self._section()),
-        ]
+    def pictures(self) -> dict[str, Figure]:
+        """See ``ExperimentReport``."""
+        return {NAME: self._draw()}
 
     def _names(self) -> list[str]:
         return list(dict.fromkeys(series.mission for series in self.series))
@@ -179,7 +178,8 @@ class DrivingReport:
         figure.legend(loc="outside lower center", ncols=len(planners), frameon=False)
         return figure
 
-    def _section(self) -> str:
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
         tables = "\n\n".join(f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}" for name in self._names())
         return f"""## What the rover feels: driving times
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import platform
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from importlib.metadata import version
 from os import cpu_count
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import ClassVar, Protocol, runtime_checkable
 
+from matplotlib.figure import Figure
 from rich.table import Table
 
 from companion.core.grid import Cell, Grid
@@ -17,6 +19,8 @@ from companion.mapping.map_files import load_map
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings
 from companion.storage.files import why_no_file
+from sitl.experiments import drawing
+from sitl.experiments.results_page import write_section
 
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""
@@ -47,20 +51,33 @@ class Options:
         return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"
 
 
-class Report(Protocol):
-    """What came out."""
+class ExperimentReport(ABC):
+    """What came out: the base class of every experiment's report."""
 
+    name: ClassVar[str]
+    page: ClassVar[str] = "results.md"
+    """The page of the documentation that has its section."""
+
+    @abstractmethod
     def tables(self) -> list[Table]:
         """For the terminal."""
-        ...
 
+    @abstractmethod
     def as_json(self) -> dict[str, object]:
         """Everything measured."""
-        ...
+
+    @abstractmethod
+    def section(self) -> str:
+        """Its section of the page, in Markdown."""
+
+    def pictures(self) -> dict[str, Figure]:
+        """Pictures of the section, by name without suffix."""
+        return {}
 
     def write_docs(self, folder: Path) -> list[Path]:
-        """Write this experiment's part of results.md and its pictures (under images/); gives the files written."""
-        ...
+        """Write pictures (under images/) and section; gives the files written."""
+        files = [drawing.save(picture, folder / "images" / f"{name}.png") for name, picture in self.pictures().items()]
+        return [*files, write_section(folder, self.name, self.section(), self.page)]
 
 
 @runtime_checkable
@@ -76,7 +93,7 @@ class Checked(Protocol):
 Advance = Callable[[int, int], None]
 """Called with the runs done and the runs there are."""
 
-Experiment = Callable[[Options, Advance], Report]
+Experiment = Callable[[Options, Advance], ExperimentReport]
 
 
 def planners_of(options: Options, usual: Iterable[str]) -> tuple[str, ...]:

@@ -6,8 +6,7 @@ import gc
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -22,9 +21,9 @@ from companion.core.grid import Grid
 from companion.planning import registry
 from companion.settings import Settings, parse_settings
 from sitl.experiments import drawing
-from sitl.experiments.experiment import START, TARGET, Advance, Options, load_maps, where_measured
+from sitl.experiments.experiment import START, TARGET, Advance, ExperimentReport, Options, load_maps, where_measured
 from sitl.experiments.field_level import LAYERS, STEP_LIMIT, FieldRobot, FieldRun, Outcome, drive_fields
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.results_page import markdown_table, terminal_table
 
 NAME = "kwasniewski-maps"
 Profile = Literal["default", "paper"]
@@ -65,9 +64,10 @@ class Series:
 
 
 @dataclass(frozen=True)
-class MapsReport:
-    """See ``experiment.Report``."""
+class MapsReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     maps: dict[str, Grid]
     series: tuple[Series, ...]
@@ -93,15 +93,17 @@ class MapsReport:
             "results": [_series_json(series) for series in self.series],
         }
 
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section, an example path for each map, and the two histograms."""
-        images = folder / "images"
-        return [
-            drawing.save(self._draw_paths(), images / f"{NAME}-paths.png"),
-            drawing.save(self._draw_histograms("times"), images / f"{NAME}-times.png"),
-            drawing.save(self._draw_histograms("steps"), images / f"{NAME}-steps.png"),
-            write_section(folder, NAME, _section(self)),
-        ]
+    def pictures(self) -> dict[str, Figure]:
+        """See ``ExperimentReport``."""
+        return {
+            f"{NAME}-paths": self._draw_paths(),
+            f"{NAME}-times": self._draw_histograms("times"),
+            f"{NAME}-steps": self._draw_histograms("steps"),
+        }
+
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
+        return _section(self)
 
     def _draw_paths(self) -> Figure:
         figure, panels = drawing.four_panels(11.0, 6.6)
@@ -265,7 +267,7 @@ def _section(report: MapsReport) -> str:
     )
     return f"""## Unknown maps (Kwaśniewski & Gosiewski 2018, sections 5 and 6)
 
-`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
+`{report.options.command(NAME)}`
 
 Start {tuple(START)}, target {tuple(TARGET)}, 100 x 50 fields, at most {STEP_LIMIT} steps, a view of {LAYERS} layers.
 Steps, searches and plan (all searches of one run together) are medians of the runs, max is the slowest run, back (steps

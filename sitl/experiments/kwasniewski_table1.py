@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,9 +20,9 @@ from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.registry import make_planner, warm_up
 from companion.settings import PlannerSettings
 from sitl.experiments import drawing
-from sitl.experiments.experiment import START, TARGET, Advance, Options, load_maps, where_measured
+from sitl.experiments.experiment import START, TARGET, Advance, ExperimentReport, Options, load_maps, where_measured
 from sitl.experiments.plain_dijkstra import least_cost
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.results_page import markdown_table, terminal_table
 
 NAME = "kwasniewski-table1"
 TITLES = {"known-1": "Map 1", "known-2": "Map 2", "known-3": "Map 3", "known-4": "Map 4"}
@@ -105,9 +105,10 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class TableReport:
-    """See ``experiment.Report``."""
+class TableReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     maps: dict[str, Grid]
     entries: tuple[Entry, ...]
@@ -144,10 +145,13 @@ class TableReport:
             ],
         }
 
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section and a picture of the maps with paths."""
-        picture = drawing.save(self._draw(), folder / "images" / f"{NAME}.png")
-        return [picture, write_section(folder, NAME, _section(self))]
+    def pictures(self) -> dict[str, Figure]:
+        """See ``ExperimentReport``."""
+        return {NAME: self._draw()}
+
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
+        return _section(self)
 
     def _draw(self) -> Figure:
         figure, panels = drawing.four_panels(11.0, 6.6)
@@ -252,7 +256,7 @@ def _section(report: TableReport) -> str:
     )
     return f"""## Known maps (Kwaśniewski & Gosiewski 2018, Table 1)
 
-`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
+`{report.options.command(NAME)}`
 
 From {tuple(START)} to {tuple(TARGET)} on known maps of 100 x 50 fields. GA 1: population 40, 4 control points; GA 2:
 population 100, 4 control points; GA 3: population 100, 5 control points; all with 1 to 500 epochs. {NOT_FOUND} means

@@ -6,7 +6,7 @@ import gc
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -27,13 +27,14 @@ from sitl.experiments.experiment import (
     TARGET,
     Advance,
     ExperimentError,
+    ExperimentReport,
     Options,
     load_maps,
     planners_of,
     where_measured,
 )
 from sitl.experiments.field_level import STEP_LIMIT, FieldRun, Outcome, drive_fields
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.results_page import markdown_table, terminal_table
 
 NAME = "navigation"
 MAPS = ("one-obstacle", "clutter", "rooms", "complex")
@@ -89,9 +90,10 @@ HEAD = ("planner", "reached", "steps/best", "mean", "back", "searches", "plan ms
 
 
 @dataclass(frozen=True)
-class NavigationReport:
-    """See ``experiment.Report``."""
+class NavigationReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     grounds: tuple[Ground, ...]
     series: tuple[Series, ...]
@@ -124,12 +126,9 @@ class NavigationReport:
             ],
         }
 
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section and an example path of some planners on each of the four maps."""
-        return [
-            drawing.save(self._draw(), folder / "images" / f"{NAME}.png"),
-            write_section(folder, NAME, self._section()),
-        ]
+    def pictures(self) -> dict[str, Figure]:
+        """See ``ExperimentReport``."""
+        return {NAME: self._draw()}
 
     def _runs_explained(self) -> str:
         """How many runs a row is made of; column names between asterisks."""
@@ -164,7 +163,8 @@ is spent, which shows in *back*, and may give up a target that can be reached.""
         figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), frameon=False)
         return figure
 
-    def _section(self) -> str:
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
         tables = "\n\n".join(f"{name}:\n\n{markdown_table(HEAD, self._rows(name))}" for name in self._names())
         return f"""## Every planner inside the navigator
 

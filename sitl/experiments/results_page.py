@@ -19,7 +19,7 @@ all); nothing is entered by hand.
 """
 
 
-def write_section(folder: Path, name: str, text: str, file: str = "results.md") -> Path:
+def write_section(folder: Path, name: str, text: str, file: str) -> Path:
     """Put a section into ``folder``/``file``, in place of its former self or at the end."""
     page = folder / file
     folder.mkdir(parents=True, exist_ok=True)

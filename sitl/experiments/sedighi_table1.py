@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path as FilePath
+from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -16,9 +16,9 @@ from companion.planning.problem import Budget, Path, PlanningProblem
 from companion.planning.registry import make_planner, warm_up
 from companion.settings import PlannerSettings
 from sitl.experiments import drawing
-from sitl.experiments.experiment import Advance, Options, where_measured
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, where_measured
 from sitl.experiments.monotone_reach import COLUMNS, ROWS, fewest_switches
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.experiments.sedighi_spaces import DRAWINGS, given_spaces, own_spaces
 
 NAME = "sedighi-table1"
@@ -72,9 +72,10 @@ class Entry:
 
 
 @dataclass(frozen=True)
-class TableReport:
-    """See ``experiment.Report``."""
+class TableReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     spaces: dict[str, PlanningProblem]
     entries: tuple[Entry, ...]
@@ -112,10 +113,13 @@ class TableReport:
             ],
         }
 
-    def write_docs(self, folder: FilePath) -> list[FilePath]:
-        """The section and a picture of the eight spaces."""
-        picture = drawing.save(self._draw(), folder / "images" / f"{NAME}.png")
-        return [picture, write_section(folder, NAME, _section(self))]
+    def pictures(self) -> dict[str, Figure]:
+        """See ``ExperimentReport``."""
+        return {NAME: self._draw()}
+
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
+        return _section(self)
 
     def _success(self, names: dict[str, PlanningProblem]) -> list[list[str]]:
         rows = []

@@ -14,6 +14,7 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from pathlib import Path
+from typing import ClassVar
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -26,14 +27,13 @@ from companion.settings import Settings
 from sitl.autopilot.modes import arm, arming_faults, set_mode
 from sitl.autopilot.state import Mode
 from sitl.experiments import soak_faults, soak_worlds
-from sitl.experiments.experiment import Advance, Options, where_measured
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, where_measured
+from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import SOMEWHERE, Scenario
 from sitl.world.truth import SimStart
 
 NAME = "soak"
-PAGE = "safety.md"
 SUITES = ("lidar-90", "lidar-360")
 TIME_LIMIT_S = 1800.0
 PERSON_S = 8.0
@@ -168,9 +168,11 @@ def memory_mb() -> float:
 
 
 @dataclass(frozen=True)
-class SoakReport:
-    """See ``experiment.Report``."""
+class SoakReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
+    page: ClassVar[str] = "safety.md"
     options: Options
     runs: tuple[Soaked, ...]
 
@@ -192,10 +194,6 @@ class SoakReport:
             "growth_mb": self.growth_mb,
             "results": [asdict(run) for run in self.runs],
         }
-
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section of the safety page."""
-        return [write_section(folder, NAME, self._section(), PAGE)]
 
     @property
     def failure(self) -> str:
@@ -229,7 +227,8 @@ class SoakReport:
         kinds = sorted({run.ground for run in self.runs})
         return [_row(kind, [r for r in self.runs if r.ground == kind]) for kind in kinds] + [_row("all", self.runs)]
 
-    def _section(self) -> str:
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
         met = Counter(fault for run in self.runs for fault in run.faults)
         policies = Counter(run.policy for run in self.runs if run.policy is not None and run.ended is Ended.POLICY)
         by_policy = "; ".join(f"{text} ({count})" for text, count in sorted(policies.items())) or "none"

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -17,8 +16,8 @@ from companion.core.grid import Grid
 from companion.planning.registry import warm_up
 from companion.settings.planners import VertexSettings
 from sitl.experiments import drawing
-from sitl.experiments.experiment import Advance, Options, where_measured
-from sitl.experiments.results_page import markdown_table, terminal_table, write_section
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, where_measured
+from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.experiments.wang_environments import ENVIRONMENTS, Environment, place_at
 from sitl.experiments.wang_trip import SPEEDS_M_S, Trip, length_m, make_trip, time_s
 
@@ -121,9 +120,10 @@ COLUMNS = (
 
 
 @dataclass(frozen=True)
-class WangReport:
-    """See ``experiment.Report``."""
+class WangReport(ExperimentReport):
+    """See ``ExperimentReport``."""
 
+    name: ClassVar[str] = NAME
     options: Options
     entries: tuple[Entry, ...]
 
@@ -158,10 +158,13 @@ class WangReport:
             ],
         }
 
-    def write_docs(self, folder: Path) -> list[Path]:
-        """The section and a picture of the environments with one trip each."""
-        picture = drawing.save(self._draw(), folder / "images" / f"{NAME}.png")
-        return [picture, write_section(folder, NAME, _section(self))]
+    def pictures(self) -> dict[str, Figure]:
+        """See ``ExperimentReport``."""
+        return {NAME: self._draw()}
+
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
+        return _section(self)
 
     def _rows(self, criterion: str) -> list[list[str]]:
         return [row for entry in self.entries if entry.criterion == criterion for row in _rows_of(entry)]
@@ -267,7 +270,7 @@ def _section(report: WangReport) -> str:
     )
     return f"""## Moving obstacles (Wang, Sillitoe & Mulvaney 2007, table IV)
 
-`rover-sitl experiment {NAME} --runs {report.options.runs} --seed {report.options.seed} --docs docs`
+`{report.options.command(NAME)}`
 
 A robot plans off-line with `vertex++` from {tuple(ENVIRONMENTS[1].start)} to {tuple(ENVIRONMENTS[1].target)}, 1 m a
 field, speeds of {SPEEDS_M_S[0]} to {SPEEDS_M_S[1]} m/s, and follows that plan until the moving obstacles change their

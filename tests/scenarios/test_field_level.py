@@ -101,7 +101,7 @@ def test_each_experiment_replaces_only_its_own_section(tmp_path):
     from sitl.experiments.results_page import write_section
 
     for name, text in (("a", "first"), ("b", "second"), ("a", "changed"), ("b", "second")):
-        page = write_section(tmp_path, name, text)
+        page = write_section(tmp_path, name, text, "results.md")
     text = page.read_text()
     assert "first" not in text and text.count("second") == 1
     assert text.index("# Results") < text.index("changed") < text.index("second")
