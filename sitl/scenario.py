@@ -14,6 +14,7 @@ from companion.core.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
 from sitl.autopilot.parameters import DEFAULTS, REAL32, steered_wheels
+from sitl.faults.fault_file import load_faults
 from sitl.faults.plan import FaultPlan, SensorFault
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.physics import Physics
@@ -197,6 +198,17 @@ def _home(mission: Mission, spec: SitlSpec) -> GeoPoint:
         return mission.planned_home
     places = [target.place for target in mission.targets if isinstance(target.place, GeoPoint)]
     return places[0] if places else SOMEWHERE
+
+
+def equipped(mission: Mission, sensors: str | None, params: Path | None) -> Mission:
+    """The mission with other sensors, and with autopilot parameters from a file. Raises ScenarioError."""
+    mission = mission if sensors is None else with_sensors(mission, sensors)
+    return mission if params is None else with_parameter_file(mission, params)
+
+
+def simulated(mission: Mission, faults: Path | None) -> Scenario:
+    """The simulation of a mission, with the faults of a file. Raises ScenarioError, FaultFileError."""
+    return with_faults(scenario_from_mission(mission), load_faults(faults) if faults else None)
 
 
 def with_faults(scenario: Scenario, plan: FaultPlan | None) -> Scenario:

@@ -22,8 +22,10 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from companion.executive.mission_progress import MissionPhase, TargetStatus
+from companion.mapping.evidence_map import MAX_EVIDENCE_CELLS
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.safety.mode_latch import Control
+from companion.storage.validation import first_fault
 from companion.vehicle.rc_input import PULSES_US
 
 VERSION = 1
@@ -62,7 +64,6 @@ Pulse = Annotated[int, Field(ge=PULSES_US.start, lt=PULSES_US.stop)]
 NEEDS_TARGET = (MissionPhase.TRAVEL, MissionPhase.STAY, MissionPhase.WAIT)
 MAX_TARGETS = 1_000_000
 MAX_PAST_FIELDS = 4_000_000
-MAX_EVIDENCE_CELLS = 16_000_000
 
 
 class SavedValues(BaseModel):
@@ -274,6 +275,6 @@ def _decompressed(data: bytes, max_bytes: int) -> bytes:
 
 def _reason(error: Exception) -> str:
     if isinstance(error, ValidationError):
-        fault = error.errors(include_url=False)[0]
-        return f"{'.'.join(str(part) for part in fault['loc'])}: {fault['msg'].lower()}"
+        place, reason = first_fault(error)
+        return f"{place}: {reason.lower()}"
     return str(error).splitlines()[0][:100] if str(error) else type(error).__name__

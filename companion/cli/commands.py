@@ -9,10 +9,10 @@ import typer
 from companion.cli import mission
 from companion.cli.bench import bench
 from companion.cli.doctor import doctor
+from companion.cli.inputs import version_option
 from companion.cli.plan import plan
 from companion.cli.replay import replay
 from companion.cli.run import run
-from companion.cli.version import version_option
 
 app = typer.Typer(
     name="rover-companion",

@@ -150,8 +150,8 @@ def _dot(pen: ImageDraw.ImageDraw, at: tuple[float, float], scale: int, colour: 
 def _rover(pen: ImageDraw.ImageDraw, why: Explanation, scale: int) -> None:
     """A triangle that points along the rover's heading."""
     grid, pose = why.weighed, why.pose
-    x = (pose.east_m - grid.south_west.east_m) / grid.resolution_m * scale
-    y = (grid.height - (pose.north_m - grid.south_west.north_m) / grid.resolution_m) * scale
+    column, row = grid.in_fields(pose.point)
+    x, y = (column + 0.5) * scale, (grid.height - row - 0.5) * scale
     size = max(SIDE_PIXELS / 80.0, 1.2 * scale)
     corners = [(size, 0.0), (0.7 * size, 2.5), (0.7 * size, -2.5)]
     pen.polygon(

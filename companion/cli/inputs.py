@@ -1,10 +1,14 @@
-"""Checks of options that commands share: usable settings, writable files."""
+"""Options that commands share, and their checks: usable settings, writable files, ``--version``."""
 
 from __future__ import annotations
 
 import contextlib
+import importlib.metadata
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
+
+import typer
 
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import Settings, SettingsError, load_settings
@@ -61,3 +65,14 @@ def written(path: Path) -> Iterator[None]:
     except OSError as error:
         place = error.filename if path.is_dir() and error.filename else path
         raise OutputError(f"{place}: cannot be written: {error.strerror or error}; choose another place") from error
+
+
+def version_option(name: str) -> Any:
+    """The option for a script's callback: prints its name and the installed version, and ends."""
+
+    def show(asked: bool) -> None:
+        if asked:
+            typer.echo(f"{name} {importlib.metadata.version('rover-companion')}")
+            raise typer.Exit
+
+    return typer.Option("--version", callback=show, is_eager=True, help="Show the version and exit.")

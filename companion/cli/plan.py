@@ -246,7 +246,7 @@ def motion_of(name: str, settings: Settings, radius_m: float, heading_deg: float
         able = (each for each in PLANNERS if make_planner(each, settings.planner).capabilities.turning_radius)
         raise TurningError(f"--turning-radius-m: {name} does not heed it; {' and '.join(able)} do")
     heading_rad = None if heading_deg is None else math.remainder(math.radians(90.0 - heading_deg), 2.0 * math.pi)
-    return VehicleMotion(heading_rad, radius_m / grid.resolution_m)
+    return VehicleMotion(heading_rad, grid.fields(radius_m))
 
 
 def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:

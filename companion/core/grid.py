@@ -94,6 +94,10 @@ class Grid:
         y = (point.north_m - self.south_west.north_m) / self.resolution_m - 0.5
         return x, y
 
+    def fields(self, length_m: float) -> float:
+        """A length in fields."""
+        return length_m / self.resolution_m
+
     def contains(self, cell: Cell) -> bool:
         """Whether the field is part of this grid."""
         return 0 <= cell.x < self.width and 0 <= cell.y < self.height

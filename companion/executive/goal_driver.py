@@ -219,8 +219,7 @@ class GoalDriver:
         pose, settings, rover = view.pose, view.settings, view.rover
         grid = with_turning_cost(view.evidence.grid, pose, settings.guidance, rover.turning_radius_m)
         weights, navigator = grid.weights, settings.navigator
-        resolution_m = view.evidence.base.resolution_m
-        movers, motion = self._movers(view), motion_of(pose, rover, self._fastest_m_s(view), settings, resolution_m)
+        movers, motion = self._movers(view), motion_of(pose, rover, self._fastest_m_s(view), settings, grid)
 
         def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
             return self.searcher.search(weights, kind, start, target, navigator, movers, motion)

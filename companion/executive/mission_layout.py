@@ -98,6 +98,6 @@ def _start(point: NedPoint, grid: Grid) -> ResolvedTarget:
 def _base(mission: Mission, resolved: ResolvedMission) -> Grid:
     """Known ground and fences in fields grow by the rover's radius, which the other fences have in them already."""
     ground = resolved.ground
-    weights = inflated(ground.weights, mission.rover.radius_m / ground.resolution_m)
+    weights = inflated(ground.weights, ground.fields(mission.rover.radius_m))
     weights[resolved.closed] = OBSTACLE
     return ground.with_weights(weights)

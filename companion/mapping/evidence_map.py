@@ -116,7 +116,7 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
         frame.cells(evidence.rover_radius_m),
     )
     evidence.agreement.note(scan, _hit_cells(evidence, pose, scan))
-    reach = math.ceil(scan.max_range_m / evidence.base.resolution_m) + 1 + _soft_reach(evidence)
+    reach = math.ceil(evidence.base.fields(scan.max_range_m)) + 1 + _soft_reach(evidence)
     cell = evidence.base.cell_at(pose.point)
     _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
 
@@ -201,7 +201,7 @@ def _hit_cells(evidence: EvidenceMap, pose: Pose, scan: RangeScan) -> NDArray[np
 
 
 def _soft_reach(evidence: EvidenceMap) -> int:
-    return math.ceil((evidence.settings.soft_reach_m + evidence.rover_radius_m) / evidence.base.resolution_m)
+    return math.ceil(evidence.base.fields(evidence.settings.soft_reach_m + evidence.rover_radius_m))
 
 
 def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
@@ -211,7 +211,7 @@ def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
     x0, y0, x1, y1 = max(x0, 0), max(y0, 0), min(x1, base.width), min(y1, base.height)
     if x0 >= x1 or y0 >= y1:
         return  # the rover is off the map, and sees nothing of it
-    weights, reach = evidence.grid.weights, settings.soft_reach_m / base.resolution_m
+    weights, reach = evidence.grid.weights, base.fields(settings.soft_reach_m)
     radius = evidence.rover_radius_m / evidence.evidence_m
     window = (x0, y0, x1, y1)
     weigh(evidence.log_odds, base.weights, evidence.penalty, weights, window, settings.occupied_at, radius)

@@ -8,7 +8,8 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator, Field, ValidationError, model_validator
 
 from companion.mission.tables import Positive, Table
-from companion.storage.toml_file import describe_first, read_table
+from companion.storage.toml_file import read_table
+from companion.storage.validation import describe_first
 
 NAMED = ("lidar-90", "lidar-360", "beams", "none")
 """Named suites."""

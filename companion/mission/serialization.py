@@ -7,6 +7,7 @@ import functools
 from pydantic import TypeAdapter, ValidationError
 
 from companion.mission.mission import Mission, MissionError
+from companion.storage.validation import first_fault
 
 
 def to_json(mission: Mission) -> str:
@@ -19,9 +20,8 @@ def from_json(text: str | bytes, source: str) -> Mission:
     try:
         return _adapter().validate_json(text)
     except ValidationError as error:
-        fault = error.errors(include_url=False)[0]
-        place = ".".join(str(key) for key in fault["loc"]) or "file"
-        raise MissionError(f"{source}: {place}: {' '.join(fault['msg'].split())}") from error
+        place, reason = first_fault(error)
+        raise MissionError(f"{source}: {place}: {reason}") from error
 
 
 @functools.cache

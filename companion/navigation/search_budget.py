@@ -13,7 +13,7 @@ from numpy.random import Generator
 
 from companion.core.clock import stopwatch_s
 from companion.core.frames import Pose, wrap_pi_rad
-from companion.core.grid import OBSTACLE, Cell, Weights
+from companion.core.grid import OBSTACLE, Cell, Grid, Weights
 from companion.core.rover_limits import RoverLimits
 from companion.navigation.field_step import SearchKind
 from companion.planning.planner import Planner
@@ -29,16 +29,14 @@ def budget_of(settings: SearchSettings) -> Budget:
     return Budget(settings.min_epochs, settings.max_epochs, settings.control_points, settings.population)
 
 
-def motion_of(
-    pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, resolution_m: float
-) -> VehicleMotion:
+def motion_of(pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, grid: Grid) -> VehicleMotion:
     """The rover's motion for a planner: its heading, its turning radius and the range of speeds, in fields."""
     fastest_m_s = min(fastest_m_s, settings.guidance.max_speed_m_s)
     slowest_m_s = min(settings.guidance.min_speed_m_s, fastest_m_s)
     return VehicleMotion(
         heading_rad=wrap_pi_rad(0.5 * math.pi - pose.heading_rad),
-        turning_radius_fields=rover.turning_radius_m * settings.steering.planned_radius / resolution_m,
-        speeds_fields_s=(slowest_m_s / resolution_m, fastest_m_s / resolution_m),
+        turning_radius_fields=grid.fields(rover.turning_radius_m * settings.steering.planned_radius),
+        speeds_fields_s=(grid.fields(slowest_m_s), grid.fields(fastest_m_s)),
     )
 
 

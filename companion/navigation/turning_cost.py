@@ -23,7 +23,7 @@ def with_turning_cost(grid: Grid, pose: Pose, settings: GuidanceSettings, turnin
     """A copy of the grid where free fields behind the rover, up to ``turn_reach_m``, cost up to ``turn_cost`` more."""
     weights = grid.weights.copy()
     cell = grid.cell_at(pose.point)
-    reach = round(max(settings.turn_reach_m, REACH_RADII * turning_radius_m) / grid.resolution_m)
+    reach = round(grid.fields(max(settings.turn_reach_m, REACH_RADII * turning_radius_m)))
     rows = slice(max(0, cell.y - reach), max(0, cell.y + reach + 1))
     columns = slice(max(0, cell.x - reach), max(0, cell.x + reach + 1))
     window = weights[rows, columns]

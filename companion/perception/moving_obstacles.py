@@ -93,7 +93,7 @@ def planners_movers(
     """The same for a planner: time from now, places in fields of the grid, the rover's radius added."""
     return tuple(
         ObstacleTrajectory(
-            (one.radius_m + rover_radius_m) / grid.resolution_m,
+            grid.fields(one.radius_m + rover_radius_m),
             np.array([(ahead_s, *grid.in_fields(one.at(now_s + ahead_s))) for ahead_s in (0.0, settings.horizon_s)]),
         )
         for one in moving

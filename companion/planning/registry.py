@@ -24,7 +24,7 @@ from companion.planning.planner import Planner, PlannerFactory
 from companion.planning.problem import Budget, PlanningProblem
 from companion.planning.raster import cells_cost
 from companion.settings import PlannerSettings
-from companion.storage.toml_file import alike
+from companion.storage.validation import alike
 
 PLANNERS: dict[str, PlannerFactory] = {
     "bspline-ga": BsplineGa,

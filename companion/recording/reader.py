@@ -39,6 +39,7 @@ from companion.recording.record_format import (
 from companion.settings import Settings, SettingsError, parse_settings
 from companion.settings.versions import versions
 from companion.storage.files import open_file, read_at_most
+from companion.storage.validation import first_fault
 
 MAX_META_BYTES = 10_000_000
 MAX_BYTES = 200_000_000
@@ -129,9 +130,8 @@ def _meta(directory: Path) -> RecordMeta:
     try:
         return RecordMeta.model_validate(values)
     except ValidationError as error:
-        fault = error.errors(include_url=False)[0]
-        place = ".".join(str(part) for part in fault["loc"])
-        raise RecordError(f"{file}: damaged: {place}: {fault['msg'].lower()}; nothing can be replayed") from error
+        place, reason = first_fault(error)
+        raise RecordError(f"{file}: damaged: {place}: {reason.lower()}; nothing can be replayed") from error
 
 
 def _mission_and_settings(directory: Path, meta: RecordMeta) -> tuple[Mission, Settings]:

@@ -8,7 +8,8 @@ from pydantic import ValidationError
 
 from companion.settings.section import SettingsError
 from companion.settings.settings import Settings
-from companion.storage.toml_file import describe_first, read_toml
+from companion.storage.toml_file import read_toml
+from companion.storage.validation import describe_first
 
 MAX_BYTES = 1_000_000
 

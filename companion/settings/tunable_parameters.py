@@ -13,7 +13,8 @@ from pydantic import ValidationError
 
 from companion.settings.section import SettingsError
 from companion.settings.settings import Settings
-from companion.storage.toml_file import describe_first, read_toml
+from companion.storage.toml_file import read_toml
+from companion.storage.validation import describe_first, first_fault
 
 LONGEST_NAME = 16
 """Maximum length of a MAVLink parameter's name."""
@@ -98,7 +99,7 @@ def changed(settings: Settings, parameter: Parameter, value: float) -> Settings:
     try:
         return settings.model_copy(update={parameter.section: type(section).model_validate(values)})
     except ValidationError as error:
-        raise RefusedError(str(error.errors(include_url=False)[0]["msg"]).lower()) from error
+        raise RefusedError(first_fault(error)[1].lower()) from error
 
 
 def _refuse_crossed(settings: Settings, parameter: Parameter, value: float) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from companion.cli.version import version_option
+from companion.cli.inputs import version_option
 from sitl.cli.drive import drive
 from sitl.cli.experiment import experiment
 from sitl.cli.physics import physics

@@ -21,14 +21,12 @@ from companion.settings import SettingsError
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_turning_on_the_spot
 from sitl.cli.drive_outputs import outputs, print_summary
-from sitl.cli.drive_progress import Unattended, run_with_progress
+from sitl.cli.drive_progress import Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
-from sitl.cli.equipment import equipped, simulated
-from sitl.cli.pace import Pace
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.faults.fault_file import FaultFileError
 from sitl.lockstep import Drive
-from sitl.scenario import ScenarioError
+from sitl.scenario import ScenarioError, equipped, simulated
 
 EXIT_BAD_INPUT = 2
 BAD_INPUT = (

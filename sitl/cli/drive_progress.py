@@ -1,4 +1,4 @@
-"""Progress of ``drive`` without a view: the state of the run, and every text of the companion."""
+"""Pace and progress of ``drive`` without a view: the state of the run, and every text of the companion."""
 
 from __future__ import annotations
 
@@ -8,12 +8,28 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.app import Status
-from sitl.cli.pace import Pace
+from companion.core.clock import Clock
 from sitl.lockstep import Drive, Report
 
 LINE_EVERY_S = 60.0
 NOBODY_S = 60.0
 """Nobody is there to do what a companion waits for: after so long the run is ended."""
+
+
+class Pace:
+    """Limits simulated time to ``speedup`` times real time (None: as fast as possible), counted from the first call."""
+
+    def __init__(self, speedup: float | None, clock: Clock) -> None:
+        self._speedup = speedup
+        self._clock = clock
+        self._began: tuple[float, float] | None = None
+
+    def wait(self, time_s: float) -> None:
+        """Wait until the simulated ``time_s`` may be passed; return at once if it is late already."""
+        if self._speedup is None:
+            return
+        began_s, first_s = self._began = self._began or (self._clock.now_s(), time_s)
+        self._clock.sleep_until_s(began_s + (time_s - first_s) / self._speedup)
 
 
 class Unattended:

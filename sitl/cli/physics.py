@@ -14,7 +14,6 @@ from companion.core.clock import WallClock
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
-from sitl.cli.equipment import equipped
 from sitl.cli.serve import BAD_INPUT, say, stop_signals
 from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
 from sitl.firmware.parameter_files import ParameterFileError
@@ -24,7 +23,7 @@ from sitl.firmware.physics_server import open_port, run
 from sitl.network import ListenError
 from sitl.network.client_log import LoggedLink
 from sitl.network.mavlink_client import FORMS, ClientLink, open_link
-from sitl.scenario import Scenario, ScenarioError, scenario_from_mission
+from sitl.scenario import Scenario, ScenarioError, equipped, scenario_from_mission
 
 
 def physics(

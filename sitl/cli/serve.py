@@ -16,13 +16,12 @@ from companion.core.clock import WallClock
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
-from sitl.cli.equipment import equipped, simulated
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.faults.fault_file import FaultFileError
 from sitl.network import FORMS, Endpoint, ListenError, open_endpoint
 from sitl.network.event_log import EventLog
 from sitl.network.server import serve as run_server
-from sitl.scenario import Scenario, ScenarioError
+from sitl.scenario import Scenario, ScenarioError, equipped, simulated
 from sitl.view.watching import Watching
 
 DEFAULT_LISTEN = ["udpout:127.0.0.1:14550", "tcp:127.0.0.1:5760"]

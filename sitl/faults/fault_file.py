@@ -7,7 +7,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from companion.storage.toml_file import alike, describe_first, read_table
+from companion.storage.toml_file import read_table
+from companion.storage.validation import alike, describe_first
 from sitl.faults.plan import Fault, FaultPlan
 from sitl.faults.tables import KINDS, PlanTable
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from companion.core.frames import Pose
-from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell
+from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.navigation.field_step import SearchKind
 from companion.navigation.search_budget import PathSearcher, budget_of, motion_of
@@ -87,13 +87,13 @@ def test_a_map_with_a_free_start_is_not_copied():
 )
 def test_the_heading_turns_from_clockwise_from_north_to_anticlockwise_from_east(heading_deg, angle_deg):
     pose = Pose(0.0, 0.0, math.radians(heading_deg), 0.0)
-    motion = motion_of(pose, RoverLimits(0.35, 2.0, 8.0), 1.0, SETTINGS, 0.5)
+    motion = motion_of(pose, RoverLimits(0.35, 2.0, 8.0), 1.0, SETTINGS, empty_grid(9, 9, 0.5))
     assert math.degrees(motion.heading_rad) == pytest.approx(angle_deg)
 
 
 def test_radius_and_speeds_are_in_fields():
     pose, rover = Pose(0.0, 0.0, 0.0, 0.0), RoverLimits(0.35, 2.0, 8.0, turning_radius_m=1.5)
-    motion = motion_of(pose, rover, 1.0, SETTINGS, 0.5)
+    motion = motion_of(pose, rover, 1.0, SETTINGS, empty_grid(9, 9, 0.5))
     assert motion.turning_radius_fields == pytest.approx(3.0 * SETTINGS.steering.planned_radius)
     assert motion.speeds_fields_s == pytest.approx((2.0 * SETTINGS.guidance.min_speed_m_s, 2.0))
 
@@ -101,6 +101,6 @@ def test_radius_and_speeds_are_in_fields():
 def test_no_speed_is_planned_above_the_limit_or_above_the_rovers_own():
     pose, rover = Pose(0.0, 0.0, 0.0, 0.0), RoverLimits(0.35, 2.0, 8.0)
     fastest_m_s = SETTINGS.guidance.max_speed_m_s
-    assert motion_of(pose, rover, 99.0, SETTINGS, 1.0).speeds_fields_s[1] == pytest.approx(fastest_m_s)
-    slow = motion_of(pose, rover, 0.05, SETTINGS, 1.0)
+    assert motion_of(pose, rover, 99.0, SETTINGS, empty_grid(9, 9)).speeds_fields_s[1] == pytest.approx(fastest_m_s)
+    slow = motion_of(pose, rover, 0.05, SETTINGS, empty_grid(9, 9))
     assert slow.speeds_fields_s == pytest.approx((0.05, 0.05))

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from pydantic import BaseModel, ConfigDict
 
-from companion.storage.toml_file import alike, read_table, read_toml
+from companion.storage.toml_file import read_table, read_toml
+from companion.storage.validation import alike
 
 
 class Wheel(BaseModel):

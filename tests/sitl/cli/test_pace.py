@@ -2,7 +2,7 @@
 
 import pytest
 
-from sitl.cli.pace import Pace
+from sitl.cli.drive_progress import Pace
 
 
 class StillClock:

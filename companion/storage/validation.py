@@ -1,0 +1,60 @@
+"""What pydantic finds wrong with data, in one line."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import get_args
+
+from pydantic import BaseModel, ValidationError
+
+
+def first_fault(error: ValidationError) -> tuple[str, str]:
+    """Place and reason of the first fault of a validation."""
+    fault = error.errors(include_url=False)[0]
+    return ".".join(str(key) for key in fault["loc"]) or "file", " ".join(fault["msg"].split())
+
+
+def describe_first(error: ValidationError, model: type[BaseModel]) -> str:
+    """The first fault of a validation in one line: place and reason.
+
+    For an unknown key, also the nearest known key, or all.
+    """
+    # Quoted keys may hold any character.
+    return "".join(sign if sign.isprintable() else ascii(sign)[1:-1] for sign in _described(error, model))
+
+
+def alike(name: str, known: Iterable[str]) -> str:
+    """The known name with nearly the same spelling as ``name``; empty if there is none.
+
+    The first letter is rarely wrong: if it differs, the rest must match better.
+    """
+    for near in difflib.get_close_matches(name, known):
+        if near[0] == name[0] or difflib.SequenceMatcher(None, near, name).ratio() >= 0.75:
+            return near
+    return ""
+
+
+def _described(error: ValidationError, model: type[BaseModel]) -> str:
+    place, reason = first_fault(error)
+    fault = error.errors(include_url=False)[0]
+    if fault["type"] == "missing":
+        return f"{place}: field required, it is missing"
+    if fault["type"] == "value_error":
+        return f"{place}: {fault['msg'].removeprefix('Value error, ')}"
+    if fault["type"] != "extra_forbidden":
+        return f"{place}: {reason.lower()} (got {fault.get('input')!r:.60})"
+    known = _known_keys(model, fault["loc"][:-1])
+    near = alike(str(fault["loc"][-1]), known)
+    hint = f", did you mean '{near}'?" if near else f"; known here: {', '.join(known)}"
+    return f"{place}: unknown key{hint}"
+
+
+def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:
+    """The keys of the model at a place; looks through lists and optional values."""
+    for key in place:
+        field = model.model_fields.get(str(key))
+        if field is not None:
+            inside = (field.annotation, *get_args(field.annotation))
+            model = next((kind for kind in inside if isinstance(kind, type) and issubclass(kind, BaseModel)), model)
+    return list(model.model_fields)
