@@ -1,4 +1,4 @@
-"""Writes the state file: immediately (in lock-step), or in a thread, so that no tick waits for a disk.
+"""Writes the state file in a thread, so that no tick waits for a disk.
 
 Nouns: state file.
 """
@@ -43,43 +43,19 @@ class StateFile:
             self.problem = f"{self.path}: the state cannot be saved: {str(error).splitlines()[0]}"
 
 
-class InlineStateWriter:
-    """Writes immediately: equal runs leave equal files at every moment."""
-
-    def __init__(self, file: StateFile) -> None:
-        self._file = file
-
-    @property
-    def busy(self) -> bool:
-        """Never."""
-        return False
-
-    @property
-    def problem(self) -> str:
-        """See StateWriter."""
-        return self._file.problem
-
-    def put(self, update: StateUpdate) -> None:
-        """See StateWriter."""
-        self._file.apply(update)
-
-    def close(self) -> None:
-        """Nothing is left to write."""
-
-
 class ThreadStateWriter:
     """Writes in a thread."""
 
     def __init__(self, file: StateFile, patience: ShutdownBudget | None = None) -> None:
         self._file = file
         self._newest: Snapshot | None = None
-        self._beside = BackgroundWorker("state", patience)
+        self._worker = BackgroundWorker("state", patience)
         self._is_late = False
 
     @property
     def busy(self) -> bool:
         """See StateWriter."""
-        return self._beside.busy
+        return self._worker.busy
 
     @property
     def problem(self) -> str:
@@ -89,16 +65,16 @@ class ThreadStateWriter:
 
     def put(self, update: StateUpdate) -> None:
         """See StateWriter."""
-        self._beside.put(partial(self._apply, update))
+        self._worker.put(partial(self._apply, update))
 
     def close(self) -> None:
         """See StateWriter. Gives up after some time."""
-        self._is_late = not self._beside.close()
+        self._is_late = not self._worker.close()
 
     def _apply(self, update: StateUpdate) -> None:
         """When snapshots wait behind a slow disk, only the newest is written."""
         self._file.apply(StateUpdate(update.rows, None, update.new_map))
         self._newest = update.snapshot or self._newest
-        if self._newest is not None and not self._beside.behind:
+        if self._newest is not None and not self._worker.behind:
             self._file.apply(StateUpdate(snapshot=self._newest))
             self._newest = None

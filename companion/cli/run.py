@@ -110,7 +110,7 @@ def run(
             given = {"settings": settings_file, STATE: keeping.file if keeping.previous else None}
             recorder = (
                 Recorder(
-                    record, mission, settings, seed, arm=arm, files=given, beside=BackgroundWorker("record", budget)
+                    record, mission, settings, seed, arm=arm, files=given, worker=BackgroundWorker("record", budget)
                 )
                 if record
                 else NullRecorder()

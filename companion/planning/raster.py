@@ -7,14 +7,13 @@ Lines are drawn with the DDA (digital differential analyser): one field per unit
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
 from enum import StrEnum
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.core.grid import OBSTACLE, Cell, Weights, as_array
+from companion.core.grid import OBSTACLE, Weights
 from companion.planning.problem import MIN_WEIGHT
 
 CellArray = NDArray[np.int64]
@@ -163,11 +162,6 @@ def first_fault(weights: Weights, cells: CellArray, corner_cutting: bool) -> tup
         if cuts and x != from_x and y != from_y and not corner_cutting:
             return 4, i
     return 0, -1
-
-
-def is_path(weights: Weights, cells: Iterable[Cell], corner_cutting: bool = False) -> bool:
-    """Whether the fields are inside the map, free, each adjacent to the one before, and cut no corner."""
-    return bool(first_fault(plain(weights), as_array(cells), corner_cutting)[0] == 0)
 
 
 def plain(weights: Weights) -> Weights:

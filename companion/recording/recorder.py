@@ -98,7 +98,7 @@ class Recorder:
     """Writes the directory that docs/record.md describes.
 
     A directory that already has a record keeps it: the new one goes to the same name with a number, see ``directory``.
-    Data is written once a second; with ``beside`` by a thread, which ``close`` ends, so that no round waits for the
+    Data is written once a second; with ``worker`` by a thread, which ``close`` ends, so that no round waits for the
     disk. A full disk ends the record, never the run: see ``problem``.
     """
 
@@ -112,7 +112,7 @@ class Recorder:
         arm: bool = False,
         files: Mapping[str, Path | None] | None = None,
         start_us: int | None = None,
-        beside: BackgroundWorker | None = None,
+        worker: BackgroundWorker | None = None,
     ) -> None:
         """``files``: further input files by kind; they are copied. None: there is no file of that kind.
 
@@ -127,7 +127,7 @@ class Recorder:
         self._sums: dict[str, tuple[int, int]] = {}
         self._given_bytes = self._written_bytes = 0
         self._closed = False
-        self._beside = beside
+        self._worker = worker
         self._clock_at_start_s: float | None = None
         self._flushed_s = 0.0
         self._round: Round | None = None
@@ -199,7 +199,7 @@ class Recorder:
         self._hand_over()
         self._closed = True
         self._do(self._finish)
-        if self._beside is not None and not self._beside.close():
+        if self._worker is not None and not self._worker.close():
             self.problem = self.problem or self._ended(NO_ANSWER)
 
     def _packet(self, time_s: float, raw: bytes) -> None:
@@ -234,7 +234,7 @@ class Recorder:
             self._do(partial(self._write_batch, batch))
 
     def _do(self, job: Job) -> None:
-        job() if self._beside is None else self._beside.put(job)
+        job() if self._worker is None else self._worker.put(job)
 
     def _write_batch(self, batch: Mapping[str, bytes]) -> None:
         """Write, unless there has been a problem. Must not raise."""

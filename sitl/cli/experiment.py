@@ -54,7 +54,7 @@ def experiment(
     ] = 100,
     seed: Annotated[int, typer.Option(min=0, help="Of the first run; the next ones are consecutive.")] = 0,
     jobs: Annotated[
-        int, typer.Option(min=1, help="Parallel runs. Results stay the same, but measured times get longer.")
+        int, typer.Option(min=1, help="Processes (needs joblib). Results stay the same, but measured times get longer.")
     ] = 1,
     maps: Annotated[
         Path | None, typer.Option(help="Folder with the maps; default: missions/maps. sedighi-table1: more grids.")

@@ -11,14 +11,13 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
-from joblib import Parallel, delayed
 from rich.table import Table
 
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, SitlSpec
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.experiments.experiment import Advance, ExperimentReport, Options, shipped_missions
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, each, shipped_missions
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
@@ -195,11 +194,8 @@ def run(options: Options, advance: Advance) -> DeadReport:
     """
     missions = [with_suite(mission, suite) for mission in shipped(options) for suite in SUITES]
     deaths: list[Death] = []
-    calls = (
-        delayed(deaths_of)(mission, options.seed + number, options.runs) for number, mission in enumerate(missions)
-    )
-    made: Iterable[list[Death]] = Parallel(n_jobs=options.jobs, return_as="generator")(calls)
-    for done, some in enumerate(made, start=1):
+    tasks = ((mission, options.seed + number, options.runs) for number, mission in enumerate(missions))
+    for done, some in enumerate(each(options.jobs, deaths_of, tasks), start=1):
         deaths += some
         advance(done, len(missions))
     return DeadReport(options, tuple(deaths))

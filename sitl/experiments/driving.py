@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
-from joblib import Parallel, delayed
 from matplotlib.figure import Figure
 from rich.table import Table
 
@@ -24,6 +22,7 @@ from sitl.experiments.experiment import (
     ExperimentError,
     ExperimentReport,
     Options,
+    each,
     planners_of,
     shipped_missions,
     where_measured,
@@ -241,8 +240,7 @@ def run(options: Options, advance: Advance) -> DrivingReport:
     keys = [(name, planner) for name in missions for planner in planners]
     tasks = [(name, planner, options.seed + i) for name, planner in keys for i in range(options.runs)]
     collected: dict[tuple[str, str], list[Report]] = {key: [] for key in keys}
-    calls = (delayed(drive)(missions[name], planner, seed) for name, planner, seed in tasks)
-    made: Iterable[Report] = Parallel(n_jobs=options.jobs, return_as="generator")(calls)
+    made = each(options.jobs, drive, ((missions[name], planner, seed) for name, planner, seed in tasks))
     for done, ((name, planner, _), report) in enumerate(zip(tasks, made, strict=True), start=1):
         collected[name, planner].append(report)
         advance(done, len(tasks))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import platform
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
+from itertools import starmap
 from os import cpu_count
 from pathlib import Path
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import ClassVar, Protocol, TypeVar, runtime_checkable
 
 from matplotlib.figure import Figure
 from rich.table import Table
@@ -94,6 +95,26 @@ Advance = Callable[[int, int], None]
 """Called with the runs done and the runs there are."""
 
 Experiment = Callable[[Options, Advance], ExperimentReport]
+
+
+Result = TypeVar("Result")
+
+
+def each(jobs: int, work: Callable[..., Result], tasks: Iterable[tuple[object, ...]]) -> Iterator[Result]:
+    """The results of ``work`` for each tuple of arguments, in their order, made by ``jobs`` processes.
+
+    Raises ExperimentError if several processes are wanted, and what they need is not installed.
+    """
+    if jobs == 1:
+        return starmap(work, tasks)
+    try:
+        from joblib import Parallel, delayed
+    except ImportError as error:
+        raise ExperimentError(
+            f"--jobs {jobs}: joblib is not installed; install rover-companion[experiments], or leave the option out"
+        ) from error
+    made: Iterator[Result] = Parallel(n_jobs=jobs, return_as="generator")(delayed(work)(*task) for task in tasks)
+    return made
 
 
 def planners_of(options: Options, usual: Iterable[str]) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ obstacles hide what lies behind them; before a move the robot turns, so it sees 
 
 from __future__ import annotations
 
+import gc
 from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import cache
@@ -18,6 +19,7 @@ from companion.core.clock import stopwatch_s
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Grid, Weights
 from companion.navigation.field_step import Action, Decision, Part, SearchKind, initial_state, step
 from companion.navigation.search_budget import PathSearcher
+from companion.planning import registry
 from companion.planning.problem import PlanResult
 from companion.planning.registry import make_planner
 from companion.settings import Settings
@@ -184,3 +186,21 @@ def drive_fields(
 ) -> FieldRun:
     """One run over unknown ground; a function of its arguments (but for the times measured)."""
     return FieldRobot(truth, start, target, settings, seed).drive(step_limit)
+
+
+def measured_runs(truth: Grid, start: Cell, target: Cell, settings: Settings, seeds: range) -> list[FieldRun]:
+    """One run for each seed. Neither loading compiled code nor a full collection counts as planning of some run."""
+    _warm_up_once()
+    collecting = gc.isenabled()
+    gc.disable()
+    try:
+        return [drive_fields(truth, start, target, settings, seed) for seed in seeds]
+    finally:
+        if collecting:
+            gc.enable()
+
+
+@cache
+def _warm_up_once() -> None:
+    """Once in each process."""
+    registry.warm_up()

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import gc
-from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, ClassVar, Literal, get_args
 
 import numpy as np
-from joblib import Parallel, delayed
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -21,8 +17,17 @@ from companion.core.grid import Grid
 from companion.planning import registry
 from companion.settings import Settings, parse_settings
 from sitl.experiments import drawing
-from sitl.experiments.experiment import START, TARGET, Advance, ExperimentReport, Options, load_maps, where_measured
-from sitl.experiments.field_level import LAYERS, STEP_LIMIT, FieldRobot, FieldRun, Outcome, drive_fields
+from sitl.experiments.experiment import (
+    START,
+    TARGET,
+    Advance,
+    ExperimentReport,
+    Options,
+    each,
+    load_maps,
+    where_measured,
+)
+from sitl.experiments.field_level import LAYERS, STEP_LIMIT, FieldRobot, FieldRun, Outcome, measured_runs
 from sitl.experiments.results_page import markdown_table, terminal_table
 
 NAME = "kwasniewski-maps"
@@ -155,7 +160,9 @@ def run(options: Options, advance: Advance) -> MapsReport:
     tasks = [(key, seeds[at : at + RUNS_A_TASK]) for key in keys for at in range(0, options.runs, RUNS_A_TASK)]
     collected: dict[tuple[Profile, str], list[FieldRun]] = {key: [] for key in keys}
     done = 0
-    for (key, _), runs in zip(tasks, _made(tasks, maps, options.jobs), strict=True):
+    calls = ((maps[name], START, TARGET, profile_settings(profile), seeds) for (profile, name), seeds in tasks)
+    made = each(options.jobs, measured_runs, calls)
+    for (key, _), runs in zip(tasks, made, strict=True):
         collected[key] += runs
         done += len(runs)
         advance(done, len(keys) * options.runs)
@@ -165,33 +172,6 @@ def run(options: Options, advance: Advance) -> MapsReport:
 def profile_settings(profile: Profile) -> Settings:
     """The settings of a profile."""
     return parse_settings({"profile": profile}, "profile")
-
-
-def _made(tasks: list[tuple[tuple[Profile, str], range]], maps: dict[str, Grid], jobs: int) -> Iterable[list[FieldRun]]:
-    """The runs of each task, in the order of the tasks."""
-    calls = (delayed(_run_some)(maps[name], profile, seeds) for (profile, name), seeds in tasks)
-    made: Iterable[list[FieldRun]] = Parallel(n_jobs=jobs, return_as="generator")(calls)
-    return made
-
-
-def _run_some(truth: Grid, profile: Profile, seeds: range) -> list[FieldRun]:
-    _warm_up_once()
-    settings = profile_settings(profile)
-    # As ``timeit`` does: a full collection takes longer than all planning of a run, and would fall into some run by
-    # chance.
-    collecting = gc.isenabled()
-    gc.disable()
-    try:
-        return [drive_fields(truth, START, TARGET, settings, seed) for seed in seeds]
-    finally:
-        if collecting:
-            gc.enable()
-
-
-@cache
-def _warm_up_once() -> None:
-    """Once in each worker: loading compiled code must not count as planning."""
-    registry.warm_up()
 
 
 def _row(series: Series) -> list[str]:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
 from typing import ClassVar
 
 import numpy as np
-from joblib import Parallel, delayed
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.table import Table
@@ -29,11 +26,12 @@ from sitl.experiments.experiment import (
     ExperimentError,
     ExperimentReport,
     Options,
+    each,
     load_maps,
     planners_of,
     where_measured,
 )
-from sitl.experiments.field_level import STEP_LIMIT, FieldRun, Outcome, drive_fields
+from sitl.experiments.field_level import STEP_LIMIT, FieldRun, Outcome, measured_runs
 from sitl.experiments.results_page import markdown_table, terminal_table
 
 NAME = "navigation"
@@ -212,7 +210,11 @@ def run(options: Options, advance: Advance) -> NavigationReport:
         seeds = range(options.seed, options.seed + (options.runs if random else 1))
         tasks += [(planner, ground, seeds[at : at + RUNS_A_TASK]) for at in range(0, len(seeds), RUNS_A_TASK)]
     collected: dict[tuple[str, str], list[tuple[FieldRun, int]]] = {(p, g.name): [] for p, g in keys}
-    for done, ((planner, ground, _), runs) in enumerate(zip(tasks, _made(tasks, options.jobs), strict=True), start=1):
+    calls = (
+        (ground.truth, ground.start, ground.target, settings_with(planner), seeds) for planner, ground, seeds in tasks
+    )
+    made = each(options.jobs, measured_runs, calls)
+    for done, ((planner, ground, _), runs) in enumerate(zip(tasks, made, strict=True), start=1):
         collected[planner, ground.name] += [(one, ground.best_steps) for one in runs]
         advance(done, len(tasks))
     return NavigationReport(options, grounds, tuple(_series(*key, runs) for key, runs in collected.items()))
@@ -246,30 +248,6 @@ def _grounds(case: Case) -> Iterable[Ground]:
             yield Ground(case.name, Grid(case.weights, 1.0), start, target, len(best.cell_array) - 1)
 
 
-def _made(tasks: list[tuple[str, Ground, range]], jobs: int) -> Iterable[list[FieldRun]]:
-    calls = (delayed(_run_some)(ground, planner, seeds) for planner, ground, seeds in tasks)
-    made: Iterable[list[FieldRun]] = Parallel(n_jobs=jobs, return_as="generator")(calls)
-    return made
-
-
-def _run_some(ground: Ground, planner: str, seeds: range) -> list[FieldRun]:
-    _warm_up_once()
-    settings = settings_with(planner)
-    collecting = gc.isenabled()
-    gc.disable()  # a full collection would fall into some run by chance
-    try:
-        return [drive_fields(ground.truth, ground.start, ground.target, settings, seed) for seed in seeds]
-    finally:
-        if collecting:
-            gc.enable()
-
-
 def settings_with(planner: str) -> Settings:
     """The defaults with another planner in the navigator."""
     return parse_settings({"navigator": {"planner": planner}}, "experiment")
-
-
-@cache
-def _warm_up_once() -> None:
-    """Once in each worker: loading compiled code must not count as planning."""
-    registry.warm_up()

@@ -17,7 +17,6 @@ from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
-from joblib import Parallel, delayed
 from rich.table import Table
 
 from companion.executive.mission_progress import TargetStatus
@@ -27,7 +26,7 @@ from companion.settings import Settings
 from sitl.autopilot.modes import arm, arming_faults, set_mode
 from sitl.autopilot.state import Mode
 from sitl.experiments import soak_faults, soak_worlds
-from sitl.experiments.experiment import Advance, ExperimentReport, Options, where_measured
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, each, where_measured
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import SOMEWHERE, Scenario
@@ -280,8 +279,7 @@ def _row(name: str, runs: Iterable[Soaked]) -> list[str]:
 def run(options: Options, advance: Advance) -> SoakReport:
     """One mission a seed."""
     done: list[Soaked] = []
-    with Parallel(n_jobs=options.jobs, return_as="generator") as pool:
-        for result in pool(delayed(soaked)(options.seed + number) for number in range(options.runs)):
-            done.append(result)
-            advance(len(done), options.runs)
+    for result in each(options.jobs, soaked, ((options.seed + number,) for number in range(options.runs))):
+        done.append(result)
+        advance(len(done), options.runs)
     return SoakReport(options, tuple(done))

@@ -7,7 +7,6 @@ from itertools import product
 from typing import Any, ClassVar
 
 import numpy as np
-from joblib import Parallel, delayed
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from rich.table import Table
@@ -16,7 +15,7 @@ from companion.core.grid import Grid
 from companion.planning.registry import warm_up
 from companion.settings.planners import VertexSettings
 from sitl.experiments import drawing
-from sitl.experiments.experiment import Advance, ExperimentReport, Options, where_measured
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, each, where_measured
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.experiments.wang_environments import ENVIRONMENTS, Environment, place_at
 from sitl.experiments.wang_trip import SPEEDS_M_S, Trip, length_m, make_trip, time_s
@@ -199,9 +198,7 @@ def run(options: Options, advance: Advance) -> WangReport:
     for criterion, number in product((TIME, LENGTH), ENVIRONMENTS):
         make_trip(ENVIRONMENTS[number], SETTINGS[criterion], options.seed)  # so that no time has the loading in it
         seeds = range(options.seed, options.seed + options.runs)
-        trips = Parallel(n_jobs=options.jobs)(
-            delayed(make_trip)(ENVIRONMENTS[number], SETTINGS[criterion], seed) for seed in seeds
-        )
+        trips = each(options.jobs, make_trip, ((ENVIRONMENTS[number], SETTINGS[criterion], seed) for seed in seeds))
         entries.append(Entry(criterion, number, tuple(trips)))
         advance(len(entries), 2 * len(ENVIRONMENTS))
     return WangReport(options, tuple(entries))

@@ -219,10 +219,6 @@ class World:
         """When a door next opens or closes, after a moment; infinity if none ever does."""
         return next_change_s(self.doors, time_s)
 
-    def ray_m(self, north_m: float, east_m: float, bearing_rad: float, max_m: float, time_s: float = 0.0) -> float:
-        """Metres along a bearing to the first obstacle that stands still and reflects the ray, or ``max_m``."""
-        return float(ray_length(self.layers(time_s).echoing, north_m, east_m, bearing_rad, max_m))
-
     def rays_m(self, north_m: float, east_m: float, bearings_rad: Floats, max_m: float, time_s: float = 0.0) -> Floats:
         """The shortest ray of each row of bearings (sectors x rays) at a moment, ``max_m`` where nothing was hit."""
         layers = self.layers(time_s)

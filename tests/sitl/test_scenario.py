@@ -9,6 +9,7 @@ from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.mission import GridSpec, Mission, RoverSpec, SitlSpec, Target
 from sitl.scenario import SOMEWHERE, ScenarioError, scenario_from_mission
+from tests.support.rays import ray_m
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def test_fields_of_world_and_mission_are_the_same(world_file: Path) -> None:
     assert (scenario.start.north_m, scenario.start.east_m) == (4.5, 7.5)
     assert np.degrees(scenario.start.heading_rad) == pytest.approx(45.0)
     assert scenario.world.obstacles[2].tolist() == [True] * 5 + [False] * 15
-    assert scenario.world.ray_m(4.5, 2.5, np.pi, 9.0) == pytest.approx(1.5)
+    assert ray_m(scenario.world, 4.5, 2.5, np.pi, 9.0) == pytest.approx(1.5)
     simulator = scenario.simulator(3)
     assert (simulator.truth.north_m, simulator.truth.east_m) == (4.5, 7.5)
 

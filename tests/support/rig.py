@@ -17,9 +17,9 @@ from PIL import Image
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.app import Companion
-from companion.checkpoint.checkpointer import Checkpointer
+from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
 from companion.checkpoint.state_directory import StateDirectory
-from companion.checkpoint.state_writer import InlineStateWriter, StateFile
+from companion.checkpoint.state_writer import StateFile
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -379,6 +379,25 @@ class QuickDisk(OsDisk):
         pass
 
     def sync_directory(self, path: Path) -> None:
+        pass
+
+
+class InlineStateWriter:
+    """Writes immediately: equal runs leave equal files at every moment."""
+
+    busy = False
+
+    def __init__(self, file: StateFile) -> None:
+        self._file = file
+
+    @property
+    def problem(self) -> str:
+        return self._file.problem
+
+    def put(self, update: StateUpdate) -> None:
+        self._file.apply(update)
+
+    def close(self) -> None:
         pass
 
 

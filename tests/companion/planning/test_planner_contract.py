@@ -8,9 +8,10 @@ from scipy.ndimage import label
 
 from companion.core.grid import Cell
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus, path_cost
-from companion.planning.raster import FAULTS, PathFault, first_fault, is_path, plain
+from companion.planning.raster import FAULTS, PathFault, first_fault, plain
 from companion.planning.registry import PLANNERS, make_planner
 from companion.settings import PlannerSettings
+from tests.support.paths import is_path
 
 BUDGET = Budget(min_epochs=2, max_epochs=15, control_points=(4, 6), population=18)
 SETTINGS = PlannerSettings.model_validate({"sedighi": {"population": 20, "generations": 40}})

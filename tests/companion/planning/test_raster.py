@@ -13,11 +13,11 @@ from companion.planning.raster import (
     PathFault,
     cells_cost,
     first_fault,
-    is_path,
     plain,
     polyline,
     without_loops,
 )
+from tests.support.paths import is_path
 from tests.support.planning_maps import drawn
 
 places = st.tuples(st.integers(-60, 60), st.integers(-60, 60))

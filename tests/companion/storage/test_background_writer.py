@@ -105,7 +105,7 @@ def test_state_settings_and_record_wait_with_one_budget(tmp_path: Path, hanging:
     saver.save(tmp_path / "tuned.toml", b"new")
     writer = ThreadStateWriter(StateFile(tmp_path / "state", hanging), budget)
     writer.put(StateUpdate())
-    recorder = Recorder(tmp_path / "run", None, Settings(), 0, beside=BackgroundWorker("record", budget))
+    recorder = Recorder(tmp_path / "run", None, Settings(), 0, worker=BackgroundWorker("record", budget))
     for part in (saver, writer, recorder):
         part.close()
     assert budget.asked == 3
@@ -126,8 +126,8 @@ def test_a_disk_that_hangs_does_not_keep_the_record_from_being_closed(
 ) -> None:
     free = threading.Event()
     mission = yard(tmp_path)
-    beside = BackgroundWorker("record", ShutdownBudget(0.01))
-    recorder = Recorder(tmp_path / "run", mission, Settings(), 0, beside=beside)
+    worker = BackgroundWorker("record", ShutdownBudget(0.01))
+    recorder = Recorder(tmp_path / "run", mission, Settings(), 0, worker=worker)
     monkeypatch.setattr("os.fsync", lambda handle: free.wait(30.0))
     recorder.begin(0.0, Mark.BEGIN)
     recorder.heard(1.0, [])
@@ -137,14 +137,14 @@ def test_a_disk_that_hangs_does_not_keep_the_record_from_being_closed(
     record = load_record(tmp_path / "run")
     assert not record.complete and any("was not closed" in note for note in record.notes)
     free.set()
-    beside.close()
+    worker.close()
 
 
 def test_a_disk_that_hangs_for_minutes_ends_the_record_before_the_memory(tmp_path: Path) -> None:
     free = threading.Event()
-    beside = BackgroundWorker("record", ShutdownBudget(0.01))
-    beside.put(lambda: bool(free.wait(30.0)) and None)
-    recorder = Recorder(tmp_path / "run", None, Settings(), 0, beside=beside)
+    worker = BackgroundWorker("record", ShutdownBudget(0.01))
+    worker.put(lambda: bool(free.wait(30.0)) and None)
+    recorder = Recorder(tmp_path / "run", None, Settings(), 0, worker=worker)
     recorder.begin(0.0, Mark.BEGIN)
     for second in range(1, 30):
         recorder.said(float(second), bytes(MAX_UNWRITTEN_BYTES // 20))
@@ -157,8 +157,8 @@ def test_a_disk_that_hangs_for_minutes_ends_the_record_before_the_memory(tmp_pat
 
 def test_with_a_thread_the_record_is_the_same(tmp_path: Path) -> None:
     written = []
-    for name, beside in (("at-once", None), ("beside", BackgroundWorker("record", ShutdownBudget(30.0)))):
-        recorder = Recorder(tmp_path / name, None, Settings(), 0, start_us=0, beside=beside)
+    for name, worker in (("at-once", None), ("beside", BackgroundWorker("record", ShutdownBudget(30.0)))):
+        recorder = Recorder(tmp_path / name, None, Settings(), 0, start_us=0, worker=worker)
         for tick in range(100):
             recorder.heard(0.1 * tick, [bytes([tick])])
             recorder.said(0.1 * tick, b"said")

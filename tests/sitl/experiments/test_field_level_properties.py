@@ -12,9 +12,9 @@ from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Grid
 from companion.navigation.field_step import simplified
 from companion.planning.graph_search.dijkstra import Dijkstra
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
-from companion.planning.raster import is_path
 from companion.settings import Settings
 from sitl.experiments.field_level import Outcome, drive_fields
+from tests.support.paths import is_path
 
 PLACES = st.tuples(st.integers(0, 13), st.integers(0, 10)).map(lambda place: Cell(*place))
 

@@ -11,6 +11,7 @@ from sitl.simulator import Simulator
 from sitl.world.doors import FOR_EVER_MS, Door, next_change_s
 from sitl.world.truth import SimStart
 from sitl.world.world import World
+from tests.support.rays import ray_m
 from tests.support.sitl_client import HOME, Client, ready
 
 NOTHING = np.zeros((12, 12), dtype=np.bool_)
@@ -63,7 +64,7 @@ def test_nothing_moves_before_the_next_change(
 
 def test_rays_see_it_while_it_is_closed() -> None:
     world = behind(door((10.0, 20.0)))
-    ranges = [world.ray_m(2.0, 5.5, 0.0, 9.0, time_s) for time_s in (0.0, 9.99, 10.0, 19.99, 20.0)]
+    ranges = [ray_m(world, 2.0, 5.5, 0.0, 9.0, time_s) for time_s in (0.0, 9.99, 10.0, 19.99, 20.0)]
     assert ranges == pytest.approx([6.0, 6.0, 9.0, 9.0, 6.0])
     assert world.clearance_m(7.0, 5.5, 3.0, 0.0) == pytest.approx(1.0)
     assert world.clearance_m(7.0, 5.5, 3.0, 10.0) == 3.0

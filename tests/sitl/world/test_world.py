@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from companion.core.frames import NedPoint
 from companion.core.grid import Grid
 from sitl.world.world import World
+from tests.support.rays import ray_m
 
 
 def one_block() -> World:
@@ -32,12 +33,12 @@ def one_block() -> World:
     ],
 )
 def test_rays_end_at_the_face_they_hit(north_m: float, east_m: float, bearing_deg: float, length_m: float) -> None:
-    ray_m = one_block().ray_m(north_m, east_m, math.radians(bearing_deg), 20.0)
-    assert ray_m == pytest.approx(length_m, abs=1e-9)
+    found_m = ray_m(one_block(), north_m, east_m, math.radians(bearing_deg), 20.0)
+    assert found_m == pytest.approx(length_m, abs=1e-9)
 
 
 def test_rays_are_no_longer_than_asked() -> None:
-    assert one_block().ray_m(0.5, 3.5, 0.0, 4.4) == 4.4
+    assert ray_m(one_block(), 0.5, 3.5, 0.0, 4.4) == 4.4
 
 
 def test_no_ray_slips_between_two_walls_that_meet_at_a_corner() -> None:
@@ -46,10 +47,10 @@ def test_no_ray_slips_between_two_walls_that_meet_at_a_corner() -> None:
     world = World(obstacles, resolution_m=0.1)
     for bearing_deg in np.linspace(-80.0, 80.0, 1601):
         bearing_rad = math.radians(bearing_deg)
-        ray_m = world.ray_m(0.05, 2.0, bearing_rad, 30.0)
+        found_m = ray_m(world, 0.05, 2.0, bearing_rad, 30.0)
         reaches_m = 1.95 / math.cos(bearing_rad)
         if abs(reaches_m * math.sin(bearing_rad)) < 1.99:
-            assert ray_m == pytest.approx(reaches_m, abs=1e-9)
+            assert found_m == pytest.approx(reaches_m, abs=1e-9)
 
 
 worlds = st.integers(0, 2**32 - 1).map(
@@ -68,13 +69,13 @@ def test_rays_agree_with_small_steps(world: World, place: tuple[float, float], b
         inside = 0 <= y < world.obstacles.shape[0] and 0 <= x < world.obstacles.shape[1]
         return inside and bool(world.obstacles[y, x])
 
-    ray_m = world.ray_m(*place, bearing_rad, 8.0)
-    assert 0.0 <= ray_m <= 8.0
+    found_m = ray_m(world, *place, bearing_rad, 8.0)
+    assert 0.0 <= found_m <= 8.0
     # A ray that only grazes a corner may count either way: 1 mm of obstacle is what a step may miss.
-    steps = np.arange(0.0, max(ray_m - 1e-6, 0.0), 0.01)
+    steps = np.arange(0.0, max(found_m - 1e-6, 0.0), 0.01)
     assert not any(blocked(step) and blocked(step + 1e-3) and blocked(max(step - 1e-3, 0.0)) for step in steps)
-    if ray_m < 8.0:
-        assert blocked(ray_m + 1e-7) or blocked(max(ray_m - 1e-7, 0.0))
+    if found_m < 8.0:
+        assert blocked(found_m + 1e-7) or blocked(max(found_m - 1e-7, 0.0))
 
 
 @given(worlds, places)
@@ -94,10 +95,10 @@ def test_a_grid_becomes_a_world_in_the_same_place() -> None:
     weights[0, 0] = 0.99
     world = World.from_grid(Grid(weights, 2.0, NedPoint(10.0, -20.0)))
     assert world.clearance_m(15.0, -17.0, 5.0) == 0.0
-    assert world.ray_m(11.0, -17.0, 0.0, 50.0) == pytest.approx(3.0)
+    assert ray_m(world, 11.0, -17.0, 0.0, 50.0) == pytest.approx(3.0)
     assert (world.width_m, world.height_m) == (8.0, 6.0)
 
 
 def test_open_ground_has_no_obstacle() -> None:
-    assert World.open().ray_m(0.0, 0.0, 1.0, 100.0) == 100.0
+    assert ray_m(World.open(), 0.0, 0.0, 1.0, 100.0) == 100.0
     assert World.open(50.0, 20.0).clearance_m(3.0, 3.0, 9.0) == 9.0

@@ -7,8 +7,8 @@ from scipy.sparse.csgraph import dijkstra as scipy_dijkstra
 from companion.core.grid import Cell
 from companion.planning.graph_search.dijkstra import Dijkstra
 from companion.planning.problem import MIN_WEIGHT, Budget, PlanningProblem, PlanStatus, path_cost
-from companion.planning.raster import is_path
 from companion.settings import PlannerSettings
+from tests.support.paths import is_path
 from tests.support.planning_maps import drawn, movingai_map, one_obstacle
 from tests.support.shared_data import SHARED, needs_shared
 

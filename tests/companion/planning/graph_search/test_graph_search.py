@@ -15,8 +15,9 @@ from companion.planning.graph_search.dstar_lite import DstarLite
 from companion.planning.graph_search.steps import Query, least_cost
 from companion.planning.graph_search.theta_star import Ground, ThetaStar, line_cost, others_before
 from companion.planning.problem import MIN_WEIGHT, Budget, PlanningProblem, PlanStatus
-from companion.planning.raster import cells_cost, is_path, polyline
+from companion.planning.raster import cells_cost, polyline
 from companion.settings import PlannerSettings
+from tests.support.paths import is_path
 from tests.support.planning_maps import drawn, one_obstacle
 
 SETTINGS = PlannerSettings()

@@ -16,11 +16,11 @@ from companion.planning.papers.achour_kernel import Task, cross, fitness, fittes
 from companion.planning.papers.line_of_sight import sees
 from companion.planning.problem import Budget, PlanningProblem, PlanStatus
 from companion.planning.random_numbers import seeded
-from companion.planning.raster import is_path
 from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
 from companion.settings.planners import AchourSettings
 from sitl.experiments.achour_environments import FIELDS_A_METRE, OBSTACLES, environments
+from tests.support.paths import is_path
 from tests.support.planning_maps import drawn, one_obstacle
 
 SEEDS = 200
