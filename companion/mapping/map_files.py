@@ -21,7 +21,7 @@ from PIL import Image, UnidentifiedImageError
 
 from companion.core.frames import NedPoint
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Grid, Weights
-from companion.storage.files import open_file, why_no_file, write_whole
+from companion.storage.files import open_file, read_bytes, why_no_file, write_whole
 
 MAX_FIELDS = 25_000_000
 """Larger maps are refused before memory is asked for (5000 x 5000 fields are 200 MB of weights)."""
@@ -98,17 +98,6 @@ def save_ros_map(grid: Grid, path_without_suffix: Path, known: NDArray[np.bool_]
         write_whole(image.with_suffix(".yaml"), text.encode())
     except OSError as error:
         raise MapError(f"{image}: cannot be written: {error.strerror}; choose another place") from error
-
-
-def _read_bytes(path: Path, limit: int) -> bytes:
-    try:
-        with open_file(path) as file:
-            data = file.read(limit + 1)
-    except OSError as error:
-        raise MapError(f"{path}: cannot be read: {error.strerror}; check the path") from error
-    if len(data) > limit:
-        raise MapError(f"{path}: larger than {limit} bytes")
-    return data
 
 
 def _check_size(path: Path, width: int, height: int) -> None:
@@ -195,7 +184,7 @@ def _load_ros(path: Path) -> Grid:
 
 
 def _read_yaml(path: Path) -> dict[object, object]:
-    data = _read_bytes(path, MAX_YAML_BYTES)
+    data = read_bytes(path, MapError, MAX_YAML_BYTES)
     try:
         fields = yaml.safe_load(data)
     except yaml.MarkedYAMLError as error:
@@ -233,7 +222,7 @@ PASSABLE, BLOCKED = ".GS", "@OTW"
 
 
 def _read_movingai(path: Path) -> Weights:
-    lines = _read_bytes(path, MAX_TEXT_BYTES).decode("latin-1").splitlines()
+    lines = read_bytes(path, MapError, MAX_TEXT_BYTES).decode("latin-1").splitlines()
     head = [line.split() for line in lines[:4]]
     if len(head) < 4 or head[0][:1] != ["type"] or head[3] != ["map"]:
         raise MapError(f"{path}: header: expected the lines type, height, width, map")

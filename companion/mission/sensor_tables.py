@@ -11,7 +11,8 @@ from companion.mission.tables import Positive, Table
 from companion.storage.toml_file import read_table
 from companion.storage.validation import describe_first
 
-NAMED = ("lidar-90", "lidar-360", "beams", "none")
+NONE = "none"
+NAMED = ("lidar-90", "lidar-360", "beams", NONE)
 """Named suites."""
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -94,16 +95,26 @@ class SensorsTable(Table):
     beam: Annotated[list[BeamTable], Field(max_length=10, default_factory=list)]
     proximity: ProximityTable | None = None
 
+    @property
+    def is_empty(self) -> bool:
+        """Whether there is none."""
+        return not (self.lidar or self.beam or self.proximity)
+
     def __str__(self) -> str:
         """The sensors in words."""
         sensors = ["a lidar"] if self.lidar else []
         sensors += [f"{len(self.beam)} beams" if len(self.beam) > 1 else "a beam"] if self.beam else []
         sensors += ["proximity sectors"] if self.proximity else []
-        return " and ".join(sensors) or "none"
+        return " and ".join(sensors) or NONE
 
 
 Sensors = str | SensorsTable
 """The name of a suite, or a description."""
+
+
+def is_blind(sensors: Sensors) -> bool:
+    """Whether a rover with these sensors has none."""
+    return sensors.is_empty if isinstance(sensors, SensorsTable) else sensors == NONE
 
 
 def sensors_given(value: object) -> Sensors:
@@ -122,7 +133,7 @@ def sensors_from(value: Sensors, folder: Path, error: type[Exception]) -> Sensor
     """The sensors, read from their file if they are given as one. Raises ``error`` for a bad file."""
     if isinstance(value, str) and value.endswith(".toml"):
         sensors = read_table(folder / value, SensorsTable, error, "docs/worlds.md describes range sensors")
-        if str(sensors) == "none":
+        if sensors.is_empty:
             raise error(
                 f"{folder / value}: describes no sensor; "
                 "give a [lidar], [[beam]] or [proximity], or write sensors = 'none'"

@@ -16,8 +16,6 @@ from companion.settings.settings import Settings
 from companion.storage.toml_file import read_toml
 from companion.storage.validation import describe_first, first_fault
 
-LONGEST_NAME = 16
-"""Maximum length of a MAVLink parameter's name."""
 DIGITS = 7
 """Values are sent as 32-bit floats; rounding to 7 digits keeps 0.15 from becoming 0.1500000059."""
 

@@ -51,8 +51,8 @@ def read_at_most(path: Path, limit: int) -> bytes:
         return file.read(limit)
 
 
-def read_text(path: Path, error: type[Exception], limit: int, encoding: str = "utf-8") -> str:
-    """The text of a file in UTF-8.
+def read_bytes(path: Path, error: type[Exception], limit: int) -> bytes:
+    """The content of an ordinary file.
 
     Raises ``error``, also for more than ``limit`` bytes: one line with file, reason and remedy.
     """
@@ -63,8 +63,13 @@ def read_text(path: Path, error: type[Exception], limit: int, encoding: str = "u
         raise error(f"{path}: cannot be read: {fault.strerror}; check the path") from fault
     if len(data) > limit:
         raise error(f"{path}: larger than {limit} bytes; check the path")
+    return data
+
+
+def read_text(path: Path, error: type[Exception], limit: int, encoding: str = "utf-8") -> str:
+    """The text of a file in UTF-8. Raises ``error``, as ``read_bytes`` does."""
     try:
-        return data.decode(encoding)
+        return read_bytes(path, error, limit).decode(encoding)
     except UnicodeDecodeError as fault:
         raise error(f"{path}: not UTF-8 text (byte {fault.start}); save it as UTF-8") from fault
 

@@ -123,7 +123,6 @@ def arm(vehicle: Vehicle, force: bool = False) -> bool:
     if faults:
         return False
     vehicle.armed = True
-    vehicle.clocks.armed_s = vehicle.time_s
     vehicle.control["armed"] = 1
     remember_start(vehicle)
     vehicle.say(Severity.INFO, "Throttle armed")

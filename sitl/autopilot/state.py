@@ -45,7 +45,6 @@ class Clocks:
 
     ground_station_s: float | None = None
     prearm_text_s: float = 0.0
-    armed_s: float | None = None
     variance_text_s: float = 0.0
     logging_s: float = -math.inf
     """When arming was last tried, or when it ended; the log is written for some seconds after that."""

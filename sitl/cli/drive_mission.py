@@ -7,6 +7,7 @@ from pathlib import Path
 
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
+from companion.mission.sensor_tables import is_blind
 from sitl.map_mission import field_at, mission_in_world, mission_on_map
 from sitl.scenario import Scenario
 from sitl.world.world_file import ground_grid
@@ -59,7 +60,7 @@ def _driven_here(mission: Mission) -> Mission:
 
 def refuse_blind(mission: Mission) -> None:
     """Refuse a mission without range sensors. Raises MissionError."""
-    if mission.sitl is not None and str(mission.sitl.sensors) == "none":
+    if mission.sitl is not None and is_blind(mission.sitl.sensors):
         raise MissionError(
             "sensors none: the companion does not drive without range data; none is for rover-sitl serve"
         )

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rich.table import Table
 
 from companion.core.grid import Grid
+from companion.navigation.field_step import Part
 from companion.planning import registry
 from companion.settings import Settings, parse_settings
 from sitl.experiments import drawing
@@ -208,7 +209,7 @@ def _series_json(series: Series) -> dict[str, object]:
 def _draw_track(panel: Any, run: FieldRun) -> None:
     """Onward blue, going back red, one line for each stretch."""
     points = np.array(run.track, float)
-    back = np.array([part == "A" for part in run.parts])
+    back = np.array([part is Part.RETURN for part in run.parts])
     at = 0
     while at < len(back):
         stop = at + 1
