@@ -71,9 +71,13 @@ class StuckRecovery:
         self._back_until_s = view.pose.time_s + settings.back_out_m / settings.back_out_speed_m_s
         self._progress = None
 
+    def is_backing(self, now_s: float) -> bool:
+        """Whether the rover is being backed out."""
+        return now_s < self._back_until_s
+
     def backing(self, view: LocalView) -> ControlCommand | None:
         """Straight back over ground that is known to be free, and no farther; None when not under way."""
-        if view.pose.time_s >= self._back_until_s:
+        if not self.is_backing(view.pose.time_s):
             return None
         self._progress = None
         speed_m_s = backing_speed_m_s(view)

@@ -80,7 +80,6 @@ class GoalDriver:
         self.step_s = 0.0
         """From the round in which the last step began to the one that took its answer: a replay has the same rounds."""
         self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
-        self._moving: tuple[Moving, ...] = ()
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf
         self._avoidance = CollisionAvoidance()
@@ -145,16 +144,25 @@ class GoalDriver:
         """The rover stands still for a good reason: do not count it as stuck."""
         self._recovery.pause()
 
-    def update(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> tuple[ControlCommand, Decision | None]:
-        """One tick: the command for now, and the navigator's decision if there is a new one. ``moving``: what moves."""
-        command, decision = self._drive(view, moving)
-        if self._goal is None or not moving or (decision is not None and decision.action is Action.REACHED):
-            return command, decision
+    def decide(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> Decision | None:
+        """The navigator's decision if there is a new one in this tick. ``moving``: what moves."""
+        if self._goal is None or self._state is None or self._recovery.is_backing(view.pose.time_s):
+            return None
+        decision = self._field_step(view, moving)
+        if self._has_arrived(view):
+            decision = self.decision = Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
+        return decision
+
+    def guide(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> ControlCommand:
+        """The command for this tick: along the path, and out of the way of what moves."""
+        command = self._follow(view)
+        if not moving or (self.decision is not None and self.decision.action is Action.REACHED):
+            return command
         command, yields = self._avoided(command, view, moving)
         # A rover that makes way is not stuck; one that does so for very long is.
         if self._avoidance.is_patient(view.pose.time_s, view.settings.traffic.patience_s, yields=yields):
             self.pause()
-        return command, decision
+        return command
 
     def _avoided(
         self, command: ControlCommand, view: LocalView, moving: tuple[Moving, ...]
@@ -165,27 +173,19 @@ class GoalDriver:
         option = self._avoidance.avoid(command, line, view, moving, backwards=controller.backwards)
         return option.command, option.yields
 
-    def _drive(self, view: LocalView, moving: tuple[Moving, ...]) -> tuple[ControlCommand, Decision | None]:
-        """The command if nothing comes across."""
-        self._moving = moving
-        if self._goal is None or self._state is None:
-            return STANDSTILL, None
-        backing = self._recovery.backing(view)
-        if backing is not None:
-            return backing, None
-        decision = self._field_step(view)
-        if self._has_arrived(view):
-            self.decision = Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
-            return STANDSTILL, self.decision
-        if decision is not None and decision.action is Action.UNREACHABLE:
-            return STANDSTILL, decision
+    def _follow(self, view: LocalView) -> ControlCommand:
+        """The command if nothing comes across: back out, follow the path, or stand where there is none."""
+        if self._goal is None:
+            return STANDSTILL
+        if (backing := self._recovery.backing(view)) is not None:
+            return backing
         if self.path is None:
-            return STANDSTILL, decision
+            return STANDSTILL
         self.path = advanced(self.path, view.pose)
         command = self._controller.follow(self.path, self._at_planned_speed(self.path, view))
         if self._recovery.is_stuck(view, command):
             self._get_unstuck(view)
-        return command, decision
+        return command
 
     def _at_planned_speed(self, path: ReferencePath, view: LocalView) -> LocalView:
         """The same moment, with the speed that is planned here as cruise speed."""
@@ -193,14 +193,14 @@ class GoalDriver:
         planned_m_s = min(max(path.planned_m_s, guidance.min_speed_m_s), guidance.max_speed_m_s)
         return view.with_speeds(min(wanted_m_s, planned_m_s), max(view.rover.cruise_speed_m_s, wanted_m_s))
 
-    def _field_step(self, view: LocalView) -> Decision | None:
+    def _field_step(self, view: LocalView, moving: tuple[Moving, ...]) -> Decision | None:
         """Start the navigator's step when a new field is entered or the path ahead is blocked; take its result."""
         assert self._state is not None
         pose, evidence = view.pose, view.evidence
         cell = evidence.base.cell_at(pose.point)
-        self._notice_changes(view)
+        self._notice_changes(view, moving)
         if not self._runner.busy and evidence.base.contains(cell) and self._step_is_due(cell, view):
-            self._start_step(self._state, cell, view)
+            self._start_step(self._state, cell, view, moving)
         result = self._runner.take()
         if result is not None:
             self.step_s = pose.time_s - self._began_s
@@ -214,12 +214,13 @@ class GoalDriver:
         self._lay_path(self.decision, view)
         return self.decision
 
-    def _start_step(self, state: NavState, cell: Cell, view: LocalView) -> None:
+    def _start_step(self, state: NavState, cell: Cell, view: LocalView, moving: tuple[Moving, ...]) -> None:
         """Hand a step over to the runner, with all it needs to know as it is now."""
         pose, settings, rover = view.pose, view.settings, view.rover
         grid = with_turning_cost(view.evidence.grid, pose, settings.guidance, rover.turning_radius_m)
         weights, navigator = grid.weights, settings.navigator
-        movers, motion = self._movers(view), motion_of(pose, rover, self._fastest_m_s(view), settings, grid)
+        movers = self._movers(view, moving)
+        motion = motion_of(pose, rover, self._fastest_m_s(view), settings, grid)
 
         def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
             return self.searcher.search(weights, kind, start, target, navigator, movers, motion)
@@ -235,25 +236,25 @@ class GoalDriver:
     def _plans_among_movers(self) -> bool:
         return self.searcher.planner.capabilities.moving_obstacles
 
-    def _movers(self, view: LocalView) -> tuple[problem.ObstacleTrajectory, ...]:
+    def _movers(self, view: LocalView, moving: tuple[Moving, ...]) -> tuple[problem.ObstacleTrajectory, ...]:
         """What moves, for a planner that asks."""
         if not self._plans_among_movers:
             return ()
         radius_m, traffic = view.rover.radius_m, view.settings.traffic
-        return planners_movers(self._moving, view.evidence.grid, radius_m, view.pose.time_s, traffic)
+        return planners_movers(moving, view.evidence.grid, radius_m, view.pose.time_s, traffic)
 
     def _fastest_m_s(self, view: LocalView) -> float:
         """The mission's own speed for this leg, or the rover's."""
         wanted_m_s = None if self._goal is None else self._goal.speed_m_s
         return view.rover.cruise_speed_m_s if wanted_m_s is None else wanted_m_s
 
-    def _notice_changes(self, view: LocalView) -> None:
+    def _notice_changes(self, view: LocalView, moving: tuple[Moving, ...]) -> None:
         """A plan made among moving things is dropped when one of them moves otherwise than it did."""
         state, traffic, now_s = self._state, view.settings.traffic, view.pose.time_s
         if state is None or not self._plans_among_movers or now_s - self._replanned_s < traffic.replan_s:
             return
-        if not self._runner.busy and motion_changed(self._planned_among, self._moving, traffic):
-            self._replanned_s, self._planned_among = now_s, self._moving
+        if not self._runner.busy and motion_changed(self._planned_among, moving, traffic):
+            self._replanned_s, self._planned_among = now_s, moving
             self._state = abandon_path(state)
 
     def _is_doubted(self, decision: Decision, view: LocalView) -> bool:

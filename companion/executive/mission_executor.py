@@ -43,7 +43,7 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
 from companion.navigation.search_budget import PathSearcher
 from companion.navigation.step_runner import StepRunner
-from companion.perception.moving_obstacles import announced, merged
+from companion.perception.moving_obstacles import Moving, announced, merged
 from companion.perception.object_tracker import ObjectTracker
 from companion.planning.registry import make_planner
 from companion.recording.recorder import RunLog
@@ -236,7 +236,7 @@ class MissionExecutor:
     # One tick ----------------------------------------------------------------------------------------------------
 
     def decide(self, vehicle: VehicleState, now_s: float) -> Task:
-        """What to do for the mission now, and where to; the leg to a new goal begins here."""
+        """What to do for the mission now, and by which path: legs begin and end here, and the navigator decides."""
         view = self.view(vehicle, now_s)
         self.trail.enter(self.evidence.base.cell_at(view.pose.point))
         waited = self.progress.phase is MissionPhase.WAIT
@@ -255,19 +255,15 @@ class MissionExecutor:
             self._notifier.tell(f"Heading for {self.progress.goal.name}", Severity.INFO)
             self.driver.head_for(self.progress.goal, view, self._way_back(view.pose))
         self.phase = RunPhase.DRIVING
+        decision = self.driver.decide(view, self._moving(vehicle, view))
+        if decision is not None:
+            self._take_decision(decision, now_s)
         return Task.DRIVE
 
     def guide(self, task: Task, vehicle: VehicleState, view: LocalView) -> ControlCommand:
         """How to do it now: the setpoint and the speed."""
-        now_s = view.pose.time_s
-        others = announced(vehicle, view.pose, self._mission.rover.radius_m, self._settings.current.traffic)
-        moving = merged(others, self._tracker.moving(now_s, view.settings.traffic), now_s)
-        if task is Task.STAND:
-            return self.driver.standing(view, moving)
-        command, decision = self.driver.update(view, moving)
-        if decision is not None:
-            self._take_decision(decision, now_s)
-        return command
+        moving = self._moving(vehicle, view)
+        return self.driver.standing(view, moving) if task is Task.STAND else self.driver.guide(view, moving)
 
     def view(self, vehicle: VehicleState, now_s: float) -> LocalView:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
@@ -275,6 +271,12 @@ class MissionExecutor:
         assert pose is not None
         settings = self._settings_for_link(vehicle.latency_s)
         return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, settings)
+
+    def _moving(self, vehicle: VehicleState, view: LocalView) -> tuple[Moving, ...]:
+        """All that moves round the rover, announced or seen."""
+        now_s = view.pose.time_s
+        others = announced(vehicle, view.pose, self._mission.rover.radius_m, self._settings.current.traffic)
+        return merged(others, self._tracker.moving(now_s, view.settings.traffic), now_s)
 
     def _settings_for_link(self, link_s: float) -> Settings:
         """The settings in force for a link that takes this long, there and back."""

@@ -238,7 +238,8 @@ def test_the_planner_is_told_heading_and_radius() -> None:
     start = view(ground(), pose(30.0))
     there = NedPoint(MIDDLE, MIDDLE + 10.0)
     driver.head_for(ResolvedTarget("t", there, start.evidence.base.cell_at(there), 0.0, OnBlocked.SKIP, None), start)
-    command, _ = driver.update(start)
+    driver.decide(start)
+    command = driver.guide(start)
     assert asked[0].motion.heading_rad == pytest.approx(math.radians(60.0)), "from east towards north"
     assert asked[0].motion.turning_radius_fields == pytest.approx(RADIUS_M * SETTINGS.steering.planned_radius)
     assert isinstance(command.setpoint, GuidedVelocity)

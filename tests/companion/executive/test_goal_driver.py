@@ -83,7 +83,9 @@ class Drive:
         self.driver.head_for(goal, self.at(time_s))
 
     def update(self, time_s: float, speed_m_s: float = 0.0) -> tuple[ControlCommand, Decision | None]:
-        return self.driver.update(self.at(time_s, speed_m_s))
+        view = self.at(time_s, speed_m_s)
+        decision = self.driver.decide(view)
+        return self.driver.guide(view), decision
 
 
 def test_the_rover_stands_until_the_first_decision() -> None:
