@@ -52,23 +52,24 @@ class Companion:
         self._autopilot = autopilot
         self._clock = clock
         self._pace = parts.pace
-        self._listener = parts.listener
+        self._dispatcher = parts.dispatcher
+        self._operator_server = parts.operator_server
         self._supervisor = parts.supervisor
         self._notifier = parts.notifier
         self.mission_run = parts.run
         self.outcome = parts.outcome
 
     def tick(self) -> None:
-        """One field step: sleep, listen, map, judge, decide, guide, speak, record."""
+        """One field step: sleep, listen, map, answer, supervise, decide, guide, speak, conclude."""
         now_s = self._pace.sleep()
-        scans = self._listener.listen(now_s)
+        scans = self._dispatcher.listen(now_s)
         self.mission_run.map(scans)
-        self._listener.answer(now_s)
-        verdict = self._supervisor.judge(now_s)
+        self._operator_server.answer(now_s)
+        verdict = self._supervisor.supervise(now_s)
         task = self.mission_run.decide(verdict, now_s)
         command = self.mission_run.guide(task, now_s)
         self.mission_run.speak(command, now_s)
-        self._supervisor.record(task, now_s)
+        self._supervisor.conclude(task, now_s)
         self._autopilot.service(now_s)
         self.outcome.step_seconds.append(self._pace.elapsed_s)
 

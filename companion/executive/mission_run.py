@@ -1,6 +1,6 @@
 """One run of a mission: the vehicle's state, the mode latch, what the run does now, and the mission executor.
 
-Nouns: mission run, order.
+Nouns: mission run, order, stop.
 """
 
 from __future__ import annotations
@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import Enum, auto
+
+import numpy as np
 
 from companion.control.controller import STANDSTILL, ControlCommand
 from companion.control.setpoint_check import SetpointCheck
@@ -19,9 +21,12 @@ from companion.executive.mission_executor import MissionExecutor, Task
 from companion.executive.mission_layout import MissionLayout
 from companion.executive.mission_progress import MissionProgress, TargetStatus
 from companion.executive.setpoint_sender import SetpointSender
+from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.mission import Mission
+from companion.navigation.step_runner import StepRunner
+from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import LatchState, Reaction, Verdict
-from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, WaitReason
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import Command, SetMode
 from companion.vehicle.events import RoverMode
@@ -37,6 +42,14 @@ class LocatedScan:
     pose: Pose
     yaw_rate_rad_s: float
     scan: RangeScan
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """Why the rover is not to be driven, and what is awaited before it may be again; None where nothing is."""
+
+    reason: Reason[Enum] | None
+    awaited: Reason[WaitReason] | None = None
 
 
 class Order(Enum):
@@ -58,8 +71,8 @@ COMMANDS: dict[Order, ControlCommand | Command | None] = {
 class MissionRun:
     """What all parts of the companion share of a run.
 
-    The listener writes ``vehicle`` (after an error, the shutdown), listener and judge ``latch``, the judge ``stopped``,
-    the shutdown ``end``. ``activity`` is written by whichever part has the rover in this tick.
+    Each attribute has one writer: the event dispatcher writes ``vehicle`` (after an error, the shutdown), the drive
+    permission ``latch`` and ``stop``, arming ``awaited``, the shutdown ``end``. ``activity`` follows from them.
     """
 
     def __init__(
@@ -77,15 +90,34 @@ class MissionRun:
         self.latch = LatchState()
         self.executor: MissionExecutor | None = None
         """None until the mission has begun."""
-        self.activity = Activity(RunPhase.CONNECTING)
-        self.stopped = False
-        """Whether the rover was not to be driven in the last tick."""
+        self.awaited: Reason[WaitReason] | None = None
+        """What arming waits for; None before it has looked."""
+        self.stop: Stop | None = None
+        """Why the rover was not to be driven in the last tick; None if it was."""
         self.end: Reason[EndReason] | None = None
         """Why the run ends; None while it goes on."""
         self.setpoint_check = SetpointCheck(notifier.tell)
         self.legs = AutoModeLegs(notifier)
         self._settings = settings
         self._make_executor = make_executor
+
+    @property
+    def activity(self) -> Activity:
+        """What the run does now."""
+        if self.end is not None:
+            return Activity(RunPhase.ENDED, self.end)
+        if self.executor is None:
+            phase = RunPhase.CONNECTING if self.awaited is None else RunPhase.WAITING
+            return Activity(phase, awaited=self.awaited)
+        if self.stop is None:
+            return Activity(self.executor.phase)
+        phase = RunPhase.STOPPED if self.stop.awaited is None else RunPhase.STOPPED_AND_WAITING
+        return Activity(phase, self.stop.reason, self.stop.awaited)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the rover was not to be driven in the last tick."""
+        return self.stop is not None
 
     @property
     def is_driving(self) -> bool:
@@ -118,12 +150,10 @@ class MissionRun:
                 self.executor.map_scan(seen.pose, seen.yaw_rate_rad_s, seen.scan)
 
     def decide(self, verdict: Verdict, now_s: float) -> Task | Order:
-        """What to do in this tick: what the verdict demands, or, if the rover may be driven, what the mission does."""
+        """What to do in this tick: what the verdict demands, or, if the rover may be driven, what the mission needs."""
         if verdict.reaction is not Reaction.DRIVE or self.executor is None:
             return ORDERS.get(verdict.reaction, Order.NOTHING)
-        task = self.executor.decide(self.vehicle, now_s)
-        self.activity = Activity(self.executor.phase)
-        return task
+        return self.executor.decide(self.vehicle, now_s)
 
     def guide(self, task: Task | Order, now_s: float) -> ControlCommand | Command | None:
         """The command for that. What the mission wants passes the check of setpoints before it is sent."""
@@ -139,3 +169,23 @@ class MissionRun:
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:
         """Send it, if it is new or due again."""
         self.sender.speak(command, now_s)
+
+
+def new_run(
+    mission: Mission,
+    vehicle: VehicleState,
+    autopilot: AutopilotLink,
+    settings: LiveSettings,
+    notifier: TextSink,
+    runner: StepRunner,
+    log: RunLog,
+    seed: int,
+) -> MissionRun:
+    """A run that has not begun. ``seed``: of random choices."""
+    rng = np.random.default_rng(seed)
+
+    def make_executor(layout: MissionLayout, progress: MissionProgress, scan: RangeScan) -> MissionExecutor:
+        return MissionExecutor(mission, settings, layout, progress, scan, runner, log, notifier, rng)
+
+    sender = SetpointSender(autopilot, settings, notifier)
+    return MissionRun(mission, vehicle, sender, settings, notifier, make_executor)

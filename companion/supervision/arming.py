@@ -19,7 +19,7 @@ from companion.mission.bounds import Bounds
 from companion.mission.mission import MissionError
 from companion.operator.notifications import Notifier
 from companion.safety.mode_latch import Control
-from companion.safety.reasons import Activity, Doubt, PowerReason, Reason, RunPhase, WaitReason
+from companion.safety.reasons import Doubt, PowerReason, Reason, WaitReason
 from companion.safety.watchdogs import data_doubt
 from companion.settings import SafetySettings
 from companion.settings.live_settings import LiveSettings
@@ -141,7 +141,7 @@ class Arming:
         target behind a fence, before anybody arms.
         """
         if self._autopilot.twin_heard(now_s):
-            self._run.activity = Activity(RunPhase.WAITING, awaited=Reason(WaitReason.OTHER_COMPANION_SILENT))
+            self._run.awaited = Reason(WaitReason.OTHER_COMPANION_SILENT)
             return None
         cleared = None if now_s < self._look_again_s else self._look(self._run.vehicle, now_s)
         if cleared is None:
@@ -223,7 +223,7 @@ class Arming:
         arming = self._awaited is not None and self._awaited.kind is WaitReason.ARMING
         if refused is not None and refused.result != 0 and arming:
             self._notifier.once(f"The autopilot refuses to arm (result {refused.result})")
-        self._run.activity = Activity(RunPhase.WAITING, awaited=self._awaited)
+        self._run.awaited = self._awaited
 
     # Whose rover it is -------------------------------------------------------------------------------------------
 

@@ -13,7 +13,7 @@ from companion.core.severity import Severity, TextSink
 from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.mode_latch import Control
-from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.safety.reasons import EndReason, Reason
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import SetMode
 from companion.vehicle.events import RoverMode
@@ -41,7 +41,6 @@ class Shutdown:
     def begin(self, why: Reason[EndReason], now_s: float) -> None:
         """The run ends: stop the rover and ask for HOLD, and say so; nothing is sent if the rover is not ours."""
         self._run.end = why
-        self._run.activity = Activity(RunPhase.ENDED, why)
         self._leave_at_s = now_s
         if not self._is_ours(now_s):
             return

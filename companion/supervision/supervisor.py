@@ -1,4 +1,4 @@
-"""The supervisor: decides each tick whether mission, arming or shutdown goes on; begins the mission, ends the run.
+"""The supervisor: takes a run from arming through the mission to its shutdown; says whether the rover may drive.
 
 Nouns: supervisor.
 """
@@ -7,28 +7,28 @@ from __future__ import annotations
 
 from companion.core.clock import Clock
 from companion.core.round_marks import Mark
-from companion.core.severity import Severity, TextSink
+from companion.core.severity import Severity
 from companion.executive.mission_executor import Task
 from companion.executive.mission_run import MissionRun, Order
 from companion.navigation.step_runner import StepRunner
-from companion.operator.notifications import Outcome
+from companion.operator.notifications import Notifier, Outcome
 from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Reaction, Verdict
 from companion.safety.reasons import EndReason, Reason
 from companion.safety.watchdogs import LoopMonitor
 from companion.supervision.arming import Arming
-from companion.supervision.judge import Judge
-from companion.supervision.keeper import Keeper
+from companion.supervision.drive_permission import DrivePermission
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.supervision.mission_limits import MissionLimits
 from companion.supervision.pace import Pace
+from companion.supervision.run_saver import RunSaver
 from companion.supervision.shutdown import Shutdown
 
 SILENT = Verdict(Reaction.SILENT)
 
 
 class LoopWatch:
-    """Tells the loop's monitor how late each round is, and whether the navigator works beside it."""
+    """Tells the loop's monitor how late each tick is, and whether the navigator works beside it."""
 
     def __init__(self, monitor: LoopMonitor, pace: Pace, runner: StepRunner) -> None:
         self._monitor = monitor
@@ -36,7 +36,7 @@ class LoopWatch:
         self._runner = runner
 
     def tick(self, now_s: float) -> None:
-        """A round has begun."""
+        """A tick has begun."""
         self._monitor.tick(now_s, self._pace.late_s, planner_works=self._runner.working)
 
 
@@ -46,27 +46,27 @@ class Supervisor:
     def __init__(
         self,
         run: MissionRun,
-        judge: Judge,
+        permission: DrivePermission,
         arming: Arming,
         limits: MissionLimits,
         shutdown: Shutdown,
         *,
         loop: LoopWatch,
         localization: LocalizationMonitor,
-        keeper: Keeper,
+        saver: RunSaver,
         log: RunLog,
-        notifier: TextSink,
+        notifier: Notifier,
         outcome: Outcome,
     ) -> None:
         self.done = False
         self._run = run
-        self._judge = judge
+        self._permission = permission
         self._arming = arming
         self._limits = limits
         self._shutdown = shutdown
         self._loop = loop
         self._localization = localization
-        self._keeper = keeper
+        self._saver = saver
         self._log = log
         self._notifier = notifier
         self._outcome = outcome
@@ -76,8 +76,11 @@ class Supervisor:
         """Ask for an orderly end at the next tick. Safe in a signal handler."""
         self._stop_asked = True
 
-    def judge(self, now_s: float) -> Verdict:
-        """What the rover may do in this tick. Silent before the mission has begun and while the run ends."""
+    def supervise(self, now_s: float) -> Verdict:
+        """Go on with arming, mission or shutdown, whichever it is, and say what the rover may do in this tick.
+
+        Silent before the mission has begun and while the run ends.
+        """
         self._loop.tick(now_s)
         self._limits.service(now_s)
         if self._stop_asked and self._run.end is None:
@@ -91,16 +94,16 @@ class Supervisor:
         if self._run.executor is None:
             return SILENT
         if self._run.legs.follow(self._run.vehicle, self._run.executor):
-            self._conclude(now_s)
+            self._end_mission(now_s)
             return SILENT
-        return self._judge_mission(now_s)
+        return self._mission_verdict(now_s)
 
-    def record(self, task: Task | Order, now_s: float) -> None:
-        """End the run if the mission has ended; keep what it would need to go on after a crash, and tell of faults."""
+    def conclude(self, task: Task | Order, now_s: float) -> None:
+        """The end of a tick: end the run if the mission has ended, save the run's state, and tell of faults."""
         if task is Task.END:
-            self._conclude(now_s)
-        self._keeper.note(now_s, done=self.done)
-        self._keeper.tell_faults(now_s)
+            self._end_mission(now_s)
+        self._saver.save(now_s, done=self.done)
+        self._notifier.tell_faults(self._run, now_s, self._saver.problem)
 
     def close(self, clock: Clock) -> None:
         """The way out after an error: a rover that is ours is stopped and put into HOLD before this returns."""
@@ -111,12 +114,12 @@ class Supervisor:
         self._shutdown.begin(Reason(EndReason.ERROR), now_s)
         now_s = self._shutdown.wait(clock, now_s)
         self.done = True
-        self._keeper.note(now_s, done=True)
+        self._saver.save(now_s, done=True)
 
-    def _judge_mission(self, now_s: float) -> Verdict:
+    def _mission_verdict(self, now_s: float) -> Verdict:
         self._localization.service(now_s)
         self._limits.heed_fence()
-        verdict = self._judge.judge(now_s)
+        verdict = self._permission.check(now_s)
         if verdict.reaction is Reaction.DRIVE and (reason := self._limits.enforce(now_s)) is not None:
             self._shutdown.begin(Reason(EndReason.BATTERY, (reason,)), now_s)
             return SILENT
@@ -133,11 +136,11 @@ class Supervisor:
         text = f"Companion: {self._run.mission.name}, {len(cleared.progress.targets)} targets"
         self._notifier.tell(text, Severity.INFO)
         executor = self._run.begin(cleared.layout, cleared.progress)
-        if self._keeper.resume(executor, now_s):
+        if self._saver.resume(executor, now_s):
             text = f"Resumed {cleared.found}, {executor.reached} targets reached before"
             self._notifier.tell(text, Severity.INFO)
 
-    def _conclude(self, now_s: float) -> None:
+    def _end_mission(self, now_s: float) -> None:
         """The mission has ended, one way or another: say so, and end the run."""
         executor = self._run.executor
         assert executor is not None

@@ -10,9 +10,9 @@ from companion.control.controller import STANDSTILL
 from companion.control.point_controller import ControlCommand
 from companion.executive.mission_executor import Task
 from companion.executive.mission_progress import TargetStatus
-from companion.executive.mission_run import LocatedScan, MissionRun, Order
+from companion.executive.mission_run import LocatedScan, MissionRun, Order, Stop
 from companion.safety.mode_latch import Reaction, Verdict
-from companion.safety.reasons import Activity, EndReason, Reason, RunPhase
+from companion.safety.reasons import Activity, Doubt, EndReason, Reason, RunPhase, WaitReason
 from companion.vehicle.commands import SetMode
 from companion.vehicle.events import RoverMode
 from tests.support.desk import Desk
@@ -68,8 +68,25 @@ def test_a_run_that_is_stopped_or_ends_is_not_driving(tmp_path: Path, stands: st
     desk = Desk(tmp_path)
     desk.begin()
     run: MissionRun = desk.run
-    run.stopped, run.end = stands == "stopped", Reason(EndReason.DONE) if stands == "ending" else None
+    why = Reason(EndReason.DONE)
+    run.stop, run.end = (Stop(None), None) if stands == "stopped" else (None, why)
     assert not run.is_driving
+
+
+def test_what_the_run_does_follows_from_its_state(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    run, wait, why = desk.run, Reason(WaitReason.GUIDED), Reason(Doubt.LOOP_LATE)
+    assert run.activity == Activity(RunPhase.CONNECTING)
+    run.awaited = wait
+    assert run.activity == Activity(RunPhase.WAITING, awaited=wait)
+    desk.begin()
+    assert run.activity == Activity(RunPhase.DRIVING)
+    run.stop = Stop(why)
+    assert run.activity == Activity(RunPhase.STOPPED, why)
+    run.stop = Stop(why, wait)
+    assert run.activity == Activity(RunPhase.STOPPED_AND_WAITING, why, wait)
+    run.end = Reason(EndReason.DONE)
+    assert run.activity == Activity(RunPhase.ENDED, run.end)
 
 
 def test_starting_afresh_leaves_the_leg_and_says_all_again(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The keeper of a run: where nothing is kept, and what a person is told of it."""
+"""The run saver: where nothing is saved, and what a person is told of it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from companion.supervision.keeper import Keeper
+from companion.supervision.run_saver import RunSaver
 from tests.support.desk import Desk
 from tests.support.whole import Log, Whole
 
@@ -25,13 +25,10 @@ def test_faults_that_stop_nothing_are_told_once(whole: Whole) -> None:
     assert whole.companion.outcome.said.count("The state cannot be saved") == 1
 
 
-def test_without_a_state_file_nothing_is_kept(tmp_path: Path) -> None:
+def test_without_a_state_file_nothing_is_saved(tmp_path: Path) -> None:
     desk = Desk(tmp_path)
     executor = desk.begin()
-    told: list[str] = []
-    notifier: Any = type("Told", (), {"tell_faults": lambda self, run, now_s, problem: told.append(problem)})()
     unused: Any = None
-    keeper = Keeper(desk.run, None, Log(), notifier, unused, unused)
-    keeper.note(10.0, done=True)
-    keeper.tell_faults(10.0)
-    assert not keeper.resume(executor, 10.0) and told == [""]
+    saver = RunSaver(desk.run, None, Log(), unused, unused)
+    saver.save(10.0, done=True)
+    assert not saver.resume(executor, 10.0) and saver.problem == ""

@@ -1,4 +1,4 @@
-"""The listener: what becomes of events, and the answers to operators."""
+"""The event dispatcher: what becomes of events."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import pytest
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan
 from companion.operator.notifications import News
-from companion.safety.mode_latch import Control
-from companion.supervision.listener import Listener
+from companion.supervision.event_dispatcher import EventDispatcher
 from companion.vehicle.commands import (
     AnswerTarget,
     ParameterValue,
@@ -24,7 +23,7 @@ from companion.vehicle.events import (
     ParameterAsked,
     TextSeen,
 )
-from tests.companion.safety.test_mode_latch import GUIDED, HOLD
+from tests.companion.safety.test_mode_latch import HOLD
 from tests.support.desk import Desk
 from tests.support.whole import Whole
 
@@ -44,26 +43,24 @@ def test_ground_stations_are_answered_and_the_autopilots_warnings_shown(whole: W
 
 
 class Heard:
-    """A listener with what it hands events to."""
+    """A dispatcher with what it hands events to."""
 
     def __init__(self, folder: Path, *, begun: bool = True) -> None:
         self.desk, self.taken, self.noted = Desk(folder), [], []
         self.scans, self.localization = SimpleNamespace(fits=True), SimpleNamespace(position_doubted=False)
         notifier: Any = SimpleNamespace(news=["old"], note=lambda text, severity: self.noted.append((text, severity)))
-        parameters: Any = SimpleNamespace(take=lambda event, vehicle: self.taken.append("parameters"))
         one, other = (
             SimpleNamespace(take=lambda event, vehicle, name=name: self.taken.append(name)) for name in ("one", "other")
         )
         link: Any = self.desk.autopilot
-        telemetry: Any = None
         parts: Any = ((one, other), self.scans, self.localization)
-        self.listener, self.notifier = Listener(self.desk.run, link, notifier, parameters, telemetry, *parts), notifier
+        self.dispatcher, self.notifier = EventDispatcher(self.desk.run, link, notifier, *parts), notifier
         if begun:
             self.desk.begin()
 
     def listen(self, *events: Event) -> list[LocatedScan]:
         self.desk.autopilot.events = list(events)
-        return self.listener.listen(self.desk.now_s)
+        return self.dispatcher.listen(self.desk.now_s)
 
 
 def test_every_event_is_folded_and_handed_on_in_order(tmp_path: Path) -> None:
@@ -71,7 +68,7 @@ def test_every_event_is_folded_and_handed_on_in_order(tmp_path: Path) -> None:
     assert heard.listen(HeartbeatSeen(11.0, HOLD, False, 1)) == []
     heartbeat = heard.desk.run.vehicle.heartbeat
     assert heartbeat is not None and heartbeat.time_s == 11.0
-    assert heard.taken == ["parameters", "one", "other"] and heard.notifier.news == []
+    assert heard.taken == ["one", "other"] and heard.notifier.news == []
 
 
 @pytest.mark.parametrize(("severity", "shown"), [(3, True), (4, True), (5, False)])
@@ -79,12 +76,6 @@ def test_only_warnings_of_the_autopilot_are_shown(tmp_path: Path, severity: int,
     heard = Heard(tmp_path)
     heard.listen(TextSeen(10.0, severity, "Bad battery"))
     assert heard.noted == ([("autopilot: Bad battery", Severity(severity))] if shown else [])
-
-
-def test_who_drives_is_followed_from_heartbeat_to_heartbeat_before_the_mission(tmp_path: Path) -> None:
-    heard = Heard(tmp_path, begun=False)
-    heard.listen(HeartbeatSeen(11.0, GUIDED, False, 1), HeartbeatSeen(11.0, HOLD, False, 1))
-    assert heard.desk.run.latch.control is Control.PERSON
 
 
 @pytest.mark.parametrize("missing", ["", "begun", "fits", "position", "attitude"])

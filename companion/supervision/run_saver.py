@@ -1,6 +1,6 @@
-"""The keeper of a run: keeps in each tick what the run would need to go on after a crash, and tells of faults.
+"""The run saver: saves in each tick what the run would need to go on after a crash; resumes an earlier run.
 
-Nouns: keeper.
+Nouns: run saver.
 """
 
 from __future__ import annotations
@@ -8,45 +8,42 @@ from __future__ import annotations
 from companion.checkpoint.checkpointer import Checkpointer, RunMoment
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_run import MissionRun
-from companion.operator.notifications import Notifier
 from companion.recording.recorder import RunLog
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.supervision.shutdown import Shutdown
 
 
-class Keeper:
-    """``checkpointer``: None where nothing is kept."""
+class RunSaver:
+    """``checkpointer``: None where nothing is saved."""
 
     def __init__(
         self,
         run: MissionRun,
         checkpointer: Checkpointer | None,
         log: RunLog,
-        notifier: Notifier,
         localization: LocalizationMonitor,
         shutdown: Shutdown,
     ) -> None:
         self._run = run
         self._checkpointer = checkpointer
         self._log = log
-        self._notifier = notifier
         self._localization = localization
         self._shutdown = shutdown
+
+    @property
+    def problem(self) -> str:
+        """What is wrong with the record or the state file, for people; empty if nothing is."""
+        return self._log.problem or (self._checkpointer.problem_text(self._log) if self._checkpointer else "")
 
     def resume(self, executor: MissionExecutor, now_s: float) -> bool:
         """Go on in the middle of the leg of an earlier run; False when there is none to take up."""
         return self._checkpointer is not None and self._checkpointer.resume(executor, self._run.vehicle, now_s)
 
-    def note(self, now_s: float, *, done: bool) -> None:
-        """Keep what this run would need to go on. ``done``: this is the last tick."""
+    def save(self, now_s: float, *, done: bool) -> None:
+        """Save what this run would need to go on. ``done``: this is the last tick."""
         run = self._run
         if self._checkpointer is not None and run.executor is not None:
             released, doubted = self._shutdown.stopped_ours, self._localization.position_doubted
             control = run.latch.control
             moment = RunMoment(now_s, run.vehicle, control, run.executor, doubted, released=released, done=done)
             self._checkpointer.update(moment)
-
-    def tell_faults(self, now_s: float) -> None:
-        """What a person should know although it stops nothing."""
-        problem = self._log.problem or (self._checkpointer.problem_text(self._log) if self._checkpointer else "")
-        self._notifier.tell_faults(self._run, now_s, problem)

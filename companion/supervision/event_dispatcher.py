@@ -1,6 +1,6 @@
-"""The listener: folds events into the vehicle's state, passes them to all that take them, and answers operators.
+"""The event dispatcher: folds events into the vehicle's state and passes them to all that handle them.
 
-Nouns: listener.
+Nouns: event dispatcher.
 """
 
 from __future__ import annotations
@@ -10,73 +10,54 @@ from typing import Protocol
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan, MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
-from companion.operator.figures import Telemetry
 from companion.operator.notifications import Notifier
-from companion.operator.parameter_server import ParameterServer
 from companion.perception.scan_filter import newest_ranges
-from companion.safety.mode_latch import LatchState, latched
 from companion.safety.watchdogs import ScanMonitor
 from companion.supervision.localization_monitor import LocalizationMonitor
-from companion.vehicle.events import (
-    Event,
-    RangeSeen,
-    TextSeen,
-)
+from companion.vehicle.events import Event, RangeSeen, TextSeen
 from companion.vehicle.state import VehicleState, fold
 
 
-class Takes(Protocol):
-    """Listens to events."""
+class EventHandler(Protocol):
+    """Takes events."""
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event, already folded into ``vehicle``."""
         ...
 
 
-class Listener:
-    """``listening``: the monitors and all others that take events, in this order."""
+class EventDispatcher:
+    """``handlers``: in this order."""
 
     def __init__(
         self,
         run: MissionRun,
         autopilot: AutopilotLink,
         notifier: Notifier,
-        parameters: ParameterServer,
-        telemetry: Telemetry,
-        listening: tuple[Takes, ...],
+        handlers: tuple[EventHandler, ...],
         scans: ScanMonitor,
         localization: LocalizationMonitor,
     ) -> None:
         self._run = run
         self._autopilot = autopilot
         self._notifier = notifier
-        self._parameters = parameters
-        self._telemetry = telemetry
-        self._listening = listening
+        self._handlers = handlers
         self._scans = scans
         self._localization = localization
 
     def listen(self, now_s: float) -> list[LocatedScan]:
-        """Everything that has come in since the last round; the scans that may go on the map are returned."""
+        """Dispatch everything that has come in since the last tick; return the scans that may go on the map."""
         self._notifier.news.clear()
         run, found = self._run, []
         for event in newest_ranges(self._autopilot.poll(now_s)):
             run.vehicle = fold(run.vehicle, event)
-            self._parameters.take(event, run.vehicle)
             self._note_text(event)
-            for one in self._listening:
-                one.take(event, run.vehicle)
-            if run.executor is None:
-                # At every heartbeat: a person may take the rover out of GUIDED within a tick of our having set it.
-                run.latch = LatchState(latched(run.latch.control, run.vehicle))
-            elif isinstance(event, RangeSeen) and (scan := self._located(event)) is not None:
-                found.append(scan)
+            for handler in self._handlers:
+                handler.take(event, run.vehicle)
+            if run.executor is not None and isinstance(event, RangeSeen):
+                located = self._located(event)
+                found += [] if located is None else [located]
         return found
-
-    def answer(self, now_s: float) -> None:
-        """What ground stations have asked for, and figures for them to plot."""
-        for command in (*self._parameters.due(now_s), *self._telemetry.due(self._run.executor, now_s)):
-            self._autopilot.send(command, now_s)
 
     def _note_text(self, event: Event) -> None:
         """The autopilot's own warnings are shown where the companion runs."""

@@ -1,0 +1,66 @@
+"""Drive permission: whether the rover may be driven in this tick, by the monitors and the mode latch, and why not.
+
+Nouns: drive permission.
+"""
+
+from __future__ import annotations
+
+from companion.core.severity import Severity, TextSink
+from companion.executive.mission_run import MissionRun, Stop
+from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
+from companion.safety.watchdogs import Monitor, first_doubt
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.events import Event
+from companion.vehicle.state import VehicleState
+
+
+class DrivePermission:
+    """``monitors``: in order of precedence. It alone writes the run's ``latch`` and ``stop``."""
+
+    def __init__(
+        self, run: MissionRun, monitors: tuple[Monitor, ...], settings: LiveSettings, notifier: TextSink
+    ) -> None:
+        self._run = run
+        self._monitors = monitors
+        self._settings = settings
+        self._notifier = notifier
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """Before the mission has begun the latch follows the mode with every event.
+
+        A person may take the rover out of GUIDED within a tick of our having set it.
+        """
+        if self._run.executor is None:
+            self._run.latch = LatchState(latched(self._run.latch.control, vehicle))
+
+    def check(self, now_s: float) -> Verdict:
+        """Ask the monitors and the latch. Why the rover is not driven is told here."""
+        run, settings, before = self._run, self._settings.current.safety, self._run.latch.control
+        doubt = first_doubt(self._monitors, now_s)
+        run.latch, verdict = check(run.latch, run.vehicle, now_s, settings, doubt)
+        drives = verdict.reaction is Reaction.DRIVE
+        if drives == run.stopped or (drives and before is not Control.COMPANION):
+            run.start_afresh()
+        run.stop = None if drives else self._stop(verdict, now_s)
+        if not drives:
+            self._tell(verdict, before)
+        return verdict
+
+    def _stop(self, verdict: Verdict, now_s: float) -> Stop:
+        """What is awaited is of interest only once the companion is silent."""
+        silent = verdict.reaction is Reaction.SILENT
+        return Stop(
+            verdict.reason, awaited(self._run.vehicle, now_s, self._settings.current.safety) if silent else None
+        )
+
+    def _tell(self, verdict: Verdict, before: Control) -> None:
+        """``before``: who drove until now."""
+        match verdict.reaction:
+            case Reaction.STOP:
+                self._notifier.tell(f"Stopping: {verdict.reason}", Severity.WARNING)
+            case Reaction.HOLD:
+                self._notifier.tell(f"HOLD: {verdict.reason}", Severity.WARNING)
+            case _ if before is Control.COMPANION:
+                self._notifier.tell(f"Companion silent: {verdict.reason}", Severity.WARNING)
+            case _:
+                pass

@@ -1,0 +1,86 @@
+"""Drive permission: which doubt counts, what is told of it, and when the leg begins afresh."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from companion.safety.mode_latch import Control, Reaction
+from companion.safety.reasons import Doubt, Reason, RunPhase, WaitReason
+from companion.supervision.drive_permission import DrivePermission
+from companion.vehicle.events import Event, HeartbeatSeen
+from companion.vehicle.state import VehicleState, fold
+from tests.companion.safety.test_mode_latch import GUIDED, HOLD
+from tests.support.desk import Desk
+
+
+class Says:
+    """A monitor that doubts what it is told to."""
+
+    def __init__(self, doubt: Doubt | None = None) -> None:
+        self.said = doubt
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """Ignored."""
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        return None if self.said is None else Reason(self.said)
+
+
+class Permitted(Desk):
+    """A mission under way with two monitors."""
+
+    def __init__(self, folder: Path) -> None:
+        super().__init__(folder)
+        self.first, self.second = Says(), Says()
+        self.permission = DrivePermission(self.run, (self.first, self.second), self.settings, self.notices)
+        self.begin()
+        self.stand(0.0, 0.0)
+
+    def verdict(self, after_s: float = 0.0) -> Reaction:
+        self.clock.time_s += after_s
+        return self.permission.check(self.now_s).reaction
+
+
+def test_the_first_doubt_stops_the_rover_and_is_told(tmp_path: Path) -> None:
+    permitted = Permitted(tmp_path)
+    assert permitted.verdict() is Reaction.DRIVE and not permitted.run.stopped
+    permitted.first.said, permitted.second.said = Doubt.POSITION_JUMPED, Doubt.LOOP_LATE
+    assert permitted.verdict() is Reaction.STOP and permitted.run.stopped
+    assert permitted.notices.texts == ["Stopping: position jumped"]
+    assert permitted.run.activity.phase is RunPhase.STOPPED
+    permitted.first.said = None
+    assert permitted.verdict() is Reaction.STOP and permitted.notices.texts[-1] == "Stopping: the companion is too slow"
+    assert permitted.verdict(5.0) is Reaction.HOLD and permitted.notices.texts[-1] == "HOLD: the companion is too slow"
+    assert permitted.run.latch.control is Control.PERSON
+
+
+def test_the_leg_begins_afresh_at_each_change_and_not_between(tmp_path: Path) -> None:
+    permitted, afresh = Permitted(tmp_path), []
+    permitted.run.start_afresh = lambda: afresh.append(permitted.now_s)  # type: ignore[method-assign]
+    for doubt, count in ((None, 1), (None, 1), (Doubt.LOOP_LATE, 2), (Doubt.LOOP_LATE, 2), (None, 3), (None, 3)):
+        permitted.first.said = doubt
+        permitted.verdict()
+        assert len(afresh) == count
+
+
+def test_a_companion_that_falls_silent_says_what_it_waits_for(tmp_path: Path) -> None:
+    permitted = Permitted(tmp_path)
+    permitted.verdict()
+    permitted.stand(0.0, 0.0, mode=HOLD)
+    assert permitted.verdict() is Reaction.SILENT
+    assert permitted.notices.texts == ["Companion silent: mode is not GUIDED"]
+    activity = permitted.run.activity
+    assert activity.phase is RunPhase.STOPPED_AND_WAITING and activity.needs_person
+    assert activity.awaited is not None and activity.awaited.kind is WaitReason.PERSON_SETS_MODE
+    permitted.verdict()
+    assert len(permitted.notices.told) == 1, "once"
+
+
+def test_who_drives_is_followed_from_heartbeat_to_heartbeat_before_the_mission(tmp_path: Path) -> None:
+    desk = Desk(tmp_path)
+    permission = DrivePermission(desk.run, (), desk.settings, desk.notices)
+    for mode in (GUIDED, HOLD):
+        heartbeat = HeartbeatSeen(11.0, mode, False, 1)
+        desk.run.vehicle = fold(desk.run.vehicle, heartbeat)
+        permission.take(heartbeat, desk.run.vehicle)
+    assert desk.run.latch.control is Control.PERSON
