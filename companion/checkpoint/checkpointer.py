@@ -16,17 +16,17 @@ from companion.checkpoint.state_format import (
     Raster,
     RowBand,
     SavedGenerator,
-    SavedGoalRequest,
     SavedGrid,
     SavedNavState,
     SavedPlace,
     SavedProgress,
+    SavedRequestedGoal,
     SavedState,
     SavedTally,
 )
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import Cell, Grid
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_progress import MissionProgress
 from companion.mapping.evidence_map import EvidenceMap
@@ -208,7 +208,6 @@ class Checkpointer:
         executor = moment.executor
         progress, control, armed, released, ended = condition
         driver, layout = executor.driver, executor.layout
-        nav_state, doubts_left, epoch = driver.leg
         tally = driver.tally
         return Snapshot(
             mission=self._name,
@@ -223,12 +222,12 @@ class Checkpointer:
             origin=layout.origin,
             home=layout.home,
             progress=progress,
-            nav_state=nav_state if driver.goal == progress.goal else None,
-            doubts_left=doubts_left,
+            nav_state=driver.nav_state if driver.goal == progress.goal else None,
+            doubts_left=driver.doubts_left,
             trail=executor.trail.back()[::-1],
             base=executor.evidence.base,
             subdivisions=executor.evidence.subdivisions,
-            tally=SavedTally(steps=tally.steps, return_steps=tally.return_steps, stuck=tally.stuck, epoch=epoch),
+            tally=SavedTally(steps=tally.steps, return_steps=tally.return_steps, stuck=tally.stuck, epoch=driver.epoch),
             draws=self._draws,
             sticks_us=moment.vehicle.sticks.rest_us,
         )
@@ -267,7 +266,7 @@ def saved_state(snapshot: Snapshot) -> SavedState:
         origin=(snapshot.origin.lat_deg, snapshot.origin.lon_deg),
         home=(snapshot.home.lat_deg, snapshot.home.lon_deg),
         progress=_saved_progress(snapshot.progress, snapshot.now_s),
-        leg=None if snapshot.nav_state is None else _saved_nav_state(snapshot.nav_state, snapshot.doubts_left),
+        nav_state=None if snapshot.nav_state is None else _saved_nav_state(snapshot.nav_state, snapshot.doubts_left),
         trail=snapshot.trail,
         ground=ground,
         tally=snapshot.tally,
@@ -282,10 +281,10 @@ def _saved_progress(progress: MissionProgress, now_s: float) -> SavedProgress:
         start=SavedPlace(name=home.name, north_m=home.point.north_m, east_m=home.point.east_m),
         statuses=progress.statuses,
         index=progress.index,
-        leg=progress.phase,
+        phase=progress.phase,
         left_s=_left_s(progress.until_s, now_s),
         give_up_left_s=None if give_up_s is None else _left_s(give_up_s, now_s),
-        errand=None if progress.requested is None else _saved_request(progress.requested),
+        requested=None if progress.requested is None else _saved_requested(progress.requested),
     )
 
 
@@ -293,9 +292,9 @@ def _left_s(until_s: float, now_s: float) -> float:
     return min(max(0.0, until_s - now_s), MAX_DURATION_S)
 
 
-def _saved_request(goal: ResolvedTarget) -> SavedGoalRequest:
+def _saved_requested(goal: ResolvedTarget) -> SavedRequestedGoal:
     point = goal.point
-    return SavedGoalRequest(name=goal.name, north_m=point.north_m, east_m=point.east_m, speed_m_s=goal.speed_m_s)
+    return SavedRequestedGoal(name=goal.name, north_m=point.north_m, east_m=point.east_m, speed_m_s=goal.speed_m_s)
 
 
 def _saved_nav_state(state: NavState, doubts_left: int) -> SavedNavState:

@@ -142,7 +142,7 @@ def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: Ve
     for x, y in state.trail:
         executor.trail.enter(Cell(x + shift.x, y + shift.y))
     _map_newest_scan(executor, vehicle)
-    progress, saved, pose = executor.progress, state.leg, vehicle.pose_at(now_s)
+    progress, saved, pose = executor.progress, state.nav_state, vehicle.pose_at(now_s)
     drives = progress.phase in (MissionPhase.TRAVEL, MissionPhase.HOME) and not executor.target_refused
     if saved is not None and pose is not None and drives:
         nav_state = resumed_nav_state(saved, shift)
@@ -176,16 +176,16 @@ def resumed_nav_state(saved: SavedNavState, shift: Cell) -> NavState:
 def _progress(layout: MissionLayout, state: SavedState, saved_origin: GeoPoint, now_s: float) -> MissionProgress:
     """The saved progress, with the targets in the present frame."""
     saved, requested = state.progress, None
-    if saved.errand is not None:
-        point = _in_frame(saved.errand, saved_origin, layout.origin)
+    if saved.requested is not None:
+        point = _in_frame(saved.requested, saved_origin, layout.origin)
         cell = layout.evidence.base.cell_at(point)
-        requested = ResolvedTarget(saved.errand.name, point, cell, 0.0, OnBlocked.SKIP, saved.errand.speed_m_s)
+        requested = ResolvedTarget(saved.requested.name, point, cell, 0.0, OnBlocked.SKIP, saved.requested.speed_m_s)
     return MissionProgress(
         layout.targets,
         replace(layout.start, name=saved.start.name),
         saved.statuses,
         index=saved.index,
-        phase=saved.leg,
+        phase=saved.phase,
         until_s=now_s + saved.left_s,
         give_up_s=None if saved.give_up_left_s is None else now_s + saved.give_up_left_s,
         requested=requested,

@@ -28,7 +28,7 @@ from companion.safety.mode_latch import Control
 from companion.storage.validation import first_fault
 from companion.vehicle.rc_input import PULSES_US
 
-VERSION = 1
+VERSION = 2
 MAGIC = b"rover-companion state "
 LENGTH = struct.Struct(">I")
 SUM_BYTES = hashlib.sha256().digest_size
@@ -80,7 +80,7 @@ class SavedPlace(SavedValues):
     east_m: Metres
 
 
-class SavedGoalRequest(SavedPlace):
+class SavedRequestedGoal(SavedPlace):
     """A place that a ground station asked the rover to visit during the mission."""
 
     speed_m_s: Annotated[float, Field(gt=0.0, le=1000.0)] | None
@@ -92,14 +92,14 @@ class SavedProgress(SavedValues):
     start: SavedPlace
     statuses: tuple[TargetStatus, ...] = Field(min_length=1, max_length=MAX_TARGETS)
     index: Count
-    leg: MissionPhase
+    phase: MissionPhase
     left_s: Seconds
     give_up_left_s: Seconds | None
-    errand: SavedGoalRequest | None = None
+    requested: SavedRequestedGoal | None = None
 
     @model_validator(mode="after")
     def _agree(self) -> SavedProgress:
-        if self.index > len(self.statuses) or (self.leg in NEEDS_TARGET and self.index == len(self.statuses)):
+        if self.index > len(self.statuses) or (self.phase in NEEDS_TARGET and self.index == len(self.statuses)):
             raise ValueError("there is no such target")
         return self
 
@@ -171,7 +171,7 @@ class SavedState(SavedValues):
     origin: GeoPair
     home: GeoPair
     progress: SavedProgress
-    leg: SavedNavState | None
+    nav_state: SavedNavState | None
     trail: tuple[tuple[FieldNumber, FieldNumber], ...] = Field((), max_length=MAX_PAST_FIELDS)
     ground: SavedGrid
     tally: SavedTally

@@ -69,7 +69,7 @@ def _print(record: Record, result: ReplayResult) -> None:
     for name, status in result.targets:
         typer.echo(f"{name}: {status}")
     typer.echo(
-        f"{record.mission.name}: {result.seconds:.1f} s, {result.rounds} rounds, {result.heard} packets heard, "
+        f"{record.mission.name}: {result.seconds:.1f} s, {result.ticks} ticks, {result.heard} packets heard, "
         f"{result.said} said, {result.decisions} decisions"
     )
     for line in result.differences[:SHOWN]:

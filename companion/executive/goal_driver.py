@@ -1,4 +1,4 @@
-"""Goal driver: drives to one goal (a leg): navigator steps, the reference path from them, recovery when stuck.
+"""Goal driver: drives one leg, the way to one goal: navigator steps, the reference path from them, recovery when stuck.
 
 Nouns: goal driver.
 """
@@ -78,7 +78,7 @@ class GoalDriver:
         self._sure_from_s = -math.inf
         self._began_s = 0.0
         self.step_s = 0.0
-        """From the round in which the last step began to the one that took its answer: a replay has the same rounds."""
+        """From the tick in which the last step began to the one that took its answer: a replay has the same ticks."""
         self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf
@@ -111,9 +111,19 @@ class GoalDriver:
         self.tally, self._epoch = tally, epoch
 
     @property
-    def leg(self) -> tuple[NavState | None, int, int]:
-        """For a checkpoint: the navigator's memory, the doubts of the map that are left, the number of legs so far."""
-        return self._state, self._doubts_left, self._epoch
+    def nav_state(self) -> NavState | None:
+        """The navigator's state on this leg; None between legs."""
+        return self._state
+
+    @property
+    def doubts_left(self) -> int:
+        """How often the map may still be doubted on this leg."""
+        return self._doubts_left
+
+    @property
+    def epoch(self) -> int:
+        """How many legs and recoveries have begun so far."""
+        return self._epoch
 
     @property
     def planning(self) -> bool:
@@ -125,8 +135,8 @@ class GoalDriver:
         """Where this leg leads."""
         return self._goal
 
-    def doubt_until(self, time_s: float) -> None:
-        """No target is given up before then: the position jumped, and what is seen now may lie elsewhere."""
+    def give_up_no_target_before(self, time_s: float) -> None:
+        """The position jumped, and what is seen until then may lie elsewhere."""
         self._sure_from_s = time_s
 
     def leave(self) -> None:

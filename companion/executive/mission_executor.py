@@ -171,7 +171,7 @@ class MissionExecutor:
         searcher, seed = before.searcher, before.seed
         self.driver = GoalDriver(controller_for(self._limits), searcher, self._runner, seed)
         self.driver.tally = before.tally
-        self.driver.doubt_until(now_s + VERDICT_S)
+        self.driver.give_up_no_target_before(now_s + VERDICT_S)
         self._tracker = ObjectTracker(self.evidence)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         return True
@@ -182,7 +182,7 @@ class MissionExecutor:
         self.maps_begun += 1
         self._tracker = ObjectTracker(self.evidence)
         self.driver.leave()
-        self.driver.doubt_until(now_s + VERDICT_S)
+        self.driver.give_up_no_target_before(now_s + VERDICT_S)
 
     def heed_fence(self, fence: AutopilotFence) -> None:
         """The autopilot's fence as it is now; a new one closes and opens ground at once."""

@@ -11,7 +11,7 @@ from typing import Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec, Packet
 from companion.mavlink.confirmation import CommandTracker, TargetReadBack

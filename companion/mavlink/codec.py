@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from companion.core.frames import GeoPoint
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.mavlink.decode import MISSION_ACK_COMMAND, Decoder
 from companion.mavlink.encode import EncodeError, Encoder, command_number
 from companion.mavlink.framing import AUTOPILOT, MAGIC_V2, SIGNED, Framer, Packet

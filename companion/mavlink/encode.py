@@ -12,7 +12,7 @@ from companion.mavlink.requests import answer_message
 from companion.mavlink.signing import Signer
 from companion.mavlink.statustext import chunks_of
 from companion.vehicle.commands import (
-    AnswerTarget,
+    AnswerGoal,
     Arm,
     ChangeSpeed,
     Command,
@@ -105,7 +105,7 @@ class Encoder:
                 return self._text(command)
             case RequestList() | RequestItem() | EndTransfer():
                 return [self._transfer(command)]
-            case AnswerTarget():
+            case AnswerGoal():
                 return [answer_message(command)]
             case ParameterValue():
                 return [_parameter_value(command)]

@@ -11,15 +11,15 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint
 from companion.mavlink.positions import point_of
-from companion.vehicle.commands import AnswerTarget
+from companion.vehicle.commands import AnswerGoal
 from companion.vehicle.events import (
     Asker,
+    GoalAnswer,
+    GoalRequested,
     ParameterAsked,
     ParameterChangeAsked,
     ParameterRequest,
     ParametersAsked,
-    TargetAnswer,
-    TargetAsked,
     TargetForm,
 )
 
@@ -35,31 +35,31 @@ GUIDED_ITEM = 2
 NO_POSITION = 0b11
 """Bits of a type mask: x or y is not used."""
 KEEP_SPEED = (-1.0, 0.0)
-COMMAND_RESULTS: Mapping[TargetAnswer, int] = MappingProxyType(
+COMMAND_RESULTS: Mapping[GoalAnswer, int] = MappingProxyType(
     {
-        TargetAnswer.ACCEPTED: mavlink.MAV_RESULT_ACCEPTED,
-        TargetAnswer.DENIED: mavlink.MAV_RESULT_DENIED,
-        TargetAnswer.NOT_NOW: mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
-        TargetAnswer.BAD_FRAME: mavlink.MAV_RESULT_DENIED,
-        TargetAnswer.BAD_VALUE: mavlink.MAV_RESULT_DENIED,
-        TargetAnswer.UNSUPPORTED: mavlink.MAV_RESULT_UNSUPPORTED,
+        GoalAnswer.ACCEPTED: mavlink.MAV_RESULT_ACCEPTED,
+        GoalAnswer.DENIED: mavlink.MAV_RESULT_DENIED,
+        GoalAnswer.NOT_NOW: mavlink.MAV_RESULT_TEMPORARILY_REJECTED,
+        GoalAnswer.BAD_FRAME: mavlink.MAV_RESULT_DENIED,
+        GoalAnswer.BAD_VALUE: mavlink.MAV_RESULT_DENIED,
+        GoalAnswer.UNSUPPORTED: mavlink.MAV_RESULT_UNSUPPORTED,
     }
 )
 """ArduRover denies local frames and places of zeros too."""
-ITEM_RESULTS: Mapping[TargetAnswer, int] = MappingProxyType(
+ITEM_RESULTS: Mapping[GoalAnswer, int] = MappingProxyType(
     {
-        TargetAnswer.ACCEPTED: mavlink.MAV_MISSION_ACCEPTED,
-        TargetAnswer.DENIED: mavlink.MAV_MISSION_DENIED,
-        TargetAnswer.NOT_NOW: mavlink.MAV_MISSION_ERROR,
-        TargetAnswer.BAD_FRAME: mavlink.MAV_MISSION_UNSUPPORTED_FRAME,
-        TargetAnswer.BAD_VALUE: mavlink.MAV_MISSION_INVALID_PARAM5_X,
-        TargetAnswer.UNSUPPORTED: mavlink.MAV_MISSION_UNSUPPORTED,
+        GoalAnswer.ACCEPTED: mavlink.MAV_MISSION_ACCEPTED,
+        GoalAnswer.DENIED: mavlink.MAV_MISSION_DENIED,
+        GoalAnswer.NOT_NOW: mavlink.MAV_MISSION_ERROR,
+        GoalAnswer.BAD_FRAME: mavlink.MAV_MISSION_UNSUPPORTED_FRAME,
+        GoalAnswer.BAD_VALUE: mavlink.MAV_MISSION_INVALID_PARAM5_X,
+        GoalAnswer.UNSUPPORTED: mavlink.MAV_MISSION_UNSUPPORTED,
     }
 )
 EVERYBODY = 0
 
 
-def target_asked(message: Any, time_s: float) -> TargetAsked | None:
+def target_asked(message: Any, time_s: float) -> GoalRequested | None:
     """The guided target in a message to the companion; None for other commands and for items of missions."""
     number = message.get_msgId()
     asker = Asker(message.get_srcSystem(), message.get_srcComponent())
@@ -72,18 +72,18 @@ def target_asked(message: Any, time_s: float) -> TargetAsked | None:
             return None
         form, speed_m_s = TargetForm.ITEM, math.nan
         if message.command != mavlink.MAV_CMD_NAV_WAYPOINT or message.mission_type != mavlink.MAV_MISSION_TYPE_MISSION:
-            return _refused(time_s, asker, form, TargetAnswer.UNSUPPORTED, "a guided item must be a waypoint")
+            return _refused(time_s, asker, form, GoalAnswer.UNSUPPORTED, "a guided item must be a waypoint")
     frame = getattr(message, "frame", GLOBAL_FRAMES[0])
     if frame not in GLOBAL_FRAMES:
-        return _refused(time_s, asker, form, TargetAnswer.BAD_FRAME, f"frame {frame} has no latitude and longitude")
+        return _refused(time_s, asker, form, GoalAnswer.BAD_FRAME, f"frame {frame} has no latitude and longitude")
     point = _place(message)
     if point is None:
-        return _refused(time_s, asker, form, TargetAnswer.BAD_VALUE, "no latitude and longitude in it")
+        return _refused(time_s, asker, form, GoalAnswer.BAD_VALUE, "no latitude and longitude in it")
     if math.isnan(speed_m_s) or speed_m_s in KEEP_SPEED:
-        return TargetAsked(time_s, asker, form, point)
+        return GoalRequested(time_s, asker, form, point)
     if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
-        return _refused(time_s, asker, form, TargetAnswer.BAD_VALUE, f"a speed of {speed_m_s:g} m/s")
-    return TargetAsked(time_s, asker, form, point, speed_m_s)
+        return _refused(time_s, asker, form, GoalAnswer.BAD_VALUE, f"a speed of {speed_m_s:g} m/s")
+    return GoalRequested(time_s, asker, form, point, speed_m_s)
 
 
 def is_place(message: Any) -> bool:
@@ -91,8 +91,8 @@ def is_place(message: Any) -> bool:
     return message.coordinate_frame in GLOBAL_FRAMES and not message.type_mask & NO_POSITION
 
 
-def _refused(time_s: float, asker: Asker, form: TargetForm, fault: TargetAnswer, reason: str) -> TargetAsked:
-    return TargetAsked(time_s, asker, form, None, None, fault, reason)
+def _refused(time_s: float, asker: Asker, form: TargetForm, fault: GoalAnswer, reason: str) -> GoalRequested:
+    return GoalRequested(time_s, asker, form, None, None, fault, reason)
 
 
 def _place(message: Any) -> GeoPoint | None:
@@ -105,7 +105,7 @@ def _place(message: Any) -> GeoPoint | None:
     return point_of(round(lat * 1e7), round(lon * 1e7)) if math.isfinite(lat) and math.isfinite(lon) else None
 
 
-def answer_message(command: AnswerTarget) -> Any:
+def answer_message(command: AnswerGoal) -> Any:
     """The message that answers a guided target."""
     to = (command.asker.system_id, command.asker.component_id)
     if command.form is TargetForm.COMMAND:

@@ -18,7 +18,7 @@ from typing import Protocol
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.clock import unix_time_us
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.mavlink.framing import CHECKSUM, MAGIC_V2, SIGNATURE, SIGNED, Packet
 from companion.storage.files import open_file
 
@@ -161,7 +161,7 @@ class Recorded:
         self.refused = Refused()
 
     def set_marks(self, marks: int) -> None:
-        """The marks of the next round."""
+        """The marks of the next tick."""
         self.signed |= bool(marks & Mark.SIGNED)
         self.refused = Refused(bool(marks & Mark.UNSIGNED), bool(marks & Mark.WRONG), bool(marks & Mark.OLD))
 

@@ -12,7 +12,7 @@ from queue import SimpleQueue
 from threading import Thread
 from typing import Protocol
 
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.navigation.field_step import Decision, NavState
 
 StepCall = Callable[[], tuple[NavState, Decision]]

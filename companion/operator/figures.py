@@ -34,7 +34,7 @@ class Telemetry:
 def figures(executor: MissionExecutor) -> dict[str, float]:
     """NAV_PART: 1 A (return), 2 B, 3 C, 0 none yet. PATH_COST: of the path decided on, -1 for none.
 
-    SEARCH_MS: the last step with its searches, in whole rounds.
+    SEARCH_MS: the last step with its searches, in whole ticks.
 
     PROGRESS: targets reached, of all, in percent.
     """

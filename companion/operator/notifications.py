@@ -25,7 +25,7 @@ NOT_FOLLOWED_S = 5.0
 FAULT_AFTER_S = 5.0
 """A message rate that is too low for a moment is not told."""
 STEPS_KEPT = 100_000
-"""The times of this many of the newest rounds are kept."""
+"""The times of this many of the newest ticks are kept."""
 SAID_KEPT = 1000
 """This many texts are remembered as said."""
 

@@ -1,4 +1,4 @@
-"""Reads a record back: checks it against its check sums, and yields as many rounds as there are.
+"""Reads a record back: checks it against its check sums, and yields as many ticks as there are.
 
 Nouns: record.
 """
@@ -20,21 +20,21 @@ from companion.mavlink.framing import first_packet
 from companion.mission.mission import Mission, MissionError
 from companion.mission.serialization import from_json
 from companion.recording.record_format import (
-    CHECKED_ROUND,
+    CHECKED_TICK,
     DECISIONS,
     FORMAT,
     META,
     MISSION,
     PACKETS,
-    ROUNDS,
     STAMP,
+    TICKS,
     InputFile,
     RecordError,
     RecordMeta,
-    Round,
+    TickEntry,
     run_sum,
     settings_sum,
-    unpacked_rounds,
+    unpacked_ticks,
 )
 from companion.settings import Settings, SettingsError, parse_settings
 from companion.settings.versions import versions
@@ -43,15 +43,15 @@ from companion.storage.validation import first_fault
 
 MAX_META_BYTES = 10_000_000
 MAX_BYTES = 200_000_000
-"""Of the rounds or the decisions: more than a day of driving."""
+"""Of the ticks or the decisions: more than a day of driving."""
 MAX_PACKET_BYTES = 280
 CHUNK_BYTES = 1 << 20
 
 
-class RecordedRound(NamedTuple):
-    """A round with its packets."""
+class RecordedTick(NamedTuple):
+    """A tick with its packets."""
 
-    round: Round
+    entry: TickEntry
     heard: list[bytes]
     said: list[bytes]
 
@@ -72,20 +72,20 @@ class Record:
         """The copy of a further file that the run depended on."""
         return next((self.directory / entry.name for entry in self.meta.inputs if entry.kind == kind), None)
 
-    def rounds(self) -> Iterator[RecordedRound]:
-        """The rounds in order, as far as both the round and its packets are there.
+    def ticks(self) -> Iterator[RecordedTick]:
+        """The ticks in order, as far as both the tick and its packets are there.
 
         Raises RecordError if packets are damaged. If packets are missing at the end, that is added to ``notes``.
         """
-        rounds, _ = unpacked_rounds(read_at_most(self.directory / ROUNDS, MAX_BYTES))
+        ticks, _ = unpacked_ticks(read_at_most(self.directory / TICKS, MAX_BYTES))
         with open_file(self.directory / PACKETS) as file:
-            for number, entry in enumerate(rounds):
+            for number, entry in enumerate(ticks):
                 packets = list(_packets(file, entry.heard + entry.said, self.directory / PACKETS))
                 if len(packets) < entry.heard + entry.said:
-                    after_s = entry.time_s - rounds[0].time_s
-                    self.notes.append(f"{self.directory / PACKETS}: ends after {after_s:.2f} s ({number} rounds)")
+                    after_s = entry.time_s - ticks[0].time_s
+                    self.notes.append(f"{self.directory / PACKETS}: ends after {after_s:.2f} s ({number} ticks)")
                     return
-                yield RecordedRound(entry, packets[: entry.heard], packets[entry.heard :])
+                yield RecordedTick(entry, packets[: entry.heard], packets[entry.heard :])
 
 
 def load_record(directory: Path) -> Record:
@@ -97,11 +97,11 @@ def load_record(directory: Path) -> Record:
         if entry.name != MISSION and _has_changed(Path(entry.source), entry.sha256):
             notes.append(f"{entry.source}: changed since the run; its copy in the record is used")
     mission, settings = _mission_and_settings(directory, meta)
-    cut = [line for name in (PACKETS, ROUNDS, DECISIONS) if (line := _check_length(directory / name, meta))]
+    cut = [line for name in (PACKETS, TICKS, DECISIONS) if (line := _check_length(directory / name, meta))]
     if meta.end is None:
         reason = "killed, power lost or the disk full"
         cut = [f"{directory}: the record was not closed ({reason}); what there is of it is replayed"]
-    _check_rounds(directory / ROUNDS)
+    _check_ticks(directory / TICKS)
     decisions = _content(directory / DECISIONS).decode(errors="replace").split("\n")[:-1]
     return Record(directory, meta, mission, settings, decisions, not cut, notes + cut)
 
@@ -151,13 +151,13 @@ def _mission_and_settings(directory: Path, meta: RecordMeta) -> tuple[Mission, S
     return mission, settings
 
 
-def _check_rounds(file: Path) -> None:
-    """Raises RecordError if there are no rounds, or if one before the last is damaged."""
+def _check_ticks(file: Path) -> None:
+    """Raises RecordError if there are no ticks, or if one before the last is damaged."""
     data = _content(file)
-    rounds, length = unpacked_rounds(data)
-    if not rounds:
-        raise RecordError(f"{file}: holds no rounds; there is nothing to replay")
-    if len(data) - length >= CHECKED_ROUND.size:
+    ticks, length = unpacked_ticks(data)
+    if not ticks:
+        raise RecordError(f"{file}: holds no ticks; there is nothing to replay")
+    if len(data) - length >= CHECKED_TICK.size:
         raise RecordError(f"{file}: damaged at byte {length}; take the record from a copy that is whole")
 
 

@@ -1,6 +1,6 @@
-"""The format of a record: names of its files, ``meta.json``, rounds as bytes, decisions as JSON (docs/record.md).
+"""The format of a record: names of its files, ``meta.json``, ticks as bytes, decisions as JSON (docs/record.md).
 
-Nouns: round.
+Nouns: tick entry.
 """
 
 from __future__ import annotations
@@ -16,16 +16,16 @@ from pydantic import BaseModel, ConfigDict
 from companion.navigation.field_step import Decision
 from companion.settings import Settings
 
-FORMAT = 3
+FORMAT = 4
 """Of the whole directory. A reader refuses others."""
-META, MISSION, PACKETS, ROUNDS, DECISIONS = "meta.json", "mission.json", "link.tlog", "rounds.bin", "decisions.jsonl"
+META, MISSION, PACKETS, TICKS, DECISIONS = "meta.json", "mission.json", "link.tlog", "ticks.bin", "decisions.jsonl"
 INPUTS = "inputs"
 STATE = "state"
 """The kind of the input file that an interrupted run has left."""
 STAMP = struct.Struct(">Q")
 """Before each packet in ``link.tlog``: microseconds since 1970, as ground stations write it."""
-ROUND = struct.Struct("<dIII")
-CHECKED_ROUND = struct.Struct("<dIIII")
+TICK = struct.Struct("<dIII")
+CHECKED_TICK = struct.Struct("<dIIII")
 
 
 class RecordError(Exception):
@@ -66,8 +66,8 @@ class RecordMeta(BaseModel):
     end: dict[str, FileLength] | None
 
 
-class Round(NamedTuple):
-    """One round of the companion: it listened, and acted.
+class TickEntry(NamedTuple):
+    """One tick in the record: the companion listened, and acted.
 
     ``time_s``: the companion's clock. ``heard``, ``said``: number of packets in the packet log, first those heard.
     ``marks``: bits of Mark.
@@ -79,21 +79,21 @@ class Round(NamedTuple):
     marks: int = 0
 
 
-def packed_round(entry: Round) -> bytes:
-    """The 24 bytes in the file. Each round has its own check sum, so that a torn or damaged one is noticed."""
-    data = ROUND.pack(*entry)
+def packed_tick(entry: TickEntry) -> bytes:
+    """The 24 bytes in the file. Each tick has its own check sum, so that a torn or damaged one is noticed."""
+    data = TICK.pack(*entry)
     return data + struct.pack("<I", zlib.crc32(data))
 
 
-def unpacked_rounds(data: bytes) -> tuple[list[Round], int]:
-    """The rounds of a file up to the first that is torn or damaged, and the number of bytes they take."""
-    rounds: list[Round] = []
-    for *values, check in CHECKED_ROUND.iter_unpack(data[: len(data) - len(data) % CHECKED_ROUND.size]):
-        found = Round(*values)
-        if zlib.crc32(ROUND.pack(*found)) != check:
+def unpacked_ticks(data: bytes) -> tuple[list[TickEntry], int]:
+    """The ticks of a file up to the first that is torn or damaged, and the number of bytes they take."""
+    ticks: list[TickEntry] = []
+    for *values, check in CHECKED_TICK.iter_unpack(data[: len(data) - len(data) % CHECKED_TICK.size]):
+        found = TickEntry(*values)
+        if zlib.crc32(TICK.pack(*found)) != check:
             break
-        rounds.append(found)
-    return rounds, len(rounds) * CHECKED_ROUND.size
+        ticks.append(found)
+    return ticks, len(ticks) * CHECKED_TICK.size
 
 
 def decision_line(time_s: float, target: str, decision: Decision) -> str:

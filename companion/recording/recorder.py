@@ -1,4 +1,4 @@
-"""Writes the record of a run: packets, rounds, decisions, and copies of the input files (docs/record.md).
+"""Writes the record of a run: packets, ticks, decisions, and copies of the input files (docs/record.md).
 
 Nouns: recorder.
 """
@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import IO, Protocol
 
 from companion.core.clock import unix_time_us
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.mission.mission import Mission
 from companion.mission.serialization import to_json
 from companion.mission.source_files import source_files
@@ -28,15 +28,15 @@ from companion.recording.record_format import (
     META,
     MISSION,
     PACKETS,
-    ROUNDS,
     STAMP,
+    TICKS,
     FileLength,
     InputFile,
     RecordError,
     RecordMeta,
-    Round,
+    TickEntry,
     decision_line,
-    packed_round,
+    packed_tick,
     run_sum,
     settings_sum,
 )
@@ -52,7 +52,7 @@ NO_ANSWER = "the disk does not answer"
 
 
 class RunLog(Protocol):
-    """What the companion records beside packets: decisions, and marks of rounds."""
+    """What the companion records beside packets: decisions, and marks of ticks."""
 
     problem: str
     """Why the record has ended early; empty while it is complete."""
@@ -62,11 +62,11 @@ class RunLog(Protocol):
         ...
 
     def begin(self, time_s: float, mark: Mark) -> None:
-        """A round in which nothing is heard: the companion was made, or shuts down after an error."""
+        """A tick in which nothing is heard: the companion was made, or shuts down after an error."""
         ...
 
     def mark(self, mark: Mark) -> None:
-        """Something happened in this round that does not follow from bytes."""
+        """Something happened in this tick that does not follow from bytes."""
         ...
 
 
@@ -98,7 +98,7 @@ class Recorder:
     """Writes the directory that docs/record.md describes.
 
     A directory that already has a record keeps it: the new one goes to the same name with a number, see ``directory``.
-    Data is written once a second; with ``worker`` by a thread, which ``close`` ends, so that no round waits for the
+    Data is written once a second; with ``worker`` by a thread, which ``close`` ends, so that no tick waits for the
     disk. A full disk ends the record, never the run: see ``problem``.
     """
 
@@ -130,7 +130,7 @@ class Recorder:
         self._worker = worker
         self._clock_at_start_s: float | None = None
         self._flushed_s = 0.0
-        self._round: Round | None = None
+        self._tick: TickEntry | None = None
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             inputs = _copied_inputs(self.directory, mission, files or {})
@@ -150,7 +150,7 @@ class Recorder:
                 end=None,
             )
             self._write_meta()
-            for name in (PACKETS, ROUNDS, DECISIONS):
+            for name in (PACKETS, TICKS, DECISIONS):
                 refuse_pipe(self.directory / name)
                 self._files[name] = (self.directory / name).open("wb", buffering=0)
                 self._waiting[name], self._sums[name] = bytearray(), (0, 0)
@@ -163,13 +163,13 @@ class Recorder:
             raise RecordError(f"{place}: cannot record here: {reason}; {remedy}") from error
 
     def begin(self, time_s: float, mark: Mark) -> None:
-        """A round in which nothing is heard."""
+        """A tick in which nothing is heard."""
         self.heard(time_s, [], mark)
 
     def heard(self, time_s: float, packets: list[bytes], mark: Mark = Mark(0)) -> None:  # noqa: B008 - frozen
-        """A new round, and the packets that were heard in it."""
-        self._end_round()
-        self._round = Round(time_s, len(packets), 0, mark)
+        """A new tick, and the packets that were heard in it."""
+        self._end_tick()
+        self._tick = TickEntry(time_s, len(packets), 0, mark)
         for raw in packets:
             self._packet(time_s, raw)
         if time_s - self._flushed_s >= FLUSH_INTERVAL_S:
@@ -178,14 +178,14 @@ class Recorder:
 
     def said(self, time_s: float, raw: bytes) -> None:
         """One packet that the companion sent."""
-        if self._round is not None:
-            self._round = self._round._replace(said=self._round.said + 1)
+        if self._tick is not None:
+            self._tick = self._tick._replace(said=self._tick.said + 1)
         self._packet(time_s, raw)
 
     def mark(self, mark: Mark) -> None:
-        """Something happened in this round that does not follow from bytes."""
-        if self._round is not None:
-            self._round = self._round._replace(marks=self._round.marks | mark)
+        """Something happened in this tick that does not follow from bytes."""
+        if self._tick is not None:
+            self._tick = self._tick._replace(marks=self._tick.marks | mark)
 
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
         """One line of JSON."""
@@ -195,7 +195,7 @@ class Recorder:
         """Write what is left, and mark the record complete. Gives up on a disk that hangs. May be called again."""
         if self._closed:
             return
-        self._end_round()
+        self._end_tick()
         self._hand_over()
         self._closed = True
         self._do(self._finish)
@@ -209,10 +209,10 @@ class Recorder:
         stamp_us = max(0, self._meta.start_unix_us + round((time_s - self._clock_at_start_s) * 1e6))
         self._write(PACKETS, STAMP.pack(stamp_us) + raw)
 
-    def _end_round(self) -> None:
-        ended, self._round = self._round, None
+    def _end_tick(self) -> None:
+        ended, self._tick = self._tick, None
         if ended is not None:
-            self._write(ROUNDS, packed_round(ended))
+            self._write(TICKS, packed_tick(ended))
 
     def _write(self, name: str, data: bytes) -> None:
         if self._closed or self.problem:

@@ -112,7 +112,7 @@ class DecisionExplainer(ReplayObserver):
 
     def _noted(self, companion: Companion) -> _Scene | None:
         driver, evidence, pose = companion.driver, companion.evidence, companion.status().pose
-        state = None if driver is None else driver.leg[0]
+        state = None if driver is None else driver.nav_state
         if evidence is None or state is None or pose is None:
             return None
         grid = evidence.grid.with_weights(evidence.grid.weights.copy())

@@ -1,7 +1,7 @@
 """Runs the companion again on the bytes of a record, and compares its decisions and packets with the recorded ones.
 
 It reads files and nothing else: no link, no clock, no thread. The record contains everything that did not follow from
-bytes and files, such as the round in which the answer of a thread arrived (docs/record.md).
+bytes and files, such as the tick in which the answer of a thread arrived (docs/record.md).
 
 Nouns: replay.
 """
@@ -16,7 +16,7 @@ from companion.app import Companion
 from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
 from companion.checkpoint.resume import PreviousRun
 from companion.checkpoint.state_format import MAX_FILE_BYTES, StateError, decode_state
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.describe import packet_difference, packet_name
@@ -24,8 +24,8 @@ from companion.mavlink.signing import Recorded, without_signature
 from companion.mission.mission import MissionError
 from companion.navigation.field_step import Decision, NavState
 from companion.navigation.step_runner import StepCall
-from companion.recording.reader import Record, RecordedRound
-from companion.recording.record_format import STATE, RecordError, Round, decision_line
+from companion.recording.reader import Record, RecordedTick
+from companion.recording.record_format import STATE, RecordError, TickEntry, decision_line
 from companion.storage.files import read_at_most
 
 Answer = tuple[NavState, Decision]
@@ -39,7 +39,7 @@ class EndOfRecordError(Exception):
 class ReplayResult:
     """Counts, differences (a line each) and what became of the targets. ``companion``: the one that was run."""
 
-    rounds: int = 0
+    ticks: int = 0
     seconds: float = 0.0
     heard: int = 0
     said: int = 0
@@ -50,7 +50,7 @@ class ReplayResult:
 
 
 class RecordPlayer:
-    """Plays a record round by round: it is the link, the clock and the log of the companion that is run again."""
+    """Plays a record tick by tick: it is the link, the clock and the log of the companion that is run again."""
 
     description = "record"
     problem = ""
@@ -59,42 +59,42 @@ class RecordPlayer:
         self.result = ReplayResult()
         self.signatures = Recorded()
         self._record = record
-        self._rounds: Iterator[RecordedRound] = record.rounds()
-        self._next = next(self._rounds, None)
-        self._current = RecordedRound(Round(0.0), [], [])
+        self._ticks: Iterator[RecordedTick] = record.ticks()
+        self._next = next(self._ticks, None)
+        self._current = RecordedTick(TickEntry(0.0), [], [])
         self._began_s: float | None = None
         self._unread: list[bytes] = []
         self._said: list[bytes] = []
         self._on_decision = on_decision
 
     @property
-    def round(self) -> Round:
-        """The present round."""
-        return self._current.round
+    def entry(self) -> TickEntry:
+        """The present tick."""
+        return self._current.entry
 
     @property
     def next_marks(self) -> Mark | None:
-        """Marks of the next round; None if there is none left."""
-        return None if self._next is None else Mark(self._next.round.marks)
+        """Marks of the next tick; None if there is none left."""
+        return None if self._next is None else Mark(self._next.entry.marks)
 
     def advance(self) -> None:
-        """Go to the next round. Raises EndOfRecordError."""
+        """Go to the next tick. Raises EndOfRecordError."""
         self._compare_said(last=self._next is None)
         if self._next is None:
             raise EndOfRecordError
-        self._current, self._next = self._next, next(self._rounds, None)
-        self.signatures.set_marks(self.round.marks)
+        self._current, self._next = self._next, next(self._ticks, None)
+        self.signatures.set_marks(self.entry.marks)
         self._unread, self._said = list(self._current.heard), []
-        self._began_s = self.round.time_s if self._began_s is None else self._began_s
-        self.result.rounds += 1
-        self.result.seconds = self.round.time_s - self._began_s
+        self._began_s = self.entry.time_s if self._began_s is None else self._began_s
+        self.result.ticks += 1
+        self.result.seconds = self.entry.time_s - self._began_s
 
     def differs(self, what: str) -> None:
         """Note a difference."""
         self.result.differences.append(f"{self.result.seconds:.2f} s: {what}")
 
     def end(self) -> None:
-        """The replay is over: compare the last round, and note what it left out."""
+        """The replay is over: compare the last tick, and note what it left out."""
         self._compare_said(last=True)
         if self._next is not None:
             self.differs("the replay has ended, and the run went on")
@@ -105,15 +105,15 @@ class RecordPlayer:
     # The companion's clock and link ------------------------------------------------------------------------------
 
     def now_s(self) -> float:
-        """The time of the present round."""
-        return self.round.time_s
+        """The time of the present tick."""
+        return self.entry.time_s
 
     def sleep_until_s(self, time_s: float) -> None:
-        """The companion's sleep goes to the next round, however long the recorded one slept."""
+        """The companion's sleep goes to the next tick, however long the recorded one slept."""
         self.advance()
 
     def read(self) -> bytes:
-        """What was heard in this round."""
+        """What was heard in this tick."""
         data, self._unread = b"".join(self._unread), []
         return data
 
@@ -130,16 +130,16 @@ class RecordPlayer:
         self.result.heard += len(packets)
 
     def said(self, time_s: float, raw: bytes) -> None:
-        """Compared when the round is over."""
+        """Compared when the tick is over."""
         self._said.append(raw)
 
     def begin(self, time_s: float, mark: Mark) -> None:
         """It is in the record."""
 
     def mark(self, mark: Mark) -> None:
-        """The recorded round must have this mark."""
-        if not self.round.marks & mark:
-            self.differs(f"{mark.name} in this round, not so in the run")
+        """The recorded tick must have this mark."""
+        if not self.entry.marks & mark:
+            self.differs(f"{mark.name} in this tick, not so in the run")
 
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
         """Compared with the recorded one of the same number."""
@@ -152,12 +152,12 @@ class RecordPlayer:
             self.differs(f"decision {number + 1}: {decision.reason}, recorded: {self._record.decisions[number]:.200}")
 
     def _is_due(self, line: str) -> bool:
-        """Whether a recorded decision should have been made by now: the last rounds of a record may be missing."""
+        """Whether a recorded decision should have been made by now: the last ticks of a record may be missing."""
         time_s = json.loads(line)["time_s"]
-        return self._record.complete or time_s < self.round.time_s
+        return self._record.complete or time_s < self.entry.time_s
 
     def _compare_said(self, *, last: bool) -> None:
-        """Compare packets. In the ``last`` round more are no difference: the run may have ended in the middle of it."""
+        """Compare packets. In the ``last`` tick more are no difference: the run may have ended in the middle of it."""
         recorded, now = self._current.said, self._said
         self._said = []
         self.result.said += len(now)
@@ -171,7 +171,7 @@ class RecordPlayer:
 
 
 class ReplayStepRunner:
-    """Computes a step at once, and returns the answer in the round in which the recorded run got it."""
+    """Computes a step at once, and returns the answer in the tick in which the recorded run got it."""
 
     def __init__(self, player: RecordPlayer, on_start: Callable[[], None]) -> None:
         self._player = player
@@ -185,8 +185,8 @@ class ReplayStepRunner:
 
     @property
     def working(self) -> bool:
-        """Whether the thread of the recorded run was computing in this round."""
-        return bool(self._player.round.marks & Mark.WORKING)
+        """Whether the thread of the recorded run was computing in this tick."""
+        return bool(self._player.entry.marks & Mark.WORKING)
 
     def start(self, call: StepCall) -> None:
         """Compute now. An error is kept and raised by ``take``."""
@@ -198,7 +198,7 @@ class ReplayStepRunner:
 
     def take(self) -> Answer | None:
         """The answer, once, and not before the recorded run had it."""
-        if self._answer is None or not self._player.round.marks & Mark.ANSWER:
+        if self._answer is None or not self._player.entry.marks & Mark.ANSWER:
             return None
         answer, self._answer = self._answer, None
         if isinstance(answer, Exception):
@@ -240,7 +240,7 @@ def replay(record: Record, observer: ReplayObserver | None = None) -> ReplayResu
     )
     player.result.companion = companion
     try:
-        while not companion.done and _round(companion, player):
+        while not companion.done and _tick(companion, player):
             pass
     except EndOfRecordError:
         pass
@@ -274,7 +274,7 @@ class _NoStateWriter:
     @property
     def problem(self) -> str:
         """Whether the recorded run could not save its state."""
-        return "not saved" if self._player.round.marks & Mark.UNSAVED else ""
+        return "not saved" if self._player.entry.marks & Mark.UNSAVED else ""
 
     def put(self, update: StateUpdate) -> None:
         """Ignored."""
@@ -283,8 +283,8 @@ class _NoStateWriter:
         """Nothing to write."""
 
 
-def _round(companion: Companion, player: RecordPlayer) -> bool:
-    """Run one round of any kind. False if there is none left."""
+def _tick(companion: Companion, player: RecordPlayer) -> bool:
+    """Run one tick of any kind. False if there is none left."""
     marks = player.next_marks
     if marks is None:
         return False

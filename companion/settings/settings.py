@@ -89,7 +89,7 @@ class MappingSettings(Section):
 class GuidanceSettings(Section):
     """From the path to a guided target and a speed."""
 
-    horizon_m: float = Field(8.0, gt=0.0, description="maximum distance of a target along the route")
+    horizon_m: float = Field(8.0, gt=0.0, description="maximum distance of a guided target along the reference path")
     clearance_m: float = Field(
         0.15, ge=0.0, description="room beside the rover's radius that the choice of speed keeps"
     )
@@ -186,11 +186,11 @@ class SteeringSettings(Section):
     )
     narrow_clearance_m: float = Field(0.3, ge=0.0, description="both with single thin beams, which leave gaps unseen")
     drives_on_m: float = Field(
-        2.5, gt=0.0, description="the rover searches a manoeuvre if it can drive less than this of its route in arcs"
+        2.5, gt=0.0, description="the rover searches a manoeuvre if it can drive less than this of its path in arcs"
     )
     manoeuvre_every_s: float = Field(0.5, ge=0.0, description="... and at most this often")
-    join_within_m: float = Field(0.5, gt=0.0, description="a manoeuvre ends within this distance of the route")
-    end_within_m: float = Field(0.3, gt=0.0, description="... and within this distance of the route's end")
+    join_within_m: float = Field(0.5, gt=0.0, description="a manoeuvre ends within this distance of the reference path")
+    end_within_m: float = Field(0.3, gt=0.0, description="... and within this distance of the path's end")
     switch_cost_m: float = Field(1.5, ge=0.0, description="cost of a change of direction, in metres")
     turned_cost_radii: float = Field(2.5, ge=0.0, description="cost of ending a manoeuvre tail first, in turning radii")
     most_poses: int = Field(6000, ge=100, le=1_000_000, description="poses that one search for a manoeuvre expands")
@@ -207,7 +207,7 @@ class SafetySettings(Section):
     latency_s: float = Field(1.0, gt=0.0, description="round trip to the autopilot longer than this: stop")
     planner_s: float = Field(30.0, gt=0.0, description="a step of the navigator that takes this long: stop")
     settle_s: float = Field(0.5, ge=0.0, description="how long the rover stands after a jump of the autopilot's clock")
-    errand_reach_m: float = Field(300.0, gt=0.0, description="a guided target farther away than this is refused")
+    requested_goal_m: float = Field(300.0, gt=0.0, description="a requested goal farther away than this is refused")
 
 
 class FenceSettings(Section):

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 from companion.checkpoint.checkpointer import Checkpointer
 from companion.core.clock import Clock
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.executive.autopilot_mission import MissionChangeMonitor
-from companion.executive.goal_requests import GoalRequests
 from companion.executive.mission_run import MissionRun, new_run
+from companion.executive.requested_goals import RequestedGoals
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.mission import Mission
 from companion.navigation.step_runner import NotedRunner, StepRunner
@@ -75,7 +75,7 @@ def assemble(
     permission = DrivePermission(run, monitors.by_precedence, live, notifier)
     operator_server = OperatorServer(run, autopilot, live, notifier, options.keep_settings)
     changes = MissionChangeMonitor(mission.stored, autopilot.downloads, notifier)
-    requests = GoalRequests(run, live, notifier)
+    requests = RequestedGoals(run, live, notifier)
     handlers: tuple[EventHandler, ...]
     handlers = (operator_server, changes, *monitors.by_precedence, monitors.batteries, requests, permission)
     dispatcher = EventDispatcher(run, autopilot, notifier, handlers, monitors.scans, monitors.localization)

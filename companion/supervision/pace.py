@@ -1,4 +1,4 @@
-"""The pace of the field step: sleeps until the next round begins, and measures how late and how long it is.
+"""The pace of the field step: sleeps until the next tick begins, and measures how late and how long it is.
 
 Nouns: pace.
 """
@@ -11,11 +11,11 @@ from companion.supervision.localization_monitor import LocalizationMonitor
 
 
 class Pace:
-    """Sleeps until the next round begins; in lock-step this moves the world."""
+    """Sleeps until the next tick begins; in lock-step this moves the world."""
 
     def __init__(self, clock: Clock, settings: LiveSettings, localization: LocalizationMonitor) -> None:
         self.late_s = 0.0
-        """How late this round is."""
+        """How late this tick is."""
         self._clock = clock
         self._settings = settings
         self._localization = localization
@@ -24,7 +24,7 @@ class Pace:
 
     @property
     def elapsed_s(self) -> float:
-        """How long this round has taken so far, by the computer's own stopwatch."""
+        """How long this tick has taken so far, by the computer's own stopwatch."""
         return stopwatch_s() - self._began_s
 
     def sleep(self) -> float:

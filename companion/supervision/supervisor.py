@@ -6,8 +6,8 @@ Nouns: supervisor.
 from __future__ import annotations
 
 from companion.core.clock import Clock
-from companion.core.round_marks import Mark
 from companion.core.severity import Severity
+from companion.core.tick_marks import Mark
 from companion.executive.mission_executor import Task
 from companion.executive.mission_run import MissionRun, Order
 from companion.navigation.step_runner import StepRunner

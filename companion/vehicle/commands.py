@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from companion.core.frames import NedPoint
 from companion.core.severity import Severity
-from companion.vehicle.events import Asker, PlanKind, TargetAnswer, TargetForm
+from companion.vehicle.events import Asker, GoalAnswer, PlanKind, TargetForm
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,12 +146,12 @@ class StatusText:
 
 
 @dataclass(frozen=True, slots=True)
-class AnswerTarget:
+class AnswerGoal:
     """The answer to a guided target asked of the companion; sent to the asker alone."""
 
     asker: Asker
     form: TargetForm
-    answer: TargetAnswer
+    answer: GoalAnswer
 
 
 Setpoint = GuidedPosition | GuidedVelocity | GuidedHeading
@@ -172,7 +172,7 @@ Command = (
     | RequestItem
     | EndTransfer
     | StatusText
-    | AnswerTarget
+    | AnswerGoal
     | ParameterValue
     | NamedValue
 )

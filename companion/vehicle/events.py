@@ -276,7 +276,7 @@ class TargetForm(StrEnum):
     """A guided mission item, answered with MISSION_ACK."""
 
 
-class TargetAnswer(StrEnum):
+class GoalAnswer(StrEnum):
     """The answer to a request; a text gives the reason."""
 
     ACCEPTED = "accepted"
@@ -297,7 +297,7 @@ class Asker:
 
 
 @dataclass(frozen=True, slots=True)
-class TargetAsked:
+class GoalRequested:
     """DO_REPOSITION or a guided mission item, addressed to the companion itself.
 
     ``point`` is None when the request holds no usable place; ``fault`` and ``reason`` say why. ``speed_m_s``: None for
@@ -309,7 +309,7 @@ class TargetAsked:
     form: TargetForm
     point: GeoPoint | None
     speed_m_s: float | None = None
-    fault: TargetAnswer = TargetAnswer.ACCEPTED
+    fault: GoalAnswer = GoalAnswer.ACCEPTED
     reason: str = ""
 
 
@@ -364,7 +364,7 @@ Event = (
     | PlanCountSeen
     | PlanItemSeen
     | PlanChangedSeen
-    | TargetAsked
+    | GoalRequested
     | SticksSeen
     | ParameterRequest
     | LegSeen

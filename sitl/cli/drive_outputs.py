@@ -99,7 +99,7 @@ def print_summary(report: Report, console: Console) -> None:
         "steps": f"{report.steps} fields, {report.return_steps} of them going back, {report.searches} searches",
         "stuck": "never" if report.stuck == 0 else f"{report.stuck} x",
         "planning": f"{1e3 * report.planning_time_s:.1f} ms in total; "
-        f"99 % of rounds (20 a second) within {report.tick_p99_ms:.2f} ms",
+        f"99 % of ticks (20 a second) within {report.tick_p99_ms:.2f} ms",
         "time": f"{report.sim_time_s:.0f} s simulated in {report.wall_time_s:.1f} s "
         f"({report.sim_time_s / max(report.wall_time_s, 1e-9):.0f} times real time)",
         "compilation": f"{report.compile_time_s:.1f} s (kept for the next run)",

@@ -109,16 +109,16 @@ def tuned(ground: Program, here: Scene, folder: Path) -> None:
     assert here.witness.wait(lambda m: m.get_type() == "PARAM_VALUE" and m.param_id == "CMP_HORIZON").param_value == 6.0
 
 
-def errand(ground: Program, here: Scene) -> None:
+def requested_goal(ground: Program, here: Scene) -> None:
     """A place for the companion, which it drives to first; one that is too far away; both as a person types them."""
     place = PLACES[0]
     ground.tell("set target_component 191")
     ground.told(f"guided {place[0] + 0.1} {place[1]} 0", "DO_REPOSITION: DENIED")
-    ground.says("AP: Errand refused: .* m away, farther than 300 m")
+    ground.says("AP: Requested goal refused: .* m away, farther than 300 m")
     ground.told(f"guided {place[0]} {place[1]} 0", "DO_REPOSITION: ACCEPTED")
-    ground.says("AP: Errand 1: .* m away, then the mission goes on")
+    ground.says("AP: Requested goal 1: .* m away, then the mission goes on")
     ground.tell("set target_component 1")
-    here.companion.says("Reached errand 1")
+    here.companion.says("Reached requested goal 1")
     assert math.dist(here.witness.place_m(), metres_from_home(*place)) < 5.0
     here.driving()
 
@@ -148,7 +148,7 @@ def test_mavproxy_beside_the_companion(tmp_path: Path) -> None:
         here.companion.says("mode is not GUIDED")
         ground.told("mode guided", "Mode GUIDED")
         here.driving()
-        errand(ground, here)
+        requested_goal(ground, here)
         here.arrived()
 
         # Nobody else drives any more: MAVProxy does.

@@ -101,7 +101,7 @@ async def drive(ground: Ground, here: Scene) -> None:
     assert math.dist(here.witness.place_m(), goal_m) < 2.0
 
 
-async def errand(system: Any, here: Scene) -> None:
+async def requested_goal(system: Any, here: Scene) -> None:
     """A place for the companion itself: MAVSDK's own targets go to the autopilot, so the message is written out."""
     from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync, MavlinkMessage
 
@@ -117,7 +117,7 @@ async def errand(system: Any, here: Scene) -> None:
     await direct.send_message(MavlinkMessage("COMMAND_INT", 0, 0, 1, 191, json.dumps(fields)))
     answer = json.loads((await heard).fields_json)
     assert (answer["command"], answer["result"]) == (192, 0)
-    here.companion.says("Reached errand 1")
+    here.companion.says("Reached requested goal 1")
 
 
 async def session(here: Scene) -> None:
@@ -137,7 +137,7 @@ async def session(here: Scene) -> None:
         # A place to go to is overruled by the companion's next target, as the companion drives.
         await ground.action.goto_location(*PLACES[0], 120.0, 0.0)
         here.driving()
-        await errand(system, here)
+        await requested_goal(system, here)
         here.arrived()
         await drive(ground, here)
         here.untouched()

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Decision
@@ -37,7 +37,7 @@ class HashingRecorder(NullRecorder):
         self.packets = 0
 
     def heard(self, time_s: float, packets: list[bytes], mark: Mark) -> None:
-        """The packets of a round."""
+        """The packets of a tick."""
         for raw in packets:
             self.said(time_s, raw)
 

@@ -22,7 +22,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.mission.resolve import resolve
 from companion.recording.reader import load_record
-from companion.recording.record_format import RecordError, Round, packed_round
+from companion.recording.record_format import RecordError, TickEntry, packed_tick
 from companion.settings import Settings, SettingsError, load_settings
 from companion.settings.tunable_parameters import with_tuned
 from companion.vehicle.state import VehicleState, fold
@@ -141,7 +141,7 @@ def record(data: bytes) -> None:
         for name in ("link.tlog", "decisions.jsonl"):
             (path.parent / name).write_bytes(b"")
         (path.parent / "mission.json").write_bytes(A_MISSION)
-        (path.parent / "rounds.bin").write_bytes(packed_round(Round(0.0, 0, 0)))
+        (path.parent / "ticks.bin").write_bytes(packed_tick(TickEntry(0.0, 0, 0)))
         load_record(path.parent)
 
     _file("meta.json", data, use)
@@ -195,7 +195,7 @@ def link_contents(data: bytes) -> None:
 
 
 def driving(data: bytes) -> None:
-    """Well-formed packets among those of a rover that drives: parameters, errands, fences and the like."""
+    """Well-formed packets among those of a rover that drives: parameters, requested goals, fences and the like."""
     with tempfile.TemporaryDirectory() as folder:
         rig = Rig(yard(Path(folder)), late_s=LONG_ON_S)
     rig.until_driven(0.2)

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.executive.goal_requests import GoalRequests
+from companion.executive.requested_goals import RequestedGoals
 from companion.operator.parameter_server import ParameterServer
 from companion.supervision.fence_monitor import FenceMonitor
 from tests.fuzz.finds import FINDS
@@ -51,7 +51,7 @@ def test_changed_packets_are_survived_by_a_companion_that_drives(data: st.DataOb
 
 @pytest.mark.parametrize(
     ("example", "part", "method"),
-    [(1, ParameterServer, "_change"), (2, GoalRequests, "_judge"), (3, FenceMonitor, "doubt")],
+    [(1, ParameterServer, "_change"), (2, RequestedGoals, "_judge"), (3, FenceMonitor, "doubt")],
 )
 def test_packets_reach_whom_they_are_for(
     example: int, part: type, method: str, monkeypatch: pytest.MonkeyPatch

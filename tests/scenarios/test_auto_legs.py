@@ -14,7 +14,7 @@ from companion.mission.mission import Mission
 from companion.navigation.field_step import Action
 from companion.safety.reasons import LatchReason, RunPhase, WaitReason
 from tests.clients.scene import HOME_DEG
-from tests.scenarios.test_errands import low_battery
+from tests.scenarios.test_requested_goals import low_battery
 from tests.support.asker import Asker
 from tests.support.rig import ARM, AUTO, GUIDED, HOLD, MANUAL, SET_MODE, without, yard
 
@@ -272,7 +272,7 @@ def test_two_legs_with_a_way_of_the_autopilots_between(tmp_path: Path) -> None:
     assert_steered_only_in_the_leg(rig)
 
 
-def test_errands_are_not_for_legs_of_auto(tmp_path: Path) -> None:
+def test_requested_goals_are_not_for_legs_of_auto(tmp_path: Path) -> None:
     rig = in_leg(tmp_path)
     rig.reposition(rig.field(5, 12))
     assert rig.answered() == 1

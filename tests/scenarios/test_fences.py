@@ -213,15 +213,15 @@ def test_a_target_that_comes_to_lie_outside_while_nobody_listens_is_given_up_too
     assert max(east for _, east in rig.track) < 12.0 and rig.breaches == 0
 
 
-@pytest.mark.parametrize("when", ["before the errand", "during the errand"])
-def test_an_errand_is_driven_though_the_target_after_it_is_refused(tmp_path: Path, when: str) -> None:
+@pytest.mark.parametrize("when", ["before the requested goal", "during the requested goal"])
+def test_a_requested_goal_is_driven_though_the_target_after_it_is_refused(tmp_path: Path, when: str) -> None:
     target = '[[target]]\nname = "far"\nfield = [19, 7]\non_blocked = "wait"\n'
     prepare = stored(box(KEEP_IN, -6.0, -2.4, 7.0, 21.4), **POLYGONS, FENCE_MARGIN=0.0)
     options = parse_settings({"navigator": {"wait_retry_s": 10.0, "wait_limit_s": 20.0}}, "test")
     rig = Asker(yard(tmp_path, target), options, prepare=prepare, late_s=0.0)
     rig.until_driven(2.0)
     smaller = [*box(KEEP_IN, -6.0, -2.4, 7.0, 12.0), (CIRCLE_IN, 0.0, 0.0, 90.0)]
-    if when == "before the errand":
+    if when == "before the requested goal":
         Person(rig).upload(smaller)
         rig.until(lambda: rig.executor.statuses()[0][1] is TargetStatus.UNREACHABLE, 3.0)
         rig.reposition(rig.field(4, 3))
@@ -229,7 +229,7 @@ def test_an_errand_is_driven_though_the_target_after_it_is_refused(tmp_path: Pat
         rig.reposition(rig.field(4, 3))
         rig.run_for(0.5)
         Person(rig).upload(smaller)
-    rig.until(lambda: rig.has_reached("errand 1"), 30.0)
+    rig.until(lambda: rig.has_reached("requested goal 1"), 30.0)
     assert rig.passed_m(4, 3) < 0.7
     rig.finish()
     assert [status for _, status in rig.companion.statuses()] == [TargetStatus.UNREACHABLE]

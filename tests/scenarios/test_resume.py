@@ -105,7 +105,7 @@ def test_map_and_past_path_are_there_again(tmp_path: Path, metres: float) -> Non
     assert evidence is not None and driver is not None
     seen_before, seen_now = before != 0.0, evidence.log_odds != 0.0
     assert (seen_before & seen_now).sum() > 0.8 * seen_before.sum(), "what had been seen, but for the last seconds"
-    state = driver.leg[0]
+    state = driver.nav_state
     assert state is not None and state.past[0] == Cell(2, 7), "the way back on this leg"
     trail = rig.executor.trail.back()
     assert trail[-1] == Cell(2, 7), "the way back to the start"
@@ -114,11 +114,11 @@ def test_map_and_past_path_are_there_again(tmp_path: Path, metres: float) -> Non
     assert any(text.startswith("Resumed with its map, 0 targets reached") for text in rig.texts())
 
 
-def test_an_errand_is_run_to_its_end_and_then_the_mission(tmp_path: Path) -> None:
+def test_a_requested_goal_is_run_to_its_end_and_then_the_mission(tmp_path: Path) -> None:
     rig, mission = rig_of(tmp_path)
     rig.until_driven(3.0)
     centre = rig.executor.evidence.base.centre_of(Cell(5, 12))
-    rig.executor.request(ResolvedTarget("errand 1", centre, Cell(5, 12), 0.0, OnBlocked.SKIP, 1.5))
+    rig.executor.request(ResolvedTarget("requested goal 1", centre, Cell(5, 12), 0.0, OnBlocked.SKIP, 1.5))
     rig.run_for(0.5)
     kill_and_resume(rig, mission)
     goes_on_after_s(rig, rig.now_s())

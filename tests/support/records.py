@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.core.grid import Cell
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.navigation.field_step import Action, Decision, Part, SearchKind
 from companion.planning.problem import Path as FieldPath
 from companion.recording.recorder import Recorder
@@ -16,7 +16,7 @@ from companion.settings import Settings
 from tests.support.mavlink_vehicle import Station
 from tests.support.rig import yard
 
-ROUNDS = 200
+TICKS = 200
 DECISION = Decision(
     action=Action.FOLLOW,
     part=Part.SEARCH,
@@ -34,7 +34,7 @@ def write_record(folder: Path) -> Path:
     recorder = Recorder(folder / "record", yard(folder), Settings(), 0, arm=True, start_us=0)
     rover, companion = Station(), Station(1, 191)
     recorder.begin(0.0, Mark.BEGIN)
-    for number in range(1, ROUNDS):
+    for number in range(1, TICKS):
         time_s = 0.05 * number
         recorder.heard(time_s, [rover.local_position(50 * number, 0.1 * number), rover.heartbeat()])
         recorder.said(time_s, companion.heartbeat(kind=18, autopilot=8))

@@ -45,7 +45,7 @@ def progresses(draw: st.DrawFn) -> SavedProgress:
         start=SavedPlace(north_m=draw(METRES), east_m=draw(METRES)),
         statuses=tuple(statuses),
         index=draw(st.integers(0, len(statuses) - 1)),
-        leg=draw(st.sampled_from(MissionPhase)),
+        phase=draw(st.sampled_from(MissionPhase)),
         left_s=draw(st.floats(0.0, 1e4)),
         give_up_left_s=draw(st.none() | st.floats(0.0, 1e4)),
     )
@@ -55,7 +55,7 @@ def progresses(draw: st.DrawFn) -> SavedProgress:
 def states(draw: st.DrawFn) -> SavedState:
     count = st.integers(0, 2**60)
     word = st.integers(0, 2**128 - 1)
-    leg = st.builds(
+    nav_state = st.builds(
         SavedNavState,
         past=st.lists(st.tuples(FIELD, FIELD), min_size=1, max_size=30).map(tuple),
         returning=st.booleans(),
@@ -79,7 +79,7 @@ def states(draw: st.DrawFn) -> SavedState:
         origin=(draw(st.floats(-90.0, 90.0)), draw(st.floats(-180.0, 180.0))),
         home=(draw(st.floats(-90.0, 90.0)), draw(st.floats(-180.0, 180.0))),
         progress=draw(progresses()),
-        leg=draw(st.none() | leg),
+        nav_state=draw(st.none() | nav_state),
         trail=draw(st.lists(st.tuples(FIELD, FIELD), max_size=30).map(tuple)),
         ground=SavedGrid(
             north_m=draw(METRES),
@@ -138,11 +138,13 @@ def a_state(**changes: Any) -> SavedState:
             start=SavedPlace(north_m=0.0, east_m=0.0),
             statuses=(TargetStatus.PENDING,),
             index=0,
-            leg=MissionPhase.TRAVEL,
+            phase=MissionPhase.TRAVEL,
             left_s=0.0,
             give_up_left_s=None,
         ),
-        "leg": SavedNavState(past=((1, 2),), returning=False, until_search=0, since_better=0, draws=1, doubts_left=3),
+        "nav_state": SavedNavState(
+            past=((1, 2),), returning=False, until_search=0, since_better=0, draws=1, doubts_left=3
+        ),
         "ground": SavedGrid(north_m=0.0, east_m=0.0, resolution_m=1.0, width=7, height=5, subdivisions=2),
         "tally": SavedTally(),
         "draws": None,

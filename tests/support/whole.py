@@ -10,8 +10,8 @@ import numpy as np
 
 from companion.app import Companion
 from companion.checkpoint.checkpointer import RunMoment
-from companion.core.round_marks import Mark
 from companion.core.scan import RangeScan
+from companion.core.tick_marks import Mark
 from companion.executive.mission_executor import MissionExecutor
 from companion.navigation.step_runner import InlineRunner
 from companion.recording.recorder import NullRecorder
@@ -98,7 +98,7 @@ class Whole:
         ]
 
     def tick(self, *events: Event, silent: bool = False) -> list[object]:
-        """One round; what it sends, texts aside."""
+        """One tick; what it sends, texts aside."""
         self.autopilot.events = [*([] if silent else self.heard()), *events]
         self.companion.tick()
         return [command for command in self.autopilot.taken() if not isinstance(command, StatusText)]

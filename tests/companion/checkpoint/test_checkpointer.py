@@ -23,7 +23,7 @@ from companion.checkpoint.checkpointer import (
 from companion.checkpoint.resume import resumed_nav_state
 from companion.core.frames import GeoPoint, LocalFrame, Pose
 from companion.core.grid import Cell, empty_grid
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, lay
@@ -69,14 +69,12 @@ class PathSearcher:
 @dataclass
 class Driver:
     goal: object
-    state: NavState
+    nav_state: NavState
     planning: bool = False
     tally: Tally = field(default_factory=lambda: Tally(5, 2, 1))
     searcher: PathSearcher = field(default_factory=PathSearcher)
-
-    @property
-    def leg(self) -> tuple[NavState, int, int]:
-        return self.state, 3, 4
+    doubts_left: int = 3
+    epoch: int = 4
 
 
 @dataclass
@@ -202,9 +200,9 @@ def test_the_state_has_what_a_resumed_run_needs(bench: Bench, mission: Mission) 
     state = saved_state(update.snapshot)
     assert (state.mission, state.released, state.control, state.armed) == (mission.name, True, Control.COMPANION, True)
     assert state.progress.left_s == pytest.approx(7.0) and state.ahead_s == pytest.approx(90.0)
-    assert state.leg is not None and state.trail == ((2, 7),)
-    restored, driver = resumed_nav_state(state.leg, Cell(0, 0)), bench.executor.driver
-    assert restored.past == driver.state.past and restored.draws == driver.state.draws
+    assert state.nav_state is not None and state.trail == ((2, 7),)
+    restored, driver = resumed_nav_state(state.nav_state, Cell(0, 0)), bench.executor.driver
+    assert restored.past == driver.nav_state.past and restored.draws == driver.nav_state.draws
     assert (state.tally.steps, state.tally.epoch) == (5, 4)
     assert state.draws is not None
     assert state.draws.state == driver.searcher.rng.bit_generator.state["state"]["state"]
@@ -214,7 +212,7 @@ def test_the_navigators_state_of_another_target_is_not_saved(bench: Bench) -> No
     bench.executor.driver.goal = None
     bench.update()
     _, update = bench.update(done=True)
-    assert update.snapshot is not None and saved_state(update.snapshot).leg is None
+    assert update.snapshot is not None and saved_state(update.snapshot).nav_state is None
 
 
 def test_a_problem_is_noted_in_the_record(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

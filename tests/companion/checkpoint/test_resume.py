@@ -90,7 +90,7 @@ def previous_run(folder: Path, origin: GeoPoint = ORIGIN) -> tuple[PreviousRun, 
             start=SavedPlace(north_m=home.north_m, east_m=home.east_m),
             statuses=(TargetStatus.UNREACHABLE,),
             index=0,
-            leg=MissionPhase.WAIT,
+            phase=MissionPhase.WAIT,
             left_s=2.0,
             give_up_left_s=100.0,
         ),
@@ -151,8 +151,8 @@ def test_a_grid_that_has_become_a_field_larger_takes_the_map_along(tmp_path: Pat
     s = layout.evidence.subdivisions
     assert np.array_equal(layout.evidence.log_odds[:-s, 2 * s :], previous.rasters["log_odds"][s:, : -2 * s])
     assert not layout.evidence.log_odds[:, : 2 * s].any()
-    leg = SavedNavState(past=((4, 4), (5, 4)), returning=True, until_search=2, since_better=1, draws=9, doubts_left=1)
-    assert resumed_nav_state(leg, grid_shift(moved.state, layout)).past == (Cell(6, 3), Cell(7, 3))
+    saved = SavedNavState(past=((4, 4), (5, 4)), returning=True, until_search=2, since_better=1, draws=9, doubts_left=1)
+    assert resumed_nav_state(saved, grid_shift(moved.state, layout)).past == (Cell(6, 3), Cell(7, 3))
 
 
 def test_other_settings_of_the_map_cost_the_map_and_not_the_progress(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def test_a_leg_begins_once_and_a_stay_and_the_end_follow(desk: Desk) -> None:
 
 def test_a_requested_goal_comes_first(desk: Desk) -> None:
     step(desk)
-    goal = ResolvedTarget("errand 1", NedPoint(3.0, 0.0), Cell(2, 10), 0.0, OnBlocked.SKIP, None)
+    goal = ResolvedTarget("requested goal 1", NedPoint(3.0, 0.0), Cell(2, 10), 0.0, OnBlocked.SKIP, None)
     desk.executor.request(goal)
     assert desk.executor.driver.goal is None, "the leg under way is left"
     step(desk)

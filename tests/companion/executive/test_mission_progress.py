@@ -101,36 +101,36 @@ def test_time_alone_changes_nothing_else(phase):
     assert on_time(state, 1e9) is state
 
 
-def test_an_errand_comes_first_and_then_the_same_target():
-    state = with_requested(progress(), target("errand"))
-    assert state.goal.name == "errand" and not state.ended
+def test_a_requested_goal_comes_first_and_then_the_same_target():
+    state = with_requested(progress(), target("requested goal"))
+    assert state.goal.name == "requested goal" and not state.ended
     for after in (on_reached(state, 5.0), blocked(state)):
         assert after == progress()
 
 
-def test_a_stay_that_an_errand_interrupts_is_over():
-    state = with_requested(on_reached(progress(), 100.0), target("errand"))
+def test_a_stay_that_a_requested_goal_interrupts_is_over():
+    state = with_requested(on_reached(progress(), 100.0), target("requested goal"))
     assert on_time(state, 100.5) is state
     state = on_reached(state, 101.0)
     assert (state.phase, state.goal.name, state.statuses) == (MissionPhase.TRAVEL, "b", (REACHED, PENDING, PENDING))
 
 
-def test_an_errand_while_waiting_at_the_last_target_comes_before_the_end():
+def test_a_requested_goal_while_waiting_at_the_last_target_comes_before_the_end():
     state = progress()
     for now_s in (10.0, 20.0):
         state = on_time(on_reached(state, now_s), now_s + 3.0)
-    state = with_requested(on_reached(state, 30.0), target("errand"))
+    state = with_requested(on_reached(state, 30.0), target("requested goal"))
     assert state.phase is MissionPhase.DONE and not state.ended
     assert on_reached(state, 40.0).ended
 
 
-def test_a_wait_that_an_errand_interrupts_is_another_try_and_keeps_its_limit():
-    state = with_requested(blocked(progress(OnBlocked.WAIT), 10.0), target("errand"))
+def test_a_wait_that_a_requested_goal_interrupts_is_another_try_and_keeps_its_limit():
+    state = with_requested(blocked(progress(OnBlocked.WAIT), 10.0), target("requested goal"))
     state = on_reached(state, 20.0)
     assert (state.phase, state.goal.name, state.give_up_s) == (MissionPhase.TRAVEL, "a", 22.0)
     assert blocked(state, 22.0).goal.name == "b"
 
 
-def test_a_newer_errand_takes_the_place_of_one_under_way():
+def test_a_newer_requested_goal_takes_the_place_of_one_under_way():
     state = with_requested(with_requested(progress(), target("first")), target("second"))
     assert on_reached(state, 5.0) == progress()

@@ -4,7 +4,7 @@ import threading
 
 import pytest
 
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.navigation.step_runner import InlineRunner, NotedRunner, ThreadRunner
 
 RESULT = (object(), object())

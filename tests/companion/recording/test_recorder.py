@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from pymavlink import mavutil
 
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.mission.serialization import from_json
-from companion.recording.record_format import RecordError, Round, unpacked_rounds
+from companion.recording.record_format import RecordError, TickEntry, unpacked_ticks
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from tests.support.mavlink_vehicle import Station
@@ -78,7 +78,7 @@ def test_it_is_on_disk_after_a_second_without_closing(tmp_path: Path) -> None:
     recorder.heard(0.5, [packet])
     recorder.heard(1.5, [packet])
     assert (tmp_path / "run" / "link.tlog").stat().st_size == 3 * (8 + len(packet))
-    assert unpacked_rounds((tmp_path / "run" / "rounds.bin").read_bytes())[0] == [Round(0.0, 1), Round(0.5, 1)]
+    assert unpacked_ticks((tmp_path / "run" / "ticks.bin").read_bytes())[0] == [TickEntry(0.0, 1), TickEntry(0.5, 1)]
     assert json.loads((tmp_path / "run" / "meta.json").read_text())["end"] is None
     recorder.close()
 

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.recording.reader import load_record
-from companion.recording.record_format import packed_round, unpacked_rounds
+from companion.recording.record_format import packed_tick, unpacked_ticks
 from companion.replay.replay import EndOfRecordError, RecordPlayer, ReplayStepRunner
 from tests.support.mavlink_vehicle import Station
-from tests.support.records import DECISION, ROUNDS, unclosed, write_record
+from tests.support.records import DECISION, TICKS, unclosed, write_record
 
 
 @pytest.fixture
@@ -20,8 +20,8 @@ def player(tmp_path: Path) -> RecordPlayer:
     return RecordPlayer(load_record(write_record(tmp_path)), lambda *_: None)
 
 
-def play(player: RecordPlayer, until: int = ROUNDS) -> None:
-    """Do what the recorded run did in its first rounds."""
+def play(player: RecordPlayer, until: int = TICKS) -> None:
+    """Do what the recorded run did in its first ticks."""
     companion = Station(1, 191)
     for number in range(until):
         player.advance()
@@ -36,8 +36,8 @@ def test_the_same_run_has_no_differences(player: RecordPlayer) -> None:
     play(player)
     player.end()
     assert player.result.differences == []
-    assert (player.result.rounds, player.result.said, player.result.decisions) == (ROUNDS, ROUNDS - 1, 9)
-    assert player.result.seconds == pytest.approx(0.05 * (ROUNDS - 1))
+    assert (player.result.ticks, player.result.said, player.result.decisions) == (TICKS, TICKS - 1, 9)
+    assert player.result.seconds == pytest.approx(0.05 * (TICKS - 1))
     with pytest.raises(EndOfRecordError):
         player.advance()
 
@@ -99,13 +99,13 @@ def test_a_mark_that_the_run_did_not_have_is_told(player: RecordPlayer) -> None:
 
 def test_an_answer_is_taken_in_the_round_in_which_the_run_took_it(tmp_path: Path) -> None:
     record = write_record(tmp_path)
-    rounds, _ = unpacked_rounds((record / "rounds.bin").read_bytes())
+    ticks, _ = unpacked_ticks((record / "ticks.bin").read_bytes())
     marks = {2: Mark.WORKING, 3: Mark.ANSWER}
-    changed = [entry._replace(marks=entry.marks | marks.get(number, 0)) for number, entry in enumerate(rounds)]
-    (record / "rounds.bin").write_bytes(b"".join(packed_round(entry) for entry in changed))
+    changed = [entry._replace(marks=entry.marks | marks.get(number, 0)) for number, entry in enumerate(ticks)]
+    (record / "ticks.bin").write_bytes(b"".join(packed_tick(entry) for entry in changed))
     unclosed(record)
     player, started = RecordPlayer(load_record(record), lambda *_: None), []
-    runner = ReplayStepRunner(player, lambda: started.append(player.round.time_s))
+    runner = ReplayStepRunner(player, lambda: started.append(player.entry.time_s))
 
     def failing() -> None:
         raise ZeroDivisionError

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from companion.checkpoint.state_writer import StateFile, StateUpdate, ThreadStateWriter
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.recording.reader import load_record
 from companion.recording.recorder import MAX_UNWRITTEN_BYTES, Recorder
 from companion.settings import Settings

@@ -22,7 +22,7 @@ def test_monitors_hear_of_an_event_before_the_drive_permission(tmp_path: Path) -
     assert isinstance(parts.supervisor, Supervisor)
     names = [type(handler).__name__ for handler in parts.dispatcher._handlers]
     assert names[:2] == ["OperatorServer", "MissionChangeMonitor"] and len(names) == 13
-    assert names[-3:] == ["BatteryMonitor", "GoalRequests", "DrivePermission"]
+    assert names[-3:] == ["BatteryMonitor", "RequestedGoals", "DrivePermission"]
 
 
 def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from companion.core.round_marks import Mark
+from companion.core.tick_marks import Mark
 from companion.safety.reasons import EndReason, Reason
 from companion.supervision.supervisor import LoopWatch
 from companion.vehicle.commands import (
@@ -46,7 +46,7 @@ def test_an_error_ends_the_run_in_hold_before_close_returns(whole: Whole) -> Non
     assert whole.autopilot.taken() == [], "once"
 
 
-def test_the_monitor_of_the_loop_is_told_how_late_a_round_is_and_whether_the_navigator_works() -> None:
+def test_the_monitor_of_the_loop_is_told_how_late_a_tick_is_and_whether_the_navigator_works() -> None:
     told: list[tuple[float, float, bool]] = []
     monitor: Any = SimpleNamespace(
         tick=lambda now_s, late_s, *, planner_works: told.append((now_s, late_s, planner_works))

@@ -1,4 +1,4 @@
-"""Marks of one round of the program's loop: what happened in it besides the packets that it received and sent.
+"""Marks of one tick: what happened in it besides the packets that were received and sent.
 
 A run follows from its inputs. Most of them are in other files of its record; these marks are what remains: when a
 thread's answer was taken, when a person ended the run, which packets were refused.
@@ -10,7 +10,7 @@ from enum import IntFlag
 
 
 class Mark(IntFlag):
-    """What happened in a round besides packets. The numbers are those of the record's files."""
+    """What happened in a tick besides packets. The numbers are those of the record's files."""
 
     BEGIN = 1
     """The companion was made; no packets were read."""

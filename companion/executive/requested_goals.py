@@ -1,6 +1,6 @@
-"""Goal requests: places that people ask for during a run (DO_REPOSITION, a guided item), accepted or refused.
+"""Requested goals: places that people ask for during a run (DO_REPOSITION, a guided item), accepted or refused.
 
-Nouns: goal request, errand.
+Nouns: requested goal.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.safety.reasons import LatchReason, Reason, Refusal
 from companion.settings.live_settings import LiveSettings
-from companion.vehicle.commands import AnswerTarget
+from companion.vehicle.commands import AnswerGoal
 from companion.vehicle.events import (
     Event,
+    GoalAnswer,
+    GoalRequested,
     RoverMode,
-    TargetAnswer,
-    TargetAsked,
 )
 from companion.vehicle.state import VehicleState
 
@@ -55,7 +55,7 @@ def refusal(place: NedPoint, here: NedPoint, layout: MissionLayout, reach_m: flo
     return Reason(Refusal.OBSTACLE_SEEN) if evidence.grid.weights[cell.y, cell.x] >= OBSTACLE else None
 
 
-class GoalRequests:
+class RequestedGoals:
     """Answers every request, and has the accepted ones driven."""
 
     def __init__(self, run: MissionRun, settings: LiveSettings, notifier: TextSink) -> None:
@@ -63,7 +63,7 @@ class GoalRequests:
         self._settings = settings
         self._notifier = notifier
         self._count = 0
-        self._last: TargetAsked | None = None
+        self._last: GoalRequested | None = None
         self._heard_s = self._refused_s = -math.inf
         self._reason: Reason[Refusal] | None = None
         self._refusals = 0
@@ -71,14 +71,14 @@ class GoalRequests:
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event; anything but a request is ignored."""
-        if isinstance(event, TargetAsked):
+        if isinstance(event, GoalRequested):
             self._answer(event, vehicle)
 
-    def _answer(self, asked: TargetAsked, vehicle: VehicleState) -> None:
+    def _answer(self, asked: GoalRequested, vehicle: VehicleState) -> None:
         flood = asked.time_s - self._times_s[0] < 1.0
         self._times_s.append(asked.time_s)
         if flood:
-            text = f"Errands not heard: more than {MOST_A_SECOND} a second"
+            text = f"Requested goals not heard: more than {MOST_A_SECOND} a second"
             self._notifier.tell(text, Severity.WARNING)
             return
         run = self._run
@@ -86,15 +86,15 @@ class GoalRequests:
         if asked.point is None:
             answer, reason = asked.fault, Reason(Refusal.MALFORMED, (asked.reason,)) if asked.reason else None
         elif run.executor is None or not run.is_driving:
-            answer, reason = TargetAnswer.NOT_NOW, Reason(Refusal.NOT_DRIVING, (run.activity,))
+            answer, reason = GoalAnswer.NOT_NOW, Reason(Refusal.NOT_DRIVING, (run.activity,))
         elif not _may_drive(vehicle):
             why = Reason(LatchReason.OTHER_MODE, (RoverMode.GUIDED.name,))
-            answer, reason = TargetAnswer.NOT_NOW, Reason(Refusal.NOT_DRIVING, (why,))
+            answer, reason = GoalAnswer.NOT_NOW, Reason(Refusal.NOT_DRIVING, (why,))
         else:
             answer, reason = self._judge(asked, vehicle, run.executor)
         if reason is not None:
             self._refuse(reason, asked.time_s)
-        run.sender.send(AnswerTarget(asked.asker, asked.form, answer), asked.time_s)
+        run.sender.send(AnswerGoal(asked.asker, asked.form, answer), asked.time_s)
 
     def _refuse(self, reason: Reason[Refusal], now_s: float) -> None:
         """Say why. A reason that was the last one's too is said again, but not at every repetition of one request."""
@@ -104,40 +104,40 @@ class GoalRequests:
         self._reason, self._refused_s = reason, now_s
         self._refusals = self._refusals + 1 if same else 1
         again = f" ({self._refusals} times)" if same else ""
-        self._notifier.tell(f"Errand refused{again}: {reason}", Severity.WARNING)
+        self._notifier.tell(f"Requested goal refused{again}: {reason}", Severity.WARNING)
 
     def _judge(
-        self, asked: TargetAsked, vehicle: VehicleState, executor: MissionExecutor
-    ) -> tuple[TargetAnswer, Reason[Refusal] | None]:
+        self, asked: GoalRequested, vehicle: VehicleState, executor: MissionExecutor
+    ) -> tuple[GoalAnswer, Reason[Refusal] | None]:
         """A place, and a rover that is driven: the answer, and the reason of a refusal."""
         pose = vehicle.pose_at(asked.time_s)
         assert asked.point is not None
         if pose is None:
-            return TargetAnswer.NOT_NOW, Reason(Refusal.NO_POSITION)
+            return GoalAnswer.NOT_NOW, Reason(Refusal.NO_POSITION)
         progress = executor.progress
         if progress.phase is MissionPhase.HOME:
-            return TargetAnswer.NOT_NOW, Reason(Refusal.RETURNING)
+            return GoalAnswer.NOT_NOW, Reason(Refusal.RETURNING)
         if progress.ended:
-            return TargetAnswer.NOT_NOW, Reason(Refusal.ENDED)
+            return GoalAnswer.NOT_NOW, Reason(Refusal.ENDED)
         place = LocalFrame(executor.layout.origin).to_ned(asked.point)
         if self._is_repeated(asked, place, executor):
             self._heard_s = asked.time_s
-            return TargetAnswer.ACCEPTED, None
-        reach_m = self._settings.current.safety.errand_reach_m
+            return GoalAnswer.ACCEPTED, None
+        reach_m = self._settings.current.safety.requested_goal_m
         if (reason := refusal(place, pose.point, executor.layout, reach_m)) is not None:
-            return TargetAnswer.DENIED, reason
+            return GoalAnswer.DENIED, reason
         self._last, self._heard_s = asked, asked.time_s
         self._count += 1
-        name, cell = f"errand {self._count}", executor.evidence.base.cell_at(place)
+        name, cell = f"requested goal {self._count}", executor.evidence.base.cell_at(place)
         cruise_m_s = self._run.mission.rover.cruise_speed_m_s
         speed_m_s = None if asked.speed_m_s is None else min(asked.speed_m_s, cruise_m_s)
         distance_m = pose.point.distance_m(place)
-        text = f"Errand {self._count}: {distance_m:.1f} m away, then the mission goes on"
+        text = f"Requested goal {self._count}: {distance_m:.1f} m away, then the mission goes on"
         self._notifier.tell(text, Severity.INFO)
         executor.request(ResolvedTarget(name, place, cell, 0.0, OnBlocked.SKIP, speed_m_s))
-        return TargetAnswer.ACCEPTED, None
+        return GoalAnswer.ACCEPTED, None
 
-    def _is_repeated(self, asked: TargetAsked, place: NedPoint, executor: MissionExecutor) -> bool:
+    def _is_repeated(self, asked: GoalRequested, place: NedPoint, executor: MissionExecutor) -> bool:
         """Whether this very goal is under way, or was a moment ago."""
         last, requested = self._last, executor.progress.requested
         if last is None or last.point is None or asked.speed_m_s != last.speed_m_s:

@@ -9,7 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
-from companion.executive.goal_requests import REPEAT_S
+from companion.executive.requested_goals import REPEAT_S
 from companion.navigation.field_step import Action
 from companion.safety.reasons import RunPhase, WaitReason
 from companion.settings import parse_settings
@@ -30,12 +30,12 @@ def driving(tmp_path: Path) -> Asker:
 def test_a_place_asked_for_is_driven_first_and_then_the_mission_goes_on(driving: Asker) -> None:
     driving.reposition(driving.field(5, 12))
     assert driving.answered() == ACCEPTED
-    driving.until(lambda: driving.has_reached("errand 1"), 60.0)
+    driving.until(lambda: driving.has_reached("requested goal 1"), 60.0)
     assert driving.passed_m(5, 12) < 0.7
     driving.finish()
     assert driving.companion.outcome.complete
     assert driving.passed_m(15, 7) < 0.7
-    assert driving.goals == ["gate", "errand 1", "gate"]
+    assert driving.goals == ["gate", "requested goal 1", "gate"]
     assert driving.texts()[-1] == "Mission ended: 1 of 1 targets reached"
     assert driving.simulator.collisions == ()
 
@@ -110,9 +110,9 @@ def test_a_place_refused_again_is_told_again(driving: Asker) -> None:
         driving.reposition(driving.field(40, 7))
         assert driving.answered() == DENIED
         driving.run_for(1.0)
-    told = [text for text in driving.texts() if text.startswith("Errand refused")]
+    told = [text for text in driving.texts() if text.startswith("Requested goal refused")]
     reason = "outside the mission's grid"
-    assert told == [f"Errand refused{again}: {reason}" for again in ("", " (2 times)", " (3 times)")]
+    assert told == [f"Requested goal refused{again}: {reason}" for again in ("", " (2 times)", " (3 times)")]
 
 
 def test_a_place_where_an_obstacle_was_seen_is_refused(driving: Asker) -> None:
@@ -164,16 +164,16 @@ def test_a_repeated_request_changes_nothing(driving: Asker) -> None:
         assert driving.answered() == ACCEPTED
     driving.until(lambda: driving.passed_m(5, 12) < 1.5, 60.0)
     driving.reposition(place)
-    driving.until(lambda: driving.has_reached("errand 1"), 60.0)
+    driving.until(lambda: driving.has_reached("requested goal 1"), 60.0)
     driving.answers.clear()
     driving.reposition(place)  # once more by a ground station that has not heard the answer
     assert driving.answered() == ACCEPTED
-    assert driving.goals == ["gate", "errand 1", "gate"]
+    assert driving.goals == ["gate", "requested goal 1", "gate"]
     driving.run_for(REPEAT_S)
     driving.reposition(place)  # and this time it is meant
     assert driving.answered() == ACCEPTED
     driving.finish()
-    assert driving.goals == ["gate", "errand 1", "gate", "errand 2", "gate"]
+    assert driving.goals == ["gate", "requested goal 1", "gate", "requested goal 2", "gate"]
     assert driving.companion.outcome.complete
 
 
@@ -183,7 +183,7 @@ def test_the_newest_request_counts(driving: Asker) -> None:
     driving.reposition(driving.field(4, 2))
     assert driving.answered() == ACCEPTED
     driving.finish()
-    assert driving.has_reached("errand 2") and not driving.has_reached("errand 1")
+    assert driving.has_reached("requested goal 2") and not driving.has_reached("requested goal 1")
     assert driving.companion.outcome.complete
 
 
@@ -194,7 +194,7 @@ def test_a_place_that_cannot_be_reached_is_given_up_and_the_mission_goes_on(tmp_
     rig.reposition(rig.field(15, 7))
     assert rig.answered() == ACCEPTED
     rig.finish(600.0)
-    assert rig.times_decided(Action.UNREACHABLE, "errand 1") == 1
+    assert rig.times_decided(Action.UNREACHABLE, "requested goal 1") == 1
     assert rig.companion.outcome.complete
     assert rig.simulator.collisions == ()
 
@@ -223,7 +223,7 @@ def test_a_speed_is_a_limit_and_never_more_than_the_mission_allows(driving: Aske
         assert progress.requested.speed_m_s == (None if taken_m_s is None else pytest.approx(taken_m_s))
 
 
-def test_an_errand_keeps_its_place_when_the_origin_moves(tmp_path: Path) -> None:
+def test_a_requested_goal_keeps_its_place_when_the_origin_moves(tmp_path: Path) -> None:
     rig = Asker(yard(tmp_path), parse_settings({"link": {"setpoint": "global"}}, "test"))
     rig.until_driven(1.5)
     rig.reposition(rig.field(5, 12))
@@ -231,7 +231,7 @@ def test_an_errand_keeps_its_place_when_the_origin_moves(tmp_path: Path) -> None
     rig.change = Frame(20.0, -35.0)
     origin = rig.companion.origin
     rig.until(lambda: rig.companion.origin != origin, 3.0)
-    rig.until(lambda: rig.has_reached("errand 1"), 60.0)
+    rig.until(lambda: rig.has_reached("requested goal 1"), 60.0)
     assert rig.passed_m(5, 12) < 1.5
     rig.finish()
     assert rig.companion.outcome.complete
@@ -243,22 +243,22 @@ def low_battery(message: Any) -> Any:
     return message
 
 
-def test_a_battery_that_runs_low_ends_an_errand(driving: Asker) -> None:
+def test_a_battery_that_runs_low_ends_a_requested_goal(driving: Asker) -> None:
     driving.reposition(driving.field(20, 12))
     assert driving.answered() == ACCEPTED
     driving.run_for(2.0)
     driving.change = low_battery
     driving.finish()
     assert driving.companion.outcome.broken_off is not None
-    assert not driving.has_reached("errand 1")
+    assert not driving.has_reached("requested goal 1")
     assert driving.passed_m(2, 7) < 1.5, "back where it began"
     driving.change = None
 
 
-def test_a_rover_on_its_way_back_takes_no_errand(driving: Asker) -> None:
+def test_a_rover_on_its_way_back_takes_no_requested_goal(driving: Asker) -> None:
     driving.until_driven(6.0)
     driving.change = low_battery
     driving.until(lambda: driving.companion.outcome.broken_off is not None, 12.0)
     driving.reposition(driving.field(20, 12))
     assert driving.answered() == NOT_NOW
-    assert "errand 1" not in driving.goals
+    assert "requested goal 1" not in driving.goals
