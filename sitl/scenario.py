@@ -18,7 +18,7 @@ from sitl.faults.fault_file import load_faults
 from sitl.faults.plan import FaultPlan, SensorFault
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.physics import Physics
-from sitl.plant.main_loop import NoiseSettings
+from sitl.plant.closed_loop import NoiseSettings
 from sitl.sensors.range_sensors import SensorSuite, suite_named
 from sitl.sensors.suites import suite_of
 from sitl.simulator import Simulator

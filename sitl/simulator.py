@@ -24,7 +24,7 @@ from sitl.autopilot.vehicle import Vehicle
 from sitl.faults.link_faults import LinkQueue
 from sitl.faults.plan import FaultPlan
 from sitl.faults.player import FaultPlayer
-from sitl.plant.main_loop import NOISE_COLUMNS, NoiseSettings, run_loops
+from sitl.plant.closed_loop import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.plant.rover import new_rover
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite, suite_named
 from sitl.sim_link import SimLink

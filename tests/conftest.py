@@ -9,9 +9,9 @@ import pytest
 from hypothesis import HealthCheck, settings
 from hypothesis.database import DirectoryBasedExampleDatabase
 
-from companion.cli import kernels
+from companion.cli import kernel_cache
 
-kernels.use_cache(os.environ)  # before a test imports numba
+kernel_cache.use_cache(os.environ)  # before a test imports numba
 
 # The same examples every time, on however busy a machine. ``make fuzz`` draws new ones, and tries finds again.
 settings.register_profile(

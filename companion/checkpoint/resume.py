@@ -105,7 +105,8 @@ def resumed_layout(
     """The mission in the present frame with the saved map, the saved progress, and a text about the map for people.
 
     ``same``: the autopilot has not restarted, so its frame is the same unless its origin has moved. Otherwise a new
-    position estimate may be some metres off: no ground counts as seen free, and the obstacles count as barely seen.
+    position estimate may be some metres off: no ground counts as seen free, and obstacles keep the least evidence that
+    still makes them obstacles.
     Raises MissionError.
     """
     state, saved_origin = previous.state, GeoPoint(*previous.state.origin)
@@ -131,7 +132,7 @@ def resumed_layout(
 def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: VehicleState, now_s: float) -> None:
     """Continue in the middle of a leg: counts, random generator, trail, and the navigator's state.
 
-    The leg begins again if the rover was carried, or if it must not be driven.
+    The leg begins again if the rover was carried, or if the mission does not drive now.
     """
     state = previous.state
     tally = Tally(state.tally.steps, state.tally.return_steps, state.tally.stuck)

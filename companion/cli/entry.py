@@ -10,7 +10,7 @@ from collections.abc import Callable
 from types import FrameType
 from typing import cast
 
-from companion.cli import kernels
+from companion.cli import kernel_cache
 
 EXIT_USAGE, EXIT_STOPPED = 2, 130
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
@@ -29,10 +29,11 @@ def start(name: str, load: Callable[[], Callable[..., object]]) -> int:
         print(f"{name}: {fault}", file=sys.stderr)
         return EXIT_USAGE
     try:
-        kernels.use_cache(os.environ)
+        kernel_cache.use_cache(os.environ)
     except OSError as error:
         print(
-            f"{name}: no place for compiled kernels ({error.strerror or error}); set {kernels.PLACE}", file=sys.stderr
+            f"{name}: no place for compiled kernels ({error.strerror or error}); set {kernel_cache.PLACE}",
+            file=sys.stderr,
         )
         return EXIT_USAGE
     terminated = _Terminated()

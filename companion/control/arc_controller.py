@@ -226,9 +226,10 @@ class _Ways:
         return self._arcs.progress_along(segment.points, progress, course_rad, STEP_M)
 
     def brake(self) -> ControlCommand:
-        """Stop with the wheels as they were told: the arc that the rover is on has been looked along.
+        """Stop with the wheels as they were last told: that arc has been checked.
 
-        To tell it the arc it really drives would widen that arc more and more if it drives wider ones than it is told.
+        The measured curvature is not used. A rover that drives wider arcs than it is told would drive wider and wider
+        ones.
         """
         if abs(self.rolling.speed_m_s) <= self.view.settings.guidance.roll_out_m_s:
             return stop_for(Purpose.BRAKE)
@@ -270,8 +271,8 @@ class _Ways:
     def _left_alone_m_s(self, wanted_m_s: float, curvature_per_m: float, *, backwards: bool) -> float:
         """The wanted speed, or the highest at which the rover may be left alone; 0 where that is too slow to drive.
 
-        Left alone it goes on at the turn rate that it was told, gathering speed, until that is forgotten: on an arc
-        that its speed widens.
+        If the link fails, the rover keeps the turn rate that it was told and gathers speed until the command expires.
+        Its arc widens as its speed grows.
         """
         guidance, steering = self.view.settings.guidance, self.view.settings.steering
         course_rad = self._course_rad(backwards=backwards)

@@ -44,7 +44,7 @@ def stopping_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
 
 
 def blind_distance_m(speed_m_s: float, settings: GuidanceSettings) -> float:
-    """How far a rover drives that is told nothing more after a velocity: until that is forgotten, and to standing."""
+    """How far a rover drives if nothing follows a velocity command: until the command expires, and while it brakes."""
     return speed_m_s * settings.velocity_lasts_s + braking_distance_m(speed_m_s, settings)
 
 

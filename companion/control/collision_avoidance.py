@@ -42,9 +42,9 @@ from companion.perception.moving_obstacles import Moving
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 MARGIN_SHARES = (1.0, 0.5)
-"""With half the margin the rover still goes on, rather than out of the way altogether."""
+"""First with the whole margin, then with half: going on with half the margin is better than leaving the path."""
 NEAR_M = 0.15
-"""Where every option touches something in the end, the one that comes this near last is taken."""
+"""If every option touches something in the end, the option is taken that comes within this distance latest."""
 GO_ON_S = (math.inf, 3.0, 1.5, 0.4)
 """How long the rover might go on before it stops, the longest first: 0.4 s is longer than to the next tick."""
 STRAIGHT_S = 1.0
@@ -52,7 +52,7 @@ TURNING_S = 5.0
 """A rover that stands to look about goes on with that while nothing comes within this time."""
 ASIDE_M = (2.5, 1.5)
 ASIDE_RAD = (0.5 * math.pi, -0.5 * math.pi, 0.25 * math.pi, -0.25 * math.pi)
-"""Where it might move aside to: this far, in these directions from the course of the other."""
+"""How far it may move aside, and in which directions, counted from the course of the other."""
 ASIDE_M_S = 1.2
 OFF_M = 1.5
 """How far it backs off at most."""
@@ -205,9 +205,9 @@ def _on_the_way(outlook: Outlook, command: ControlCommand, line: ReferencePath |
 
 
 def _nearer(command: ControlCommand, pose: Pose, along_m: Points) -> ControlCommand | None:
-    """The same with a position no farther than where the rover is to come to stand; None where it is not farther.
+    """The command with its position moved to where the rover should stop; None if it is not farther than that.
 
-    The rover must stop there also if it is told nothing more.
+    The rover must stop there even if it hears nothing more.
     """
     if not isinstance(command.setpoint, GuidedPosition):
         return None
@@ -221,8 +221,7 @@ def _nearer(command: ControlCommand, pose: Pose, along_m: Points) -> ControlComm
 def _told_way(command: ControlCommand, line: ReferencePath, pose: Pose) -> Points:
     """Where it drives: straight to the position that it is told, and on from there along the line.
 
-    That position lies some metres ahead. Where the line turns off before it, a new one that begins sideways above
-    all, the rover cuts across, and is not where the line is.
+    That position lies some metres ahead. If the line bends before it, the rover cuts the corner and leaves the line.
     """
     ahead = line.points[line.progress + 1 :]
     here = (pose.north_m, pose.east_m)
@@ -248,7 +247,7 @@ def _out_of_the_way(outlook: Outlook, moving: tuple[Moving, ...], aside_rad: flo
 
 
 def _straight_on(outlook: Outlook) -> list[Option]:
-    """Straight past, and stop then: a path that has just been laid anew may turn off before what comes across."""
+    """Drive straight on, then stop. A new path may turn off in front of something that crosses."""
     view = outlook.view
     along_m = outlook.driven_m(view.speed_m_s, STRAIGHT_S)
     there = view.pose.point.moved(view.pose.heading_rad, float(along_m[-1]))

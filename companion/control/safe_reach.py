@@ -38,8 +38,8 @@ class Reach:
 def farthest_clear(path: ReferencePath, view: LocalView) -> Reach:
     """The farthest place of the path in clear sight.
 
-    With wide room where there is that much, with less only where that leads farther. From walls that thin beams
-    have seen more distance is kept: such a wall stays in the map where the position was wrong at that moment.
+    Wide room beside the rover is tried first; less room counts only if it leads farther. With thin beams more room is
+    kept: they map a wall in the wrong place when the position is wrong at that moment, and it stays there.
     """
     settings, here = view.settings.guidance, view.pose.point
     best = Reach(here, 0.0, 0.0)

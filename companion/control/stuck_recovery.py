@@ -1,4 +1,4 @@
-"""Stuck recovery: notices that the rover does not get on, backs it out, and remembers the place as costly.
+"""Stuck recovery: notices that the rover makes no progress, backs it out, and marks the place as costly.
 
 Nouns: stuck recovery.
 """
@@ -25,7 +25,7 @@ TRIES_AT_ONE_PLACE = 3
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where the rover last got on, and when it last moved and last moved or turned."""
+    """Where the rover last made progress; when it last moved; when it last moved or turned."""
 
     pose: Pose
     moved_s: float

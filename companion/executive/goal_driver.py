@@ -259,7 +259,7 @@ class GoalDriver:
         return view.rover.cruise_speed_m_s if wanted_m_s is None else wanted_m_s
 
     def _notice_changes(self, view: LocalView, moving: tuple[Moving, ...]) -> None:
-        """A plan made among moving things is dropped when one of them moves otherwise than it did."""
+        """Drop a plan made among moving obstacles if one of them has changed its motion."""
         state, traffic, now_s = self._state, view.settings.traffic, view.pose.time_s
         if state is None or not self._plans_among_movers or now_s - self._replanned_s < traffic.replan_s:
             return
@@ -268,9 +268,9 @@ class GoalDriver:
             self._state = abandon_path(state)
 
     def _is_doubted(self, decision: Decision, view: LocalView) -> bool:
-        """Whether to look at the map again before the first step back, or giving up, on a proof.
+        """Whether the map must be looked at again before the rover gives up, or goes back because there is no path.
 
-        A proof is only as good as the map, and as the position.
+        The proof that there is no path is only as good as the map and the position.
         """
         giving_up = decision.action is Action.UNREACHABLE or (decision.part is Part.RETURN and decision.proved)
         if not giving_up or view.pose.time_s < self._sure_from_s:

@@ -1,6 +1,6 @@
 """The mission executor: the mission under way, its map, the next target, and the driver that goes there.
 
-Nouns: mission executor, task.
+Nouns: mission executor, mission task.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ WATCHED_SCANS = 20
 """After a wait, obstacles that are not in this many newest scans are forgotten: a door may have opened."""
 
 
-class Task(Enum):
+class MissionTask(Enum):
     """What there is to do for the mission in one tick."""
 
     STAND = auto()
@@ -235,7 +235,7 @@ class MissionExecutor:
 
     # One tick ----------------------------------------------------------------------------------------------------
 
-    def decide(self, vehicle: VehicleState, now_s: float) -> Task:
+    def decide(self, vehicle: VehicleState, now_s: float) -> MissionTask:
         """What to do for the mission now, and by which path: legs begin and end here, and the navigator decides."""
         view = self.view(vehicle, now_s)
         self.trail.enter(self.evidence.base.cell_at(view.pose.point))
@@ -244,26 +244,26 @@ class MissionExecutor:
         if waited and self.progress.phase is MissionPhase.TRAVEL:
             look_again(self.evidence, self._scans - WATCHED_SCANS)
         if self.progress.ended:
-            return Task.END
+            return MissionTask.END
         if self.progress.phase in (MissionPhase.STAY, MissionPhase.WAIT):
             self.phase = RunPhase.HOLDING if self.progress.phase is MissionPhase.STAY else RunPhase.WAY_BLOCKED
             self.driver.pause()
-            return Task.STAND
+            return MissionTask.STAND
         if self.driver.goal != self.progress.goal:
             if self._is_refused(now_s):
-                return Task.STAND
+                return MissionTask.STAND
             self._notifier.tell(f"Heading for {self.progress.goal.name}", Severity.INFO)
             self.driver.head_for(self.progress.goal, view, self._way_back(view.pose))
         self.phase = RunPhase.DRIVING
         decision = self.driver.decide(view, self._moving(vehicle, view))
         if decision is not None:
             self._take_decision(decision, now_s)
-        return Task.DRIVE
+        return MissionTask.DRIVE
 
-    def guide(self, task: Task, vehicle: VehicleState, view: LocalView) -> ControlCommand:
+    def guide(self, task: MissionTask, vehicle: VehicleState, view: LocalView) -> ControlCommand:
         """How to do it now: the setpoint and the speed."""
         moving = self._moving(vehicle, view)
-        return self.driver.standing(view, moving) if task is Task.STAND else self.driver.guide(view, moving)
+        return self.driver.standing(view, moving) if task is MissionTask.STAND else self.driver.guide(view, moving)
 
     def view(self, vehicle: VehicleState, now_s: float) -> LocalView:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""

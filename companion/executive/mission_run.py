@@ -17,7 +17,7 @@ from companion.core.frames import Pose
 from companion.core.scan import RangeScan
 from companion.core.severity import TextSink
 from companion.executive.auto_mode_legs import AutoModeLegs
-from companion.executive.mission_executor import MissionExecutor, Task
+from companion.executive.mission_executor import MissionExecutor, MissionTask
 from companion.executive.mission_layout import MissionLayout
 from companion.executive.mission_progress import MissionProgress, TargetStatus
 from companion.executive.setpoint_sender import SetpointSender
@@ -149,17 +149,17 @@ class MissionRun:
             for seen in scans:
                 self.executor.map_scan(seen.pose, seen.yaw_rate_rad_s, seen.scan)
 
-    def decide(self, verdict: Verdict, now_s: float) -> Task | Order:
+    def decide(self, verdict: Verdict, now_s: float) -> MissionTask | Order:
         """What to do in this tick: what the verdict demands, or, if the rover may be driven, what the mission needs."""
         if verdict.reaction is not Reaction.DRIVE or self.executor is None:
             return ORDERS.get(verdict.reaction, Order.NOTHING)
         return self.executor.decide(self.vehicle, now_s)
 
-    def guide(self, task: Task | Order, now_s: float) -> ControlCommand | Command | None:
+    def guide(self, task: MissionTask | Order, now_s: float) -> ControlCommand | Command | None:
         """The command for that. What the mission wants passes the check of setpoints before it is sent."""
         if isinstance(task, Order):
             return COMMANDS[task]
-        if task is Task.END or self.executor is None:
+        if task is MissionTask.END or self.executor is None:
             return None
         executor, view = self.executor, self.executor.view(self.vehicle, now_s)
         wanted = executor.guide(task, self.vehicle, view)

@@ -1,7 +1,7 @@
 """Compiled loops over the evidence raster for a rover on arcs: clear length of an arc, pure pursuit along a line.
 
 Lengths and places are in evidence cells, x east and y north; headings are clockwise from north; a curvature is per
-cell, clockwise positive as seen in the direction of travel. The map comes as the tuple ``Ground``.
+cell, clockwise positive as seen in the direction of travel. The map comes as the tuple ``EvidenceArrays``.
 
 Nouns: pure pursuit, curvature.
 """
@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.mapping.kernels import nearest
+from companion.mapping.evidence_kernels import nearest
 
 Points = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ LATE_RAD = 0.6 * math.pi
 """A place on the line that lies farther aside cannot be steered for: the rover would have to turn round first."""
 
 
-class Ground(NamedTuple):
+class EvidenceArrays(NamedTuple):
     """An ``EvidenceMap`` for the compiled loops. The field (``home_x``, ``home_y``) of the rover is never blocked."""
 
     log_odds: NDArray[np.float32]

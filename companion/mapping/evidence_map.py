@@ -21,7 +21,7 @@ from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, Grid
 from companion.core.scan import RangeScan
 from companion.mapping.cell_frame import CellFrame
-from companion.mapping.kernels import InverseSensorModel, ScanInCells, cast_scan, soften, weigh
+from companion.mapping.evidence_kernels import InverseSensorModel, ScanInCells, cast_scan, soften, weigh
 from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 

@@ -13,10 +13,10 @@ import numpy as np
 
 from companion.core.frames import NedPoint, Pose
 from companion.mapping import arc_kernels
-from companion.mapping.arc_kernels import Following, Ground, Start, arc_clear, follow, kept_room, pursue
+from companion.mapping.arc_kernels import EvidenceArrays, Following, Start, arc_clear, follow, kept_room, pursue
 from companion.mapping.cell_frame import Points
+from companion.mapping.evidence_kernels import first_unseen, look, nearest
 from companion.mapping.evidence_map import EvidenceMap
-from companion.mapping.kernels import first_unseen, look, nearest
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,11 +124,11 @@ def within_map_m(evidence: EvidenceMap, point: NedPoint, bearing_rad: float, dis
     return distance_m
 
 
-def ground_at(evidence: EvidenceMap, pose: Pose) -> Ground:
+def ground_at(evidence: EvidenceMap, pose: Pose) -> EvidenceArrays:
     """The map for the compiled loops, with the field that the rover stands in."""
     cell = evidence.base.cell_at(pose.point)
     weights, settings = evidence.base.weights, evidence.settings
-    return Ground(
+    return EvidenceArrays(
         evidence.log_odds, weights, evidence.penalty, evidence.subdivisions, settings.occupied_at, cell.x, cell.y
     )
 

@@ -111,7 +111,7 @@ class NotSaved:
         """Nothing to do."""
 
 
-class Refusal(StrEnum):
+class PacketRefusal(StrEnum):
     """Why a packet is refused."""
 
     UNSIGNED = "unsigned"
@@ -137,11 +137,11 @@ class Refused:
         counts = [f"{count} {what}" for count, what in named if count]
         return f"packets refused: {', '.join(counts)}" if counts else ""
 
-    def count(self, why: Refusal) -> None:
+    def count(self, why: PacketRefusal) -> None:
         """Count one more."""
-        self.unsigned += why is Refusal.UNSIGNED
-        self.wrong += why is Refusal.WRONG
-        self.old += why is Refusal.OLD
+        self.unsigned += why is PacketRefusal.UNSIGNED
+        self.wrong += why is PacketRefusal.WRONG
+        self.old += why is PacketRefusal.OLD
 
     @property
     def marks(self) -> Mark:
@@ -201,7 +201,7 @@ class Signer:
             self.refused.count(why)
         return why is None
 
-    def _refusal(self, packet: Packet) -> Refusal | None:
+    def _refusal(self, packet: Packet) -> PacketRefusal | None:
         """Why to refuse a packet; None to accept it.
 
         pymavlink's own check stores a packet's timestamp before it verifies the signature: a forger could silence a
@@ -209,17 +209,17 @@ class Signer:
         """
         raw = packet.raw
         if raw[0] != MAGIC_V2 or not raw[2] & SIGNED:
-            return None if packet.message_id in ACCEPTED_UNSIGNED else Refusal.UNSIGNED
+            return None if packet.message_id in ACCEPTED_UNSIGNED else PacketRefusal.UNSIGNED
         if not hmac.compare_digest(hashlib.sha256(self.key + raw[:-6]).digest()[:6], raw[-6:]):
-            return Refusal.WRONG
+            return PacketRefusal.WRONG
         stream = (raw[-SIGNATURE], packet.system_id, packet.component_id)
         timestamp = int.from_bytes(raw[-12:-6], "little")
         newest = self._streams.get(stream)
         if newest is None:
             if len(self._streams) >= MOST_STREAMS or timestamp + MINUTE < max(self._sent, self._heard):
-                return Refusal.OLD
+                return PacketRefusal.OLD
         elif timestamp <= newest:
-            return Refusal.OLD
+            return PacketRefusal.OLD
         self._streams[stream] = timestamp
         self._heard = max(self._heard, timestamp)
         return None

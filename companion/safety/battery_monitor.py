@@ -23,7 +23,7 @@ LOW, CRITICAL, FAILED = 2, 3, 5
 """MAV_BATTERY_CHARGE_STATE: low, and from critical to failed; what comes after that is no matter of charge."""
 
 
-class Level(IntEnum):
+class BatteryLevel(IntEnum):
     """What the batteries allow. It never goes back: a battery that recovers at rest is still empty."""
 
     FINE = 0
@@ -36,8 +36,8 @@ class BatteryState:
     """The newest of each battery, since when it has been below which threshold, and what followed (and why)."""
 
     batteries: Mapping[int, BatterySeen] = field(default_factory=dict)
-    since_s: Mapping[Level, float] = field(default_factory=dict)
-    level: Level = Level.FINE
+    since_s: Mapping[BatteryLevel, float] = field(default_factory=dict)
+    level: BatteryLevel = BatteryLevel.FINE
     reason: Reason[PowerReason] | None = None
 
 
@@ -48,7 +48,10 @@ def with_battery(state: BatteryState, seen: BatterySeen) -> BatteryState:
 
 def judged(state: BatteryState, now_s: float, settings: PowerSettings) -> BatteryState:
     """The state at this moment: a level is reached when a reading has asked for it for ``after_s`` without a break."""
-    reasons = {level: _reason(level, _known(state.batteries, now_s), settings) for level in (Level.RETURN, Level.HOLD)}
+    reasons = {
+        level: _reason(level, _known(state.batteries, now_s), settings)
+        for level in (BatteryLevel.RETURN, BatteryLevel.HOLD)
+    }
     since_s = {level: state.since_s.get(level, now_s) for level, reason in reasons.items() if reason is not None}
     state = replace(state, since_s=since_s)
     for level, began_s in since_s.items():
@@ -63,11 +66,11 @@ def _known(batteries: Mapping[int, BatterySeen], now_s: float) -> list[BatterySe
     return [seen for seen in fresh if seen.number >= 0] or fresh
 
 
-def _reason(level: Level, batteries: list[BatterySeen], settings: PowerSettings) -> Reason[PowerReason] | None:
+def _reason(level: BatteryLevel, batteries: list[BatterySeen], settings: PowerSettings) -> Reason[PowerReason] | None:
     """Why this level is asked for, by the first battery that does; None if none does."""
     percent, volts = settings.return_percent, settings.return_volts
     states = range(LOW, FAILED + 1)
-    if level is Level.HOLD:
+    if level is BatteryLevel.HOLD:
         percent, volts = settings.hold_percent, settings.hold_volts
         states = range(CRITICAL, FAILED + 1)
     for seen in batteries:
@@ -93,14 +96,14 @@ class BatteryMonitor:
         if isinstance(event, BatterySeen):
             self.state = with_battery(self.state, event)
 
-    def level(self, now_s: float) -> Level:
+    def level(self, now_s: float) -> BatteryLevel:
         """What they allow now."""
         self.state = judged(self.state, now_s, self._settings)
         return self.state.level
 
     def awaited(self, now_s: float) -> Reason[WaitReason] | None:
         """What a rover that has not begun yet waits for. Unlike a level this ends when the battery is another one."""
-        reason = _reason(Level.RETURN, _known(self.state.batteries, now_s), self._settings)
+        reason = _reason(BatteryLevel.RETURN, _known(self.state.batteries, now_s), self._settings)
         return None if reason is None else Reason(WaitReason.CHARGED_BATTERY, (reason,))
 
     @property

@@ -66,7 +66,7 @@ class WaitReason(Enum):
     """What is awaited before the companion drives, or drives again."""
 
     HEARTBEAT = "the autopilot's heartbeat{}"
-    """The figure says where was listened."""
+    """The figure tells in words where the companion listens."""
     ORIGIN_AND_HOME = "the autopilot's origin and home"
     GOOD_DATA = "good data ({})"
     FENCE = "the autopilot's fence and rally points{}"

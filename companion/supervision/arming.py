@@ -29,15 +29,15 @@ from companion.vehicle.events import AckSeen, HeartbeatSeen, RoverMode
 from companion.vehicle.state import VehicleState
 
 ASK_AGAIN_S = 3.0
-"""The next command is given after this long, and one that has not worked again,"""
+"""At least this long lies between two commands; one that has not worked is repeated after it."""
 AGAIN_RESUMED_S = 1.0
-"""and by a run that is to go on as soon as the autopilot lets itself be armed, after this long."""
+"""A resumed run repeats a command after this long: it should go on as soon as the autopilot can be armed."""
 TAKEN_S = 0.5
-"""A heartbeat this long after the answer to a mode change shows what has become of it."""
+"""A heartbeat this long after the autopilot accepted a mode shows the mode that it is really in."""
 LEFT_S = 10.0
-"""A rover that an earlier run has left armed in GUIDED, and that cannot be driven for this long, is put into HOLD."""
+"""For a rover that an earlier run left armed in GUIDED: if it cannot be driven for this long, it is put into HOLD."""
 LOOK_AGAIN_S = 2.0
-"""A rover that stands beside the mission's grid is looked at again after this long."""
+"""A rover outside the mission's grid is checked again after this long."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +199,7 @@ class Arming:
         return SetMode(RoverMode.HOLD)
 
     def _give(self, command: Command | None, now_s: float) -> None:
-        """The command, if it is not too soon; a run that is taken up waits only with one that has just been given."""
+        """Send the command, unless it is too soon. A resumed run waits only before it repeats the same command."""
         if self._previous is None:
             soon = now_s - self._asked_s <= ASK_AGAIN_S
         else:
@@ -228,7 +228,7 @@ class Arming:
     # Whose rover it is -------------------------------------------------------------------------------------------
 
     def _had_by_person(self, vehicle: VehicleState) -> bool:
-        """Whether a person has driven it, or taken it out of our mode, in this run and not set our mode since."""
+        """Whether a person drove it or took it out of our mode during this run, and has not set our mode since."""
         if (heartbeat := vehicle.heartbeat) is None:
             return False
         if heartbeat.mode == vehicle.own_mode:
@@ -239,7 +239,7 @@ class Arming:
         return self._persons
 
     def _whose(self, vehicle: VehicleState) -> Control:
-        """Who drives. Where an earlier run had the rover that is looked at once, then the mode decides as always."""
+        """Who drives. If an earlier run had the rover, its saved state decides first; then the mode does, as always."""
         taken = overruled(self._autopilot.last_ack(SetMode(RoverMode.GUIDED)), vehicle.heartbeat)
         control = Control.PERSON if taken else self._run.latch.control
         if self._owner is None and self._previous is not None:

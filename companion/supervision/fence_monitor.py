@@ -31,8 +31,8 @@ PARAMETER_S, PARAMETER_TRIES = 1.0, 8
 FAILED_S = 2.0
 """A list that could not be fetched is asked for again after this long."""
 STATUS_S, ON_S = 5.0, 30.0
-"""FENCE_STATUS comes once a second while a fence is switched on, by whatever means: one older than the first says
-nothing of a breach, but on a bad line the fence counts as on until the second."""
+"""FENCE_STATUS comes once a second while a fence is on. A message older than the first time says nothing of a breach;
+only after the second time does the fence count as switched off, because a bad line loses messages."""
 TOTALS = {"FENCE_TOTAL": PlanKind.FENCE, "RALLY_TOTAL": PlanKind.RALLY}
 """ArduPilot tells everybody these parameters when a list has got another length."""
 

@@ -25,16 +25,16 @@ from companion.vehicle.state import VehicleState
 
 HOME_MOVED_M = 2.0
 ASK_PLACES_S = 0.5
-"""While it is doubtful where the rover is, the origin is asked for this often,"""
+"""While the position is doubted, the origin is requested this often."""
 SETTLED_S = 0.4
-"""and an answer counts that comes this long after the doubt arose: position and origin are then of one frame."""
+"""An answer counts if it comes at least this long after the doubt arose: position and origin then share one frame."""
 
 WANDERINGS, WANDERINGS_S = 3, 20.0
-"""A position that wanders this often within this time is no position to drive by,"""
+"""If the position wanders this often within this time, the rover must not drive."""
 ONCE_S = 3.0
-"""(what lasts no longer than this is once)"""
+"""Wandering that goes on within this time of the last is counted once."""
 CALM_S = 10.0
-"""until it has been calm for this long."""
+"""How long after the last wandering the rover must not drive."""
 
 
 class LocalizationMonitor:

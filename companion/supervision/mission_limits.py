@@ -9,7 +9,7 @@ from companion.core.frames import LocalFrame
 from companion.executive.mission_run import MissionRun
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.operator.notifications import Outcome
-from companion.safety.battery_monitor import BatteryMonitor, Level
+from companion.safety.battery_monitor import BatteryLevel, BatteryMonitor
 from companion.safety.reasons import Doubt, PowerReason, Reason, WaitReason
 from companion.settings import PowerSettings
 from companion.supervision.fence_monitor import FenceMonitor
@@ -68,10 +68,10 @@ class MissionLimits:
             self._run.executor.heed_fence(self._fences.fence)
 
     def awaited(self, now_s: float, *, left_driving: bool) -> Reason[WaitReason] | None:
-        """What must come before the rover may be driven at all; None when nothing must.
+        """What is awaited before the rover may be driven; None if nothing is.
 
-        ``left_driving``: an earlier run has left it armed in GUIDED, perhaps far from anybody. Then no other companion
-        drives it, and a low battery is a reason to go back, not to stay.
+        ``left_driving``: an earlier run left it armed in GUIDED, perhaps far from any person. Then only the fence is
+        awaited: no other companion drives the rover, and a low battery is a reason to return, not to wait.
         """
         fence = self._fences.awaited()
         if fence is not None or left_driving:
@@ -80,20 +80,21 @@ class MissionLimits:
 
     def must_stop(self, now_s: float) -> Reason[PowerReason] | None:
         """Why the rover must stop for good wherever it is; None while it need not."""
-        if self._batteries.level(now_s) is not Level.HOLD:
+        if self._batteries.level(now_s) is not BatteryLevel.HOLD:
             return None
         self._outcome.broken_off = self._batteries.reason
         return self._outcome.broken_off
 
     def enforce(self, now_s: float) -> Reason[PowerReason] | None:
-        """During the mission: why the rover must stop for good here; None to go on, though perhaps only back.
+        """During the mission: why the rover must stop here for good; None if it may go on.
 
-        Within AUTO the battery is left to the autopilot's own failsafe: there is no way back inside a leg.
+        With a low battery the mission is given up, and the rover goes on only to return. In AUTO the battery is left to
+        the autopilot's own failsafe, because the companion cannot turn back within a leg.
         """
         executor, pose = self._run.executor, self._run.vehicle.pose_at(now_s)
         if self._run.vehicle.in_auto or executor is None or pose is None:
             return None
-        if self._batteries.level(now_s) is not Level.RETURN:
+        if self._batteries.level(now_s) is not BatteryLevel.RETURN:
             return self.must_stop(now_s)
         self._outcome.broken_off = self._batteries.reason
         if not executor.returning:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from companion.core.clock import Clock
 from companion.core.severity import Severity
 from companion.core.tick_marks import Mark
-from companion.executive.mission_executor import Task
+from companion.executive.mission_executor import MissionTask
 from companion.executive.mission_run import MissionRun, Order
 from companion.navigation.step_runner import StepRunner
 from companion.operator.notifications import Notifier, Outcome
@@ -98,9 +98,9 @@ class Supervisor:
             return SILENT
         return self._mission_verdict(now_s)
 
-    def conclude(self, task: Task | Order, now_s: float) -> None:
+    def conclude(self, task: MissionTask | Order, now_s: float) -> None:
         """The end of a tick: end the run if the mission has ended, save the run's state, and tell of faults."""
-        if task is Task.END:
+        if task is MissionTask.END:
             self._end_mission(now_s)
         self._saver.save(now_s, done=self.done)
         self._notifier.tell_faults(self._run, now_s, self._saver.problem)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from multiprocessing import get_context
 
-from companion.cli import kernels
+from companion.cli import kernel_cache
 from companion.core.clock import stopwatch_s
 
 Job = Callable[[], None]
@@ -76,7 +76,7 @@ FOR_ALL: tuple[Sequence[Job], ...] = (
 def main() -> None:
     """Run all jobs, with a line for each."""
     groups = FOR_ALL if "--all" in sys.argv[1:] else FOR_A_DRIVE
-    kernels.use_cache(os.environ)
+    kernel_cache.use_cache(os.environ)
     count, done, since_s = sum(map(len, groups)), 0, stopwatch_s()
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
         for group in groups:

@@ -19,7 +19,7 @@ from numba import njit
 
 from sitl.autopilot.lidar import Scanner, ScannerPort
 from sitl.firmware.json_frames import COUNTS, RANGES_MOST, BodyState, ServoFrame, decode, encode
-from sitl.plant.main_loop import NoiseSettings
+from sitl.plant.closed_loop import NoiseSettings
 from sitl.plant.rover import GRAVITY_M_S2, drive, meet_movers, new_rover
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite
 from sitl.world.truth import Collision, SimStart, collision_of

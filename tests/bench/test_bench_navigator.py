@@ -11,8 +11,8 @@ from companion.bench.cases import paper_cases
 from companion.core.clock import stopwatch_s
 from companion.core.frames import Pose
 from companion.core.grid import OBSTACLE, Cell, Grid
+from companion.mapping.evidence_kernels import soften
 from companion.mapping.evidence_map import MAX_SOFT_WEIGHT
-from companion.mapping.kernels import soften
 from companion.navigation.field_step import SearchKind
 from companion.navigation.search_budget import PathSearcher
 from companion.navigation.turning_cost import with_turning_cost

@@ -30,7 +30,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from companion.cli import kernels
+from companion.cli import kernel_cache
 
 if TYPE_CHECKING:
     from tests.fuzz.targets import Target
@@ -159,5 +159,5 @@ def readers_are_clean(names: list[str], seconds: float, runs: int, seed: int) ->
 
 
 if __name__ == "__main__":
-    kernels.use_cache(os.environ)
+    kernel_cache.use_cache(os.environ)
     main()

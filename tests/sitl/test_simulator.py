@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.parameters import DEFAULTS
-from sitl.plant.main_loop import NoiseSettings
+from sitl.plant.closed_loop import NoiseSettings
 from sitl.simulator import Simulator
 from sitl.world.truth import SimStart
 from sitl.world.world import World

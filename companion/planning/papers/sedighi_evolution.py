@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.planning.papers.sedighi_kernel import Chromosomes, Ground, Numbers, Square, corners_of, measure
+from companion.planning.papers.sedighi_kernel import Chromosomes, Numbers, ObstacleCounts, Square, corners_of, measure
 from companion.planning.random_numbers import State, uniform, whole
 from companion.planning.raster import CellArray
 
@@ -172,7 +172,7 @@ def empty_population(count: int, genes: int) -> Chromosomes:
 
 
 @njit(cache=True, nogil=True)
-def evolve(square: Square, ground: Ground, tuning: Tuning, state: State) -> tuple[bool, CellArray, int]:
+def evolve(square: Square, ground: ObstacleCounts, tuning: Tuning, state: State) -> tuple[bool, CellArray, int]:
     """Evolve: (whether the best path is free, its corners, generations)."""
     count, genes, sides = tuning.population, len(square.gene_rows), len(square.place_rows)
     old, new = empty_population(count, genes), empty_population(count, genes)

@@ -38,7 +38,7 @@ class Square(NamedTuple):
     target: tuple[int, int]
 
 
-class Ground(NamedTuple):
+class ObstacleCounts(NamedTuple):
     """Cumulative counts of obstacles, so that a line of any length takes two look-ups.
 
     ``across[y, x]``: obstacles in row y west of x, shape (height, width + 1). ``along[x, y]``: in column x south of y.
@@ -92,8 +92,8 @@ def square_over(width: int, height: int, start: tuple[int, int], target: tuple[i
 
 
 @njit(cache=True, nogil=True)
-def summed(weights: Weights) -> Ground:
-    """See ``Ground``."""
+def summed(weights: Weights) -> ObstacleCounts:
+    """See ``ObstacleCounts``."""
     height, width = weights.shape
     across = np.zeros((height, width + 1), np.int32)
     along = np.zeros((width, height + 1), np.int32)
@@ -102,7 +102,7 @@ def summed(weights: Weights) -> Ground:
             blocked = 1 if weights[y, x] >= OBSTACLE else 0
             across[y, x + 1] = across[y, x] + blocked
             along[x, y + 1] = along[x, y] + blocked
-    return Ground(across, along)
+    return ObstacleCounts(across, along)
 
 
 @njit(cache=True, nogil=True)
@@ -122,7 +122,7 @@ def column_wise(modes: Numbers, i: int, k: int) -> bool:
 
 
 @njit(cache=True, nogil=True)
-def measure(square: Square, ground: Ground, population: Chromosomes, measures: Numbers) -> None:
+def measure(square: Square, ground: ObstacleCounts, population: Chromosomes, measures: Numbers) -> None:
     """Write every path's length in fields, its turns and its steps onto obstacles (section IV.A).
 
     All arrays are taken out of their tuples first: passing tuples to a function for each vertex takes most of the time.

@@ -11,16 +11,16 @@ from pathlib import Path
 
 import pytest
 
-from companion.cli import kernels
+from companion.cli import kernel_cache
 from companion.cli.entry import start, unsuitable
 
-PACKAGE = Path(kernels.__file__).parents[1]
+PACKAGE = Path(kernel_cache.__file__).parents[1]
 
 
 def test_the_users_choice_of_a_place_counts(tmp_path: Path) -> None:
-    environment = {kernels.PLACE: "/my/own", "HOME": str(tmp_path)}
-    assert kernels.use_cache(environment) == Path("/my/own")
-    assert environment[kernels.PLACE] == "/my/own"
+    environment = {kernel_cache.PLACE: "/my/own", "HOME": str(tmp_path)}
+    assert kernel_cache.use_cache(environment) == Path("/my/own")
+    assert environment[kernel_cache.PLACE] == "/my/own"
 
 
 @pytest.mark.parametrize(
@@ -37,16 +37,16 @@ def test_the_users_choice_of_a_place_counts(tmp_path: Path) -> None:
 def test_the_place_is_the_first_that_can_be_written(tmp_path: Path, given: dict[str, str], base: str) -> None:
     (tmp_path / "file").touch()
     environment = {key: value.replace("{}", str(tmp_path)) for key, value in given.items()}
-    place = kernels.use_cache(environment)
+    place = kernel_cache.use_cache(environment)
     assert place == tmp_path / base / "kernels" and place.is_dir()
-    assert environment[kernels.PLACE] == str(place)
+    assert environment[kernel_cache.PLACE] == str(place)
 
 
 def test_nowhere_to_write_is_a_temporary_place(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     environment = {"HOME": str(tmp_path / "file")}
-    place = kernels.use_cache(environment)
-    assert place.is_dir() and environment[kernels.PLACE] == str(place)
+    place = kernel_cache.use_cache(environment)
+    assert place.is_dir() and environment[kernel_cache.PLACE] == str(place)
     place.rmdir()
 
 
@@ -98,7 +98,7 @@ class Program:
 
     def __init__(self, folder: Path, cache: Path) -> None:
         self.folder, self._cache = folder, cache
-        for name in ("__init__.py", "cli/__init__.py", "cli/entry.py", "cli/kernels.py"):
+        for name in ("__init__.py", "cli/__init__.py", "cli/entry.py", "cli/kernel_cache.py"):
             (folder / "companion" / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(PACKAGE / name, folder / "companion" / name)
         for name, text in MODULES.items():
@@ -157,17 +157,17 @@ def test_a_package_that_cannot_be_written_is_compiled_once(tmp_path: Path) -> No
 
 
 def test_of_a_files_old_versions_some_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(kernels.PLACE, str(tmp_path))
-    for number in range(kernels.KEPT + 2):
-        old = tmp_path / f"companion.mapping.kernels-{number:016}"
+    monkeypatch.setenv(kernel_cache.PLACE, str(tmp_path))
+    for number in range(kernel_cache.KEPT + 2):
+        old = tmp_path / f"companion.mapping.evidence_kernels-{number:016}"
         old.mkdir()
         os.utime(old, (number, number))
     other = tmp_path / "companion.mapping.arc_kernels-0000000000000000"
     other.mkdir()
-    file = PACKAGE / "mapping" / "kernels.py"
-    locator = kernels.Locator.from_function(test_of_a_files_old_versions_some_are_kept, str(file))
+    file = PACKAGE / "mapping" / "evidence_kernels.py"
+    locator = kernel_cache.Locator.from_function(test_of_a_files_old_versions_some_are_kept, str(file))
     assert locator is not None and Path(locator.get_cache_path()).is_dir()
-    left = sorted(path.name[-1] for path in tmp_path.glob("companion.mapping.kernels-0*"))
+    left = sorted(path.name[-1] for path in tmp_path.glob("companion.mapping.evidence_kernels-0*"))
     assert left == ["3", "4", "5"] and other.is_dir()
 
 
@@ -182,7 +182,7 @@ def test_a_file_that_is_edited_while_the_program_loads_makes_no_kernel_for_other
 
 
 def test_kernels_of_other_projects_are_left_to_numba() -> None:
-    assert kernels.Locator.from_function(json.dumps, json.__file__) is None
+    assert kernel_cache.Locator.from_function(json.dumps, json.__file__) is None
 
 
 def test_a_32_bit_system_gets_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

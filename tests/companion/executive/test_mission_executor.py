@@ -10,7 +10,7 @@ import pytest
 
 from companion.core.frames import LocalFrame, NedPoint
 from companion.core.grid import Cell
-from companion.executive.mission_executor import Task
+from companion.executive.mission_executor import MissionTask
 from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import OnBlocked
@@ -31,26 +31,26 @@ def desk(tmp_path: Path) -> Desk:
     return desk
 
 
-def step(desk: Desk, after_s: float = 0.05) -> Task:
+def step(desk: Desk, after_s: float = 0.05) -> MissionTask:
     """One tick later, the vehicle where it is."""
     desk.clock.time_s += after_s
     position = desk.run.vehicle.position
     assert position is not None
     desk.stand(position.north_m, position.east_m)
     task = desk.executor.decide(desk.run.vehicle, desk.now_s)
-    if task is not Task.END:
+    if task is not MissionTask.END:
         desk.executor.guide(task, desk.run.vehicle, desk.executor.view(desk.run.vehicle, desk.now_s))
     return task
 
 
 def test_a_leg_begins_once_and_a_stay_and_the_end_follow(desk: Desk) -> None:
-    assert [step(desk), step(desk)] == [Task.DRIVE] * 2 and desk.executor.phase is RunPhase.DRIVING
+    assert [step(desk), step(desk)] == [MissionTask.DRIVE] * 2 and desk.executor.phase is RunPhase.DRIVING
     assert desk.notices.texts == ["Heading for gate"]
     desk.at(desk.executor.progress.goal.point)
-    assert step(desk) is Task.DRIVE, "it is reached in this tick"
+    assert step(desk) is MissionTask.DRIVE, "it is reached in this tick"
     assert desk.notices.texts[1:] == ["Reached gate"] and desk.executor.reached == 1
-    assert step(desk) is Task.STAND and desk.executor.phase is RunPhase.HOLDING
-    assert step(desk, 5.0) is Task.END and desk.executor.progress.ended
+    assert step(desk) is MissionTask.STAND and desk.executor.phase is RunPhase.HOLDING
+    assert step(desk, 5.0) is MissionTask.END and desk.executor.progress.ended
 
 
 def test_a_requested_goal_comes_first(desk: Desk) -> None:
@@ -68,7 +68,7 @@ def test_a_requested_goal_comes_first(desk: Desk) -> None:
 
 def test_a_target_behind_the_fence_is_not_tried(desk: Desk) -> None:
     desk.executor.layout = replace(desk.executor.layout, refused={0: "gate lies behind the fence"})
-    assert step(desk) is Task.STAND
+    assert step(desk) is MissionTask.STAND
     assert desk.notices.texts == ["Refused: gate lies behind the fence"]
     assert desk.executor.progress.statuses == (TargetStatus.UNREACHABLE,)
 
@@ -95,7 +95,7 @@ def test_a_low_battery_leads_back_the_way_it_came(desk: Desk) -> None:
     assert desk.notices.texts[-1] == "Heading for start"
     desk.stand(0.0, 0.0)
     step(desk)
-    assert step(desk) is Task.END and desk.executor.progress.statuses == (TargetStatus.SKIPPED,)
+    assert step(desk) is MissionTask.END and desk.executor.progress.statuses == (TargetStatus.SKIPPED,)
 
 
 def test_a_map_is_forgotten_and_laid_out_anew_when_the_frame_moves(desk: Desk) -> None:

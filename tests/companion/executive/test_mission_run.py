@@ -8,7 +8,7 @@ import pytest
 
 from companion.control.controller import STANDSTILL
 from companion.control.point_controller import ControlCommand
-from companion.executive.mission_executor import Task
+from companion.executive.mission_executor import MissionTask
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.mission_run import LocatedScan, MissionRun, Order, Stop
 from companion.safety.mode_latch import Reaction, Verdict
@@ -41,7 +41,7 @@ def test_a_verdict_that_is_not_to_drive_decides_alone(
 
 def test_before_the_mission_has_begun_nothing_is_driven(tmp_path: Path) -> None:
     run = Desk(tmp_path).run
-    assert run.decide(DRIVE, 10.0) is Order.NOTHING and run.guide(Task.DRIVE, 10.0) is None
+    assert run.decide(DRIVE, 10.0) is Order.NOTHING and run.guide(MissionTask.DRIVE, 10.0) is None
     assert run.statuses() == [("gate", TargetStatus.PENDING)] and not run.is_driving
     run.map([])
     run.start_afresh()
@@ -55,7 +55,7 @@ def test_a_mission_that_drives_speaks_setpoints_that_were_checked(tmp_path: Path
     assert pose is not None and seen.scan is not None
     desk.run.map([LocatedScan(pose, 0.0, seen.scan.scan)] * 3)
     task = desk.run.decide(DRIVE, desk.now_s)
-    assert task is Task.DRIVE and desk.run.activity == Activity(RunPhase.DRIVING) and desk.run.is_driving
+    assert task is MissionTask.DRIVE and desk.run.activity == Activity(RunPhase.DRIVING) and desk.run.is_driving
     command = desk.run.guide(task, desk.now_s)
     assert isinstance(command, ControlCommand)
     desk.run.speak(command, desk.now_s)
@@ -105,4 +105,4 @@ def test_starting_afresh_leaves_the_leg_and_says_all_again(tmp_path: Path) -> No
 def test_an_ended_mission_sends_nothing(tmp_path: Path) -> None:
     desk = Desk(tmp_path)
     desk.begin()
-    assert desk.run.guide(Task.END, desk.now_s) is None
+    assert desk.run.guide(MissionTask.END, desk.now_s) is None

@@ -18,7 +18,7 @@ from sitl.autopilot.control.records import (
     new_tuning,
 )
 from sitl.autopilot.parameters import DEFAULTS, Parameters, steered_wheels
-from sitl.plant.main_loop import NOISE_COLUMNS, NoiseSettings, run_loops
+from sitl.plant.closed_loop import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.plant.rover import new_rover
 from sitl.world.world import World
 from tests.support.sitl_client import READY_S, Client, open_ground

@@ -1,4 +1,4 @@
-"""The compiled main loop: estimate, motion control, battery, plant; runs a batch of loops in one call.
+"""The closed loop, compiled: estimate, motion control, battery and plant; runs many passes of it in one call.
 
 Nouns: NoiseSettings.
 """

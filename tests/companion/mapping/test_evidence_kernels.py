@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from companion.mapping.kernels import (
+from companion.mapping.evidence_kernels import (
     InverseSensorModel,
     ScanInCells,
     cast_scan,
