@@ -12,9 +12,9 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from companion.cli import kernels
+from companion.cli import kernel_cache
 
-kernels.use_cache(os.environ)  # before numba is imported
+kernel_cache.use_cache(os.environ)  # before numba is imported
 
 from numba.core.dispatcher import Dispatcher  # noqa: E402
 from pymavlink.dialects.v20 import ardupilotmega as mavlink  # noqa: E402

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 
-from companion.cli import kernels
+from companion.cli import kernel_cache
 
-kernels.use_cache(os.environ)  # before numba is imported
+kernel_cache.use_cache(os.environ)  # before numba is imported
 
 import companion.cli.commands  # noqa: E402, F401
 import sitl.cli.commands  # noqa: E402, F401
