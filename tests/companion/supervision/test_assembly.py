@@ -7,9 +7,7 @@ from typing import Any
 
 from companion.navigation.step_runner import InlineRunner
 from companion.supervision.assembly import Options, assemble
-from companion.supervision.monitors import make_monitors
 from companion.supervision.supervisor import Supervisor
-from tests.support.desk import Desk
 from tests.support.fake_autopilot import FakeAutopilot
 from tests.support.notices import HandClock
 from tests.support.rig import yard
@@ -23,19 +21,3 @@ def test_monitors_hear_of_an_event_before_the_drive_permission(tmp_path: Path) -
     names = [type(handler).__name__ for handler in parts.dispatcher._handlers]
     assert names[:2] == ["OperatorServer", "MissionChangeMonitor"] and len(names) == 13
     assert names[-3:] == ["BatteryMonitor", "RequestedGoals", "DrivePermission"]
-
-
-def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None:
-    desk = Desk(tmp_path)
-    link: Any = desk.autopilot
-    monitors = make_monitors(desk.run, link, desk.settings, desk.notices)
-    assert [type(monitor).__name__ for monitor in monitors.by_precedence] == [
-        "SticksMonitor",
-        "DataMonitor",
-        "LocalizationMonitor",
-        "LoopMonitor",
-        "ScanMonitor",
-        "RivalMonitor",
-        "FenceMonitor",
-        "BorderMonitor",
-    ]
