@@ -75,7 +75,9 @@ def at(time_s: float, speed_m_s: float = 1.0) -> LocalView:
 def test_the_lower_of_planned_speed_and_guidances_limit_reaches_the_autopilot(
     planned_fields_s: float, told_m_s: float
 ) -> None:
-    command, _ = driver_with(Straight(planned_fields_s)).update(at(0.0))
+    driver = driver_with(Straight(planned_fields_s))
+    driver.decide(at(0.0))
+    command = driver.guide(at(0.0))
     assert command.purpose is Purpose.DRIVE
     commands = SentSetpoints().due(command, 0.0, SETTINGS.guidance, confirmed=None)
     assert ChangeSpeed(pytest.approx(told_m_s)) in commands
@@ -84,7 +86,7 @@ def test_the_lower_of_planned_speed_and_guidances_limit_reaches_the_autopilot(
 def test_the_planner_is_told_what_moves_and_how_fast_the_rover_goes() -> None:
     planner = Straight(2.0)
     cart = Moving("cart", 0.0, NedPoint(15.25, 2.25), 0.0, 0.1, 0.65)
-    driver_with(planner).update(at(0.0), (cart,))
+    driver_with(planner).decide(at(0.0), (cart,))
     (problem,) = planner.asked
     assert problem.motion.speeds_fields_s == pytest.approx((1.0, 4.0))
     assert problem.moving_obstacles[0].radius_fields == pytest.approx(2.0)
@@ -99,10 +101,10 @@ def test_it_plans_anew_when_something_moves_otherwise_and_not_while_it_does_not(
         return (Moving("cart", time_s, NedPoint(19.0, 2.0), 0.0, east_m_s, 0.5),)
 
     for tick in range(60):
-        driving.update(at(0.05 * tick), cart(0.05 * tick, -1.0))
+        driving.decide(at(0.05 * tick), cart(0.05 * tick, -1.0))
     # The first plan, and one when the cart was first heard of.
     assert len(planner.asked) <= 2
     before = len(planner.asked)
     for tick in range(60, 70):
-        driving.update(at(0.05 * tick), cart(0.05 * tick, 0.6))
+        driving.decide(at(0.05 * tick), cart(0.05 * tick, 0.6))
     assert len(planner.asked) == before + 1
