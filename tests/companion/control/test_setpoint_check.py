@@ -181,12 +181,12 @@ def test_standing_and_turning_on_the_spot_always_pass(setpoint: Setpoint) -> Non
 @pytest.mark.parametrize("value", [math.nan, math.inf])
 def test_what_is_not_a_number_does_not_pass(value: float) -> None:
     pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
-    for setpoint in (
-        GuidedPosition(NedPoint(value, 1.0)),
-        GuidedVelocity(value, 0.0),
-        GuidedVelocity(1.0, value),
+    for setpoint, kind in (
+        (GuidedPosition(NedPoint(value, 1.0)), SetpointFault.BEYOND_HORIZON),
+        (GuidedVelocity(value, 0.0), SetpointFault.NOT_A_NUMBER),
+        (GuidedVelocity(1.0, value), SetpointFault.NOT_A_NUMBER),
     ):
-        assert fault(Output(setpoint, pose, 0.0), open_ground())
+        assert fault(Output(setpoint, pose, 0.0), open_ground()) is kind
 
 
 def test_the_faults_have_names() -> None:

@@ -17,6 +17,7 @@ from companion.safety.reasons import (
     Reason,
     Refusal,
     RunPhase,
+    SetpointFault,
     WaitReason,
 )
 
@@ -45,6 +46,12 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (Doubt.FENCE_BREACHED, (), "the autopilot's fence is breached"),
     (Doubt.BEYOND_BORDER, ("the yard",), "the rover is beyond the border of the yard"),
     (Doubt.WAITED_TOO_LONG, (Reason(WaitReason.ARMING),), "waited too long for arming"),
+    (SetpointFault.BEYOND_HORIZON, (), "target farther away than the horizon"),
+    (SetpointFault.BEHIND_OBSTACLE, (), "target behind something"),
+    (SetpointFault.ON_UNSEEN_GROUND, (), "target on ground not seen"),
+    (SetpointFault.NOT_A_NUMBER, (), "velocity is not a number"),
+    (SetpointFault.INTO_OBSTACLE, (), "velocity leads into something"),
+    (SetpointFault.OVER_BORDER, ("the yard",), "setpoint leads over the border of the yard"),
     (LatchReason.OTHER_MODE, ("GUIDED",), "mode is not GUIDED"),
     (LatchReason.BETWEEN_LEGS, (), "AUTO goes on by itself"),
     (LatchReason.DISARMED, (), "disarmed"),
@@ -108,7 +115,7 @@ def test_the_text_of_a_reason(kind: Enum, figures: tuple[object, ...], text: str
 
 
 def test_every_reason_has_its_line_here() -> None:
-    kinds = (Doubt, LatchReason, WaitReason, PowerReason, EndReason, Refusal)
+    kinds = (Doubt, SetpointFault, LatchReason, WaitReason, PowerReason, EndReason, Refusal)
     assert {kind for kind, _, _ in TEXTS} == {member for enum in kinds for member in enum}
 
 
