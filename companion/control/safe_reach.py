@@ -95,12 +95,12 @@ def may_be_last(view: LocalView, reach: Reach) -> bool:
         return False
     over_m = overshoot_m(reach.distance_m, view.settings.guidance)
     stands = reach.target.moved(bearing, within_map_m(evidence, reach.target, bearing, over_m))
+    if unseen_flank(view, stands) is not None:  # asked early: thin beams fail here most often
+        return False
     if look_along(evidence, here, stands, radius_m).clear_m < here.distance_m(stands) - 0.05:
         return False
     front = stands.moved(bearing, within_map_m(evidence, stands, bearing, radius_m))
-    if look_along(evidence, stands, front, 0.0).seen_m < stands.distance_m(front) - ROLLED_M:
-        return False
-    return unseen_flank(view, stands) is None
+    return look_along(evidence, stands, front, 0.0).seen_m >= stands.distance_m(front) - ROLLED_M
 
 
 def unseen_flank(view: LocalView, point: NedPoint) -> Unseen | None:
