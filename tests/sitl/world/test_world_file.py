@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from PIL import Image
 from typer.testing import CliRunner
@@ -53,6 +53,7 @@ def test_places_are_north_and_east(tmp_path: Path) -> None:
 
 @settings(max_examples=15, deadline=None)
 @given(st.lists(st.tuples(st.floats(1.0, 14.0), st.floats(1.0, 19.0)), min_size=3, max_size=6))
+@example([(1.0, 3.0), (2.0, 1.16796875), (4.0, 4.0)])
 def test_fields_cover_a_polygon_and_hardly_more(corners: list[tuple[float, float]]) -> None:
     hull = shapely.MultiPoint(corners).convex_hull
     if hull.geom_type != "Polygon" or hull.area < 0.01:
@@ -65,8 +66,9 @@ def test_fields_cover_a_polygon_and_hardly_more(corners: list[tuple[float, float
     missed = shape.difference(
         shapely.union_all(shapely.box(columns * 0.1, rows * 0.1, columns * 0.1 + 0.1, rows * 0.1 + 0.1))
     )
-    # What no field covers are slivers beside the corner of a field, narrower than (sqrt 2 - 1) / 2 of a field.
-    assert missed.buffer(-0.0104).is_empty
+    # A field whose middle is within half a field of the shape is filled. What is missed lies round a corner that
+    # fields share, outside the circles in them: no circle in it has a radius above (sqrt 2 - 1) / 2 of a field.
+    assert missed.buffer(-0.0208).is_empty
 
 
 @settings(max_examples=40, deadline=None)
