@@ -142,7 +142,7 @@ def _mission_and_settings(directory: Path, meta: RecordMeta) -> tuple[Mission, S
         raise _unreadable(directory / MISSION, error) from error
     except (MissionError, SettingsError) as error:
         raise RecordError(str(error)) from error
-    if settings_sum(settings) != meta.settings_sha256:
+    if settings_sum(meta.settings) != meta.settings_sha256:
         raise RecordError(f"{directory / META}: settings changed since the run; a replay needs them as they were")
     if run_sum(meta.seed, meta.settings_sha256, arm=meta.arm) != meta.run_sha256:
         raise RecordError(f"{directory / META}: seed or arm changed since the run; a replay needs them as they were")

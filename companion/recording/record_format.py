@@ -9,16 +9,16 @@ import hashlib
 import json
 import struct
 import zlib
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
 from companion.navigation.field_step import Decision
-from companion.settings import Settings
 
-FORMAT = 4
+FORMAT = 3
 """Of the whole directory. A reader refuses others."""
-META, MISSION, PACKETS, TICKS, DECISIONS = "meta.json", "mission.json", "link.tlog", "ticks.bin", "decisions.jsonl"
+META, MISSION, PACKETS, TICKS, DECISIONS = "meta.json", "mission.json", "link.tlog", "rounds.bin", "decisions.jsonl"
 INPUTS = "inputs"
 STATE = "state"
 """The kind of the input file that an interrupted run has left."""
@@ -113,9 +113,9 @@ def decision_line(time_s: float, target: str, decision: Decision) -> str:
     )
 
 
-def settings_sum(settings: Settings) -> str:
-    """SHA-256 of all settings."""
-    return hashlib.sha256(json.dumps(settings.model_dump(mode="json"), sort_keys=True).encode()).hexdigest()
+def settings_sum(settings: Mapping[str, object]) -> str:
+    """SHA-256 of all settings, as they stand in ``meta.json``."""
+    return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
 
 def run_sum(seed: int, settings_sha256: str, *, arm: bool) -> str:

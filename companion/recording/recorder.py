@@ -136,14 +136,15 @@ class Recorder:
             inputs = _copied_inputs(self.directory, mission, files or {})
             if mission is not None:
                 inputs.append(_written_mission(self.directory, mission, inputs))
+            values = settings.model_dump(mode="json")
             self._meta = RecordMeta(
                 format=FORMAT,
                 mission=None if mission is None else mission.name,
                 seed=seed,
                 arm=arm,
-                settings=settings.model_dump(mode="json"),
-                settings_sha256=settings_sum(settings),
-                run_sha256=run_sum(seed, settings_sum(settings), arm=arm),
+                settings=values,
+                settings_sha256=settings_sum(values),
+                run_sha256=run_sum(seed, settings_sum(values), arm=arm),
                 start_unix_us=unix_time_us() if start_us is None else start_us,
                 versions=versions(),
                 inputs=inputs,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import AliasChoices, Field, model_validator
 
 from companion.settings.planners import PlannerSettings
 from companion.settings.section import Section
@@ -207,7 +207,12 @@ class SafetySettings(Section):
     latency_s: float = Field(1.0, gt=0.0, description="round trip to the autopilot longer than this: stop")
     planner_s: float = Field(30.0, gt=0.0, description="a step of the navigator that takes this long: stop")
     settle_s: float = Field(0.5, ge=0.0, description="how long the rover stands after a jump of the autopilot's clock")
-    requested_goal_m: float = Field(300.0, gt=0.0, description="a requested goal farther away than this is refused")
+    requested_goal_m: float = Field(
+        300.0,
+        gt=0.0,
+        validation_alias=AliasChoices("requested_goal_m", "errand_reach_m"),  # the key of older files and records
+        description="a requested goal farther away than this is refused",
+    )
 
 
 class FenceSettings(Section):

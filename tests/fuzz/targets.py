@@ -141,7 +141,7 @@ def record(data: bytes) -> None:
         for name in ("link.tlog", "decisions.jsonl"):
             (path.parent / name).write_bytes(b"")
         (path.parent / "mission.json").write_bytes(A_MISSION)
-        (path.parent / "ticks.bin").write_bytes(packed_tick(TickEntry(0.0, 0, 0)))
+        (path.parent / "rounds.bin").write_bytes(packed_tick(TickEntry(0.0, 0, 0)))
         load_record(path.parent)
 
     _file("meta.json", data, use)

@@ -66,7 +66,7 @@ def test_two_equal_drives_give_the_same_record_byte_for_byte(mission: Path, tmp_
         assert CliRunner().invoke(app, ["drive", str(mission), "--record", str(tmp_path / name)]).exit_code == 0
         files = (path for path in (tmp_path / name).rglob("*") if path.is_file())
         records.append({path.relative_to(tmp_path / name): path.read_bytes() for path in files})
-    assert {"link.tlog", "ticks.bin", "decisions.jsonl", "meta.json"} <= {str(path) for path in records[0]}
+    assert {"link.tlog", "rounds.bin", "decisions.jsonl", "meta.json"} <= {str(path) for path in records[0]}
     assert records[0] == records[1]
 
 

@@ -37,7 +37,7 @@ from tests.support.rig import Rig, kept_in, yard
 from tests.support.served import finished, process
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
-FILES = ("link.tlog", "ticks.bin", "decisions.jsonl")
+FILES = ("link.tlog", "rounds.bin", "decisions.jsonl")
 
 
 def recorded(folder: Path, mission: Mission, faults: str | None = None, limit_s: float = 200.0) -> Path:
@@ -151,10 +151,10 @@ def test_answers_of_a_thread_are_handed_over_when_the_run_had_them(tmp_path: Pat
     rig.recorder.close()
     assert_same(rig.place)
     # Without the marks of the answers no decision is made: they are what tells when.
-    ticks, _ = unpacked_ticks((rig.place / "ticks.bin").read_bytes())
+    ticks, _ = unpacked_ticks((rig.place / "rounds.bin").read_bytes())
     assert sum(bool(entry.marks & Mark.ANSWER) for entry in ticks) > 5
     unmarked = b"".join(packed_tick(entry._replace(marks=entry.marks & ~Mark.ANSWER)) for entry in ticks)
-    (rig.place / "ticks.bin").write_bytes(unmarked)
+    (rig.place / "rounds.bin").write_bytes(unmarked)
     unclosed(rig.place)
     result = replay(load_record(rig.place))
     assert result.decisions <= 1, "nothing but: we are there"
@@ -215,10 +215,10 @@ def test_a_run_that_was_otherwise_differs(copy: Path) -> None:
 
 
 def test_a_record_that_cannot_be_replayed_is_exit_code_2_and_one_line(copy: Path) -> None:
-    (copy / "ticks.bin").unlink()
+    (copy / "rounds.bin").unlink()
     result = CliRunner().invoke(app, ["replay", str(copy)])
     assert result.exit_code == 2
-    assert len(result.output.strip().splitlines()) == 1 and str(copy / "ticks.bin") in result.output
+    assert len(result.output.strip().splitlines()) == 1 and str(copy / "rounds.bin") in result.output
 
 
 @settings(max_examples=12, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
@@ -234,14 +234,14 @@ def test_a_record_that_is_cut_anywhere_is_replayed_as_far_as_it_goes(
     lengths = {}
     for name in FILES:
         size = (copy / name).stat().st_size
-        lengths[name] = data.draw(st.integers(CHECKED_TICK.size if name == "ticks.bin" else 0, size - 1), name)
+        lengths[name] = data.draw(st.integers(CHECKED_TICK.size if name == "rounds.bin" else 0, size - 1), name)
         with (copy / name).open("r+b") as file:
             file.truncate(lengths[name])
     loaded = load_record(copy)
     result = replay(loaded)
     assert result.differences == []
     assert loaded.notes and all("\n" not in note for note in loaded.notes)
-    assert result.ticks <= lengths["ticks.bin"] // CHECKED_TICK.size
+    assert result.ticks <= lengths["rounds.bin"] // CHECKED_TICK.size
 
 
 def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
@@ -264,9 +264,9 @@ def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
 
 def test_why_tells_the_seconds_since_the_beginning(copy: Path) -> None:
     time_s = json.loads(load_record(copy).decisions[1])["time_s"]
-    ticks, _ = unpacked_ticks((copy / "ticks.bin").read_bytes())
+    ticks, _ = unpacked_ticks((copy / "rounds.bin").read_bytes())
     later = b"".join(packed_tick(entry._replace(time_s=entry.time_s + 50000.0)) for entry in ticks)
-    (copy / "ticks.bin").write_bytes(later)  # as on a computer that has run for half a day
+    (copy / "rounds.bin").write_bytes(later)  # as on a computer that has run for half a day
     unclosed(copy)
     result = CliRunner().invoke(app, ["replay", str(copy), "--why", "2"])
     assert f"decision 2 at {time_s:.2f} s" in result.output

@@ -25,7 +25,7 @@ from tests.support.records import (
     write_record,
 )
 
-SEQUENCES = ("link.tlog", "ticks.bin", "decisions.jsonl")
+SEQUENCES = ("link.tlog", "rounds.bin", "decisions.jsonl")
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +74,7 @@ REFUSED: dict[str, tuple[Change, list[str]]] = {
     "mission.json changed": (with_flipped_bit("mission.json", 30), ["mission.json", "changed since the run"]),
     "map gone": (removed("inputs/mission/yard.png"), ["yard.png", "cannot be read"]),
     "settings changed": (with_meta("settings", {"safety": {"stale_s": 2.0}}), ["meta.json", "settings changed"]),
-    "older": (with_meta("format", 1), ["meta.json", "format 1", "format 4"]),
+    "older": (with_meta("format", 1), ["meta.json", "format 1", "format 3"]),
     "newer": (with_meta("format", 99), ["format 99"]),
     "no json": (overwritten("meta.json", b"{"), ["meta.json", "damaged"]),
     "no object": (overwritten("meta.json", b"[]"), ["meta.json", "damaged"]),
@@ -82,17 +82,17 @@ REFUSED: dict[str, tuple[Change, list[str]]] = {
     "a number": (overwritten("meta.json", b"0"), ["meta.json", "damaged"]),
     "seed changed": (with_meta("seed", 7), ["meta.json", "seed or arm changed"]),
     "arm changed": (with_meta("arm", False), ["meta.json", "seed or arm changed"]),
-    "half": (overwritten("meta.json", b'{"format": 4}'), ["meta.json", "seed"]),
+    "half": (overwritten("meta.json", b'{"format": 3}'), ["meta.json", "seed"]),
     "outside": (with_meta("inputs", [{"kind": "x", "name": "../x", "source": "", "sha256": ""}]), ["outside"]),
     "packets damaged": (with_flipped_bit("link.tlog", 5000), ["link.tlog", "damaged"]),
-    "ticks damaged": (with_flipped_bit("ticks.bin", 500), ["ticks.bin", "damaged"]),
+    "ticks damaged": (with_flipped_bit("rounds.bin", 500), ["rounds.bin", "damaged"]),
     "decisions damaged": (with_flipped_bit("decisions.jsonl", 500), ["decisions.jsonl", "damaged"]),
     "nothing there": (shutil.rmtree, ["meta.json", "cannot be read"]),
     "no packets": (removed("link.tlog"), ["link.tlog", "cannot be read"]),
-    "ticks huge": (huge("ticks.bin"), ["ticks.bin", "larger than"]),
+    "ticks huge": (huge("rounds.bin"), ["rounds.bin", "larger than"]),
     "decisions huge": (huge("decisions.jsonl"), ["decisions.jsonl", "larger than"]),
     "packets without end": (linked("link.tlog", "/dev/zero"), ["link.tlog", "not a file"]),
-    "no ticks": (overwritten("ticks.bin", b""), ["ticks.bin", "no ticks"]),
+    "no ticks": (overwritten("rounds.bin", b""), ["rounds.bin", "no ticks"]),
 }
 
 
@@ -106,7 +106,7 @@ def test_what_cannot_be_replayed_is_one_line(copy: Path, what: str) -> None:
     assert "\n" not in line and all(word in line for word in words), line
 
 
-@pytest.mark.parametrize(("name", "at"), [("link.tlog", 5010), ("ticks.bin", 500)])
+@pytest.mark.parametrize(("name", "at"), [("link.tlog", 5010), ("rounds.bin", 500)])
 def test_damage_is_found_in_a_record_that_was_never_closed(copy: Path, name: str, at: int) -> None:
     unclosed(copy)
     with_flipped_bit(name, at)(copy)
@@ -127,12 +127,12 @@ def test_a_record_that_is_cut_anywhere_is_read_as_far_as_it_goes(
     lengths = {}
     for name in SEQUENCES:
         size = (copy / name).stat().st_size
-        lengths[name] = data.draw(st.integers(CHECKED_TICK.size if name == "ticks.bin" else 0, size - 1), name)
+        lengths[name] = data.draw(st.integers(CHECKED_TICK.size if name == "rounds.bin" else 0, size - 1), name)
         with (copy / name).open("r+b") as file:
             file.truncate(lengths[name])
     loaded = load_record(copy)
     ticks, whole = list(loaded.ticks()), read(record)
     assert not loaded.complete
     assert loaded.notes and all("\n" not in note for note in loaded.notes)
-    assert ticks == whole[: len(ticks)] and len(ticks) <= lengths["ticks.bin"] // CHECKED_TICK.size
+    assert ticks == whole[: len(ticks)] and len(ticks) <= lengths["rounds.bin"] // CHECKED_TICK.size
     assert loaded.decisions == load_record(record).decisions[: len(loaded.decisions)]

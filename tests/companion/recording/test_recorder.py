@@ -78,7 +78,7 @@ def test_it_is_on_disk_after_a_second_without_closing(tmp_path: Path) -> None:
     recorder.heard(0.5, [packet])
     recorder.heard(1.5, [packet])
     assert (tmp_path / "run" / "link.tlog").stat().st_size == 3 * (8 + len(packet))
-    assert unpacked_ticks((tmp_path / "run" / "ticks.bin").read_bytes())[0] == [TickEntry(0.0, 1), TickEntry(0.5, 1)]
+    assert unpacked_ticks((tmp_path / "run" / "rounds.bin").read_bytes())[0] == [TickEntry(0.0, 1), TickEntry(0.5, 1)]
     assert json.loads((tmp_path / "run" / "meta.json").read_text())["end"] is None
     recorder.close()
 

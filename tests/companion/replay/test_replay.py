@@ -10,9 +10,10 @@ import pytest
 from companion.core.tick_marks import Mark
 from companion.recording.reader import load_record
 from companion.recording.record_format import packed_tick, unpacked_ticks
-from companion.replay.replay import EndOfRecordError, RecordPlayer, ReplayStepRunner
+from companion.replay.replay import EndOfRecordError, RecordPlayer, ReplayStepRunner, replay
 from tests.support.mavlink_vehicle import Station
 from tests.support.records import DECISION, TICKS, unclosed, write_record
+from tests.support.shared_data import SHARED, needs_shared
 
 
 @pytest.fixture
@@ -99,10 +100,10 @@ def test_a_mark_that_the_run_did_not_have_is_told(player: RecordPlayer) -> None:
 
 def test_an_answer_is_taken_in_the_round_in_which_the_run_took_it(tmp_path: Path) -> None:
     record = write_record(tmp_path)
-    ticks, _ = unpacked_ticks((record / "ticks.bin").read_bytes())
+    ticks, _ = unpacked_ticks((record / "rounds.bin").read_bytes())
     marks = {2: Mark.WORKING, 3: Mark.ANSWER}
     changed = [entry._replace(marks=entry.marks | marks.get(number, 0)) for number, entry in enumerate(ticks)]
-    (record / "ticks.bin").write_bytes(b"".join(packed_tick(entry) for entry in changed))
+    (record / "rounds.bin").write_bytes(b"".join(packed_tick(entry) for entry in changed))
     unclosed(record)
     player, started = RecordPlayer(load_record(record), lambda *_: None), []
     runner = ReplayStepRunner(player, lambda: started.append(player.entry.time_s))
@@ -122,3 +123,13 @@ def test_an_answer_is_taken_in_the_round_in_which_the_run_took_it(tmp_path: Path
     with pytest.raises(ZeroDivisionError):
         runner.take()
     assert not runner.busy and runner.take() is None
+
+
+@needs_shared
+def test_a_record_of_the_real_firmware_that_an_older_version_made_replays_without_a_difference() -> None:
+    """Its settings have a key that is called otherwise today."""
+    record = load_record(SHARED / "data" / "real-firmware" / "wall-end")
+    assert "errand_reach_m" in str(record.meta.settings) and record.settings.safety.requested_goal_m == 300.0
+    result = replay(record)
+    assert result.differences == []
+    assert result.ticks > 3000 and result.decisions > 200

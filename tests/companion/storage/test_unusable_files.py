@@ -82,7 +82,7 @@ SITL: dict[str, tuple[str, ...]] = {
     "image.png": ("drive", "yard.toml", "--image", "{}"),
     "stem.yaml": ("drive", "yard.toml", "--map", "stem"),
     "drive.json": ("drive", "yard.toml", "--json", "{}"),
-    "driven/ticks.bin": ("drive", "yard.toml", "--record", "driven"),
+    "driven/rounds.bin": ("drive", "yard.toml", "--record", "driven"),
     "rover.param": ("drive", "yard.toml", "--params", "{}"),
     "faults.toml": ("drive", "yard.toml", "--faults", "{}"),
     "served.toml": ("serve", "{}"),
