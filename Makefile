@@ -12,6 +12,8 @@ NAVIGATORS := hybrid,bspline-ga,astar,theta-star,dstar-lite,dijkstra,achour,prm,
 CANDIDATES := python3.11 python3.12 python3.13 python3.14 python3 python
 # For make fuzz: how long it searches.
 SECONDS := 600
+# Container images often set this. Without compiled bytecode each start of a program takes three times as long.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test lint pytest bench results soak fuzz clean
 

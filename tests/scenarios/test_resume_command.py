@@ -120,7 +120,7 @@ def test_a_state_that_cannot_be_taken_up_is_told_before_anything_is_connected(
     tmp_path: Path, fault: str, code: int, said: str
 ) -> None:
     mission = yard(tmp_path)
-    values = {**a_state().progress.model_dump(), "statuses": ["reached"], "leg": "done", "index": 1}
+    values = {**a_state().progress.model_dump(), "statuses": ["reached"], "phase": "done", "index": 1}
     state = a_state(mission_sha256=fingerprint(mission), ended=True, progress=SavedProgress.model_validate(values))
     data = encode_state(state, {})
     (tmp_path / "state").mkdir()

@@ -553,7 +553,7 @@ def test_an_error_in_the_program_leaves_the_rover_standing_in_hold(rig: Rig, mon
     def broken(*_: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(rig.companion.driver, "update", broken)
+    monkeypatch.setattr(rig.companion.driver, "guide", broken)
     with pytest.raises(ZeroDivisionError):
         rig.run_for(1.0)
     since_s = rig.now_s()

@@ -56,7 +56,7 @@ def test_without_resume_a_mission_begins_anew_and_the_state_before_is_kept(tmp_p
 
 def test_a_mission_that_has_ended_is_told_and_not_driven_again(tmp_path: Path) -> None:
     mission = yard(tmp_path)
-    values = {**a_state().progress.model_dump(), "statuses": ["reached"], "leg": "done", "index": 1}
+    values = {**a_state().progress.model_dump(), "statuses": ["reached"], "phase": "done", "index": 1}
     progress = SavedProgress.model_validate(values)
     leave_state(tmp_path, mission, ended=True, progress=progress).close()
     said: list[str] = []
