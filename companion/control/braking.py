@@ -63,8 +63,3 @@ def fastest_within_m(distance_m: float, settings: GuidanceSettings) -> float:
     """The speed from which the rover can stop within a distance: the inverse of ``stopping_distance_m``."""
     a, t = settings.deceleration_m_s2, settings.latency_s
     return a * (math.sqrt(t * t + 2.0 * max(distance_m, 0.0) / a) - t)
-
-
-def overshoot_m(distance_m: float, settings: GuidanceSettings) -> float:
-    """How far beyond a guided position at this distance the rover may come to stand."""
-    return min(settings.overshoot_m, 0.1 * distance_m)

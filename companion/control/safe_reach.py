@@ -14,16 +14,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.control.braking import blind_distance_m, farthest_m, fastest_blind_m_s, overshoot_m
+from companion.control.braking import blind_distance_m, farthest_m, fastest_blind_m_s
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import NedPoint, wrap_pi_rad
-from companion.mapping.map_queries import ArcQueries, Unseen, Until, look_along, unseen_beside, within_map_m
+from companion.mapping.map_queries import ArcQueries, Unseen, Until, ground_at, look_along, unseen_beside
+from companion.mapping.reach_kernels import Stopping, first_to_stop_at, may_stop_at
 
 BACK_LEAST_M_S = 0.2
 """The rover does not back out at all where there is only room to do so slower than this."""
 ROLLED_M = 0.05
 """Targets along the path are chosen in steps of this; the rover's front may lie beyond seen ground by as much."""
+FLANK_M, FLANK_NEAR_M = 0.05, 0.2
+"""So far beside the rover the ground must have been seen, from so far before it on: no sensor sees nearer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,15 +41,16 @@ class Reach:
 def farthest_clear(path: ReferencePath, view: LocalView) -> Reach:
     """The farthest place of the path in clear sight.
 
-    Wide room beside the rover is tried first; less room counts only if it leads farther. With thin beams more room is
-    kept: they map a wall in the wrong place when the position is wrong at that moment, and it stays there.
+    With wide room where there is that much, with less only where that leads farther. From walls that thin beams
+    have seen more distance is kept: such a wall stays in the map where the position was wrong at that moment.
     """
     settings, here = view.settings.guidance, view.pose.point
     best = Reach(here, 0.0, 0.0)
+    search = _Search(path, view)
     for extra_m, enough_m in settings.clearances:
         if view.rover.narrow_sight and extra_m < settings.narrow_clearance_m:
             break
-        found = _farthest_with(path, view, extra_m)
+        found = search.farthest(extra_m)
         if found.distance_m > best.distance_m + 0.5 or best.distance_m == 0.0:
             best = found
         if best.distance_m >= min(enough_m, here.distance_m(path.end) - 0.1):
@@ -54,59 +58,72 @@ def farthest_clear(path: ReferencePath, view: LocalView) -> Reach:
     return best
 
 
-def _farthest_with(path: ReferencePath, view: LocalView, room_m: float) -> Reach:
-    settings, here = view.settings.guidance, view.pose.point
-    limit_m = farthest_m(view.speed_m_s, settings)
-    last = min(len(path.points) - 1, path.progress + int(settings.horizon_m / STEP_M))
-    for index in range(last, path.progress, -2):  # in double steps, for speed
-        target = path.point(index)
-        reach = Reach(target, here.distance_m(target), room_m)
-        if 0.05 <= reach.distance_m <= limit_m and may_be_last(view, reach):
-            return _moved_on(reach, [path.point(i) for i in (index + 1, index + 2) if i <= last], view, limit_m)
-    return Reach(here, 0.0, room_m)
+class _Search:
+    """Looks for the farthest target, among the points of a path, that may be the last the autopilot receives.
 
-
-def _moved_on(reach: Reach, further: list[NedPoint], view: LocalView, limit_m: float) -> Reach:
-    """The target moved on towards the next points of the path, which are too far, in steps of ``ROLLED_M``.
-
-    The farther the target, the faster the autopilot drives, so no decimetre is given away.
+    The rover stops there, or a little farther, on ground seen free (``reach_kernels.may_stop_at``).
     """
-    for point in further:
-        bearing, left_m = reach.target.bearing_rad(point), reach.target.distance_m(point)
-        pieces = max(1, math.ceil(left_m / ROLLED_M - 1e-6))
-        for _ in range(pieces):
-            target = reach.target.moved(bearing, left_m / pieces)
-            nearer = Reach(target, view.pose.point.distance_m(target), reach.room_m)
-            if not reach.distance_m < nearer.distance_m <= limit_m or not may_be_last(view, nearer):
-                return reach
-            reach = nearer
-    return reach
 
+    def __init__(self, path: ReferencePath, view: LocalView) -> None:
+        settings, frame = view.settings.guidance, view.evidence.frame
+        self._path, self._view = path, view
+        self._last = min(len(path.points) - 1, path.progress + int(settings.horizon_m / STEP_M))
+        self._limit_m = farthest_m(view.speed_m_s, settings)
+        self._ground = ground_at(view.evidence, view.pose)
+        self._start = frame.xy(view.pose.point)
+        # From the farthest on, in double steps, for speed.
+        self._targets = frame.xys(path.points[self._last : path.progress : -2])
 
-def may_be_last(view: LocalView, reach: Reach) -> bool:
-    """Whether the rover could be left alone with this target: it stops there, or a little farther, on ground seen free.
+    def farthest(self, room_m: float) -> Reach:
+        """With this much room kept beside the rover; a reach of 0 m when there is nowhere to be sent."""
+        here, stopping = self._view.pose.point, self._stopping(room_m)
+        limit = self._view.evidence.frame.cells(self._limit_m)
+        found = first_to_stop_at(self._ground, self._start, self._targets, limit, stopping)
+        if found < 0:
+            return Reach(here, 0.0, room_m)
+        index = self._last - 2 * found
+        target = self._path.point(index)
+        further = [self._path.point(i) for i in (index + 1, index + 2) if i <= self._last]
+        return self._moved_on(Reach(target, here.distance_m(target), room_m), further, stopping)
 
-    Its front must come to lie on seen ground, too, and so must its flanks all the way.
-    """
-    evidence, here, radius_m = view.evidence, view.pose.point, view.rover.radius_m
-    bearing = here.bearing_rad(reach.target)
-    line = look_along(evidence, here, reach.target, radius_m + reach.room_m)
-    if line.clear_m < reach.distance_m - 0.05 or line.seen_m < reach.distance_m - 0.05:
-        return False
-    over_m = overshoot_m(reach.distance_m, view.settings.guidance)
-    stands = reach.target.moved(bearing, within_map_m(evidence, reach.target, bearing, over_m))
-    if unseen_flank(view, stands) is not None:  # asked early: thin beams fail here most often
-        return False
-    if look_along(evidence, here, stands, radius_m).clear_m < here.distance_m(stands) - 0.05:
-        return False
-    front = stands.moved(bearing, within_map_m(evidence, stands, bearing, radius_m))
-    return look_along(evidence, stands, front, 0.0).seen_m >= stands.distance_m(front) - ROLLED_M
+    def _moved_on(self, reach: Reach, further: list[NedPoint], stopping: Stopping) -> Reach:
+        """The target moved on towards the next points of the path, which are too far, in steps of ``ROLLED_M``.
+
+        The farther the target, the faster the autopilot drives, so no decimetre is given away.
+        """
+        here, frame = self._view.pose.point, self._view.evidence.frame
+        for point in further:
+            bearing, left_m = reach.target.bearing_rad(point), reach.target.distance_m(point)
+            pieces = max(1, math.ceil(left_m / ROLLED_M - 1e-6))
+            for _ in range(pieces):
+                target = reach.target.moved(bearing, left_m / pieces)
+                nearer = Reach(target, here.distance_m(target), reach.room_m)
+                if not reach.distance_m < nearer.distance_m <= self._limit_m:
+                    return reach
+                if not may_stop_at(self._ground, self._start, frame.xy(target), stopping):
+                    return reach
+                reach = nearer
+        return reach
+
+    def _stopping(self, room_m: float) -> Stopping:
+        evidence, radius_m = self._view.evidence, self._view.rover.radius_m
+        lengths_m = Stopping(
+            radius=radius_m,
+            map_radius=evidence.rover_radius_m,
+            room=room_m,
+            overshoot=self._view.settings.guidance.overshoot_m,
+            flank=radius_m + FLANK_M,
+            near=radius_m + FLANK_NEAR_M,
+            slack=ROLLED_M,
+            edge=0.01,
+        )
+        return Stopping(*map(evidence.frame.cells, lengths_m))
 
 
 def unseen_flank(view: LocalView, point: NedPoint) -> Unseen | None:
     """Where the rover's flanks would enter unseen ground on the way to a point."""
     radius_m = view.rover.radius_m
-    return unseen_beside(view.evidence, view.pose.point, point, radius_m + 0.05, radius_m + 0.2)
+    return unseen_beside(view.evidence, view.pose.point, point, radius_m + FLANK_M, radius_m + FLANK_NEAR_M)
 
 
 def arc_is_free(view: LocalView, target: NedPoint) -> bool:

@@ -15,6 +15,7 @@ from companion.control.collision_avoidance import first_near, least_room_m
 from companion.control.local_view import LocalView
 from companion.control.motion_prediction import steered
 from companion.control.reference_path import ReferencePath
+from companion.control.safe_reach import farthest_clear
 from companion.control.setpoint_check import velocity_stops_in_time
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
@@ -50,6 +51,7 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     steered(0.0, 0.0, 0.0, places, np.zeros(2), np.zeros(1))
     first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
     at = LocalView(Pose(4.0, 4.0, 0.0, 0.0), 0.2, evidence, RoverLimits(0.35, 2.0, 4.0), settings)
+    farthest_clear(ReferencePath(np.column_stack((np.linspace(4.0, 7.0, 13), np.full(13, 4.0)))), at)
     velocity_stops_in_time(GuidedVelocity(0.2, 0.1), at, Bounds())
     if turning_radius_m > 0.0:
         _steer(settings)

@@ -110,20 +110,6 @@ def clearance_m(evidence: EvidenceMap, point: NedPoint, reach_m: float) -> float
     return frame.metres(float(nearest(evidence.log_odds, x, y, frame.cells(reach_m), evidence.settings.occupied_at)))
 
 
-def within_map_m(evidence: EvidenceMap, point: NedPoint, bearing_rad: float, distance_m: float) -> float:
-    """The part of a distance from a place of the map that does not leave it, up to 1 cm before its edge."""
-    grid = evidence.base
-    corner = grid.south_west
-    for from_m, size_m, step in (
-        (point.north_m - corner.north_m, grid.height * grid.resolution_m, math.cos(bearing_rad)),
-        (point.east_m - corner.east_m, grid.width * grid.resolution_m, math.sin(bearing_rad)),
-    ):
-        room_m = size_m - from_m if step > 0.0 else from_m
-        if abs(step) * distance_m > room_m - 0.01:
-            distance_m = max(room_m - 0.01, 0.0) / abs(step)
-    return distance_m
-
-
 def ground_at(evidence: EvidenceMap, pose: Pose) -> EvidenceArrays:
     """The map for the compiled loops, with the field that the rover stands in."""
     cell = evidence.base.cell_at(pose.point)

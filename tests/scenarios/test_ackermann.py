@@ -24,7 +24,15 @@ def run_of(suite: str, seed: int) -> Drive:
     return Drive(mission, scenario, Settings(), seed, NullRecorder(), time_limit_s=900.0)
 
 
-@pytest.mark.parametrize(("suite", "seed"), [("lidar-360", 0), ("lidar-360", 2), ("lidar-90", 0), ("lidar-90", 1)])
+@pytest.mark.parametrize(
+    ("suite", "seed"),
+    [
+        pytest.param("lidar-360", 0, marks=pytest.mark.thorough),
+        ("lidar-360", 2),
+        ("lidar-90", 0),
+        pytest.param("lidar-90", 1, marks=pytest.mark.thorough),
+    ],
+)
 def test_both_targets_are_reached_on_arcs_and_nothing_is_touched(suite: str, seed: int) -> None:
     """It is never told to turn on the spot; it backs up where it has to."""
     run = run_of(suite, seed)

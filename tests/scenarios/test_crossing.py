@@ -24,7 +24,7 @@ def driven(planner: str, suite: str, seed: int) -> Drive:
     return run
 
 
-@pytest.mark.parametrize("suite", ["lidar-90", "lidar-360"])
+@pytest.mark.parametrize("suite", ["lidar-90", pytest.param("lidar-360", marks=pytest.mark.thorough)])
 @pytest.mark.parametrize("planner", ["hybrid", "vertex++"])
 def test_crossing_is_driven_without_a_collision(planner: str, suite: str) -> None:
     run = driven(planner, suite, 0)
@@ -32,7 +32,7 @@ def test_crossing_is_driven_without_a_collision(planner: str, suite: str) -> Non
     assert run.report.exit_code == 0
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 7))])
 def test_other_seeds_meet_other_traffic_and_do_not_touch_it(seed: int) -> None:
     """Nothing there gives way, and one of the six announces nothing: with some seeds in twenty it is touched."""
     run = driven("hybrid", "lidar-90", seed)

@@ -16,7 +16,11 @@ MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 
 @pytest.mark.parametrize(
     ("name", "suite"),
-    [("clutter.toml", "lidar-90"), ("complex.toml", "lidar-360"), ("ackermann.toml", "lidar-360")],
+    [
+        ("clutter.toml", "lidar-90"),
+        ("complex.toml", "lidar-360"),
+        pytest.param("ackermann.toml", "lidar-360", marks=pytest.mark.thorough),
+    ],
 )
 def test_whenever_it_dies_nothing_is_touched(name: str, suite: str) -> None:
     told = overheard(with_suite(load_mission(MISSIONS / name), suite), 0)

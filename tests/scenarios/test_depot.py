@@ -23,7 +23,10 @@ def driven(path: Path, sensors: str, seed: int = 0, limit_s: float = 300.0) -> D
     return run
 
 
-@pytest.mark.parametrize("sensors", ["lidar-90", "lidar-360", str(MISSIONS / "sensors" / "weathered.toml")])
+@pytest.mark.parametrize(
+    "sensors",
+    ["lidar-90", pytest.param("lidar-360", marks=pytest.mark.thorough), str(MISSIONS / "sensors" / "weathered.toml")],
+)
 def test_the_depot_is_driven_without_a_collision(sensors: str, tmp_path: Path) -> None:
     run = driven(MISSIONS / "depot.toml", sensors)
     assert run.report.exit_code == 0, run.report.said

@@ -87,7 +87,7 @@ def test_a_person_who_takes_the_rover_before_it_is_armed_is_not_overruled(tmp_pa
     assert_reached(rig)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", [0, 1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 6))])
 def test_setpoints_go_out_only_while_guided_and_armed(tmp_path: Path, seed: int) -> None:
     """A restless person: any mode at any time, arming and disarming; in the end the rover is given back."""
     rig, rng = Rig(yard(tmp_path), seed=seed), np.random.default_rng(seed)
@@ -472,7 +472,9 @@ def test_every_form_of_setpoint_drives(form: str, kind: str) -> None:
     assert others == set()
 
 
-@pytest.mark.parametrize("name", ["one-obstacle.toml", "clutter.toml", "rooms.toml"])
+@pytest.mark.parametrize(
+    "name", ["one-obstacle.toml", "clutter.toml", pytest.param("rooms.toml", marks=pytest.mark.thorough)]
+)
 def test_no_guided_position_lies_beyond_what_was_seen_free(name: str) -> None:
     """At most by the way the rover needs to stop at cruise speed, and half a metre."""
     settings = Settings()
@@ -494,10 +496,10 @@ def targets(on_blocked: str) -> str:
 @pytest.mark.parametrize(
     ("on_blocked", "statuses", "end"),
     [
-        ("skip", [UNREACHABLE, REACHED], (1.5, 20.5)),
+        pytest.param("skip", [UNREACHABLE, REACHED], (1.5, 20.5), marks=pytest.mark.thorough),
         ("wait", [UNREACHABLE, REACHED], (1.5, 20.5)),
         ("return", [UNREACHABLE, SKIPPED], (7.5, 2.5)),
-        ("hold", [UNREACHABLE, SKIPPED], (7.5, 2.5)),
+        pytest.param("hold", [UNREACHABLE, SKIPPED], (7.5, 2.5), marks=pytest.mark.thorough),
     ],
 )
 def test_a_sealed_target(

@@ -23,6 +23,12 @@ SOLVABLE = [
 ]  # fmt: skip
 """And field.waypoints, which is field.plan in another format."""
 SUITES = ["lidar-90", "lidar-360", "beams"]
+ALWAYS = [
+    *((name, "lidar-90") for name in SOLVABLE),
+    ("clutter.toml", "lidar-360"), ("dead-end.toml", "lidar-360"), ("field.waypoints", "lidar-360"),
+    ("rooms.toml", "beams"), ("one-obstacle.toml", "beams"), ("dead-end.toml", "beams"),
+]  # fmt: skip
+"""The others are driven by ``make test-all``."""
 LIDARS_ELSEWHERE = ["ackermann.toml", "crossing.toml", "depot.toml"]
 """Tests of their own drive these with both lidars."""
 
@@ -37,7 +43,13 @@ def driven(name: str, suite: str | None = None, seed: int = 0, settings: Setting
     return report
 
 
-@pytest.mark.parametrize(("name", "suite"), [*product(SOLVABLE, SUITES), ("field.waypoints", "lidar-360")])
+@pytest.mark.parametrize(
+    ("name", "suite"),
+    [
+        pytest.param(name, suite, marks=() if (name, suite) in ALWAYS else pytest.mark.thorough)
+        for name, suite in [*product(SOLVABLE, SUITES), ("field.waypoints", "lidar-360")]
+    ],
+)
 def test_mission_is_solved(name: str, suite: str) -> None:
     report = driven(name, suite)
     assert report.collisions == 0
@@ -45,7 +57,10 @@ def test_mission_is_solved(name: str, suite: str) -> None:
     assert report.exit_code == 0
 
 
-@pytest.mark.parametrize("name", LIDARS_ELSEWHERE)
+@pytest.mark.parametrize(
+    "name",
+    ["ackermann.toml", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("crossing.toml", "depot.toml"))],
+)
 def test_mission_is_solved_with_single_beams_too(name: str) -> None:
     report = driven(name, "beams")
     assert report.collisions == 0
@@ -57,7 +72,7 @@ def test_no_shipped_mission_is_left_out() -> None:
     assert files == {*SOLVABLE, "field.waypoints", *LIDARS_ELSEWHERE, "sealed.toml"}
 
 
-@pytest.mark.parametrize("suite", SUITES)
+@pytest.mark.parametrize("suite", ["lidar-90", "beams", pytest.param("lidar-360", marks=pytest.mark.thorough)])
 def test_sealed_target_is_reported_and_the_rover_comes_back(suite: str) -> None:
     report = driven("sealed.toml", suite)
     assert report.collisions == 0
@@ -70,11 +85,9 @@ def test_sealed_target_is_reported_and_the_rover_comes_back(suite: str) -> None:
 
 
 def test_dead_end_needs_the_way_back() -> None:
-    """A lucky first path may miss the dead end; of eight seeds one did."""
-    paper = parse_settings({"profile": "paper"}, "test")
-    reports = [driven("dead-end.toml", seed=seed, settings=paper) for seed in range(3)]
-    assert all(report.exit_code == 0 for report in reports)
-    assert sum(report.return_steps > 0 for report in reports) >= 1
+    """A lucky first path may miss the dead end; of eight seeds one did, not this one."""
+    report = driven("dead-end.toml", settings=parse_settings({"profile": "paper"}, "test"))
+    assert report.exit_code == 0 and report.return_steps > 0
 
 
 def test_drive_command_writes_what_it_promises(tmp_path: Path) -> None:

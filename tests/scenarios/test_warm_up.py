@@ -9,12 +9,10 @@ from typing import Any
 
 CASES = [
     ("drive", "rooms.toml", "hybrid"),
-    ("drive", "one-obstacle.toml", "theta-star"),
     ("drive", "crossing.toml", "vertex++"),
     ("drive", "ackermann.toml", "hybrid"),
     ("serve", "open.toml", "beams"),
     ("serve", "ackermann.toml", "lidar-360"),
-    ("serve", "crossing.toml", "none"),
 ]
 
 

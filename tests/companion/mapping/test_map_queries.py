@@ -20,7 +20,6 @@ from companion.mapping.map_queries import (
     clearance_m,
     look_along,
     unseen_beside,
-    within_map_m,
 )
 from companion.settings import MappingSettings
 
@@ -108,15 +107,6 @@ def test_the_nearest_unseen_place_beside_a_line_is_found_on_either_side(corner: 
         assert unseen.place.distance_m(at(corner, 9.0, 8.06 + side * 0.5)) < 0.2
         assert unseen_beside(evidence, here, there, 0.2, 0.6) is None, "not so far aside"
         assert unseen_beside(evidence, here, there, 0.5, 5.5) is None, "too near"
-
-
-@pytest.mark.parametrize(("bearing_deg", "inside_m"), [(0.0, 5.99), (180.0, 9.99), (90.0, 3.99), (-90.0, 11.99)])
-def test_a_distance_ends_before_the_edge_of_the_map(bearing_deg: float, inside_m: float) -> None:
-    for corner in CORNERS:
-        here = at(corner, 10.0, 12.0)
-        assert within_map_m(seen_map(corner), here, math.radians(bearing_deg), 99.0) == pytest.approx(inside_m)
-        assert within_map_m(seen_map(corner), here, math.radians(bearing_deg), 1.0) == 1.0
-    assert within_map_m(seen_map(), NedPoint(SIDE + 1.0, 5.0), 0.0, 3.0) == 0.0, "it stands beyond the edge already"
 
 
 # --- arcs ------------------------------------------------------------------------------------------------------------
