@@ -26,13 +26,13 @@ test: $(TOOLS)
 	@$(MAKE) --no-print-directory --jobs=2 lint $(ALL_KERNELS)
 	@$(MAKE) --no-print-directory pytest
 
-# One worker more than processors: many tests wait for real time.
+# More workers than processors: many tests wait for real time.
 pytest: $(ALL_KERNELS)
-	$(BIN)/python -m pytest -n 3 --dist worksteal
+	$(BIN)/python -m pytest -n 4 --dist worksteal
 
 # With the drives that show a little more and take long: every mission with every sensor suite, more seeds.
 test-all: $(ALL_KERNELS)
-	$(BIN)/python -m pytest -n 3 --dist worksteal -m ""
+	$(BIN)/python -m pytest -n 4 --dist worksteal -m ""
 
 lint: $(TOOLS)
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""The companion: one tick of its loop, 20 times a second, is the field step.
+"""The companion: what it does in one tick of its loop, 20 times a second.
 
 Nouns: companion, tick.
 """
@@ -60,7 +60,7 @@ class Companion:
         self.outcome = parts.outcome
 
     def tick(self) -> None:
-        """One field step: sleep, listen, map, answer, supervise, decide, guide, speak, conclude."""
+        """One tick: sleep, listen, map, answer, supervise, decide, guide, speak, conclude."""
         now_s = self._pace.sleep()
         scans = self._dispatcher.listen(now_s)
         self.mission_run.map(scans)

@@ -33,3 +33,21 @@ def own_place_for_states(tmp_path_factory: pytest.TempPathFactory) -> Iterator[N
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("states")))
         yield
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Two workers begin with the tests that wait for real time, while the others keep the processors busy.
+
+    With ``--dist worksteal`` each worker begins with an equal share of the list, in its order.
+    """
+    workers = getattr(config, "workerinput", {}).get("workercount", 1)
+    slow = [item for item in items if item.get_closest_marker("slow")]
+    others = [item for item in items if not item.get_closest_marker("slow")]
+    waiting, share = min(2, workers), len(items) / workers
+    ordered: list[pytest.Item] = []
+    for worker in range(workers):
+        first = slow[worker::waiting] if worker < waiting else []
+        more = round((worker + 1) * share) - len(ordered) - len(first)
+        ordered += first + others[:more]
+        others = others[more:]
+    items[:] = ordered + others

@@ -17,7 +17,7 @@ from companion.control.braking import blind_distance_m, braking_distance_m, fart
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.core.frames import NedPoint
-from companion.core.severity import Severity
+from companion.core.severity import Severity, TextSink
 from companion.mapping.map_queries import ArcQueries, Until, look_along
 from companion.mission.bounds import Bounds
 from companion.safety.reasons import Reason, SetpointFault
@@ -29,9 +29,6 @@ NEARER_M = 0.05
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
 ARC_PIECES = 8
 """Straight pieces that an arc is made of where borders are concerned."""
-
-Tell = Callable[[str, Severity], None]
-"""Says a text with its severity to the people."""
 
 Fault = Reason[SetpointFault]
 
@@ -120,9 +117,9 @@ def fault_of(setpoint: Setpoint, view: LocalView, bounds: Bounds, rules: tuple[R
 class SetpointCheck:
     """Stands between the controllers and what is sent. ``refused``: how often for each fault."""
 
-    def __init__(self, tell: Tell, rules: tuple[Rule, ...] = RULES) -> None:
+    def __init__(self, notifier: TextSink, rules: tuple[Rule, ...] = RULES) -> None:
         self.refused: Counter[SetpointFault] = Counter()
-        self._tell = tell
+        self._notifier = notifier
         self._rules = rules
 
     def passed(self, command: ControlCommand, view: LocalView, bounds: Bounds) -> ControlCommand:
@@ -131,5 +128,5 @@ class SetpointCheck:
         if fault is None:
             return command
         self.refused[fault.kind] += 1
-        self._tell(f"Stopping: {fault}", Severity.WARNING)
+        self._notifier.tell(f"Stopping: {fault}", Severity.WARNING)
         return stop_for(Purpose.BRAKE)

@@ -22,4 +22,4 @@ class RoverLimits:
     turning_radius_m: float = 0.0
     """The tightest arc it can drive; 0: it turns on the spot."""
     fastest_m_s: float = math.inf
-    """The highest speed that it is ever told on its present way, whatever is planned for a part of it."""
+    """The highest speed on its present way; the way may be planned with lower speeds in places."""

@@ -25,10 +25,10 @@ class Mark(IntFlag):
     SIGNED = 32
     """The run accepted signed packets only; refused packets are not recorded."""
     UNSIGNED = 64
-    """Some packets had been refused by then because they were not signed,"""
+    """Some packets had been refused by then because they were not signed."""
     WRONG = 128
-    """because they were signed with another key,"""
+    """Some packets had been refused by then because they were signed with another key."""
     OLD = 256
-    """or because their signature was too old or had been seen before."""
+    """Some packets had been refused by then because their signature was too old or had been seen before."""
     UNSAVED = 512
     """The last attempt to save the state of the run failed."""

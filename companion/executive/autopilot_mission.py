@@ -28,9 +28,9 @@ TRIES = 3
 PAUSE_S = 2.0
 """After a try that failed: somebody may just be uploading."""
 RECEIVED = "Flight plan received"
-"""ArduPilot says so, and acknowledges, on the link that an upload came by, which need not be ours;"""
+"""ArduPilot's text after an upload. It is sent on the link of the upload only, which need not be ours."""
 AGAIN_S = 60.0
-"""so the mission is fetched again this often: nothing else tells of an upload with as many items as before."""
+"""The mission is fetched again this often. Nothing else tells of an upload by another link with as many items."""
 
 
 class MissionFetcher:

@@ -78,7 +78,7 @@ class GoalDriver:
         self._sure_from_s = -math.inf
         self._began_s = 0.0
         self.step_s = 0.0
-        """From the tick in which the last step began to the one that took its answer: a replay has the same ticks."""
+        """How long the last step took: from the tick in which it began to the tick that took its answer."""
         self._pending = 0  # the epoch of the step under way: a step begun before a new leg or a recovery is void
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf

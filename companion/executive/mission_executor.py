@@ -73,7 +73,7 @@ class MissionTask(Enum):
 class MissionExecutor:
     """Made when the rover may be driven for the first time. It alone writes ``progress``.
 
-    ``scan``: any of its sensor, which tells how far and wide it sees.
+    ``scan``: any scan of the rover's sensor. It tells how far and how wide the sensor sees.
     """
 
     def __init__(

@@ -96,7 +96,7 @@ class MissionRun:
         """Why the rover was not to be driven in the last tick; None if it was."""
         self.end: Reason[EndReason] | None = None
         """Why the run ends; None while it goes on."""
-        self.setpoint_check = SetpointCheck(notifier.tell)
+        self.setpoint_check = SetpointCheck(notifier)
         self.legs = AutoModeLegs(notifier)
         self._settings = settings
         self._make_executor = make_executor

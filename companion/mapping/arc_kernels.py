@@ -30,15 +30,15 @@ LATE_RAD = 0.6 * math.pi
 
 
 class EvidenceArrays(NamedTuple):
-    """An ``EvidenceMap`` for the compiled loops. The field (``home_x``, ``home_y``) of the rover is never blocked."""
+    """An ``EvidenceMap`` for the compiled loops. The field (``own_x``, ``own_y``) of the rover is never blocked."""
 
     log_odds: NDArray[np.float32]
     base: NDArray[np.float64]
     penalty: NDArray[np.float32]
     subdivisions: int
     occupied_at: float
-    home_x: int
-    home_y: int
+    own_x: int
+    own_y: int
 
 
 class Start(NamedTuple):
@@ -77,7 +77,7 @@ def place(ground: Any, x: float, y: float, room: float) -> int:
     if not (0 <= cx < width and 0 <= cy < height):
         return BLOCKED
     fx, fy = cx // s, cy // s
-    if ground.base[fy, fx] + ground.penalty[fy, fx] >= 1.0 and (fx != ground.home_x or fy != ground.home_y):
+    if ground.base[fy, fx] + ground.penalty[fy, fx] >= 1.0 and (fx != ground.own_x or fy != ground.own_y):
         return BLOCKED
     if nearest(ground.log_odds, x, y, room, ground.occupied_at) < room:
         return BLOCKED

@@ -57,7 +57,8 @@ FORGOTTEN_S = 5.0
 def newest_ranges(events: Sequence[Event]) -> list[Event]:
     """The events without range data that newer data of the same sensor in the same tick has overtaken; order kept.
 
-    Of each sensor the newest comes first, then of each the second, so that one that floods takes no other's place.
+    The sensors take turns: first the newest scan of each, then the second of each. So a sensor that sends too much
+    takes no other sensor's place.
     """
     heard: dict[Sensor, int] = {}
     turns: list[tuple[int, int]] = []

@@ -1,7 +1,7 @@
-"""Reasons and run phases as enums: why the rover must not move, what is awaited,
-what is wrong with a setpoint, what the run does, why it ended.
+"""Reasons and run phases as enums, with their texts.
 
-The program compares the enums; people, records and the autopilot get the texts, which are made here and nowhere else.
+They say why the rover must not move, what is awaited, what is wrong with a setpoint, what the run does and why it
+ended. The program compares the enums. People, records and the autopilot get the texts.
 
 Nouns: doubt, setpoint fault, wait reason, end reason, refusal, run phase, activity.
 """

@@ -39,7 +39,8 @@ class DrivePermission:
         doubt = first_doubt(self._monitors, now_s)
         run.latch, verdict = check(run.latch, run.vehicle, now_s, settings, doubt)
         drives = verdict.reaction is Reaction.DRIVE
-        if drives == run.stopped or (drives and before is not Control.COMPANION):
+        changed = drives == run.stopped
+        if changed or (drives and before is not Control.COMPANION):
             run.start_afresh()
         run.stop = None if drives else self._stop(verdict, now_s)
         if not drives:

@@ -1,4 +1,4 @@
-"""The pace of the field step: sleeps until the next tick begins, and measures how late and how long it is.
+"""The pace of the loop: sleeps until the next tick begins, and measures how late and how long it is.
 
 Nouns: pace.
 """

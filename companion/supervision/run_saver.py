@@ -30,9 +30,8 @@ class RunSaver:
         self._localization = localization
         self._shutdown = shutdown
 
-    @property
-    def problem(self) -> str:
-        """What is wrong with the record or the state file, for people; empty if nothing is."""
+    def note_problem(self) -> str:
+        """What is wrong with the record or the state file, for people; empty if nothing is. Noted in the record."""
         return self._log.problem or (self._checkpointer.problem_text(self._log) if self._checkpointer else "")
 
     def resume(self, executor: MissionExecutor, now_s: float) -> bool:

@@ -20,7 +20,6 @@ pytestmark = pytest.mark.skipif(
 )
 
 
-@pytest.mark.slow
 def test_every_target_is_fuzzed_without_a_find() -> None:
     command = [sys.executable, "-m", "tests.fuzz", "all", "--runs", str(RUNS), "--seed", "1"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=500)

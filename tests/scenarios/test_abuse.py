@@ -330,6 +330,7 @@ def watched(place: Path, allowed: list[Path], *arguments: object) -> tuple[int, 
         return finished(child)
 
 
+@pytest.mark.slow
 def test_no_file_is_written_outside_of_record_and_state(tmp_path: Path) -> None:
     place, record, state = tmp_path / "place", tmp_path / "record", tmp_path / "state"
     (place / "home").mkdir(parents=True)

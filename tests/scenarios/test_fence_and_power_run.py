@@ -25,6 +25,7 @@ def test_a_target_outside_the_autopilots_fence_ends_the_run_before_it_begins(tmp
         assert rover.simulator.driven_m == 0.0 and not rover.simulator._vehicle.armed
 
 
+@pytest.mark.slow
 def test_a_battery_that_runs_low_brings_the_rover_back_and_ends_the_run_with_exit_code_3(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     options = tmp_path / "settings.toml"

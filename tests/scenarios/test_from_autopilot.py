@@ -162,6 +162,7 @@ def upload(url: str, rows: list[tuple[int, tuple[float, ...], tuple[int, int]]])
     pytest.fail("the mission was not taken")
 
 
+@pytest.mark.slow
 def test_the_command_itself(tmp_path: Path) -> None:
     """Real processes: first without a mission in the autopilot, then with one."""
     with served(yard(tmp_path)) as world:
@@ -179,6 +180,7 @@ def test_the_command_itself(tmp_path: Path) -> None:
         assert world.simulator.collisions == ()
 
 
+@pytest.mark.slow
 def test_the_command_drives_what_auto_hands_over(tmp_path: Path) -> None:
     """Real processes: a person arms and sets AUTO, the companion drives the leg and ends by itself."""
     with served(yard(tmp_path)) as world:

@@ -46,6 +46,7 @@ def test_killed_at_random_times_the_mission_is_driven_to_its_end(tmp_path: Path)
     assert "Resumed with its map" in err and "Traceback" not in said + err
 
 
+@pytest.mark.slow
 def test_sigterm_stops_the_rover_saves_and_is_gone_within_a_second(tmp_path: Path) -> None:
     """One more second for this machine, and as much more as it is slower than a quiet one."""
     mission = yard(tmp_path, TWO)
@@ -78,6 +79,7 @@ os.fsync = hang
 """
 
 
+@pytest.mark.slow
 def test_sigterm_is_obeyed_within_a_second_by_a_run_whose_disk_hangs(tmp_path: Path) -> None:
     """One more second for this machine, and as much more as it is slower than a quiet one."""
     mission = yard(tmp_path, TWO)

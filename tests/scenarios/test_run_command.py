@@ -123,6 +123,7 @@ def test_a_peer_that_is_not_there_is_waited_for_until_ctrl_c(tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.slow
 def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.Signals) -> None:
     mission = yard(tmp_path)
     record = tmp_path / "record"
@@ -148,6 +149,7 @@ def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.S
     assert again.differences == [] and again.companion is not None and again.companion.done
 
 
+@pytest.mark.slow
 def test_a_companion_that_is_killed_leaves_the_rover_on_ground_it_had_seen(tmp_path: Path) -> None:
     mission, record = yard(tmp_path), tmp_path / "record"
     with (
@@ -168,6 +170,7 @@ def test_a_companion_that_is_killed_leaves_the_rover_on_ground_it_had_seen(tmp_p
     assert len(cut.notes) == 1 and "was not closed" in cut.notes[0]
 
 
+@pytest.mark.slow
 def test_the_pilot_wins_and_the_autopilot_is_quoted(tmp_path: Path) -> None:
     mission = yard(tmp_path)
     with served(mission) as world, process("companion", "run", mission_path(mission), "--connect", world.url) as run:

@@ -27,6 +27,7 @@ from companion.mission.bounds import Bound, Bounds
 from companion.safety.reasons import Reason, SetpointFault
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity, Setpoint
+from tests.support.notices import Notices
 from tests.support.rig import Rig, yard
 from tests.support.stored import KEEP_IN, POLYGONS, box, stored
 
@@ -262,26 +263,18 @@ def test_what_stands_before_the_edge_of_the_map_counts_for_a_target_beyond_it(be
 
 
 def test_a_refused_setpoint_becomes_velocity_zero_and_is_said_and_counted() -> None:
-    said: list[tuple[str, int]] = []
-    check, at = (
-        SetpointCheck(lambda text, severity: said.append((text, severity))),
-        view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0)),
-    )
+    notices = Notices()
+    check, at = SetpointCheck(notices), view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0))
     good = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE)), 1.0)
-    assert check.passed(good, at, Bounds()) == good and not said and not check.refused
+    assert check.passed(good, at, Bounds()) == good and not notices.told and not check.refused
     far = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(MIDDLE + 50.0, MIDDLE)), 1.0)
     assert check.passed(far, at, Bounds()).setpoint == STOP
-    assert (
-        said == [("Stopping: target farther away than the horizon", Severity.WARNING)]
-        and Severity.WARNING == 4
-        and check.refused.total() == 1
-    )
+    assert notices.told == [("Stopping: target farther away than the horizon", Severity.WARNING)]
+    assert check.refused.total() == 1
 
 
 def test_a_rule_more_is_asked_like_the_others() -> None:
-    check = SetpointCheck(
-        lambda text, severity: None, (lambda setpoint, at, bounds: Reason(SetpointFault.NOT_A_NUMBER),)
-    )
+    check = SetpointCheck(Notices(), (lambda setpoint, at, bounds: Reason(SetpointFault.NOT_A_NUMBER),))
     drive = ControlCommand(Purpose.LOOK, GuidedHeading(0.0), 0.5)
     at = view(open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0))
     assert check.passed(drive, at, Bounds()).setpoint == STOP
@@ -394,7 +387,7 @@ def test_guidance_that_would_leave_the_fence_does_not_get_past_it(tmp_path: Path
     rig.until_driven(1.0)
     driver, bounds = rig.companion.driver, rig.companion.executor.layout.bounds  # type: ignore[union-attr]
     assert driver is not None and len(bounds) == 1
-    rig.companion.mission_run.setpoint_check = SetpointCheck(rig.companion._notifier.tell, (inside_borders,))
+    rig.companion.mission_run.setpoint_check = SetpointCheck(rig.companion._notifier, (inside_borders,))
     out = ControlCommand(Purpose.DRIVE, GuidedVelocity(1.5, 0.0), 1.5)
     driver.guide = lambda *_: out  # type: ignore[method-assign]
     rig.run_for(15.0)

@@ -31,4 +31,4 @@ def test_without_a_state_file_nothing_is_saved(tmp_path: Path) -> None:
     unused: Any = None
     saver = RunSaver(desk.run, None, Log(), unused, unused)
     saver.save(10.0, done=True)
-    assert not saver.resume(executor, 10.0) and saver.problem == ""
+    assert not saver.resume(executor, 10.0) and saver.note_problem() == ""
