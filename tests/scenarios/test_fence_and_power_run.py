@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import pytest
+
 from tests.support.rig import HOLD, yard
 from tests.support.served import finished, mission_path, process, served, wait_until
 
