@@ -115,7 +115,8 @@ def _contestants(planners: str, settings: Settings, console: Console, *, peers: 
         others, missing = installed_peers()
         contestants += others
         if missing:
-            console.print(f"not installed: {', '.join(missing)} (pip install 'rover-companion\\[peers]')")
+            remedy = "in the project's folder: .venv/bin/pip install -e '.\\[peers]'"
+            console.print(f"not installed: {', '.join(missing)} ({remedy})")
     return contestants
 
 

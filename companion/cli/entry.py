@@ -93,6 +93,10 @@ def _run(name: str, commands: Callable[..., object]) -> int:
         where = error.ctx.command_path if error.ctx is not None else name
         print(f"{where}: {error.format_message()} (see {where} --help)", file=sys.stderr)
         return EXIT_USAGE
+    except SystemError as error:  # an interrupt inside a compiled loop
+        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from None
+        raise
     except BrokenPipeError:  # the reader has closed its end (`... | head`)
         _let_go_of_output()
         return 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib.metadata
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -49,7 +50,7 @@ def writable(path: Path | None, suffix: str = "") -> None:
     with written(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         refuse_pipe(path)
-        existed = path.exists()
+        existed = os.path.exists(path)  # Path.exists raises where a folder may not be entered
         with path.open("ab"):
             pass
         if not existed:
@@ -63,7 +64,7 @@ def written(path: Path) -> Iterator[None]:
         refuse_pipe(path)
         yield
     except OSError as error:
-        place = error.filename if path.is_dir() and error.filename else path
+        place = error.filename if os.path.isdir(path) and error.filename else path
         raise OutputError(f"{place}: cannot be written: {error.strerror or error}; choose another place") from error
 
 

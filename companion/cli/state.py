@@ -34,7 +34,7 @@ class StateFiles:
         self._directory = named or default_directory(os.environ)
         self._saver = BackgroundWriter(budget=budget)
         self._base = Settings()
-        if named is not None and named.exists() and not named.is_dir():
+        if named is not None and os.path.isfile(named):
             raise OutputError(f"{named}: is a file; --state takes a directory")
         if named is not None:
             writable(named / TUNED)

@@ -275,7 +275,7 @@ class Recorder:
 def unused(directory: Path) -> Path:
     """The directory itself, or its name with the first number from 2 on that has no record yet."""
     candidate, number = directory, 2
-    while (candidate / META).exists():
+    while os.path.exists(candidate / META):  # a folder that may not be entered is told when it is written
         candidate = directory.with_name(f"{directory.name}-{number}")
         number += 1
     return candidate

@@ -39,7 +39,7 @@ def read_toml(
             data = file.read(limit + 1)
         if len(data) > limit:
             raise error(f"{path}: larger than {limit} bytes; a short TOML file is expected")
-        return tomllib.loads(data.decode("utf-8"))
+        return tomllib.loads(data.decode("utf-8-sig"))  # editors on Windows begin a file with a mark
     except OSError as fault:
         if missing_ok and isinstance(fault, FileNotFoundError):
             return {}

@@ -42,6 +42,8 @@ def _described(error: ValidationError, model: type[BaseModel]) -> str:
         return f"{place}: field required, it is missing"
     if fault["type"] == "value_error":
         return f"{place}: {fault['msg'].removeprefix('Value error, ')}"
+    if fault["type"] in ("list_type", "tuple_type") and isinstance(fault.get("input"), dict):
+        return f"{place}: one table where several may stand; write [[{place}]] with double brackets"
     if fault["type"] != "extra_forbidden":
         return f"{place}: {reason.lower()} (got {fault.get('input')!r:.60})"
     known = _known_keys(model, fault["loc"][:-1])

@@ -85,6 +85,24 @@ def test_an_interrupt_of_a_command_that_says_nothing_itself_is_told(capsys: pyte
     assert (code, capsys.readouterr().err) == (130, "stopped by Ctrl-C: half of it is done\n")
 
 
+def test_an_interrupt_inside_a_compiled_loop_ends_a_command_like_any_other(capsys: pytest.CaptureFixture[str]) -> None:
+    """What numba makes of it; other errors of that kind stay what they are."""
+    app = typer.Typer()
+
+    @app.command()
+    def interrupted() -> None:
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    @app.command()
+    def broken() -> None:
+        raise SystemError("bad call")
+
+    assert start("script", lambda: partial(app, ["interrupted"])) == 130
+    assert capsys.readouterr().err == "script: stopped by Ctrl-C\n"
+    with pytest.raises(SystemError, match="bad call"):
+        start("script", lambda: partial(app, ["broken"]))
+
+
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_the_version_is_told(name: str) -> None:
     done = subprocess.run(command(name, "--version"), capture_output=True, text=True, timeout=60, check=False)

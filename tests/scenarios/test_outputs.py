@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +12,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from companion.recording.recorder import unused
 from sitl.cli.commands import app
 
 YARD = "[grid]\nsize = [20, 20]\nhome = [3, 3]\n[sitl]\nsensors = 'lidar-360'\n[[target]]\nfield = [6, 3]\n"
@@ -81,3 +84,23 @@ def test_texts_are_told_as_they_come_and_a_run_that_waits_for_a_person_is_ended(
     ended = lines.index("ended: nobody is here to do what the companion waits for")
     assert heading < silent < ended and len(lines) < 12
     assert "outcome: incomplete" in result.stdout
+
+
+@pytest.mark.parametrize("option", ["--image", "--json", "--map"])
+def test_a_folder_that_may_not_be_entered_is_one_line(
+    mission: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, option: str
+) -> None:
+    """Also for root, who may enter any: so the answer of the system is made up."""
+    looked_at = os.stat
+
+    def stat(path: str | Path | int, *args: object, **options: object) -> os.stat_result:
+        if "locked" in str(path):
+            raise PermissionError(errno.EACCES, "Permission denied", str(path))
+        return looked_at(path, *args, **options)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(os, "stat", stat)
+    assert unused(tmp_path / "locked") == tmp_path / "locked"
+    place = tmp_path / "locked" / "x.png"
+    result = CliRunner().invoke(app, ["drive", str(mission), option, str(place)])
+    assert result.exit_code == 2 and result.stderr.count("\n") == 1
+    assert str(tmp_path / "locked") in result.stderr and "Permission denied" in result.stderr

@@ -58,6 +58,8 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
         ("[[wheel]]\nradius_m = 1.0\n[[wheel]]\n", "wheel 2.radius_m: field required, it is missing; see the manual"),
         ("[[wheel]]\nradius = 1.0", "wheel 1.radius_m: field required, it is missing"),
         ("[[wheel]]\nradius_m = 'a'", "wheel 1.radius_m: input should be a valid number"),
+        ("[wheel]\nradius_m = 1.0", "wheel: one table where several may stand; write [[wheel]] with double brackets"),
+        ("\ufeffname = 1", "name: input should be a valid string"),
         ("nam = 'a'", "nam: unknown key, did you mean 'name'?; see the manual"),
         ('"a\\nb" = 1', "a\\nb: unknown key; known here: name, wheel"),
     ],
