@@ -72,7 +72,9 @@ def test_no_shipped_mission_is_left_out() -> None:
     assert files == {*SOLVABLE, "field.waypoints", *LIDARS_ELSEWHERE, "sealed.toml"}
 
 
-@pytest.mark.parametrize("suite", ["lidar-90", "beams", pytest.param("lidar-360", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize(
+    "suite", ["lidar-90", *(pytest.param(suite, marks=pytest.mark.thorough) for suite in ("beams", "lidar-360"))]
+)
 def test_sealed_target_is_reported_and_the_rover_comes_back(suite: str) -> None:
     report = driven("sealed.toml", suite)
     assert report.collisions == 0
