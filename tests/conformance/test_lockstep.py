@@ -69,6 +69,7 @@ def test_the_same_seed_gives_the_same_bytes_with_another_c_library(mission: str)
     check_same_bytes(mission, NO_FMA)
 
 
+@pytest.mark.thorough
 def test_the_same_seed_gives_the_same_bytes_on_another_machine() -> None:
     """The autopilot drives: its kernels are compiled in a quarter of the time that the planners' take."""
     check_same_bytes("auto:missions/crossing.toml", another_machine())

@@ -14,7 +14,7 @@ from sitl.experiments.achour_table1 import NAME, run
 from sitl.experiments.achour_trials import METHODS, SETTINGS, samples_of
 from sitl.experiments.experiment import Options
 
-RUNS = 4
+RUNS = 2
 
 
 def test_achour_table1(tmp_path):

@@ -18,7 +18,7 @@ MISSIONS = Path(__file__).resolve().parents[2] / "missions"
     ("name", "suite"),
     [
         ("clutter.toml", "lidar-90"),
-        ("complex.toml", "lidar-360"),
+        pytest.param("complex.toml", "lidar-360", marks=pytest.mark.thorough),
         pytest.param("ackermann.toml", "lidar-360", marks=pytest.mark.thorough),
     ],
 )

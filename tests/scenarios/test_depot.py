@@ -64,6 +64,7 @@ def test_what_sends_no_ray_back_is_not_seen_until_it_is_touched(material: str, c
         assert run.report.exit_code == 0
 
 
+@pytest.mark.thorough
 def test_the_seed_decides_what_doors_ice_and_flaws_come_to() -> None:
     weathered = str(MISSIONS / "sensors" / "weathered.toml")
     tracks = [driven(MISSIONS / "depot.toml", weathered, seed, limit_s=75.0).report.track for seed in (1, 1, 2)]

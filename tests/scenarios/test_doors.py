@@ -45,6 +45,7 @@ def test_a_door_that_opens_lets_the_rover_on(sensors: str, tmp_path: Path) -> No
     assert run.simulator.collisions == ()
 
 
+@pytest.mark.thorough
 def test_a_door_that_stays_closed_is_given_up_after_the_limit(tmp_path: Path) -> None:
     run = driven(tmp_path, "[10000.0]")
     assert [status for _, status in run.report.targets] == ["unreachable"]
