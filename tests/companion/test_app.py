@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
-import pytest
-
 from companion.safety.reasons import Doubt, RunPhase, WaitReason
 from companion.vehicle.commands import (
     Arm,
@@ -19,11 +15,6 @@ from companion.vehicle.events import (
 )
 from tests.companion.safety.test_mode_latch import GUIDED
 from tests.support.whole import Whole
-
-
-@pytest.fixture
-def whole(tmp_path: Path) -> Whole:
-    return Whole(tmp_path)
 
 
 def test_from_the_first_heartbeat_to_the_first_setpoint(whole: Whole) -> None:

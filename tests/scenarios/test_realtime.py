@@ -12,7 +12,7 @@ from companion.recording.reader import load_record
 from companion.replay.replay import replay
 from tests.sitl.network.test_server import free_port
 from tests.support.rig import yard
-from tests.support.served import finished, mission_path, process
+from tests.support.served import finished, interpreter, mission_path
 
 
 @pytest.mark.slow
@@ -27,8 +27,8 @@ def test_companion_and_simulator_as_two_processes(tmp_path: Path, kind: str, spe
     listen, connect = {"udp": ("udpout", "udpin"), "tcp": ("tcp", "tcp")}[kind]
     record = tmp_path / "record"
     with (
-        process("sitl", "serve", path, "--listen", f"{listen}:127.0.0.1:{port}", "--speedup", speedup),
-        process(
+        interpreter("sitl", "serve", path, "--listen", f"{listen}:127.0.0.1:{port}", "--speedup", speedup),
+        interpreter(
             "companion", "run", path, "--connect", f"{connect}:127.0.0.1:{port}", "--arm", "--record", record
         ) as run,
     ):

@@ -1,5 +1,6 @@
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,8 +23,8 @@ def world_file(tmp_path: Path) -> Path:
     return path
 
 
-def mission(world_file: Path | None, **changes: object) -> Mission:
-    spec = SitlSpec(world=world_file, start=Cell(7, 4), heading_deg=45.0, sensors="beams", **changes)  # type: ignore[arg-type]
+def mission(world_file: Path | None, **changes: Any) -> Mission:
+    spec = SitlSpec(world=world_file, start=Cell(7, 4), heading_deg=45.0, sensors="beams", **changes)
     return Mission("test", (Target("a", Cell(1, 1)),), GridSpec(size=(20, 10), home=Cell(9, 9)), sitl=spec)
 
 

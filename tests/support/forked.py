@@ -1,7 +1,7 @@
 """The two programs as processes of their own, forked from one that has loaded them.
 
 A start then takes milliseconds. A fresh interpreter needs seconds of a processor, most of them to load the compiler
-and the kernels; ``test_entry.py`` and ``test_realtime.py`` start some.
+and the kernels; ``test_entry.py``, ``test_outputs.py`` and ``test_realtime.py`` start some.
 """
 
 from __future__ import annotations
@@ -155,7 +155,7 @@ def _run(
     for number, output in enumerate(outputs, start=1):
         os.dup2(output, number)
         os.close(output)
-    sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), "utf-8", write_through=False)
+    sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), "utf-8")
     sys.stderr = io.TextIOWrapper(io.FileIO(2, "w", closefd=False), "utf-8", "backslashreplace", line_buffering=True)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ.clear()

@@ -27,7 +27,7 @@ class Notices:
 
 @dataclass
 class HandClock:
-    """Shows what it is set to; sleeping sets it."""
+    """Shows what it is set to; only sleeping moves it on."""
 
     time_s: float = 0.0
 
@@ -35,4 +35,4 @@ class HandClock:
         return self.time_s
 
     def sleep_until_s(self, time_s: float) -> None:
-        self.time_s = time_s
+        self.time_s = max(self.time_s, time_s)

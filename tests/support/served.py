@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import tempfile
 import threading
 import time
@@ -106,10 +108,8 @@ def process(module: str, *arguments: object, first: str = "", watchdogs: bool = 
     has others or ``watchdogs`` asks for the default ones.
     """
     with tempfile.TemporaryDirectory() as folder:
-        if module == "companion" and arguments[0] == "run" and not watchdogs and "--settings" not in arguments:
-            patient = Path(folder) / "patient.toml"
-            patient.write_text(PATIENT)
-            arguments = (*arguments, "--settings", patient)
+        if not watchdogs:
+            arguments = _patient(module, arguments, Path(folder))
         with Forked(module, arguments, {**os.environ, "XDG_STATE_HOME": folder}, first=first) as child:
             try:
                 yield child
@@ -117,7 +117,31 @@ def process(module: str, *arguments: object, first: str = "", watchdogs: bool = 
                 child.kill()
 
 
-def finished(child: Forked) -> tuple[int, str, str]:
+@contextmanager
+def interpreter(module: str, *arguments: object) -> Iterator[subprocess.Popen[str]]:
+    """Like ``process``, in an interpreter of its own that has loaded nothing."""
+    with tempfile.TemporaryDirectory() as folder:
+        code = f"from {module}.cli.main import main; main()"
+        command = [sys.executable, "-c", code, *map(str, _patient(module, arguments, Path(folder)))]
+        environment = {**os.environ, "XDG_STATE_HOME": folder}
+        with subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment
+        ) as child:
+            try:
+                yield child
+            finally:
+                child.kill()
+
+
+def _patient(module: str, arguments: tuple[object, ...], folder: Path) -> tuple[object, ...]:
+    if module != "companion" or arguments[0] != "run" or "--settings" in arguments:
+        return arguments
+    patient = folder / "patient.toml"
+    patient.write_text(PATIENT)
+    return *arguments, "--settings", patient
+
+
+def finished(child: Forked | subprocess.Popen[str]) -> tuple[int, str, str]:
     """Exit code, stdout and stderr of a process that has ended or will."""
     out, err = child.communicate(timeout=PATIENCE_S)
     return child.wait(), out, err

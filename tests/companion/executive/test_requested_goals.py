@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -38,9 +39,9 @@ class Asked(Desk):
             self.begin()
         self.stand(0.0, 0.0)
 
-    def ask(self, place: NedPoint | None = NEAR, speed_m_s: float | None = None, **fault: object) -> GoalAnswer:
+    def ask(self, place: NedPoint | None = NEAR, speed_m_s: float | None = None, **fault: Any) -> GoalAnswer:
         point = None if place is None else LocalFrame(PLACE).to_geo(place)
-        asked = GoalRequested(self.now_s, ASKER, TargetForm.COMMAND, point, speed_m_s, **fault)  # type: ignore[arg-type]
+        asked = GoalRequested(self.now_s, ASKER, TargetForm.COMMAND, point, speed_m_s, **fault)
         self.requests.take(asked, self.run.vehicle)
         answers = [command for command in self.autopilot.taken() if isinstance(command, AnswerGoal)]
         return answers[-1].answer

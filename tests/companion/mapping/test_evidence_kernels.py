@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ CELLS = st.sets(st.tuples(st.integers(0, SIZE - 1), st.integers(0, SIZE - 1)), m
 PLACES = st.floats(1.0, SIZE - 1.0)
 
 
-def raster(occupied: set[tuple[int, int]] = frozenset(), unseen: set[tuple[int, int]] = frozenset()) -> np.ndarray:  # type: ignore[assignment]
+def raster(occupied: Collection[tuple[int, int]] = (), unseen: Collection[tuple[int, int]] = ()) -> np.ndarray:
     log_odds = np.full((SIZE, SIZE), -1.0, np.float32)
     for x, y in unseen:
         log_odds[y, x] = 0.0

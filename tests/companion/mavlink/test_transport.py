@@ -20,22 +20,10 @@ from companion.mavlink.transport import (
     UdpLink,
     open_link,
 )
+from tests.support.notices import HandClock
 from tests.support.served import slowness
 
 PATIENCE_S = 60.0
-
-
-class HandClock:
-    """Time that the test turns by hand."""
-
-    def __init__(self) -> None:
-        self.time_s = 100.0
-
-    def now_s(self) -> float:
-        return self.time_s
-
-    def sleep_until_s(self, time_s: float) -> None:
-        self.time_s = max(self.time_s, time_s)
 
 
 def eventually(condition: Callable[[], bool]) -> None:
@@ -59,7 +47,7 @@ def read_all(link: ByteLink, expected: bytes) -> None:
 
 @pytest.fixture
 def clock() -> HandClock:
-    return HandClock()
+    return HandClock(100.0)
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from companion.recording.recorder import MAX_UNWRITTEN_BYTES, Recorder
 from companion.settings import Settings
 from companion.storage.background_writer import BackgroundWorker, BackgroundWriter, ShutdownBudget
 from companion.storage.files import OsDisk
+from tests.support.notices import HandClock
 from tests.support.rig import yard
 
 
@@ -34,16 +35,6 @@ class Slow(threading.Thread):
 
     def is_alive(self) -> bool:
         return self.left_s > 0.0
-
-
-class HandClock:
-    time_s = 0.0
-
-    def now_s(self) -> float:
-        return self.time_s
-
-    def sleep_until_s(self, time_s: float) -> None:
-        self.time_s = time_s
 
 
 @pytest.mark.parametrize(

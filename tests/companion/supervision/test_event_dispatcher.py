@@ -28,11 +28,6 @@ from tests.support.desk import Desk
 from tests.support.whole import Whole
 
 
-@pytest.fixture
-def whole(tmp_path: Path) -> Whole:
-    return Whole(tmp_path)
-
-
 def test_ground_stations_are_answered_and_the_autopilots_warnings_shown(whole: Whole) -> None:
     answers = whole.tick(ParameterAsked(100.0, "CMP_STALE", -1), TextSeen(100.0, 3, "Bad battery"))
     assert [answer.name for answer in answers if isinstance(answer, ParameterValue)] == ["CMP_STALE"]

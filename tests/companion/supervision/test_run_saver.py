@@ -5,16 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from companion.supervision.run_saver import RunSaver
 from tests.support.desk import Desk
 from tests.support.whole import Log, Whole
-
-
-@pytest.fixture
-def whole(tmp_path: Path) -> Whole:
-    return Whole(tmp_path)
 
 
 def test_faults_that_stop_nothing_are_told_once(whole: Whole) -> None:

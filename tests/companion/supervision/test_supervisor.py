@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-
-import pytest
 
 from companion.core.tick_marks import Mark
 from companion.safety.reasons import EndReason, Reason
@@ -19,11 +16,6 @@ from companion.vehicle.events import (
 )
 from tests.companion.safety.test_mode_latch import HOLD
 from tests.support.whole import Whole
-
-
-@pytest.fixture
-def whole(tmp_path: Path) -> Whole:
-    return Whole(tmp_path)
 
 
 def test_a_stop_ends_the_run_in_hold(whole: Whole) -> None:

@@ -3,23 +3,11 @@
 import pytest
 
 from sitl.cli.drive_progress import Pace
-
-
-class StillClock:
-    """Time passes only by sleeping."""
-
-    def __init__(self) -> None:
-        self.time_s = 100.0
-
-    def now_s(self) -> float:
-        return self.time_s
-
-    def sleep_until_s(self, time_s: float) -> None:
-        self.time_s = max(self.time_s, time_s)
+from tests.support.notices import HandClock
 
 
 def test_a_pace_counts_from_its_first_moment_and_catches_up() -> None:
-    clock = StillClock()
+    clock = HandClock(100.0)
     pace, free = Pace(10.0, clock), Pace(None, clock)
     pace.wait(5.0)
     free.wait(50.0)
