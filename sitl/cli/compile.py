@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from multiprocessing import get_context
 
 from companion.cli import kernel_cache
@@ -27,9 +27,14 @@ def graph_searches() -> None:
     _planners("astar", "theta-star")
 
 
+def vertex_planners() -> None:
+    """The genetic planners that move vertices."""
+    _planners("vertex", "vertex++")
+
+
 def other_planners() -> None:
-    """Those of the papers, and the other graph searches."""
-    _planners("sedighi", "geisler", "hermanu", "vertex", "vertex++", "achour", "prm", "dstar-lite", "dijkstra")
+    """The other planners of the papers, and the graph searches that no drive uses by default."""
+    _planners("sedighi", "geisler", "hermanu", "achour", "prm", "dstar-lite", "dijkstra")
 
 
 def simulator() -> None:
@@ -64,28 +69,46 @@ def physics() -> None:
     scenario_from_mission(Mission("", ())).physics(0, scans=False).rehearse()
 
 
-FOR_A_DRIVE: tuple[Sequence[Job], ...] = ((genetic_planner, simulator, graph_searches), (drive,))
-FOR_ALL: tuple[Sequence[Job], ...] = (
-    (genetic_planner, simulator, other_planners, graph_searches),
-    (drive, physics),
-    (manoeuvres,),
+FOR_A_DRIVE: Sequence[Job] = (genetic_planner, simulator, graph_searches, drive)
+FOR_ALL: Sequence[Job] = (
+    genetic_planner,
+    vertex_planners,
+    simulator,
+    graph_searches,
+    other_planners,
+    drive,
+    physics,
+    manoeuvres,
 )
-"""Jobs of a group share few kernels and run side by side; a group uses the kernels of those before it."""
+"""Those that take longest and that others wait for come first."""
+
+AFTER: Mapping[Job, Sequence[Job]] = {
+    other_planners: (graph_searches,),
+    drive: (genetic_planner, graph_searches),
+    physics: (simulator,),
+    manoeuvres: (drive,),
+}
+"""Jobs that use the kernels of others. Side by side, both would compile them."""
 
 
 def main() -> None:
     """Run all jobs, with a line for each."""
-    groups = FOR_ALL if "--all" in sys.argv[1:] else FOR_A_DRIVE
+    waiting = list(FOR_ALL if "--all" in sys.argv[1:] else FOR_A_DRIVE)
     kernel_cache.use_cache(os.environ)
-    count, done, since_s = sum(map(len, groups)), 0, stopwatch_s()
+    count, since_s = len(waiting), stopwatch_s()
+    done: set[Job] = set()
+    running: dict[Future[None], Job] = {}
     with ProcessPoolExecutor(os.cpu_count(), get_context("spawn")) as pool:
-        for group in groups:
-            running = {pool.submit(job): job.__name__ for job in group}
-            for future in as_completed(running):
+        while len(done) < count:
+            for job in [job for job in waiting if done.issuperset(AFTER.get(job, ()))]:
+                waiting.remove(job)
+                running[pool.submit(job)] = job
+            for future in wait(running, return_when=FIRST_COMPLETED).done:
                 future.result()
-                done += 1
-                name = running[future].replace("_", " ")
-                print(f"  compiled {done} of {count}: {name} ({stopwatch_s() - since_s:.0f} s)", flush=True)
+                job = running.pop(future)
+                done.add(job)
+                name = job.__name__.replace("_", " ")
+                print(f"  compiled {len(done)} of {count}: {name} ({stopwatch_s() - since_s:.0f} s)", flush=True)
 
 
 def _planners(*names: str) -> None:

@@ -29,7 +29,8 @@ class Forked:
     """A running program, used like a ``subprocess.Popen`` with pipes for standard output and standard error.
 
     ``module``: companion or sitl. ``first``: code that the process runs before anything else. ``merged``: standard
-    error goes to standard output. Standard input is empty.
+    error goes to standard output. Standard input is empty. ``terminal``: an open one that
+    takes the place of all three.
     """
 
     stdin = None
@@ -43,10 +44,13 @@ class Forked:
         first: str = "",
         *,
         merged: bool = False,
+        terminal: int | None = None,
     ) -> None:
         context = get_context("forkserver")
         context.set_forkserver_preload([PRELOADED])
         pipes = [os.pipe() for _ in range(2)]
+        outputs = [pipes[0][1], pipes[0 if merged else 1][1]]
+        streams = [None, *outputs] if terminal is None else [terminal] * 3
         self._process = context.Process(
             target=_run,
             args=(
@@ -55,7 +59,7 @@ class Forked:
                 dict(os.environ if environment is None else environment),
                 str(folder or Path.cwd()),
                 first,
-                [_Descriptor(pipes[0][1]), _Descriptor(pipes[0 if merged else 1][1])],
+                [None if stream is None else _Descriptor(stream) for stream in streams],
             ),
         )
         self._process.start()
@@ -149,13 +153,14 @@ def _reader(descriptor: int) -> IO[str]:
 
 
 def _run(
-    module: str, arguments: list[str], environment: dict[str, str], folder: str, first: str, outputs: list[int]
+    module: str, arguments: list[str], environment: dict[str, str], folder: str, first: str, streams: list[int | None]
 ) -> None:
     """In the new process: what an interpreter does before it calls ``main``."""
-    for number, output in enumerate(outputs, start=1):
-        os.dup2(output, number)
-        os.close(output)
-    sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), "utf-8")
+    for number, stream in enumerate(streams):
+        if stream is not None:
+            os.dup2(stream, number)
+            os.close(stream)
+    sys.stdout = io.TextIOWrapper(io.FileIO(1, "w", closefd=False), "utf-8", line_buffering=os.isatty(1))
     sys.stderr = io.TextIOWrapper(io.FileIO(2, "w", closefd=False), "utf-8", "backslashreplace", line_buffering=True)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ.clear()

@@ -5,7 +5,6 @@ import os
 import pty
 import select
 import signal
-import subprocess
 import sys
 import threading
 from pathlib import Path
@@ -18,6 +17,7 @@ from sitl.cli.commands import app
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from tests.sitl.network.test_server import free_port
 from tests.sitl.view.test_view import ROOM, a_view, scene
+from tests.support.forked import Forked
 
 MISSION = "[grid]\nsize = [20, 20]\nhome = [1, 1]\n[[target]]\nfield = [9, 9]\n"
 
@@ -33,12 +33,9 @@ def test_without_a_terminal_there_is_one_line(tmp_path: Path, command: str) -> N
 def on_a_terminal(arguments: list[str], until: bytes, number: signal.Signals, **variables: str) -> tuple[int, bytes]:
     """Run on a pseudo-terminal, send a signal when some text has appeared; exit code and everything written."""
     ours, theirs = pty.openpty()
-    code = "from sitl.cli.main import main; main()"
     environment = {**os.environ, "TERM": "xterm-256color", "COLUMNS": "80", "LINES": "24", **variables}
     written = b""
-    with subprocess.Popen(
-        [sys.executable, "-c", code, *arguments], stdin=theirs, stdout=theirs, stderr=theirs, env=environment
-    ) as child:
+    with Forked("sitl", arguments, environment, terminal=theirs) as child:
         os.close(theirs)
         try:
             told = False
