@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import socket
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,12 +14,16 @@ from companion.recording.reader import load_record
 from companion.replay.replay import replay
 from tests.sitl.network.test_server import free_port
 from tests.support.rig import yard
-from tests.support.served import finished, interpreter, mission_path
+from tests.support.served import finished, interpreter, mission_path, process
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("kind", "speedup"), [("udp", 1.0), ("tcp", 2.0)])
-def test_companion_and_simulator_as_two_processes(tmp_path: Path, kind: str, speedup: float) -> None:
+@pytest.mark.parametrize(
+    ("start", "kind", "speedup"), [(process, "udp", 1.0), (interpreter, "tcp", 2.0)], ids=["udp", "tcp"]
+)
+def test_companion_and_simulator_as_two_processes(
+    tmp_path: Path, start: Callable[..., Any], kind: str, speedup: float
+) -> None:
     """From switching on (43 s of the vehicle's time until it can be armed) to the target behind the wall."""
     mission = yard(tmp_path)
     path = mission_path(mission)
@@ -27,10 +33,8 @@ def test_companion_and_simulator_as_two_processes(tmp_path: Path, kind: str, spe
     listen, connect = {"udp": ("udpout", "udpin"), "tcp": ("tcp", "tcp")}[kind]
     record = tmp_path / "record"
     with (
-        interpreter("sitl", "serve", path, "--listen", f"{listen}:127.0.0.1:{port}", "--speedup", speedup),
-        interpreter(
-            "companion", "run", path, "--connect", f"{connect}:127.0.0.1:{port}", "--arm", "--record", record
-        ) as run,
+        start("sitl", "serve", path, "--listen", f"{listen}:127.0.0.1:{port}", "--speedup", speedup),
+        start("companion", "run", path, "--connect", f"{connect}:127.0.0.1:{port}", "--arm", "--record", record) as run,
     ):
         code, out, err = finished(run)
     assert code == 0, err
