@@ -28,7 +28,7 @@ test: $(TOOLS)
 
 # More workers than processors: many tests wait for real time.
 pytest: $(ALL_KERNELS)
-	$(BIN)/python -m pytest -n 4 --dist worksteal
+	$(BIN)/python -m pytest -n 5 --dist worksteal
 
 # With the drives that show a little more and take long: every mission with every sensor suite, more seeds.
 test-all: $(ALL_KERNELS)

@@ -27,7 +27,7 @@ LIMIT_S = 5.0
 def installed_peers() -> tuple[list[Contestant], list[str]]:
     """The peers that can take part, and the modules that are missing (extra ``peers``)."""
     found, missing = [], []
-    for module, make in _MAKERS.items():
+    for module, make in PEERS.items():
         if importlib.util.find_spec(module) is None:
             missing.append(module)
         else:
@@ -222,7 +222,7 @@ def _ompl() -> list[Contestant]:
     return [ompl_planner("RRTConnect"), ompl_planner("BITstar")]
 
 
-_MAKERS: dict[str, Callable[[], list[Contestant]]] = {
+PEERS: dict[str, Callable[[], list[Contestant]]] = {
     "scipy": _scipy,
     "skimage": _skimage,
     "tcod": _tcod,
@@ -233,3 +233,4 @@ _MAKERS: dict[str, Callable[[], list[Contestant]]] = {
     "networkx": _networkx,
     "ompl": _ompl,
 }
+"""How to make the peers of each module, once it is known to be installed."""

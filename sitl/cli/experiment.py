@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib import import_module
 from pathlib import Path
 from typing import Annotated
 
@@ -14,32 +15,23 @@ from companion.cli.inputs import OutputError, writable, written
 from companion.mapping.map_files import MapError
 from companion.settings import Settings
 from companion.settings.versions import made_with
-from sitl.experiments import (
-    achour_table1,
-    adaptive_control_points,
-    dead_companion,
-    driving,
-    kwasniewski_maps,
-    kwasniewski_table1,
-    navigation,
-    sedighi_table1,
-    soak,
-    wang_table4,
-)
 from sitl.experiments.experiment import Checked, Experiment, ExperimentError, ExperimentReport, Options
 
-EXPERIMENTS: dict[str, Experiment] = {
-    adaptive_control_points.NAME: adaptive_control_points.run,
-    kwasniewski_maps.NAME: kwasniewski_maps.run,
-    kwasniewski_table1.NAME: kwasniewski_table1.run,
-    navigation.NAME: navigation.run,
-    driving.NAME: driving.run,
-    dead_companion.NAME: dead_companion.run,
-    wang_table4.NAME: wang_table4.run,
-    sedighi_table1.NAME: sedighi_table1.run,
-    achour_table1.NAME: achour_table1.run,
-    soak.NAME: soak.run,
-}
+EXPERIMENTS = (
+    "adaptive-control-points",
+    "kwasniewski-maps",
+    "kwasniewski-table1",
+    "navigation",
+    "driving",
+    "dead-companion",
+    "wang-table4",
+    "sedighi-table1",
+    "achour-table1",
+    "soak",
+)
+"""Each is a module of ``sitl.experiments``, loaded when it is asked for: they load the plotting library."""
+ON_ANY_MAP = ("navigation", "driving")
+OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
 EXIT_BAD_INPUT = 2
 EXIT_FAILED = 3
 
@@ -80,16 +72,15 @@ def experiment(
     """
     console = Console()
     try:
-        made = EXPERIMENTS.get(name)
-        if made is None:
+        if name not in EXPERIMENTS:
             raise ExperimentError(f"experiment {name}: unknown; known are {', '.join(EXPERIMENTS)}")
-        # ExperimentReport a file that cannot be written before the work, not after it.
+        # Report a file that cannot be written before the work, not after it.
         writable(json_file)
         writable(docs and docs / "results.md")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
         names = tuple(planner.strip() for planner in planners.split(",") if planner.strip())
         options = Options(runs, seed, jobs, maps, tuple(world or ()), names)
-        report = _with_progress(name, made, options, console)
+        report = _with_progress(name, options, console)
         _put_out(report, console, json_file, docs)
         if isinstance(report, Checked) and report.failure:
             typer.echo(f"experiment {name}: {report.failure}", err=True)
@@ -101,16 +92,17 @@ def experiment(
 
 def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: Path | None) -> None:
     """Refuse options without effect. Raises ExperimentError."""
-    if name not in (navigation.NAME, driving.NAME):
+    if name not in ON_ANY_MAP:
         if planners:
             raise ExperimentError(f"--planners: {name} compares its own; the option is for navigation and driving")
         if world:
             raise ExperimentError(f"--world: {name} has its own maps; the option is for navigation and driving")
-    if maps is not None and name in (wang_table4.NAME, achour_table1.NAME):
+    if maps is not None and name in OWN_ENVIRONMENTS:
         raise ExperimentError(f"--maps: {name} draws the paper's own environments, it reads no maps")
 
 
-def _with_progress(name: str, made: Experiment, options: Options, console: Console) -> ExperimentReport:
+def _with_progress(name: str, options: Options, console: Console) -> ExperimentReport:
+    run: Experiment = import_module(f"sitl.experiments.{name.replace('-', '_')}").run
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
         # The bar appears with the first progress, so that a bad folder of maps gives one line only.
@@ -119,7 +111,7 @@ def _with_progress(name: str, made: Experiment, options: Options, console: Conso
         def advance(done: int, total: int) -> None:
             progress.update(task, completed=done, total=total, visible=True)
 
-        return made(options, advance)
+        return run(options, advance)
 
 
 def _put_out(report: ExperimentReport, console: Console, json_file: Path | None, docs: Path | None) -> None:

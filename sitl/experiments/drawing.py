@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.storage.files import refuse_pipe
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 BLUE, RED, GREEN, ORANGE, GREY = "#0072b2", "#d1495b", "#009e73", "#e69f00", "#8a8f98"
 WALL, UNSEEN, GROUND = (0.20, 0.22, 0.26), (0.78, 0.80, 0.83), (0.985, 0.985, 0.975)
@@ -18,6 +20,8 @@ WALL, UNSEEN, GROUND = (0.20, 0.22, 0.26), (0.78, 0.80, 0.83), (0.985, 0.985, 0.
 
 def four_panels(width_in: float, height_in: float) -> tuple[Figure, list[Any]]:
     """A figure of two by two panels."""
+    from matplotlib.figure import Figure  # loaded when something is drawn
+
     figure = Figure(figsize=(width_in, height_in), layout="constrained", dpi=110)
     panels = list(figure.subplots(2, 2).flat)
     for panel in panels:

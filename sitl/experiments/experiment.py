@@ -10,9 +10,8 @@ from importlib.metadata import version
 from itertools import starmap
 from os import cpu_count
 from pathlib import Path
-from typing import ClassVar, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar, runtime_checkable
 
-from matplotlib.figure import Figure
 from rich.table import Table
 
 from companion.core.grid import Cell, Grid
@@ -22,6 +21,9 @@ from companion.settings import PlannerSettings
 from companion.storage.files import why_no_file
 from sitl.experiments import drawing
 from sitl.experiments.results_page import write_section
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from scipy.interpolate import BSpline
 
 from companion.planning.bspline_ga import bspline
 
@@ -12,6 +11,8 @@ def clamped_knots(control_points: int) -> np.ndarray:
 @pytest.mark.parametrize("control_points", [3, 4, 5, 6, 8, 13])
 @pytest.mark.parametrize("samples", [2, 5, 7, 101])
 def test_the_curve_is_scipys(control_points, samples):
+    from scipy.interpolate import BSpline  # large; only the workers that run this test load it
+
     control = np.random.default_rng(control_points).random((control_points, 2)) * 100.0
     expected = BSpline(clamped_knots(control_points), control, bspline.DEGREE)(np.linspace(0.0, 1.0, samples))
     assert np.abs(bspline.curve(control, samples) - expected).max() < 1e-10

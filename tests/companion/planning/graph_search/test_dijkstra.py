@@ -1,8 +1,5 @@
-import networkx as nx
 import numpy as np
 import pytest
-from scipy.sparse import csr_matrix
-from scipy.sparse.csgraph import dijkstra as scipy_dijkstra
 
 from companion.core.grid import Cell
 from companion.planning.graph_search.dijkstra import Dijkstra
@@ -50,6 +47,9 @@ def random_weights(seed, height=23, width=31, blocked=0.3):
 @pytest.mark.parametrize("corner_cutting", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 def test_every_distance_is_scipys(seed, corner_cutting):
+    from scipy.sparse import csr_matrix  # large, like networkx; only the workers that run these tests load them
+    from scipy.sparse.csgraph import dijkstra as scipy_dijkstra
+
     weights = random_weights(seed)
     width = weights.shape[1]
     rows, columns, costs = zip(
@@ -70,6 +70,8 @@ def test_every_distance_is_scipys(seed, corner_cutting):
 @pytest.mark.parametrize("corner_cutting", [False, True])
 @pytest.mark.parametrize("seed", range(4))
 def test_paths_are_as_cheap_as_networkxs(seed, corner_cutting):
+    import networkx as nx
+
     weights = random_weights(seed, blocked=0.2)
     graph = nx.DiGraph()
     graph.add_weighted_edges_from(steps_of(weights, corner_cutting))

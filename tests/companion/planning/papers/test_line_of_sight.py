@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import binom
 
 from companion.planning.papers.line_of_sight import free_samples, sees, shortened
 from companion.planning.random_numbers import seeded
 from companion.planning.raster import first_fault, polyline
+from tests.support.chance import usual_counts
 from tests.support.planning_maps import drawn
 
 
@@ -51,7 +51,7 @@ def test_samples_are_free_and_uniform():
     weights[:, 5:15] = 1.0  # 15 of the 30 free columns are left of column 25
     samples = free_samples(weights, 4000, seeded(1))
     assert samples.shape == (4000, 2) and (weights[samples[:, 1], samples[:, 0]] < 1.0).all()
-    low, high = binom.interval(1 - 1e-5, 4000, 0.25)
+    low, high = usual_counts(4000, 0.25)
     for left in (True, False):
         for lower in (True, False):
             inside = ((samples[:, 0] < 25) == left) & ((samples[:, 1] < 10) == lower)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.stats import binom
 
 from companion.core.grid import Cell
 from companion.planning.papers.sedighi_evolution import (
@@ -30,6 +29,7 @@ from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
 from sitl.experiments.monotone_reach import COLUMNS, ROWS, fewest_switches
 from sitl.experiments.sedighi_spaces import crossing, given_spaces, own_spaces
+from tests.support.chance import more_than, usual_counts
 from tests.support.planning_maps import drawn
 from tests.support.shared_data import SHARED, needs_shared
 
@@ -183,7 +183,7 @@ def test_rank_selection_draws_in_proportion_to_the_rank():
     order = np.arange(count)[::-1].copy()
     drawn_counts = np.bincount([select(order, state) for _ in range(draws)], minlength=count)
     for index, drawn_count in enumerate(drawn_counts):  # index 7 is the best
-        low, high = binom.interval(1 - 1e-5, draws, (index + 1) / 36)
+        low, high = usual_counts(draws, (index + 1) / 36)
         assert low <= drawn_count <= high
 
 
@@ -213,7 +213,7 @@ def test_the_elite_stays_and_every_part_mutates():
         ((new.modes[:, 1] != 9).sum(), count - 1, 0.2 * 0.9),
         ((new.modes[:, 2] != 9).sum(), count - 1, 0.2 * 0.9),
     ):
-        low, high = binom.interval(1 - 1e-5, tried, chance)
+        low, high = usual_counts(tried, chance)
         assert low <= changed <= high
 
 
@@ -229,7 +229,7 @@ def test_a_forerunner_keeps_its_restriction():
 def test_success_is_above_the_papers(name, percent):
     """So many of 200 seeds that a success rate no better than the paper's would show it once in 1000 times."""
     found = successes("sedighi", own_spaces()[name], SEEDS)
-    assert found > binom.isf(1e-3, SEEDS, percent / 100.0)
+    assert found > more_than(SEEDS, percent / 100.0)
 
 
 @pytest.mark.parametrize(
@@ -237,7 +237,7 @@ def test_success_is_above_the_papers(name, percent):
 )
 def test_what_a_genotype_can_write_down_is_found(method, name):
     """So many of 30 seeds that a success rate of 70 % or less would show it once in 1000 times."""
-    assert successes(method, own_spaces()[name], 30) > binom.isf(1e-3, 30, 0.7)
+    assert successes(method, own_spaces()[name], 30) > more_than(30, 0.7)
 
 
 @pytest.mark.parametrize(
