@@ -221,6 +221,8 @@ def plan(
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     typer.echo(as_text(answer)) if as_json else Console().print(as_table(answer))
+    if image is not None:
+        typer.echo(f"picture: {image}", err=as_json)
     raise typer.Exit(EXIT_FOUND if answer.result.status is PlanStatus.FOUND else EXIT_NO_PATH)
 
 

@@ -67,8 +67,17 @@ def nobody(seen: Survey) -> Iterator[Finding]:
         )
     else:
         says = f"Nothing is heard on {seen.place}."
-        remedy = "look at power, cable, port and baud rate, and that SERIALn_PROTOCOL of that port is 2"
+        remedy = (
+            "look at power, cable, port and baud rate, and that SERIALn_PROTOCOL of that port is 2"
+            if _is_serial(seen)
+            else "look at power and network, and that the rover's side sends to this address"
+        )
         yield Finding("no-autopilot", Level.STOP, says, remedy)
+
+
+def _is_serial(seen: Survey) -> bool:
+    """Whether the link has a baud rate."""
+    return seen.place.startswith("serial:")
 
 
 def others(seen: Survey) -> Iterator[Finding]:
@@ -103,9 +112,8 @@ def identity(seen: Survey) -> Iterator[Finding]:
         yield Finding("parameters-unheard", Level.WARN, says, "ask again, over a line that drops less")
     elif seen.packets and seen.lost > LOST_SHARE * seen.packets:
         says = f"{seen.lost} packets of the autopilot were lost, {seen.packets} came."
-        yield Finding(
-            "packets-lost", Level.WARN, says, "a faster baud rate, a better cable, or fewer messages on this line"
-        )
+        better = "a faster baud rate, a better cable" if _is_serial(seen) else "a better radio or network"
+        yield Finding("packets-lost", Level.WARN, says, f"{better}, or fewer messages on this line")
 
 
 def _unheard(missing: Sequence[str], seen: Survey) -> list[str]:
@@ -200,7 +208,8 @@ def rates(seen: Survey) -> Iterator[Finding]:
             continue
         vital = message.name in ("LOCAL_POSITION_NED", "ATTITUDE", "EKF_STATUS_REPORT") and message.measured_hz < 1.5
         says = f"{message.name} comes at {message.measured_hz:.1f} Hz though {message.wanted_hz:g} Hz were asked for."
-        remedy = "a faster baud rate (115200), or keep ground stations from setting their own rates on this port"
+        faster = "a faster baud rate (115200)" if _is_serial(seen) else "a faster radio or network"
+        remedy = f"{faster}, or keep ground stations from setting their own rates on this port"
         yield Finding("rate", Level.STOP if vital else Level.WARN, says, remedy)
 
 

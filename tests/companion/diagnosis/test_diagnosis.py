@@ -129,6 +129,15 @@ CASES: list[tuple[str, Level, Survey]] = [
 ]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "seen", [replace(WELL, lost=50, packets=100), replace(WELL, slow=(SlowMessage("ATTITUDE", 10.0, 2.0),)), Survey("")]
+)
+def test_baud_rates_are_spoken_of_on_serial_lines_only(seen: Survey) -> None:
+    (wire,) = diagnose(replace(seen, place="serial:/dev/ttyAMA0:57600"))
+    (network,) = diagnose(replace(seen, place="udp:14550"))
+    assert "baud" in wire.remedy and "baud" not in network.remedy
+
+
 def test_a_rover_that_is_well_has_no_findings() -> None:
     assert diagnose(WELL) == []
 

@@ -115,7 +115,7 @@ def test_a_state_that_is_not_saved_in_time_is_told(tmp_path: Path, hanging: Hang
 def test_a_disk_that_hangs_does_not_keep_the_record_from_being_closed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    free = threading.Event()
+    written, free = threading.Event(), threading.Event()
     mission = yard(tmp_path)
     worker = BackgroundWorker("record", ShutdownBudget(0.01))
     recorder = Recorder(tmp_path / "run", mission, Settings(), 0, worker=worker)
@@ -123,6 +123,8 @@ def test_a_disk_that_hangs_does_not_keep_the_record_from_being_closed(
     recorder.begin(0.0, Mark.BEGIN)
     recorder.heard(1.0, [])
     recorder.heard(2.0, [])
+    worker.put(written.set)
+    assert written.wait(30.0)
     recorder.close()
     assert recorder.problem == f"{tmp_path / 'run'}: the record has ended: the disk does not answer"
     record = load_record(tmp_path / "run")
