@@ -32,7 +32,7 @@ pytest: $(ALL_KERNELS)
 
 # With the drives that show a little more and take long: every mission with every sensor suite, more seeds.
 test-all: $(ALL_KERNELS)
-	$(BIN)/python -m pytest -n 4 --dist worksteal -m ""
+	$(BIN)/python -m pytest -n 5 --dist worksteal -m ""
 
 lint: $(TOOLS)
 	$(BIN)/ruff check .
