@@ -57,7 +57,7 @@ results: $(TOOLS)
 	$(BIN)/rover-sitl experiment navigation --runs 10 --planners $(NAVIGATORS) --docs docs
 	$(BIN)/rover-sitl experiment driving --runs 5 --docs docs
 	$(BIN)/rover-sitl experiment dead-companion --runs 6 --docs docs
-	$(BIN)/rover-companion bench $(wildcard ../shared/data/movingai/dao/arena.map ../shared/data/movingai/dao/lak104d.map) --cell-s 2 --docs docs
+	$(BIN)/rover-companion bench $(wildcard $(addprefix ../shared/data/movingai/dao/,arena.map lak104d.map)) --cell-s 2 --docs docs
 
 soak: $(KERNELS)
 	$(BIN)/rover-sitl experiment soak --runs 100 --json out/soak.json --docs docs
@@ -97,6 +97,7 @@ $(ALL_KERNELS): $(TOOLS) $(SOURCES)
 
 # With the kernels in the user's cache: after it, everything is made from nothing.
 clean:
-	rm -rf $(VENV) out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis .benchmarks .import_linter_cache
+	rm -rf $(VENV) out build dist *.egg-info .hypothesis .benchmarks
+	rm -rf .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 	rm -rf "$${XDG_CACHE_HOME:-$$HOME/.cache}/rover-companion"
 	find companion sitl tests missions -name __pycache__ -prune -exec rm -rf {} +

@@ -47,7 +47,9 @@ def map_case(file: Path, problems: int) -> Case:
     weights = load_map(file).weights
     scenarios = scenario_file(file)
     if scenarios is None:
-        raise MapError(f"{file}: no problems: a MovingAI scenario file is needed beside it ({file.name}.scen)")
+        raise MapError(
+            f"{file}: nothing says what to search; a MovingAI scenario file is needed beside it ({file.name}.scen)"
+        )
     chosen = spread(read_scenarios(scenarios), problems)
     ends = tuple((scenario.start, scenario.target) for scenario in chosen if scenario.start != scenario.target)
     height, width = weights.shape

@@ -1,8 +1,9 @@
-"""Setpoint check: the last look at every setpoint before it is sent, against the map as it is now and the borders.
+"""Setpoint check: the last look at each position or velocity before it is sent, against the map and the borders.
 
 A setpoint may be the last one that the autopilot receives, and it is followed to its end. So each one is asked
 whether the rover may be left alone with it. One that may not is replaced by velocity zero, reported and counted.
-That this never happens is the task of the controllers; this file does not use their code.
+That this never happens is the task of the controllers. This file asks the map and the braking formulas as they do, but
+uses none of their decisions.
 
 Nouns: setpoint check.
 """

@@ -110,6 +110,10 @@ class GoalDriver:
         """Count on from where an earlier run had come to."""
         self.tally, self._epoch = tally, epoch
 
+    def forget_places(self) -> None:
+        """The fields before which the rover was stuck lie elsewhere now."""
+        self._recovery = StuckRecovery()
+
     @property
     def nav_state(self) -> NavState | None:
         """The navigator's state on this leg; None between legs."""
@@ -212,10 +216,9 @@ class GoalDriver:
         if not self._runner.busy and evidence.base.contains(cell) and self._step_is_due(cell, view):
             self._start_step(self._state, cell, view, moving)
         result = self._runner.take()
-        if result is not None:
-            self.step_s = pose.time_s - self._began_s
         if result is None or self._pending != self._epoch:
             return None
+        self.step_s = pose.time_s - self._began_s
         if self._is_doubted(result[1], view):
             self._state = abandon_path(self._state)
             self.path = self.decision = None

@@ -170,7 +170,7 @@ class MissionExecutor:
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
         self.driver = GoalDriver(controller_for(self._limits), searcher, self._runner, seed)
-        self.driver.tally = before.tally
+        self.driver.go_on(before.tally, before.epoch)
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
         self._tracker = ObjectTracker(self.evidence)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
@@ -182,6 +182,7 @@ class MissionExecutor:
         self.maps_begun += 1
         self._tracker = ObjectTracker(self.evidence)
         self.driver.leave()
+        self.driver.forget_places()
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
 
     def heed_fence(self, fence: AutopilotFence) -> None:

@@ -1,6 +1,6 @@
 """Message signing (MAVLink guide, "Message Signing"): signs packets with a key and a timestamp, and verifies them.
 
-Nouns: signed packet.
+Nouns: message signing.
 """
 
 from __future__ import annotations

@@ -35,17 +35,18 @@ def open_link(url: str, clock: Clock | None = None) -> ByteLink:
     """
     clock = clock or WallClock()
     if url.startswith("/dev/"):
-        device, comma, baud = url.partition(",")
-        return SerialLink(device, _number(baud, url, "baud rate") if comma else DEFAULT_BAUD, clock)
+        return _serial(url, url, clock)
     kind, colon, rest = url.partition(":")
+    if "://" in url:
+        raise LinkError(f"'{url}': a link has no //; use {FORMS}")
     if not colon or kind not in {"udp", "udpin", "udpout", "tcp", "tcpin", "serial"}:
         raise LinkError(f"'{url}' is not a link; use {FORMS}")
     if kind == "serial":
-        device, colon, baud = rest.rpartition(":")
-        return SerialLink(device or rest, _number(baud, url, "baud rate") if colon else DEFAULT_BAUD, clock)
+        return _serial(rest, url, clock)
     host, colon, port_text = rest.rpartition(":")
-    if not colon or not host:
-        raise LinkError(f"'{url}' names no port; use {FORMS}")
+    if not host:
+        lacks = "host" if rest.strip(":").isdigit() else "port"
+        raise LinkError(f"'{url}' names no {lacks}; use {FORMS}")
     host = host.removeprefix("[").removesuffix("]")
     port = _number(port_text, url, "port")
     if port > 65535:
@@ -57,6 +58,12 @@ def open_link(url: str, clock: Clock | None = None) -> ByteLink:
             return TcpServerLink(host, port)
         case _:
             return UdpLink(host, port, bind=kind != "udpout")
+
+
+def _serial(place: str, url: str, clock: Clock) -> SerialLink:
+    """A serial line; the baud rate stands behind a comma (MAVProxy) or a colon (ArduPilot)."""
+    device, sign, baud = place.rpartition("," if "," in place else ":")
+    return SerialLink(device or place, _number(baud, url, "baud rate") if sign else DEFAULT_BAUD, clock)
 
 
 def _number(text: str, url: str, what: str) -> int:

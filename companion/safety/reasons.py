@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Generic, TypeVar
 
-ARM_AGAIN = "arm (or end this run, and start it again with --arm)"
+ARM_AGAIN = "arm (or end this run, and start another with --arm, without --resume)"
 
 
 class Doubt(Enum):

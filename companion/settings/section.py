@@ -10,6 +10,6 @@ class SettingsError(Exception):
 
 
 class Section(BaseModel):
-    """A group of settings: immutable, unknown names refused."""
+    """A group of settings: immutable; unknown names and values of another type are refused."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)

@@ -12,7 +12,7 @@ from pydantic import AliasChoices, Field, model_validator
 from companion.settings.planners import PlannerSettings
 from companion.settings.section import Section
 
-ControlPoints = tuple[Annotated[int, Field(ge=3, le=64)], ...]
+ControlPoints = Annotated[tuple[Annotated[int, Field(ge=3, le=64)], ...], Field(strict=False)]
 
 
 class SearchSettings(Section):
@@ -93,10 +93,11 @@ class GuidanceSettings(Section):
     clearance_m: float = Field(
         0.15, ge=0.0, description="room beside the rover's radius that the choice of speed keeps"
     )
-    clearances: tuple[tuple[float, float], ...] = Field(
+    clearances: tuple[Annotated[tuple[float, float], Field(strict=False)], ...] = Field(
         ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5), (0.12, 0.3)),
         description="room beside the rover's radius, tried in turn; the next one if the reach is less than the second "
         "figure, metres",
+        strict=False,
     )
     least_reach_m: float = Field(0.4, gt=0.0, description="with less clear way than this the way counts as blocked")
     look_ahead_m: float = Field(1.0, gt=0.0, description="distance of the place to turn to when the way is unseen")
@@ -182,7 +183,10 @@ class SteeringSettings(Section):
     astray_m: float = Field(0.8, gt=0.0, description="at this distance from its path the rover has lost it")
     clearance_m: float = Field(0.15, ge=0.0, description="room beside the rover's radius")
     clearances_m: tuple[float, ...] = Field(
-        (0.4, 0.25, 0.12), min_length=1, description="the same for the search of a manoeuvre, tried in turn"
+        (0.4, 0.25, 0.12),
+        min_length=1,
+        description="the same for the search of a manoeuvre, tried in turn",
+        strict=False,
     )
     narrow_clearance_m: float = Field(0.3, ge=0.0, description="both with single thin beams, which leave gaps unseen")
     drives_on_m: float = Field(
@@ -245,6 +249,17 @@ class PowerSettings(Section):
     )
     to_rally: bool = Field(True, description="return to a rally point if the way there is shorter than the way back")
 
+    @model_validator(mode="after")
+    def _return_before_hold(self) -> Self:
+        for unit in ("percent", "volts"):
+            hold, back = getattr(self, f"hold_{unit}"), getattr(self, f"return_{unit}")
+            if hold > back > 0.0:
+                raise ValueError(
+                    f"hold_{unit} {hold:g} lies above return_{unit} {back:g}, so that it would never return; "
+                    "lower the one or raise the other"
+                )
+        return self
+
 
 class TrafficSettings(Section):
     """Moving obstacles: other vehicles that announce themselves, and what the range sensors see moving."""
@@ -288,7 +303,10 @@ class LinkSettings(Section):
     )
     tick_hz: float = Field(20.0, ge=5.0, le=100.0, description="rate of the companion's loop")
     component_id: int = Field(
-        191, ge=1, le=255, description="the companion's component id; its system id is the vehicle's"
+        191,
+        ge=2,
+        le=255,
+        description="the companion's component id, not the autopilot's 1; its system id is the vehicle's",
     )
 
 

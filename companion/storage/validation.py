@@ -8,6 +8,15 @@ from typing import get_args
 
 from pydantic import BaseModel, ValidationError
 
+WANTED = {
+    "dict_type": "a table, with its keys below a line in [brackets]",
+    "model_type": "a table, with its keys below a line in [brackets]",
+    "model_attributes_type": "a table, with its keys below a line in [brackets]",
+    "list_type": "a list in [brackets]",
+    "tuple_type": "a list in [brackets]",
+}
+"""What pydantic calls by names of Python's types."""
+
 
 def first_fault(error: ValidationError) -> tuple[str, str]:
     """Place and reason of the first fault of a validation."""
@@ -44,6 +53,8 @@ def _described(error: ValidationError, model: type[BaseModel]) -> str:
         return f"{place}: {fault['msg'].removeprefix('Value error, ')}"
     if fault["type"] in ("list_type", "tuple_type") and isinstance(fault.get("input"), dict):
         return f"{place}: one table where several may stand; write [[{place}]] with double brackets"
+    if fault["type"] in WANTED:
+        return f"{place}: input should be {WANTED[fault['type']]} (got {fault.get('input')!r:.60})"
     if fault["type"] != "extra_forbidden":
         return f"{place}: {reason.lower()} (got {fault.get('input')!r:.60})"
     known = _known_keys(model, fault["loc"][:-1])

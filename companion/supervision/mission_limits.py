@@ -1,4 +1,4 @@
-"""Mission limits: what keeps a mission from beginning and what breaks it off (fence, batteries, borders).
+"""Mission limits: what keeps a mission from beginning and what breaks it off (fence, low battery, borders).
 
 Nouns: mission limits, low battery, borders.
 """

@@ -1,4 +1,7 @@
-"""Guided targets: which messages move the rover, are refused, or are silently ignored (measured; ModeGuided)."""
+"""Guided targets: which messages move the rover, are refused, or are silently ignored (measured; ModeGuided).
+
+Nouns: ModeGuided.
+"""
 
 from __future__ import annotations
 

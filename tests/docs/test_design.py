@@ -23,7 +23,7 @@ def made() -> dict[str, Any]:
 
 def normal(text: str) -> str:
     """Lower case, words apart: ``MissionProgress`` and ``mission_progress`` both become ``mission progress``."""
-    return re.sub(r"[\s_]+", " ", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", text)).lower()
+    return re.sub(r"[\s_-]+", " ", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", text)).lower()
 
 
 def defined(source: str) -> set[str]:
@@ -42,13 +42,27 @@ def test_a_torn_line_of_the_layout_is_noticed(made: dict[str, Any]) -> None:
     assert torn != text and made["page"](torn) == text
 
 
+def own_words(path: str, source: str) -> str:
+    """What a module is about: its name, its docstring, and the names that it defines. Imports do not count."""
+    tree = ast.parse(source)
+    words = [Path(path).stem, (ast.get_docstring(tree) or "").partition("\n\nNouns:")[0]]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef | ast.FunctionDef):
+            words.append(node.name)
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            words.append(ast.unparse(node.targets[0] if isinstance(node, ast.Assign) else node.target))
+    return normal(" . ".join(words))
+
+
 def misplaced(module: Any, sources: dict[str, str], classes: dict[str, set[str]]) -> list[str]:
-    """The nouns of a module that it does not speak of, or that another one defines as a class."""
-    said = normal(re.sub(r"\n\nNouns: [^\"]+", "", sources[module.path], count=1))
+    """The nouns of a module that it does not say of itself, or that name another module or a class of another."""
+    said = own_words(module.path, sources[module.path])
     wrong = [noun for noun in module.nouns if normal(noun) not in said]
     for noun in set(module.nouns) - set(wrong):
         homes = {path for path, names in classes.items() if normal(noun) in names}
-        wrong += [noun] if homes and module.path not in homes else []
+        homes |= {path for path in classes if normal(Path(path).stem).removesuffix("s") == normal(noun)}
+        homes = {path for path in homes if path.partition("/")[0] == module.path.partition("/")[0]}
+        wrong += [noun] if homes and not any(module.path.startswith(home) for home in homes) else []
     return wrong
 
 
@@ -63,6 +77,9 @@ def test_every_noun_leads_to_the_file_that_speaks_of_it(made: dict[str, Any]) ->
     grid = next(module for module in found if module.path == "companion/core/grid.py")
     strangers = made["Module"](grid.path, grid.says, ("genetic algorithm", "Pose"))
     assert misplaced(strangers, sources, classes) == ["genetic algorithm", "Pose"]
+    for path, noun in (("supervision/arming.py", "mode latch"), ("supervision/pace.py", "watchdog")):
+        module = made["Module"](f"companion/{path}", "", (noun,))
+        assert misplaced(module, sources, classes) == [noun], "a module that only imports it, or has its name in a line"
 
 
 def test_a_noun_has_one_home(made: dict[str, Any]) -> None:

@@ -100,6 +100,40 @@ def slowness() -> float:
     return max(1.0, (time.monotonic() - began_s) / 0.1)
 
 
+class Stopwatch:
+    """How long a block takes, and how busy the machine is meanwhile: a thread works a little all the time."""
+
+    def __enter__(self) -> Stopwatch:
+        """Begin."""
+        self._over = threading.Event()
+        self._worked_s = self._passed_s = 0.0
+        self._sampler = threading.Thread(target=self._sample, daemon=True)
+        self._sampler.start()
+        self._began_s = time.monotonic()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """End."""
+        self._took_s = time.monotonic() - self._began_s
+        self._over.set()
+        self._sampler.join()
+
+    @property
+    def quiet_s(self) -> float:
+        """How long the block would have taken on a quiet machine."""
+        return self._took_s / max(1.0, self._passed_s / self._worked_s)
+
+    def _sample(self) -> None:
+        while True:
+            began_s, worked_s = time.monotonic(), time.thread_time()
+            while time.thread_time() < worked_s + 0.004:
+                pass
+            self._worked_s += time.thread_time() - worked_s
+            self._passed_s += time.monotonic() - began_s
+            if self._over.wait(0.05):
+                return
+
+
 @contextmanager
 def process(module: str, *arguments: object, first: str = "", watchdogs: bool = False) -> Iterator[Forked]:
     """Runs ``rover-companion`` (module companion) or ``rover-sitl`` (module sitl), and kills it at the end.

@@ -4,7 +4,7 @@ A position target is shaped: an inner target runs ahead of the rover with limite
 the rover follows it. If the target lies farther to the side than WP_PIVOT_ANGLE, the rover first turns on the spot;
 with steered wheels it drives an arc instead.
 
-Nouns: ModeGuided.
+Nouns: guided motion.
 """
 
 from __future__ import annotations

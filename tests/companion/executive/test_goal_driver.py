@@ -110,6 +110,7 @@ def test_a_step_begun_for_the_last_leg_does_not_steer_the_next_one() -> None:
     drive.head_for(target(10.5, 20.5), 0.1)
     runner.ready = True
     assert drive.update(0.15)[1] is None
+    assert drive.driver.step_s == 0.0, "it is not counted either"
     drive.update(0.2)
     runner.ready = True
     _, decision = drive.update(0.25)
@@ -126,6 +127,25 @@ def test_a_rover_that_does_not_get_on_backs_out_and_plans_anew() -> None:
     assert drive.driver.tally.stuck >= 1
     assert isinstance(setpoints[20], GuidedPosition)
     assert drive.evidence.penalty.max() > 0.0
+
+
+def test_where_it_was_stuck_is_forgotten_with_the_map() -> None:
+    """The third time at one place makes an obstacle of it; not if the map was forgotten between."""
+    penalties = []
+    for forgets in (False, True):
+        drive = Drive(InlineRunner())
+        for attempt in range(3):
+            drive.head_for(target(30.5, 20.5), 100.0 * attempt)
+            ticks = 0
+            while drive.driver.tally.stuck == attempt and ticks < 400:
+                drive.update(100.0 * attempt + 0.05 * ticks)
+                ticks += 1
+            penalties.append(float(drive.evidence.penalty.max()))
+            drive.driver.leave()
+            drive.evidence = seen_map(Pose(20.5, 20.5, 0.0, 0.0))
+            if forgets:
+                drive.driver.forget_places()
+    assert penalties[2] > penalties[0] and set(penalties[3:]) == {penalties[0]}
 
 
 def test_the_thread_gives_the_same_decision() -> None:

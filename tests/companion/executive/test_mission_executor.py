@@ -108,10 +108,12 @@ def test_a_map_is_forgotten_and_laid_out_anew_when_the_frame_moves(desk: Desk) -
     assert not (executor.evidence.log_odds > 0.0).any(), "smeared by turning"
     executor.forget_map(desk.now_s)
     assert not executor.evidence.log_odds.any() and executor.maps_begun == 1
+    executor.driver.go_on(replace(executor.driver.tally, stuck=2), 7)
     before = executor.progress.goal.point
     assert not executor.follow_origin(PLACE, desk.now_s)
     moved = LocalFrame(PLACE).to_geo(NedPoint(10.0, 0.0))
     assert executor.follow_origin(moved, desk.now_s) and executor.maps_begun == 2
+    assert (executor.driver.tally.stuck, executor.driver.epoch) == (2, 7), "no leg draws the numbers of an earlier one"
     assert executor.progress.goal.point.distance_m(NedPoint(before.north_m - 10.0, before.east_m)) < 0.02
 
 

@@ -21,7 +21,7 @@ from companion.safety.reasons import (
     WaitReason,
 )
 
-AGAIN = "arm (or end this run, and start it again with --arm)"
+AGAIN = "arm (or end this run, and start another with --arm, without --resume)"
 OLD = Reason(Doubt.DATA_OLD, ("position", 1.0))
 LOW = Reason(PowerReason.CHARGE, ("battery", 12))
 

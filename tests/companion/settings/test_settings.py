@@ -55,6 +55,10 @@ def test_a_key_like_no_other_is_not_taken_for_one_that_is_unrelated(tmp_path):
         ("[link]\nsetpoint = 'teleport'", "link.setpoint"),
         ("profile = 'poster'", "profile"),
         ("mapping = 3", "mapping"),
+        ("[guidance]\nhorizon_m = '6'", "guidance.horizon_m"),
+        ("[guidance]\nmax_speed_m_s = true", "guidance.max_speed_m_s"),
+        ("[link]\ncomponent_id = 1", "link.component_id"),
+        ("[power]\nreturn_percent = 5\nhold_percent = 50", "power"),
     ],
 )
 def test_a_bad_value_is_named_with_its_place(text, place, tmp_path):
