@@ -48,16 +48,16 @@ class Companion:
         keep_settings: Callable[[Settings], None] | None = None,
     ) -> None:
         options = Options(seed, arm, checkpointer, keep_settings)
-        parts = assemble(autopilot, clock, mission, settings, runner, log, options)
+        made = assemble(autopilot, clock, mission, settings, runner, log, options)
         self._autopilot = autopilot
         self._clock = clock
-        self._pace = parts.pace
-        self._dispatcher = parts.dispatcher
-        self._operator_server = parts.operator_server
-        self._supervisor = parts.supervisor
-        self._notifier = parts.notifier
-        self.mission_run = parts.run
-        self.outcome = parts.outcome
+        self._pace = made.pace
+        self._dispatcher = made.dispatcher
+        self._operator_server = made.operator_server
+        self._supervisor = made.supervisor
+        self._notifier = made.notifier
+        self.mission_run = made.run
+        self.outcome = made.outcome
 
     def tick(self) -> None:
         """One tick: sleep, listen, map, answer, supervise, decide, guide, speak, conclude."""

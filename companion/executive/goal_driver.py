@@ -23,6 +23,7 @@ from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import (
     Action,
     Decision,
+    DecisionReason,
     NavState,
     Part,
     SearchKind,
@@ -164,7 +165,7 @@ class GoalDriver:
             return None
         decision = self._field_step(view, moving)
         if self._has_arrived(view):
-            decision = self.decision = Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
+            decision = self.decision = Decision(Action.REACHED, Part.EXPLORE, (), None, DecisionReason.REACHED)
         return decision
 
     def guide(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> ControlCommand:

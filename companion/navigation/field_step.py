@@ -56,6 +56,22 @@ Search = Callable[[SearchKind, Cell, Cell], PlanResult]
 """Find a path from the first field to the second."""
 
 
+class DecisionReason(StrEnum):
+    """Why the navigator decides so."""
+
+    REACHED = "target reached"
+    FOUND_GOING_BACK = "path found on the way back"
+    NO_PATH_LEFT = "back at the start, and no path is known to be left"
+    GOING_BACK = "going back along the past path"
+    FOLLOWING = "following the current path"
+    BETTER_PATH = "a better path"
+    NO_BETTER_PATH = "no better path"
+    PATH_BLOCKED = "current path blocked: new path"
+    NEW_PATH = "new path"
+    PAST_PATH_BLOCKED = "past path blocked: going back another way"
+    SHUT_IN = "shut in: no way back either"
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class NavState:
     """The navigator's state on the way to one target.
@@ -85,7 +101,7 @@ class Decision:
     part: Part
     path: tuple[Cell, ...]
     new_path: Path | None
-    reason: str
+    reason: DecisionReason
     searches: tuple[SearchKind, ...] = ()
     proved: bool = False
     """True if the last search proved that the map as known has no path."""
@@ -101,7 +117,7 @@ def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavSt
     entered = cell != state.past[-1]
     state = _arrive(state, cell)
     if cell == state.target:
-        return state, Decision(Action.REACHED, Part.EXPLORE, (), None, "target reached")
+        return state, Decision(Action.REACHED, Part.EXPLORE, (), None, DecisionReason.REACHED)
     if state.returning:
         return _return(state, grid, search, entered=entered)
     if state.current is not None and is_clear(grid, state.current.cell_array[state.index :]):
@@ -155,17 +171,17 @@ def _return(state: NavState, grid: Grid, search: Search, *, entered: bool) -> tu
         searches = (kind,)
         proved = result.status is PlanStatus.NO_PATH
         if result.path is not None:
-            return _follow_new(state, result.path, Part.RETURN, searches, "path found on the way back")
+            return _follow_new(state, result.path, Part.RETURN, searches, DecisionReason.FOUND_GOING_BACK)
         draws, due = _two_or_three(state.draws)
         state = replace(state, draws=draws)
     state = replace(state, until_search=due)
     if at_start:
-        reason = "back at the start, and no path is known to be left"
+        reason = DecisionReason.NO_PATH_LEFT
         return state, Decision(Action.UNREACHABLE, Part.RETURN, (), None, reason, searches, proved)
     if not is_clear(grid, state.past[:-3:-1]):
         return _repair_past(state, grid, search, searches)
     return state, Decision(
-        Action.BACKTRACK, Part.RETURN, state.past[::-1], None, "going back along the past path", searches, proved
+        Action.BACKTRACK, Part.RETURN, state.past[::-1], None, DecisionReason.GOING_BACK, searches, proved
     )
 
 
@@ -175,13 +191,13 @@ def _explore(state: NavState, grid: Grid, search: Search, *, entered: bool) -> t
     ahead = state.current.cell_array[state.index :]
     passed = state.since_better + (1 if entered else 0)
     if passed < state.better_every:
-        return replace(state, since_better=passed), _follow(state, "following the current path", ())
+        return replace(state, since_better=passed), _follow(state, DecisionReason.FOLLOWING, ())
     state = replace(state, since_better=0)
     result = search(SearchKind.BETTER, state.past[-1], state.target)
     searches = (SearchKind.BETTER,)
     if result.path is not None and result.path.cost < cells_cost(plain(grid.weights), ahead) - 1e-9:
-        return _follow_new(state, result.path, Part.EXPLORE, searches, "a better path")
-    return state, _follow(state, "no better path", searches)
+        return _follow_new(state, result.path, Part.EXPLORE, searches, DecisionReason.BETTER_PATH)
+    return state, _follow(state, DecisionReason.NO_BETTER_PATH, searches)
 
 
 def _search(state: NavState, grid: Grid, search: Search) -> tuple[NavState, Decision]:
@@ -189,7 +205,7 @@ def _search(state: NavState, grid: Grid, search: Search) -> tuple[NavState, Deci
     had_path = state.current is not None
     result = search(SearchKind.THOROUGH, state.past[-1], state.target)
     if result.path is not None:
-        reason = "current path blocked: new path" if had_path else "new path"
+        reason = DecisionReason.PATH_BLOCKED if had_path else DecisionReason.NEW_PATH
         return _follow_new(state, result.path, Part.SEARCH, (SearchKind.THOROUGH,), reason)
     draws, due = _two_or_three(state.draws)
     state = replace(state, current=None, past=simplified(state.past), returning=True, draws=draws, until_search=due)
@@ -215,19 +231,19 @@ def _repair_past(
             past = state.past[:i] + result.path.cells[::-1]
             state = replace(state, past=past)
             return state, Decision(
-                Action.BACKTRACK, Part.RETURN, past[::-1], None, "past path blocked: going back another way", searches
+                Action.BACKTRACK, Part.RETURN, past[::-1], None, DecisionReason.PAST_PATH_BLOCKED, searches
             )
-    return state, Decision(Action.UNREACHABLE, Part.RETURN, (), None, "shut in: no way back either", searches)
+    return state, Decision(Action.UNREACHABLE, Part.RETURN, (), None, DecisionReason.SHUT_IN, searches)
 
 
 def _follow_new(
-    state: NavState, path: Path, part: Part, searches: tuple[SearchKind, ...], reason: str
+    state: NavState, path: Path, part: Part, searches: tuple[SearchKind, ...], reason: DecisionReason
 ) -> tuple[NavState, Decision]:
     state = replace(state, current=path, index=0, returning=False, since_better=0, until_search=0)
     return state, Decision(Action.FOLLOW, part, path.cells, path, reason, searches)
 
 
-def _follow(state: NavState, reason: str, searches: tuple[SearchKind, ...]) -> Decision:
+def _follow(state: NavState, reason: DecisionReason, searches: tuple[SearchKind, ...]) -> Decision:
     assert state.current is not None
     return Decision(Action.FOLLOW, Part.EXPLORE, state.current.cells[state.index :], None, reason, searches)
 

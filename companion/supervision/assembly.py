@@ -1,4 +1,4 @@
-"""Assembly: makes and connects the parts of one companion."""
+"""Assembly: makes and connects the components of one companion."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from companion.vehicle.state import VehicleState
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Parts:
+class Components:
     """What ``app`` calls, step by step."""
 
     run: MissionRun
@@ -63,8 +63,8 @@ def assemble(
     runner: StepRunner,
     log: RunLog,
     options: Options,
-) -> Parts:
-    """The parts of a companion that has heard nothing yet."""
+) -> Components:
+    """The components of a companion that has heard nothing yet."""
     checkpointer, live, outcome = options.checkpointer, LiveSettings(settings), Outcome()
     notifier, noted = Notifier(autopilot, clock, outcome.said), NotedRunner(runner, log.mark)
     vehicle = VehicleState(in_auto=mission.in_auto, sticks=checkpointer.sticks if checkpointer else Sticks())
@@ -97,4 +97,4 @@ def assemble(
         notifier=notifier,
         outcome=outcome,
     )
-    return Parts(run, pace, dispatcher, operator_server, supervisor, notifier, outcome)
+    return Components(run, pace, dispatcher, operator_server, supervisor, notifier, outcome)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from companion.core.grid import Cell
 from companion.core.tick_marks import Mark
-from companion.navigation.field_step import Action, Decision, Part, SearchKind
+from companion.navigation.field_step import Action, Decision, DecisionReason, Part, SearchKind
 from companion.planning.problem import Path as FieldPath
 from companion.recording.recorder import Recorder
 from companion.settings import Settings
@@ -22,7 +22,7 @@ DECISION = Decision(
     part=Part.SEARCH,
     path=(Cell(0, 24), Cell(1, 24)),
     new_path=FieldPath((Cell(0, 24), Cell(1, 24)), 1.5),
-    reason="the path is blocked",
+    reason=DecisionReason.PATH_BLOCKED,
     searches=(SearchKind.THOROUGH,),
 )
 Change = Callable[[Path], None]

@@ -19,10 +19,10 @@ Chromosomes = NDArray[np.int64]
 
 
 @njit(cache=True, nogil=True)
-def scatter(genes: CellArray, part: int, width: int, height: int, tuning: Tuning, state: State) -> None:
+def scatter(genes: CellArray, group: int, width: int, height: int, tuning: Tuning, state: State) -> None:
     """Fill in the inner points of a chromosome of the initial population (3.3).
 
-    Part 0: near the straight line, 1: near the start, 2: anywhere. The ends of the chromosome are set already.
+    Group 0: near the straight line, 1: near the start, 2: anywhere. The ends of the chromosome are set already.
     """
     last = len(genes) - 1
     start_x, start_y, target_x, target_y = genes[0, 0], genes[0, 1], genes[last, 0], genes[last, 1]
@@ -30,13 +30,13 @@ def scatter(genes: CellArray, part: int, width: int, height: int, tuning: Tuning
     shift, reach = math.ceil(tuning.line_range * smaller), math.ceil(tuning.neighbourhood * smaller)
     margin_x, margin_y = min(tuning.margin_fields, (width - 1) // 2), min(tuning.margin_fields, (height - 1) // 2)
     for i in range(1, last):
-        if part == 0:
+        if group == 0:
             genes[i, 0] = start_x + math.floor((target_x - start_x) * i / last + 0.5)
             genes[i, 1] = start_y + math.floor((target_y - start_y) * i / last + 0.5)
             for axis in range(2):
                 if uniform(state) < tuning.line_probability:
                     genes[i, axis] += whole(state, -shift, shift)
-        elif part == 1:
+        elif group == 1:
             genes[i, 0] = whole(state, max(start_x - reach, 0), min(start_x + reach, width - 1))
             genes[i, 1] = whole(state, max(start_y - reach, 0), min(start_y + reach, height - 1))
         else:

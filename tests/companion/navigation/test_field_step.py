@@ -11,6 +11,7 @@ import pytest
 from companion.core.grid import Cell, Grid
 from companion.navigation.field_step import (
     Action,
+    DecisionReason,
     NavState,
     Part,
     SearchKind,
@@ -335,7 +336,7 @@ def test_a_blocked_path_is_replaced_in_the_same_field():
     grid = ground("..........", "..........", "......#...")
     found = path((3, 0), (4, 1), (5, 1), (6, 1), (7, 1), (8, 1), (9, 0))
     state, decision = step(exploring(3), grid, ROW[3], Scripted(found))
-    assert decision.part is Part.SEARCH and "blocked" in decision.reason and state.current is found
+    assert decision.part is Part.SEARCH and decision.reason is DecisionReason.PATH_BLOCKED and state.current is found
 
 
 def test_an_obstacle_behind_the_rover_does_not_block():

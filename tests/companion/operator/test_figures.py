@@ -8,7 +8,7 @@ import pytest
 
 from companion.core.grid import Cell
 from companion.executive.mission_progress import on_reached
-from companion.navigation.field_step import Action, Decision, Part
+from companion.navigation.field_step import Action, Decision, DecisionReason, Part
 from companion.operator.figures import Telemetry, figures
 from companion.vehicle.commands import NamedValue
 from tests.support.desk import Desk
@@ -18,7 +18,7 @@ TWO = '[[target]]\nname = "a"\nfield = [3, 7]\n[[target]]\nname = "b"\nfield = [
 
 
 def decision(part: Part, *path: Cell) -> Decision:
-    return Decision(Action.FOLLOW, part, path, None, "")
+    return Decision(Action.FOLLOW, part, path, None, DecisionReason.FOLLOWING)
 
 
 def test_before_the_first_step_there_is_no_part_and_no_path(tmp_path: Path) -> None:

@@ -56,7 +56,7 @@ def test_decisions_and_what_it_was_run_with(tmp_path: Path, mission: Mission) ->
         "target": "east gate",
         "action": "follow",
         "part": "C",
-        "reason": "the path is blocked",
+        "reason": "current path blocked: new path",
         "searches": ["thorough"],
         "proved": False,
         "new_path": True,
