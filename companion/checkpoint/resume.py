@@ -15,7 +15,7 @@ from companion.checkpoint.state_format import Raster, SavedGenerator, SavedNavSt
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.executive.goal_driver import Tally
-from companion.executive.mission_executor import MissionExecutor
+from companion.executive.mission_executor import ORIGIN_MOVED_M, MissionExecutor
 from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
 from companion.executive.mission_progress import MissionPhase, MissionProgress
 from companion.mapping.evidence_map import restore
@@ -31,7 +31,6 @@ from companion.vehicle.state import VehicleState
 
 SAME_BOOT_S = 1.0
 """The difference of two clocks that keep running changes by no more than this (link delays)."""
-SAME_ORIGIN_M = 0.2
 CARRIED_M = 25.0
 """A rover found farther than this from its last field was carried: its leg begins again where it stands."""
 
@@ -117,7 +116,7 @@ def resumed_layout(
     evidence, shift = layout.evidence, grid_shift(state, layout)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:
         return layout, progress, "without its map (the settings of the map have changed)"
-    same = same and apart_m(origin, saved_origin) <= SAME_ORIGIN_M
+    same = same and apart_m(origin, saved_origin) <= ORIGIN_MOVED_M
     cell_shift = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
     log_odds = _shifted(previous.rasters["log_odds"], evidence.log_odds.shape, cell_shift)
     penalty = _shifted(previous.rasters["penalty"], evidence.penalty.shape, shift)

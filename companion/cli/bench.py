@@ -19,13 +19,11 @@ from companion.bench.movingai import ScenarioFileError
 from companion.bench.page import write_page
 from companion.bench.peers import installed_peers
 from companion.bench.report import as_json, head, rows, runs_explained
-from companion.cli.inputs import OutputError, usable_settings, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings, writable, written
 from companion.mapping.map_files import MapError
 from companion.navigation.search_budget import budget_of
 from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
 from companion.settings import Settings, SettingsError
-
-EXIT_BAD_INPUT = 2
 
 
 class BenchError(ValueError):

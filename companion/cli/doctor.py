@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from companion.cli.inputs import OutputError, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.state import StateFiles
 from companion.core.clock import WallClock
 from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
@@ -24,7 +24,7 @@ from companion.settings import SettingsError
 from companion.vehicle.survey import Survey
 
 STEP_S = 0.05
-EXIT_FINE, EXIT_BAD_INPUT, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 2, 3, 4
+EXIT_FINE, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 3, 4
 COLOURS = {Level.STOP: "red", Level.WARN: "yellow", Level.NOTE: "cyan"}
 
 

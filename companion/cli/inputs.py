@@ -15,6 +15,9 @@ from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import Settings, SettingsError, load_settings
 from companion.storage.files import refuse_pipe
 
+EXIT_BAD_INPUT = 2
+"""Of every command: it has not begun, since a file or an option cannot be used."""
+
 
 class OutputError(Exception):
     """A file that cannot be written; the text is one line with file, reason and remedy."""

@@ -10,6 +10,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from companion.cli.inputs import EXIT_BAD_INPUT
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.mapping.map_files import MapError, load_map
@@ -17,8 +18,6 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Area, Mission, MissionError, MoverSpec, Place
 from companion.mission.resolve import resolve
 from companion.storage.toml_file import read_toml
-
-EXIT_BAD_INPUT = 2
 
 app = typer.Typer(name="mission", help="Mission files: `mission check FILE` says what is understood of one.")
 

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.cli.images import save_plan
-from companion.cli.inputs import OutputError, picture, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, usable_settings
 from companion.core.clock import stopwatch_s
 from companion.core.grid import Cell, Grid
 from companion.mapping.map_files import MapError, load_map
@@ -170,7 +170,7 @@ def _bend_m(answer: Answer, path: GridPath) -> float | None:
     return radius * answer.grid.resolution_m if math.isfinite(radius) else None
 
 
-EXIT_FOUND, EXIT_BAD_INPUT, EXIT_NO_PATH = 0, 2, 3
+EXIT_FOUND, EXIT_NO_PATH = 0, 3
 
 
 class PlaceError(ValueError):

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from companion.cli.images import save_decision
-from companion.cli.inputs import OutputError, picture
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture
 from companion.mapping.map_files import MapError
 from companion.recording.reader import Record, load_record
 from companion.recording.record_format import RecordError
@@ -16,7 +16,7 @@ from companion.replay.explain import DecisionExplainer, explanation_lines
 from companion.replay.replay import ReplayResult
 from companion.replay.replay import replay as run_again
 
-EXIT_SAME, EXIT_DIFFERENT, EXIT_BAD_INPUT = 0, 1, 2
+EXIT_SAME, EXIT_DIFFERENT = 0, 1
 SHOWN = 20
 
 

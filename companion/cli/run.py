@@ -14,7 +14,7 @@ import typer
 
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
-from companion.cli.inputs import OutputError, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.live import Live, LiveConsole, Reader, levelled, reader_of
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
@@ -50,7 +50,7 @@ BAD_INPUT = (
 )
 UNHURRIED_S = 10.0
 """A run that ends by itself waits this long for a slow disk."""
-EXIT_REACHED, EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED = 0, 2, 3, 130
+EXIT_REACHED, EXIT_MISSED, EXIT_STOPPED = 0, 3, 130
 
 
 def run(

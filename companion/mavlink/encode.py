@@ -8,7 +8,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
-from companion.mavlink.requests import answer_message
+from companion.mavlink.requests import GUIDED_ITEM, KEEP_SPEED, answer_message
 from companion.mavlink.signing import Signer
 from companion.mavlink.statustext import chunks_of
 from companion.vehicle.commands import (
@@ -41,9 +41,6 @@ VELOCITY_AND_YAW_RATE = 1511
 YAW_ONLY = 2559
 """Type mask: only the yaw is used."""
 KEEP_THROTTLE = -1.0
-KEEP_SPEED = -1.0
-GUIDED_ITEM = 2
-"""``current`` of a mission item that is a guided target."""
 
 
 LongCommand = SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage | RunPrearmChecks

@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.frames import GeoPoint
 from companion.mavlink.positions import point_of
+from companion.mission.mav_commands import GLOBAL_FRAMES
 from companion.vehicle.commands import AnswerGoal
 from companion.vehicle.events import (
     Asker,
@@ -28,13 +29,11 @@ ITEMS = (mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT, mavlink.MAVLINK_MSG_ID_MISSION
 REQUESTS = (*COMMANDS, *ITEMS)
 IN_DEGREES = (mavlink.MAVLINK_MSG_ID_COMMAND_LONG, mavlink.MAVLINK_MSG_ID_MISSION_ITEM)
 """These hold places as floats in degrees, exact to half a metre at best; the others hold 1e-7 degrees."""
-GLOBAL_FRAMES = (0, 3, 5, 6, 10, 11)
-"""Frames with latitude and longitude, as ArduRover accepts them; their altitudes do not matter to a rover."""
 GUIDED_ITEM = 2
 """``current`` of a mission item that is a guided target."""
+KEEP_SPEED = -1.0
 NO_POSITION = 0b11
 """Bits of a type mask: x or y is not used."""
-KEEP_SPEED = (-1.0, 0.0)
 COMMAND_RESULTS: Mapping[GoalAnswer, int] = MappingProxyType(
     {
         GoalAnswer.ACCEPTED: mavlink.MAV_RESULT_ACCEPTED,
@@ -79,7 +78,7 @@ def target_asked(message: Any, time_s: float) -> GoalRequested | None:
     point = _place(message)
     if point is None:
         return _refused(time_s, asker, form, GoalAnswer.BAD_VALUE, "no latitude and longitude in it")
-    if math.isnan(speed_m_s) or speed_m_s in KEEP_SPEED:
+    if math.isnan(speed_m_s) or speed_m_s in (KEEP_SPEED, 0.0):
         return GoalRequested(time_s, asker, form, point)
     if not (math.isfinite(speed_m_s) and speed_m_s > 0.0):
         return _refused(time_s, asker, form, GoalAnswer.BAD_VALUE, f"a speed of {speed_m_s:g} m/s")

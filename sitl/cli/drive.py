@@ -9,7 +9,7 @@ import typer
 from rich.console import Console
 
 from companion.cli.entry import StoppedError
-from companion.cli.inputs import OutputError, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.core.clock import WallClock
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
@@ -28,7 +28,6 @@ from sitl.faults.fault_file import FaultFileError
 from sitl.lockstep import Drive
 from sitl.scenario import ScenarioError, equipped, simulated
 
-EXIT_BAD_INPUT = 2
 BAD_INPUT = (
     SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
 )  # fmt: skip

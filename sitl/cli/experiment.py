@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-from companion.cli.inputs import OutputError, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, writable, written
 from companion.mapping.map_files import MapError
 from companion.settings import Settings
 from companion.settings.versions import made_with
@@ -32,7 +32,6 @@ EXPERIMENTS = (
 """Each is a module of ``sitl.experiments``, loaded when it is asked for: they load the plotting library."""
 ON_ANY_MAP = ("navigation", "driving")
 OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
-EXIT_BAD_INPUT = 2
 EXIT_FAILED = 3
 
 
