@@ -325,3 +325,8 @@ def test_the_page_lists_every_parameter() -> None:
         for one in TABLE
     ]
     assert "\n".join(rows) in page
+
+
+def test_no_section_that_is_held_by_value_can_be_tuned() -> None:
+    """Batteries, fence and link are given their section once; a change while driving would not reach them."""
+    assert not {parameter.section for parameter in TABLE} & {"power", "fence", "link"}
