@@ -167,6 +167,8 @@ def _other_versions(meta: RecordMeta) -> list[str]:
 
 
 def _check_input(directory: Path, entry: InputFile) -> None:
+    if not entry.name.isprintable():
+        raise RecordError(f"{directory / META}: damaged: {entry.name!r:.100} is no name of a file")
     file = directory / entry.name
     if not file.resolve().is_relative_to(directory.resolve()):
         raise RecordError(f"{directory / META}: damaged: {entry.name!r:.100} lies outside the record")

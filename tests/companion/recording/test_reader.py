@@ -83,6 +83,10 @@ REFUSED: dict[str, tuple[Change, list[str]]] = {
     "seed changed": (with_meta("seed", 7), ["meta.json", "seed or arm changed"]),
     "arm changed": (with_meta("arm", False), ["meta.json", "seed or arm changed"]),
     "half": (overwritten("meta.json", b'{"format": 3}'), ["meta.json", "seed"]),
+    "no name": (
+        with_meta("inputs", [{"kind": "x", "name": "a\x7fb", "source": "", "sha256": ""}]),
+        ["no name of a file"],
+    ),
     "outside": (with_meta("inputs", [{"kind": "x", "name": "../x", "source": "", "sha256": ""}]), ["outside"]),
     "packets damaged": (with_flipped_bit("link.tlog", 5000), ["link.tlog", "damaged"]),
     "ticks damaged": (with_flipped_bit("rounds.bin", 500), ["rounds.bin", "damaged"]),
