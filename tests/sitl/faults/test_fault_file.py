@@ -96,7 +96,7 @@ def test_what_is_said_is_understood(tmp_path: Path) -> None:
 
 BAD = [
     ("", "fault: there is none; write"),
-    ("fault = 3\n", "fault: input should be a valid list"),
+    ("fault = 3\n", "fault: input should be a list in [brackets]"),
     ("[[faults]]\n", "faults: unknown key, did you mean 'fault'?"),
     ('[[fault]]\nkind = "packet_los"\nstart_s = 1\n', "unknown kind 'packet_los', did you mean 'packet_loss'?"),
     ("[[fault]]\nstart_s = 1\n", "fault 1: kind: missing; kinds are packet_loss, "),
