@@ -63,6 +63,8 @@ def open_link(url: str, clock: Clock | None = None) -> ByteLink:
 def _serial(place: str, url: str, clock: Clock) -> SerialLink:
     """A serial line; the baud rate stands behind a comma (MAVProxy) or a colon (ArduPilot)."""
     device, sign, baud = place.rpartition("," if "," in place else ":")
+    if place == url and sign == ":" and not baud.isdigit():  # /dev/serial/by-path names have colons of their own
+        device, sign = place, ""
     return SerialLink(device or place, _number(baud, url, "baud rate") if sign else DEFAULT_BAUD, clock)
 
 

@@ -347,11 +347,19 @@ class TestUrls:
         os.close(rover)
         os.close(device)
 
+    def test_a_device_may_have_colons_in_its_name(self) -> None:
+        place = "/dev/serial/by-path/pci-0000:00:14.0-usb-0:2:1.0-port0"
+        with pytest.raises(LinkError, match=f"serial:{place}:115200: "):
+            open_link(place)
+        with pytest.raises(LinkError, match=f"serial:{place}:57600: "):
+            open_link(f"{place},57600")
+
     @pytest.mark.parametrize(
         "url",
         [
             "", "nonsense", "http://rover", "udpin", "udpin:14550", "udpout:127.0.0.1", "tcp:127.0.0.1:port",
-            "tcp::5760", "tcp:127.0.0.1:70000", "udpin:127.0.0.1:-1", "serial:/dev/ttyX:fast", "/dev/ttyX,", "tcp://127.0.0.1:5760",
+            "tcp::5760", "tcp:127.0.0.1:70000", "udpin:127.0.0.1:-1", "serial:/dev/ttyX:fast", "/dev/ttyX,",
+            "tcp://127.0.0.1:5760",
         ],
     )  # fmt: skip
     def test_a_bad_url_is_one_line_with_the_forms(self, url: str) -> None:
