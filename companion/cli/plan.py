@@ -20,8 +20,8 @@ from companion.core.clock import stopwatch_s
 from companion.core.grid import Cell, Grid
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
+from companion.planning.problem import KinematicConstraints, PlanningProblem, PlanResult, PlanStatus
 from companion.planning.problem import Path as GridPath
-from companion.planning.problem import PlanningProblem, PlanResult, PlanStatus, VehicleMotion
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
 from companion.settings import Settings, SettingsError
 from companion.settings.versions import made_with
@@ -49,14 +49,14 @@ STATUS_WORDS = {
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The result of a search, and its input. ``motion``: how the rover turns."""
+    """The result of a search, and its input. ``kinematics``: how the rover turns."""
 
     result: PlanResult
     seconds: float
     seed: int
     top_left: bool
     grid: Grid
-    motion: VehicleMotion
+    kinematics: KinematicConstraints
     settings: Settings
 
     def place(self, cell: Cell) -> tuple[int, int]:
@@ -150,13 +150,13 @@ def _lengths(answer: Answer, path: GridPath) -> dict[str, str]:
     rows = {"cost": f"{path.cost:.3f}", "from field to field": both(path.length_fields)}
     rows["line to drive"] = both(length_of(line)) if path.curve is not None else "the same: through the fields' middles"
     bend_m = _bend_m(answer, path)
-    radius_m = answer.motion.turning_radius_fields * resolution_m
+    radius_m = answer.kinematics.turning_radius_fields * resolution_m
     if radius_m > 0.0:
         # The line is sampled, so its radius is only exact to some per cent.
         fits = bend_m is None or bend_m >= 0.95 * radius_m
         bend = "none" if bend_m is None else f"{bend_m:.2f} m radius"
         rows["sharpest bend"] = bend if fits else f"{bend}: too tight, the rover would manoeuvre there"
-    heading_rad = answer.motion.heading_rad
+    heading_rad = answer.kinematics.heading_rad
     if heading_rad is not None and len(line) > 1:
         off_deg = math.degrees(abs(math.remainder(bearing_of(line) - heading_rad, 2.0 * math.pi)))
         ahead = off_deg <= AHEAD_DEG
@@ -211,7 +211,7 @@ def plan(
             grid.weights,
             place_of("--start", start, grid, top_left),
             place_of("--target", target, grid, top_left),
-            motion=motion_of(name, settings, turning_radius_m, heading_deg, grid),
+            kinematics=kinematics_of(name, settings, turning_radius_m, heading_deg, grid),
         )
         picture(image)
         answer = search(grid, problem, name, settings, seed, top_left)
@@ -233,22 +233,24 @@ def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, 
         warm_up((name,), settings.planner)
     began_s = stopwatch_s()
     result = chosen.plan(problem, budget_of(settings.navigator.thorough), np.random.default_rng(seed))
-    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, problem.motion, settings)
+    return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, problem.kinematics, settings)
 
 
-def motion_of(name: str, settings: Settings, radius_m: float, heading_deg: float | None, grid: Grid) -> VehicleMotion:
+def kinematics_of(
+    name: str, settings: Settings, radius_m: float, heading_deg: float | None, grid: Grid
+) -> KinematicConstraints:
     """How the rover turns. Raises TurningError for a planner that ignores it, and UnknownPlannerError."""
     if radius_m == 0.0:
         if heading_deg is not None:
             raise TurningError(f"--heading-deg {heading_deg:g}: counts only with --turning-radius-m")
-        return VehicleMotion()
+        return KinematicConstraints()
     if not (math.isfinite(radius_m) and math.isfinite(heading_deg or 0.0)):
         raise TurningError("--turning-radius-m, --heading-deg: finite numbers are needed")
     if not make_planner(name, settings.planner).capabilities.turning_radius:
         able = (each for each in PLANNERS if make_planner(each, settings.planner).capabilities.turning_radius)
         raise TurningError(f"--turning-radius-m: {name} does not heed it; {' and '.join(able)} do")
     heading_rad = None if heading_deg is None else math.remainder(math.radians(90.0 - heading_deg), 2.0 * math.pi)
-    return VehicleMotion(heading_rad, grid.fields(radius_m))
+    return KinematicConstraints(heading_rad, grid.fields(radius_m))
 
 
 def place_of(option: str, text: str, grid: Grid, top_left: bool) -> Cell:

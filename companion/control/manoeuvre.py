@@ -32,7 +32,7 @@ ANY_RAD = math.pi
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ArcSegment:
-    """A part driven in one direction. ``points``: shape (n, 2), north and east in metres, ``STEP_M`` apart or less."""
+    """Driven in one direction. ``points``: shape (n, 2), north and east in metres, ``STEP_M`` apart or less."""
 
     points: Points
     backwards: bool

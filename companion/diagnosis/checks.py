@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.vehicle.events import RoverMode
-from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfPart
+from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
 from companion.vehicle.survey import Survey
 
 FIRMWARE = (4, 7)
@@ -158,7 +158,7 @@ def position(seen: Survey) -> Iterator[Finding]:
     if vehicle.ekf is None:
         says, remedy = "EKF_STATUS_REPORT does not come.", "look at the rates of this port"
         yield Finding("ekf", Level.STOP, says, remedy)
-    elif vehicle.ekf_lacks is EkfPart.POSITION:
+    elif vehicle.ekf_lacks is EkfQuantity.POSITION:
         flags = vehicle.ekf.flags
         why = "it only knows where it began" if flags & EKF_CONST_POSITION else "it has none"
         why = (
@@ -202,7 +202,7 @@ def arming(seen: Survey) -> Iterator[Finding]:
 
 def rates(seen: Survey) -> Iterator[Finding]:
     """Messages whose rate is too low. Without a position of the EKF, none can be sent."""
-    no_position = seen.vehicle.ekf is not None and seen.vehicle.ekf_lacks is EkfPart.POSITION
+    no_position = seen.vehicle.ekf is not None and seen.vehicle.ekf_lacks is EkfQuantity.POSITION
     for message in seen.slow:
         if message.name == "LOCAL_POSITION_NED" and no_position:
             continue

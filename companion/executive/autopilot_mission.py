@@ -15,6 +15,7 @@ from companion.mission.items import Item
 from companion.mission.mission import MissionError
 from companion.mission.stored_mission import NAME, digest
 from companion.safety.reasons import Activity, Reason, RunPhase, WaitReason
+from companion.safety.watchdogs import Monitor
 from companion.vehicle.events import (
     Event,
     ItemCurrentSeen,
@@ -78,7 +79,7 @@ class MissionFetcher:
             self._clock.sleep_until_s(min(time_s, now_s + self._tick_s))
 
 
-class MissionChangeMonitor:
+class MissionChangeMonitor(Monitor):
     """``stored``: the digest of what was read; empty for a mission from elsewhere, which nothing is compared with."""
 
     def __init__(self, stored: str, downloads: Downloads, notifier: TextSink) -> None:

@@ -33,7 +33,7 @@ from companion.navigation.field_step import (
     retrace,
     step,
 )
-from companion.navigation.search_budget import PathSearcher, motion_of
+from companion.navigation.search_budget import PathSearcher, kinematics_of
 from companion.navigation.step_runner import StepRunner
 from companion.navigation.turning_cost import with_turning_cost
 from companion.perception.moving_obstacles import Moving, motion_changed, planners_movers
@@ -234,10 +234,10 @@ class GoalDriver:
         grid = with_turning_cost(view.evidence.grid, pose, settings.guidance, rover.turning_radius_m)
         weights, navigator = grid.weights, settings.navigator
         movers = self._movers(view, moving)
-        motion = motion_of(pose, rover, self._fastest_m_s(view), settings, grid)
+        kinematics = kinematics_of(pose, rover, self._fastest_m_s(view), settings, grid)
 
         def search(kind: SearchKind, start: Cell, target: Cell) -> PlanResult:
-            return self.searcher.search(weights, kind, start, target, navigator, movers, motion)
+            return self.searcher.search(weights, kind, start, target, navigator, movers, kinematics)
 
         if cell != state.past[-1]:
             self.tally.steps += 1

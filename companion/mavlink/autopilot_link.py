@@ -160,7 +160,7 @@ class AutopilotLink:
     def service(self, now_s: float) -> None:
         """Call every tick: sends heartbeat, requests and repetitions.
 
-        The heartbeat is sent from the first tick on: the autopilot learns the route to the companion from its packets.
+        The heartbeat is sent from the first tick on: the autopilot learns from packets where the companion is.
         """
         if now_s - self._heartbeat_s >= HEARTBEAT_S - 1e-6:
             self._heartbeat_s = now_s

@@ -168,7 +168,7 @@ class Decoder:
         return self._mav.decode(bytearray(packet.raw))
 
     def _is_repeated(self, packet: Packet) -> bool:
-        """Whether the same packet has just been heard, over two routes; also counts lost packets."""
+        """Whether the same packet has just been heard, over another link; also counts lost packets."""
         last = self._last.get(packet.component_id)
         self._last[packet.component_id] = packet
         if last is None:

@@ -1,4 +1,4 @@
-"""Calls of the planner by the navigator: the budget for each kind of search, the rover's motion, the time they took.
+"""Calls of the planner by the navigator: the budget for each kind of search, kinematic constraints, the time they took.
 
 Nouns: path searcher.
 """
@@ -17,7 +17,7 @@ from companion.core.grid import OBSTACLE, Cell, Grid, Weights
 from companion.core.rover_limits import RoverLimits
 from companion.navigation.field_step import SearchKind
 from companion.planning.planner import Planner
-from companion.planning.problem import Budget, ObstacleTrajectory, PlanningProblem, PlanResult, VehicleMotion
+from companion.planning.problem import Budget, KinematicConstraints, ObstacleTrajectory, PlanningProblem, PlanResult
 from companion.settings import NavigatorSettings, SearchSettings, Settings
 
 START_WEIGHT = 0.9
@@ -29,11 +29,13 @@ def budget_of(settings: SearchSettings) -> Budget:
     return Budget(settings.min_epochs, settings.max_epochs, settings.control_points, settings.population)
 
 
-def motion_of(pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, grid: Grid) -> VehicleMotion:
-    """The rover's motion for a planner: its heading, its turning radius and the range of speeds, in fields."""
+def kinematics_of(
+    pose: Pose, rover: RoverLimits, fastest_m_s: float, settings: Settings, grid: Grid
+) -> KinematicConstraints:
+    """How the rover can move, for a planner: its heading, its turning radius and the range of speeds, in fields."""
     fastest_m_s = min(fastest_m_s, settings.guidance.max_speed_m_s)
     slowest_m_s = min(settings.guidance.min_speed_m_s, fastest_m_s)
-    return VehicleMotion(
+    return KinematicConstraints(
         heading_rad=wrap_pi_rad(0.5 * math.pi - pose.heading_rad),
         turning_radius_fields=grid.fields(rover.turning_radius_m * settings.steering.planned_radius),
         speeds_fields_s=(grid.fields(slowest_m_s), grid.fields(fastest_m_s)),
@@ -56,7 +58,7 @@ class PathSearcher:
         target: Cell,
         settings: NavigatorSettings,
         moving_obstacles: tuple[ObstacleTrajectory, ...] = (),
-        motion: VehicleMotion = VehicleMotion(),  # noqa: B008 - frozen
+        kinematics: KinematicConstraints = KinematicConstraints(),  # noqa: B008 - frozen
     ) -> PlanResult:
         """One search over ``weights``, which are not changed.
 
@@ -68,7 +70,9 @@ class PathSearcher:
             weights[start.y, start.x] = START_WEIGHT
         budget = budget_of(settings.thorough if kind is SearchKind.THOROUGH else settings.quick)
         result = self.planner.plan(
-            PlanningProblem(weights, start, target, moving_obstacles=moving_obstacles, motion=motion), budget, self.rng
+            PlanningProblem(weights, start, target, moving_obstacles=moving_obstacles, kinematics=kinematics),
+            budget,
+            self.rng,
         )
         self.seconds.append(stopwatch_s() - began_s)
         return result

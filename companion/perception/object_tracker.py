@@ -84,7 +84,7 @@ class Track:
     number: int
     sightings: tuple[Sighting, ...]
 
-    def motion(self) -> tuple[Moving, bool] | None:
+    def estimate(self) -> tuple[Moving, bool] | None:
         """Its place and velocity by least squares, and whether they are significant; None if seen too briefly."""
         time_s = np.array([one.time_s for one in self.sightings])
         if len(time_s) < LEAST_SIGHTINGS or time_s[-1] - time_s[0] < LEAST_S:
@@ -130,9 +130,9 @@ class ObjectTracker:
         """What moves now."""
         found = []
         for track in self._tracks:
-            motion = track.motion()
-            if motion is not None and now_s - motion[0].time_s <= LOST_S:
-                moving, believed = motion
+            estimate = track.estimate()
+            if estimate is not None and now_s - estimate[0].time_s <= LOST_S:
+                moving, believed = estimate
                 if believed and moving.speed_m_s >= settings.moving_m_s:
                     found.append(moving)
         return tuple(found)
@@ -169,11 +169,11 @@ class ObjectTracker:
 
 def _expected(track: Track, time_s: float) -> tuple[float, float]:
     """Where the next sighting should be."""
-    motion = track.motion()
+    estimate = track.estimate()
     last = track.sightings[-1]
-    if motion is None:
+    if estimate is None:
         return last.north_m, last.east_m
-    there = motion[0].at(time_s)
+    there = estimate[0].at(time_s)
     return there.north_m, there.east_m
 
 

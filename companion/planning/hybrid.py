@@ -58,7 +58,7 @@ class Hybrid:
         good_cost = self._tolerance * _driving_cost(problem, spent.path) + turning
         if genetic_cost <= good_cost:
             return replace(genetic, planner=self.name)
-        if problem.motion.turning_radius_fields == 0.0:
+        if problem.kinematics.turning_radius_fields == 0.0:
             return spent
         return self._with_whole_budget(problem, budget, rng, spent, good_cost)
 
@@ -75,12 +75,12 @@ class Hybrid:
 
 def _turning_cost(problem: PlanningProblem) -> float:
     """The cost of an arc towards the target, and as much again to return to the line; 0 if it turns on the spot."""
-    motion = problem.motion
-    if motion.turning_radius_fields <= 0.0 or motion.heading_rad is None:
+    kinematics = problem.kinematics
+    if kinematics.turning_radius_fields <= 0.0 or kinematics.heading_rad is None:
         return 0.0
     bearing_rad = math.atan2(problem.target[1] - problem.start[1], problem.target[0] - problem.start[0])
-    turn_rad = abs(math.remainder(bearing_rad - motion.heading_rad, 2.0 * math.pi))
-    return 2.0 * turn_rad * motion.turning_radius_fields * BASE_WEIGHT
+    turn_rad = abs(math.remainder(bearing_rad - kinematics.heading_rad, 2.0 * math.pi))
+    return 2.0 * turn_rad * kinematics.turning_radius_fields * BASE_WEIGHT
 
 
 def _least_cost(problem: PlanningProblem) -> float:

@@ -35,7 +35,7 @@ class ObstacleTrajectory:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class VehicleMotion:
+class KinematicConstraints:
     """How the vehicle can move, for planners that consider it.
 
     ``heading_rad``: at the start, 0 along +x, growing towards +y; None: any. ``turning_radius_fields``: the tightest
@@ -54,7 +54,7 @@ class PlanningProblem:
 
     ``corner_cutting`` allows a diagonal step past the corner of an obstacle, as the papers do. Without it both straight
     neighbours of a diagonal step must be free. Planners never write to ``weights``. Only planners whose capabilities
-    say so consider ``moving_obstacles`` and ``motion``.
+    say so consider ``moving_obstacles`` and ``kinematics``.
     """
 
     weights: Weights
@@ -62,7 +62,7 @@ class PlanningProblem:
     target: Cell
     corner_cutting: bool = False
     moving_obstacles: tuple[ObstacleTrajectory, ...] = ()
-    motion: VehicleMotion = VehicleMotion()
+    kinematics: KinematicConstraints = KinematicConstraints()
 
     @property
     def ends_are_free(self) -> bool:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 from companion.safety.reasons import PowerReason, Reason, WaitReason
+from companion.safety.watchdogs import Monitor
 from companion.settings import PowerSettings
 from companion.vehicle.events import (
     BatterySeen,
@@ -84,8 +85,8 @@ def _reason(level: BatteryLevel, batteries: list[BatterySeen], settings: PowerSe
     return None
 
 
-class BatteryMonitor:
-    """Keeps the state for the companion."""
+class BatteryMonitor(Monitor):
+    """Keeps the batteries' state. It has no doubt: with a low battery the rover may move, to return."""
 
     def __init__(self, settings: PowerSettings) -> None:
         self.state = BatteryState()

@@ -5,6 +5,7 @@ Nouns: watchdog, monitor.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Iterable
 from typing import Protocol
@@ -24,19 +25,45 @@ LATE_S = 0.1
 WINDOW_S = 4.0
 LATE_SHARE = 0.5
 """Late for more than this share of the window, the computer is too slow, or busy."""
-HICCUP_S = 1.0
-"""One stall counts for no more than this, however long it was: a computer that was suspended is not slow."""
+STALL_S = 1.0
+"""A tick that is later than this ends a stall. No stall counts for more, however long it was: a computer that was
+suspended is not slow."""
+SETTLE_S = 0.4
+"""What piled up during a stall is not believed until this much later."""
 
 
-class Monitor(Protocol):
-    """Watches one thing that must be well while the rover moves."""
+class Monitor:
+    """Watches one thing that must be well while the rover moves. A monitor overrides what concerns it.
+
+    The order of the calls: ``take`` for each event that came in, ``tick`` once in every tick, then ``doubt``.
+    """
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event, already folded into ``vehicle``."""
-        ...
+
+    def tick(self, now_s: float) -> None:
+        """A tick of the companion: keep up with what does not come as an event."""
 
     def doubt(self, now_s: float) -> Reason[Doubt] | None:
         """Why the rover must not move now; None when it may."""
+        return None
+
+
+class Loop(Protocol):
+    """The companion's own loop."""
+
+    @property
+    def late_s(self) -> float:
+        """How late the present tick began."""
+        ...
+
+
+class Worker(Protocol):
+    """What computes the navigator's steps."""
+
+    @property
+    def working(self) -> bool:
+        """Whether a step is being computed beside the loop."""
         ...
 
 
@@ -48,7 +75,7 @@ def first_doubt(monitors: Iterable[Monitor], now_s: float) -> Reason[Doubt] | No
     return None
 
 
-class SticksMonitor:
+class SticksMonitor(Monitor):
     """The pilot's sticks: a person who moves them wants the rover."""
 
     def __init__(self) -> None:
@@ -63,7 +90,7 @@ class SticksMonitor:
         return Reason(Doubt.STICKS_MOVED) if self._moved else None
 
 
-class DataMonitor:
+class DataMonitor(Monitor):
     """What the autopilot and the sensors tell: its age, and whether it agrees with itself."""
 
     def __init__(self, settings: LiveSettings) -> None:
@@ -106,34 +133,39 @@ def data_doubt(vehicle: VehicleState, now_s: float, settings: SafetySettings) ->
     return None
 
 
-class LoopMonitor:
-    """The companion's own work: ticks that are late again and again, and a navigator's step that does not end.
+class LoopMonitor(Monitor):
+    """The companion's own work: a loop that stood still or is late again and again, a navigator's step without an end.
 
     All times are the companion's clock. ``planner_s``: how long a step may take.
     """
 
-    def __init__(self, planner_s: float) -> None:
+    def __init__(self, loop: Loop, worker: Worker, planner_s: float) -> None:
+        self._loop = loop
+        self._worker = worker
         self._planner_s = planner_s
         self._ticks: deque[tuple[float, float]] = deque()
         self._late_s = 0.0
         self._before_s: float | None = None
         self._works_since_s: float | None = None
         self._planning_long = False
+        self._settled_s = -math.inf
 
-    def take(self, event: Event, vehicle: VehicleState) -> None:
-        """Events say nothing of the loop."""
-
-    def tick(self, now_s: float, late_s: float, *, planner_works: bool) -> None:
-        """A tick begins now, ``late_s`` after its time; ``planner_works``: a step is being computed beside the loop."""
+    def tick(self, now_s: float) -> None:
+        """How late is it, and is a step being computed?"""
+        late_s, works = self._loop.late_s, self._worker.working
+        if late_s > STALL_S:
+            self._settled_s = now_s + SETTLE_S
         elapsed_s = now_s - (now_s if self._before_s is None else self._before_s)
         self._before_s = now_s
-        self._note(now_s, min(elapsed_s, HICCUP_S) if late_s > LATE_S else 0.0)
+        self._note(now_s, min(elapsed_s, STALL_S) if late_s > LATE_S else 0.0)
         since_s = now_s if self._works_since_s is None else self._works_since_s
-        self._works_since_s = since_s if planner_works else None
-        self._planning_long = planner_works and now_s - since_s > self._planner_s
+        self._works_since_s = since_s if works else None
+        self._planning_long = works and now_s - since_s > self._planner_s
 
     def doubt(self, now_s: float) -> Reason[Doubt] | None:
         """As of the last ``tick``."""
+        if now_s < self._settled_s:
+            return Reason(Doubt.LOOP_STOOD_STILL)
         if self._planning_long:
             return Reason(Doubt.PLANNING_LONG, (self._planner_s,))
         return Reason(Doubt.LOOP_LATE) if self._late_s > LATE_SHARE * WINDOW_S else None
@@ -145,7 +177,7 @@ class LoopMonitor:
             self._late_s -= self._ticks.popleft()[1]
 
 
-class ScanMonitor:
+class ScanMonitor(Monitor):
     """The range sensors: whether one repeats itself although the rover moves."""
 
     def __init__(self) -> None:

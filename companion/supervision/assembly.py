@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from companion.checkpoint.checkpointer import Checkpointer
 from companion.core.clock import Clock
 from companion.core.tick_marks import Mark
-from companion.executive.autopilot_mission import MissionChangeMonitor
 from companion.executive.mission_run import MissionRun, new_run
 from companion.executive.requested_goals import RequestedGoals
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -27,7 +26,7 @@ from companion.supervision.monitors import make_monitors
 from companion.supervision.pace import Pace
 from companion.supervision.run_saver import RunSaver
 from companion.supervision.shutdown import Shutdown
-from companion.supervision.supervisor import LoopWatch, Supervisor
+from companion.supervision.supervisor import Supervisor
 from companion.vehicle.rc_input import Sticks
 from companion.vehicle.state import VehicleState
 
@@ -71,18 +70,17 @@ def assemble(
     run = new_run(mission, vehicle, autopilot, live, notifier, noted, log, options.seed)
     log.begin(clock.now_s(), Mark.BEGIN)
 
-    monitors = make_monitors(run, autopilot, live, notifier)
+    pace = Pace(clock, live)
+    monitors = make_monitors(run, autopilot, live, notifier, pace, noted)
     permission = DrivePermission(run, monitors.by_precedence, live, notifier)
     operator_server = OperatorServer(run, autopilot, live, notifier, options.keep_settings)
-    changes = MissionChangeMonitor(mission.stored, autopilot.downloads, notifier)
     requests = RequestedGoals(run, live, notifier)
     handlers: tuple[EventHandler, ...]
-    handlers = (operator_server, changes, *monitors.by_precedence, monitors.batteries, requests, permission)
+    handlers = (operator_server, *monitors.by_precedence, requests, permission)
     dispatcher = EventDispatcher(run, autopilot, notifier, handlers, monitors.scans, monitors.localization)
 
     limits = MissionLimits(run, monitors.fences, monitors.batteries, monitors.rivals, settings.power, outcome)
     previous = checkpointer.previous if checkpointer else None
-    pace = Pace(clock, live, monitors.localization)
     shutdown = Shutdown(run, autopilot, live, notifier)
     supervisor = Supervisor(
         run,
@@ -90,8 +88,7 @@ def assemble(
         Arming(run, autopilot, limits, live, notifier, arm=options.arm, previous=previous),
         limits,
         shutdown,
-        loop=LoopWatch(monitors.loop, pace, noted),
-        localization=monitors.localization,
+        monitors=monitors.by_precedence,
         saver=RunSaver(run, checkpointer, log, monitors.localization, shutdown),
         log=log,
         notifier=notifier,

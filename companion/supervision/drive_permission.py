@@ -15,7 +15,7 @@ from companion.vehicle.state import VehicleState
 
 
 class DrivePermission:
-    """``monitors``: in order of precedence. It alone writes the run's ``latch`` and ``stop``."""
+    """``monitors``: in order of precedence. This class alone writes the run's ``latch`` and ``stop``."""
 
     def __init__(
         self, run: MissionRun, monitors: tuple[Monitor, ...], settings: LiveSettings, notifier: TextSink

@@ -15,6 +15,7 @@ from companion.mission.autopilot_fence import NO_FENCE, PARAMETERS, AutopilotFen
 from companion.mission.fence_items import rally_points
 from companion.mission.items import ItemError
 from companion.safety.reasons import Doubt, Reason, WaitReason
+from companion.safety.watchdogs import Monitor
 from companion.settings import FenceSettings
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events import (
@@ -37,7 +38,7 @@ TOTALS = {"FENCE_TOTAL": PlanKind.FENCE, "RALLY_TOTAL": PlanKind.RALLY}
 """ArduPilot tells everybody these parameters when a list has got another length."""
 
 
-class FenceMonitor:
+class FenceMonitor(Monitor):
     """Keeps up with both lists, and says when the fence is breached."""
 
     def __init__(self, autopilot: AutopilotLink, settings: FenceSettings, notifier: TextSink) -> None:
@@ -55,6 +56,7 @@ class FenceMonitor:
         self._tries = 0
         self._known: tuple[object, ...] = ()
         self._rally: Downloaded | None = None
+        self._vehicle = VehicleState()
 
     @property
     def fence(self) -> AutopilotFence:
@@ -74,6 +76,7 @@ class FenceMonitor:
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event: whatever tells that a list may have changed has it fetched anew."""
+        self._vehicle = vehicle
         match event:
             case FenceStatusSeen():
                 self._status = event
@@ -86,9 +89,9 @@ class FenceMonitor:
             case _:
                 pass
 
-    def service(self, vehicle: VehicleState, now_s: float) -> None:
-        """To be called every tick: ask for what is missing or old, put together what has come, tell of a breach."""
-        self._ask_and_take(vehicle, now_s)
+    def tick(self, now_s: float) -> None:
+        """Ask for what is missing or old, put together what has come, tell of a breach."""
+        self._ask_and_take(self._vehicle, now_s)
         breach = self.doubt(now_s)
         if breach is not None and not self._breach_told:
             text = str(breach)
@@ -141,7 +144,7 @@ class FenceMonitor:
             self._notifier.tell(f"The autopilot's rally points are not used: {error}", Severity.WARNING)
 
     def _put_together(self, vehicle: VehicleState, now_s: float) -> None:
-        """Make the fence anew when a part of it has changed; what makes no sense leaves the fence as it was."""
+        """Make the fence anew when it has changed; what makes no sense leaves the fence as it was."""
         stored = self._autopilot.downloads.last(PlanKind.FENCE)
         told = all(name in vehicle.parameters for name in PARAMETERS) or self._tries >= PARAMETER_TRIES
         if stored is None or not told or vehicle.home is None:

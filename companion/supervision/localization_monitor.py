@@ -14,6 +14,7 @@ from companion.executive.mission_layout import apart_m
 from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.reasons import Doubt, Reason
+from companion.safety.watchdogs import Monitor
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events import (
     Event,
@@ -37,7 +38,7 @@ CALM_S = 10.0
 """How long after the last wandering the rover must not drive."""
 
 
-class LocalizationMonitor:
+class LocalizationMonitor(Monitor):
     """Keeps the doubt until it is settled. From a jump on the map is worthless, and begun anew."""
 
     def __init__(self, run: MissionRun, autopilot: AutopilotLink, settings: LiveSettings, notifier: TextSink) -> None:
@@ -47,7 +48,7 @@ class LocalizationMonitor:
         self._notifier = notifier
         self._doubt: Doubt | None = None
         self._doubt_s = 0.0
-        self._asked_s = self._settled_s = -math.inf
+        self._asked_s = -math.inf
         self._home_told = False
         self._wandered_s: deque[float] = deque(maxlen=WANDERINGS)
         self._unsure_until_s = -math.inf
@@ -61,16 +62,10 @@ class LocalizationMonitor:
         """Why the rover must not move now; None when it may."""
         if now_s < self._unsure_until_s:
             return Reason(Doubt.POSITION_WANDERS)
-        if self._doubt is not None:
-            return Reason(self._doubt)
-        return Reason(Doubt.LOOP_STOOD_STILL) if now_s < self._settled_s else None
+        return None if self._doubt is None else Reason(self._doubt)
 
-    def stalled(self, now_s: float) -> None:
-        """The companion's own loop stood still: what piled up meanwhile is not believed."""
-        self._settled_s = now_s + SETTLED_S
-
-    def service(self, now_s: float) -> None:
-        """To be called every tick: while there is a doubt, have the origin told again and again."""
+    def tick(self, now_s: float) -> None:
+        """While there is a doubt, have the origin told again and again."""
         if self._doubt is not None and now_s - self._asked_s >= ASK_PLACES_S:
             self._asked_s = now_s
             self._autopilot.ask_places()

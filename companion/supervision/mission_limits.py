@@ -11,21 +11,17 @@ from companion.mission.autopilot_fence import AutopilotFence
 from companion.operator.notifications import Outcome
 from companion.safety.battery_monitor import BatteryLevel, BatteryMonitor
 from companion.safety.reasons import Doubt, PowerReason, Reason, WaitReason
+from companion.safety.watchdogs import Monitor
 from companion.settings import PowerSettings
 from companion.supervision.fence_monitor import FenceMonitor
 from companion.supervision.rival_monitor import RivalMonitor
-from companion.vehicle.events import Event
-from companion.vehicle.state import VehicleState
 
 
-class BorderMonitor:
+class BorderMonitor(Monitor):
     """The borders of the mission and of the autopilot's fence: whether the rover is beyond one."""
 
     def __init__(self, run: MissionRun) -> None:
         self._run = run
-
-    def take(self, event: Event, vehicle: VehicleState) -> None:
-        """Events say nothing of borders."""
 
     def doubt(self, now_s: float) -> Reason[Doubt] | None:
         """Where the rover is now."""
@@ -57,10 +53,6 @@ class MissionLimits:
     def fence(self) -> AutopilotFence:
         """The autopilot's, as known now."""
         return self._fences.fence
-
-    def service(self, now_s: float) -> None:
-        """To be called every tick: keep up with the autopilot's fence."""
-        self._fences.service(self._run.vehicle, now_s)
 
     def heed_fence(self) -> None:
         """A fence that has changed is in force from here on."""

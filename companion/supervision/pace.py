@@ -6,19 +6,18 @@ Nouns: pace.
 from __future__ import annotations
 
 from companion.core.clock import Clock, stopwatch_s
+from companion.safety.watchdogs import STALL_S
 from companion.settings.live_settings import LiveSettings
-from companion.supervision.localization_monitor import LocalizationMonitor
 
 
 class Pace:
     """Sleeps until the next tick begins; in lock-step this moves the world."""
 
-    def __init__(self, clock: Clock, settings: LiveSettings, localization: LocalizationMonitor) -> None:
+    def __init__(self, clock: Clock, settings: LiveSettings) -> None:
         self.late_s = 0.0
         """How late this tick is."""
         self._clock = clock
         self._settings = settings
-        self._localization = localization
         self._next_tick_s = clock.now_s()
         self._began_s = stopwatch_s()
 
@@ -33,9 +32,8 @@ class Pace:
         self._clock.sleep_until_s(self._next_tick_s)
         now_s = self._clock.now_s()
         self.late_s = now_s - self._next_tick_s
-        if self.late_s > 1.0:
-            # After a stall (a suspended computer) do not catch up tick by tick, nor believe what piled up meanwhile.
+        if self.late_s > STALL_S:
+            # After a stall (a suspended computer) do not catch up tick by tick.
             self._next_tick_s = now_s
-            self._localization.stalled(now_s)
         self._began_s = stopwatch_s()
         return now_s

@@ -9,6 +9,7 @@ import math
 
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.reasons import Doubt, Reason, WaitReason
+from companion.safety.watchdogs import Monitor
 from companion.vehicle.events import (
     Event,
     HeartbeatSeen,
@@ -20,7 +21,7 @@ LISTEN_S = 1.5
 """How long to listen first to a rover found armed in GUIDED: another companion sends its figures every second."""
 
 
-class RivalMonitor:
+class RivalMonitor(Monitor):
     """Two companions must not steer one rover."""
 
     def __init__(self, autopilot: AutopilotLink) -> None:

@@ -10,34 +10,18 @@ from companion.core.severity import Severity
 from companion.core.tick_marks import Mark
 from companion.executive.mission_executor import MissionTask
 from companion.executive.mission_run import MissionRun, Order
-from companion.navigation.step_runner import StepRunner
 from companion.operator.notifications import Notifier, Outcome
 from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import Reaction, Verdict
 from companion.safety.reasons import EndReason, Reason
-from companion.safety.watchdogs import LoopMonitor
+from companion.safety.watchdogs import Monitor
 from companion.supervision.arming import Arming
 from companion.supervision.drive_permission import DrivePermission
-from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.supervision.mission_limits import MissionLimits
-from companion.supervision.pace import Pace
 from companion.supervision.run_saver import RunSaver
 from companion.supervision.shutdown import Shutdown
 
 SILENT = Verdict(Reaction.SILENT)
-
-
-class LoopWatch:
-    """Tells the loop's monitor how late each tick is, and whether the navigator works beside it."""
-
-    def __init__(self, monitor: LoopMonitor, pace: Pace, runner: StepRunner) -> None:
-        self._monitor = monitor
-        self._pace = pace
-        self._runner = runner
-
-    def tick(self, now_s: float) -> None:
-        """A tick has begun."""
-        self._monitor.tick(now_s, self._pace.late_s, planner_works=self._runner.working)
 
 
 class Supervisor:
@@ -51,8 +35,7 @@ class Supervisor:
         limits: MissionLimits,
         shutdown: Shutdown,
         *,
-        loop: LoopWatch,
-        localization: LocalizationMonitor,
+        monitors: tuple[Monitor, ...],
         saver: RunSaver,
         log: RunLog,
         notifier: Notifier,
@@ -64,8 +47,7 @@ class Supervisor:
         self._arming = arming
         self._limits = limits
         self._shutdown = shutdown
-        self._loop = loop
-        self._localization = localization
+        self._monitors = monitors
         self._saver = saver
         self._log = log
         self._notifier = notifier
@@ -81,8 +63,8 @@ class Supervisor:
 
         Silent before the mission has begun and while the run ends.
         """
-        self._loop.tick(now_s)
-        self._limits.service(now_s)
+        for monitor in self._monitors:
+            monitor.tick(now_s)
         if self._stop_asked and self._run.end is None:
             self._log.mark(Mark.STOP)
             self._shutdown.begin(Reason(EndReason.STOPPED_BY_USER), now_s)
@@ -117,7 +99,6 @@ class Supervisor:
         self._saver.save(now_s, done=True)
 
     def _mission_verdict(self, now_s: float) -> Verdict:
-        self._localization.service(now_s)
         self._limits.heed_fence()
         verdict = self._permission.check(now_s)
         if verdict.reaction is Reaction.DRIVE and (reason := self._limits.enforce(now_s)) is not None:

@@ -49,8 +49,8 @@ OTHERS_FORGOTTEN_S = 30.0
 """Other vehicles are kept for this long after their last message, and no more than OTHERS_KEPT of them."""
 
 
-class EkfPart(Enum):
-    """A part of the EKF's estimate."""
+class EkfQuantity(Enum):
+    """What the EKF estimates."""
 
     POSITION = "position"
     ATTITUDE = "attitude"
@@ -131,14 +131,14 @@ class VehicleState:
         return self.latency.longest_s
 
     @property
-    def ekf_lacks(self) -> EkfPart | None:
-        """The part of its estimate that the autopilot does not trust; None when the rover may drive."""
+    def ekf_lacks(self) -> EkfQuantity | None:
+        """The estimate that the autopilot does not trust; None when the rover may drive."""
         flags = 0 if self.ekf is None else self.ekf.flags
         if not flags & EKF_POSITION or flags & EKF_CONST_POSITION:
-            return EkfPart.POSITION
+            return EkfQuantity.POSITION
         if not flags & EKF_ATTITUDE:
-            return EkfPart.ATTITUDE
-        return None if flags & EKF_VELOCITY else EkfPart.VELOCITY
+            return EkfQuantity.ATTITUDE
+        return None if flags & EKF_VELOCITY else EkfQuantity.VELOCITY
 
     @property
     def ekf_ok(self) -> bool:

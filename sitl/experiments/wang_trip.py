@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from companion.core.clock import stopwatch_s
 from companion.core.grid import Cell
 from companion.planning.papers.wang_ga import Plan, planned
-from companion.planning.problem import ObstacleTrajectory, PlanningProblem, VehicleMotion
+from companion.planning.problem import KinematicConstraints, ObstacleTrajectory, PlanningProblem
 from companion.planning.raster import polyline
 from companion.settings.planners import VertexSettings
 from sitl.experiments.wang_environments import Environment
@@ -72,16 +72,18 @@ def least_gap_m(plan: Plan, movers: tuple[ObstacleTrajectory, ...], until_s: flo
 
 def make_trip(environment: Environment, settings: VertexSettings, seed: int) -> Trip:
     """Plan, follow the plan until the obstacles change, then replan with their new motion (twice, to time it)."""
-    motion = VehicleMotion(speeds_fields_s=SPEEDS_M_S)
+    kinematics = KinematicConstraints(speeds_fields_s=SPEEDS_M_S)
     weights, before, after = environment.weights(), environment.movers(), environment.movers_after()
-    problem = PlanningProblem(weights, environment.start, environment.target, moving_obstacles=before, motion=motion)
+    problem = PlanningProblem(
+        weights, environment.start, environment.target, moving_obstacles=before, kinematics=kinematics
+    )
     offline = planned(problem, settings, 2 * seed, timed=True)
     if len(offline.corners) == 0:
         return Trip(offline, None, None, None, None)
     x, y = travel(offline.corners.astype(float), offline.speeds_fields_s, np.array([environment.change_s]))
     fields = polyline(offline.corners)
     here = Cell(*(int(c) for c in fields[np.argmin((fields[:, 0] - x) ** 2 + (fields[:, 1] - y) ** 2)]))
-    rest = PlanningProblem(weights, here, environment.target, moving_obstacles=after, motion=motion)
+    rest = PlanningProblem(weights, here, environment.target, moving_obstacles=after, kinematics=kinematics)
     began_s = stopwatch_s()
     planned(rest, settings, 2 * seed + 1, timed=True, first_only=True)
     first_s = stopwatch_s()

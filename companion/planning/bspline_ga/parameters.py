@@ -68,7 +68,7 @@ def tuning_of(settings: PlannerSettings) -> Plain:
 
 def task_of(problem: PlanningProblem, by_length: bool) -> Plain:
     """The fields of ``Task`` for this problem."""
-    motion = problem.motion
-    heading_rad = math.nan if motion.heading_rad is None else float(motion.heading_rad)
-    radius_fields = float(motion.turning_radius_fields)
+    kinematics = problem.kinematics
+    heading_rad = math.nan if kinematics.heading_rad is None else float(kinematics.heading_rad)
+    radius_fields = float(kinematics.turning_radius_fields)
     return (*problem.start, *problem.target, problem.corner_cutting, radius_fields, heading_rad, by_length)

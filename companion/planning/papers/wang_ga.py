@@ -63,7 +63,7 @@ def planned(
     around = _numbered(_mover_corners(movers, settings), width, height)
     pool = np.unique(np.concatenate((corner_fields, around[polygons.owner.ravel()[around] == 0])))
     pool = pool[(pool >= 0) & (pool != start) & (pool != target)]
-    low, high = problem.motion.speeds_fields_s
+    low, high = problem.kinematics.speeds_fields_s
     speeds = np.linspace(low, high, settings.speed_levels) if timed and high > low else np.array([high])
     weights = {} if timed else {"length_weight": 1.0, "time_weight": 0.0}
     task = Task(

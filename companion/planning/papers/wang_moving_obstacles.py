@@ -37,7 +37,7 @@ class Fleet(NamedTuple):
 
 
 class Stretch(NamedTuple):
-    """A robot's motion along a straight line at a constant speed, from (x, y) at ``begin_s`` until ``end_s``."""
+    """A robot on a straight line at a constant speed, from (x, y) at ``begin_s`` until ``end_s``."""
 
     begin_s: float
     end_s: float

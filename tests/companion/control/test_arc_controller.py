@@ -240,8 +240,8 @@ def test_the_planner_is_told_heading_and_radius() -> None:
     driver.head_for(ResolvedTarget("t", there, start.evidence.base.cell_at(there), 0.0, OnBlocked.SKIP, None), start)
     driver.decide(start)
     command = driver.guide(start)
-    assert asked[0].motion.heading_rad == pytest.approx(math.radians(60.0)), "from east towards north"
-    assert asked[0].motion.turning_radius_fields == pytest.approx(RADIUS_M * SETTINGS.steering.planned_radius)
+    assert asked[0].kinematics.heading_rad == pytest.approx(math.radians(60.0)), "from east towards north"
+    assert asked[0].kinematics.turning_radius_fields == pytest.approx(RADIUS_M * SETTINGS.steering.planned_radius)
     assert isinstance(command.setpoint, GuidedVelocity)
 
 

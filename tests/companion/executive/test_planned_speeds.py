@@ -88,7 +88,7 @@ def test_the_planner_is_told_what_moves_and_how_fast_the_rover_goes() -> None:
     cart = Moving("cart", 0.0, NedPoint(15.25, 2.25), 0.0, 0.1, 0.65)
     driver_with(planner).decide(at(0.0), (cart,))
     (problem,) = planner.asked
-    assert problem.motion.speeds_fields_s == pytest.approx((1.0, 4.0))
+    assert problem.kinematics.speeds_fields_s == pytest.approx((1.0, 4.0))
     assert problem.moving_obstacles[0].radius_fields == pytest.approx(2.0)
     assert problem.moving_obstacles[0].track[0] == pytest.approx([0.0, 4.0, 30.0])
 

@@ -25,7 +25,7 @@ from companion.vehicle.events import (
     TargetSeen,
     TextSeen,
 )
-from companion.vehicle.state import EkfPart, VehicleState, fold
+from companion.vehicle.state import EkfQuantity, VehicleState, fold
 from tests.support.shared_data import SHARED, needs_shared
 from tests.support.tlog import messages, raw_packets
 
@@ -121,7 +121,7 @@ def test_boot_leads_to_a_rover_that_may_be_armed() -> None:
         if isinstance(event, AckSeen) and event.command == 400:
             arming.append(event.result)
         if isinstance(event, PrearmSeen) and event.ok:
-            ready_before_gps.append(state.ekf_lacks is EkfPart.POSITION)
+            ready_before_gps.append(state.ekf_lacks is EkfQuantity.POSITION)
     assert modes[0] == (16, False), "INITIALISING"
     assert (RoverMode.MANUAL, False) in modes
     assert modes[-1][0] == RoverMode.GUIDED

@@ -1,4 +1,4 @@
-"""What the planner is asked: the budget for each kind of search, the rover's motion in fields, a free start."""
+"""What the planner is asked: the budget for each kind of search, kinematic constraints in fields, a free start."""
 
 import math
 
@@ -9,9 +9,9 @@ from companion.core.frames import Pose
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.navigation.field_step import SearchKind
-from companion.navigation.search_budget import PathSearcher, budget_of, motion_of
+from companion.navigation.search_budget import PathSearcher, budget_of, kinematics_of
 from companion.planning.planner import Capabilities
-from companion.planning.problem import ObstacleTrajectory, PlanResult, PlanStatus, VehicleMotion
+from companion.planning.problem import KinematicConstraints, ObstacleTrajectory, PlanResult, PlanStatus
 from companion.settings import NavigatorSettings, Settings
 
 SETTINGS = Settings()
@@ -61,10 +61,10 @@ def test_the_budget_is_that_of_the_settings_given():
 
 def test_the_planner_gets_problem_and_generator():
     obstacles = (ObstacleTrajectory(1.0, np.zeros((1, 3))),)
-    motion = VehicleMotion(0.5, 2.0)
-    spy = asked(moving_obstacles=obstacles, motion=motion)
+    kinematics = KinematicConstraints(0.5, 2.0)
+    spy = asked(moving_obstacles=obstacles, kinematics=kinematics)
     assert (spy.problem.start, spy.problem.target) == (Cell(1, 2), Cell(7, 3))
-    assert spy.problem.moving_obstacles is obstacles and spy.problem.motion is motion
+    assert spy.problem.moving_obstacles is obstacles and spy.problem.kinematics is kinematics
     assert spy.rng is RNG
 
 
@@ -87,20 +87,20 @@ def test_a_map_with_a_free_start_is_not_copied():
 )
 def test_the_heading_turns_from_clockwise_from_north_to_anticlockwise_from_east(heading_deg, angle_deg):
     pose = Pose(0.0, 0.0, math.radians(heading_deg), 0.0)
-    motion = motion_of(pose, RoverLimits(0.35, 2.0, 8.0), 1.0, SETTINGS, empty_grid(9, 9, 0.5))
-    assert math.degrees(motion.heading_rad) == pytest.approx(angle_deg)
+    kinematics = kinematics_of(pose, RoverLimits(0.35, 2.0, 8.0), 1.0, SETTINGS, empty_grid(9, 9, 0.5))
+    assert math.degrees(kinematics.heading_rad) == pytest.approx(angle_deg)
 
 
 def test_radius_and_speeds_are_in_fields():
     pose, rover = Pose(0.0, 0.0, 0.0, 0.0), RoverLimits(0.35, 2.0, 8.0, turning_radius_m=1.5)
-    motion = motion_of(pose, rover, 1.0, SETTINGS, empty_grid(9, 9, 0.5))
-    assert motion.turning_radius_fields == pytest.approx(3.0 * SETTINGS.steering.planned_radius)
-    assert motion.speeds_fields_s == pytest.approx((2.0 * SETTINGS.guidance.min_speed_m_s, 2.0))
+    kinematics = kinematics_of(pose, rover, 1.0, SETTINGS, empty_grid(9, 9, 0.5))
+    assert kinematics.turning_radius_fields == pytest.approx(3.0 * SETTINGS.steering.planned_radius)
+    assert kinematics.speeds_fields_s == pytest.approx((2.0 * SETTINGS.guidance.min_speed_m_s, 2.0))
 
 
 def test_no_speed_is_planned_above_the_limit_or_above_the_rovers_own():
     pose, rover = Pose(0.0, 0.0, 0.0, 0.0), RoverLimits(0.35, 2.0, 8.0)
     fastest_m_s = SETTINGS.guidance.max_speed_m_s
-    assert motion_of(pose, rover, 99.0, SETTINGS, empty_grid(9, 9)).speeds_fields_s[1] == pytest.approx(fastest_m_s)
-    slow = motion_of(pose, rover, 0.05, SETTINGS, empty_grid(9, 9))
+    assert kinematics_of(pose, rover, 99.0, SETTINGS, empty_grid(9, 9)).speeds_fields_s[1] == pytest.approx(fastest_m_s)
+    slow = kinematics_of(pose, rover, 0.05, SETTINGS, empty_grid(9, 9))
     assert slow.speeds_fields_s == pytest.approx((0.05, 0.05))

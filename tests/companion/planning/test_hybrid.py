@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from companion.core.grid import Cell
-from companion.planning.problem import Budget, PlanningProblem, PlanStatus, VehicleMotion
+from companion.planning.problem import Budget, KinematicConstraints, PlanningProblem, PlanStatus
 from companion.planning.registry import PLANNERS, UnknownPlannerError, make_planner, warm_up
 from companion.planning.smoothing import curve_cost
 from companion.settings import PlannerSettings
@@ -57,8 +57,8 @@ def test_hard_maps_get_the_graphs_path_after_a_look():
 
 def test_who_cannot_turn_on_the_spot_gets_the_genetic_path_unless_it_is_far_dearer():
     weights = np.full((50, 100), 0.5)
-    ahead = PlanningProblem(weights, Cell(10, 24), Cell(90, 24), motion=VehicleMotion(0.0, 4.0))
-    behind = PlanningProblem(weights, Cell(50, 24), Cell(10, 24), motion=VehicleMotion(0.0, 4.0))
+    ahead = PlanningProblem(weights, Cell(10, 24), Cell(90, 24), kinematics=KinematicConstraints(0.0, 4.0))
+    behind = PlanningProblem(weights, Cell(50, 24), Cell(10, 24), kinematics=KinematicConstraints(0.0, 4.0))
     for seed in range(20):
         assert plan("hybrid", ahead, seed).path.cost <= 1.03 * 40.0 + 1e-9
         # Half a turn of 4 fields' radius costs 6.3, and as much again is allowed for.
@@ -66,7 +66,8 @@ def test_who_cannot_turn_on_the_spot_gets_the_genetic_path_unless_it_is_far_dear
     # Through the maze the genetic algorithm finds no way: the graph's is better than none.
     problem = maze()
     result = plan(
-        "hybrid", PlanningProblem(problem.weights, problem.start, problem.target, motion=VehicleMotion(0.0, 4.0))
+        "hybrid",
+        PlanningProblem(problem.weights, problem.start, problem.target, kinematics=KinematicConstraints(0.0, 4.0)),
     )
     assert result.status is PlanStatus.FOUND
     assert result.path.cost <= 1.03 * plan("dijkstra", problem).path.cost

@@ -16,9 +16,11 @@ from companion.safety.reasons import Doubt, Reason
 from companion.safety.watchdogs import (
     LATE_S,
     LATE_SHARE,
+    SETTLE_S,
     WINDOW_S,
     DataMonitor,
     LoopMonitor,
+    Monitor,
     ScanMonitor,
     SticksMonitor,
     data_doubt,
@@ -28,7 +30,6 @@ from companion.settings import SafetySettings, Settings
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events import (
     EkfStatusSeen,
-    Event,
     LocalPositionSeen,
     RangeSeen,
 )
@@ -40,14 +41,26 @@ from tests.companion.safety.test_mode_latch import doubt_of, vehicle
 TICK_S = 0.05
 
 
+class Loop:
+    """A loop that is as late as it is told to be, and a step that is under way or not."""
+
+    late_s = 0.0
+    working = False
+
+    def monitor(self, planner_s: float = 30.0) -> LoopMonitor:
+        return LoopMonitor(self, self, planner_s)
+
+
 def noticed_s(took_s: Callable[[int], float], ticks: int = 2000) -> float:
     """When a loop is noticed whose ``i``-th tick takes ``took_s(i)``; inf: never. What is a second late is given up."""
-    watch, now_s, next_s = LoopMonitor(30.0), 0.0, 0.0
+    loop, now_s, next_s = Loop(), 0.0, 0.0
+    watch = loop.monitor()
     for i in range(ticks):
         next_s += TICK_S
         now_s = max(now_s, next_s)
-        watch.tick(now_s, now_s - next_s, planner_works=False)
-        if watch.doubt(now_s) is not None:
+        loop.late_s = now_s - next_s
+        watch.tick(now_s)
+        if watch.doubt(now_s) == Reason(Doubt.LOOP_LATE):
             return now_s
         if now_s - next_s > 1.0:
             next_s = now_s
@@ -79,57 +92,71 @@ def test_a_loop_that_is_three_times_too_slow_is_noticed_within_the_window(took_s
 
 
 def test_a_loop_that_is_in_time_again_is_believed_again():
-    watch = LoopMonitor(30.0)
-    for i in range(40):
-        watch.tick(0.1 * i, 0.15, planner_works=False)
-    assert watch.doubt(4.0) == Reason(Doubt.LOOP_LATE)
-    for i in range(60):
-        watch.tick(4.0 + TICK_S * i, 0.0, planner_works=False)
-    assert watch.doubt(7.0) is None
+    loop = Loop()
+    watch = loop.monitor()
+    assert ticked(loop, watch, [(0.1 * i, 0.15) for i in range(40)])[-1] == Reason(Doubt.LOOP_LATE)
+    assert ticked(loop, watch, [(4.0 + TICK_S * i, 0.0) for i in range(60)])[-1] is None
 
 
-def ticked(watch: LoopMonitor, ticks: list[tuple[float, float]]) -> list[Reason[Doubt] | None]:
+def ticked(loop: Loop, watch: LoopMonitor, ticks: list[tuple[float, float]]) -> list[Reason[Doubt] | None]:
     """What it says after each tick (when, how late)."""
     told = []
-    for now_s, late_s in ticks:
-        watch.tick(now_s, late_s, planner_works=False)
+    for now_s, loop.late_s in ticks:
+        watch.tick(now_s)
         told.append(watch.doubt(now_s))
     return told
 
 
 def test_late_for_more_than_two_of_the_last_four_seconds_is_too_slow():
     """The first tick has no time before it; of a tick that is late all the time since the one before it counts."""
-    watch = LoopMonitor(30.0)
+    loop = Loop()
+    watch = loop.monitor()
     assert watch.doubt(100.0) is None
-    slow = ticked(watch, [(100.0 + 0.125 * i, 0.125) for i in range(18)])
+    slow = ticked(loop, watch, [(100.0 + 0.125 * i, 0.125) for i in range(18)])
     assert slow == [None] * 17 + [Reason(Doubt.LOOP_LATE)]
-    again = ticked(watch, [(102.125 + 0.125 * i, 0.0) for i in range(1, 18)])
+    again = ticked(loop, watch, [(102.125 + 0.125 * i, 0.0) for i in range(1, 18)])
     assert again == [Reason(Doubt.LOOP_LATE)] * 16 + [None]
 
 
 @pytest.mark.parametrize(("late_s", "slow"), [(0.1, False), (0.105, True)])
 def test_up_to_a_tenth_of_a_second_is_not_late(late_s: float, slow: bool):
-    told = ticked(LoopMonitor(30.0), [(0.125 * i, late_s) for i in range(40)])
+    loop = Loop()
+    told = ticked(loop, loop.monitor(), [(0.125 * i, late_s) for i in range(40)])
     assert (told[-1] is not None) is slow
 
 
 def test_a_stall_counts_for_a_second_however_long_it_was():
-    told = ticked(LoopMonitor(30.0), [(1.25 * i, 9.0) for i in range(4)])
-    assert told == [None, None, None, Reason(Doubt.LOOP_LATE)]
+    loop = Loop()
+    watch = loop.monitor()
+    ticked(loop, watch, [(1.25 * i, 9.0) for i in range(3)])
+    assert watch.doubt(2.5 + SETTLE_S) is None, "two seconds"
+    ticked(loop, watch, [(3.75, 9.0)])
+    assert watch.doubt(3.75 + SETTLE_S) == Reason(Doubt.LOOP_LATE)
+
+
+@pytest.mark.parametrize(("late_s", "stood"), [(1.0, False), (1.05, True)])
+def test_after_a_stall_the_rover_waits_until_what_piled_up_has_passed(late_s: float, stood: bool):
+    loop = Loop()
+    watch = loop.monitor()
+    ticked(loop, watch, [(10.0, 0.0), (11.0, late_s), (11.05, 0.0)])
+    waits = Reason(Doubt.LOOP_STOOD_STILL) if stood else None
+    assert [watch.doubt(11.0 + after_s) for after_s in (0.0, 0.39, 0.4)] == [waits, waits, None]
 
 
 def test_a_step_that_is_under_way_at_the_first_tick_has_just_begun():
-    watch = LoopMonitor(3.0)
+    loop = Loop()
+    loop.working, watch = True, loop.monitor(3.0)
     for now_s, long in ((100.0, False), (103.0, False), (103.1, True)):
-        watch.tick(now_s, 0.0, planner_works=True)
+        watch.tick(now_s)
         assert watch.doubt(now_s) == (Reason(Doubt.PLANNING_LONG, (3.0,)) if long else None)
 
 
 def test_a_step_that_does_not_end_is_noticed_and_ends():
-    watch = LoopMonitor(3.0)
-    doubts = []
+    loop = Loop()
+    watch, doubts = loop.monitor(3.0), []
     for i in range(200):
-        watch.tick(TICK_S * i, 0.0, planner_works=20 <= i < 100 or i >= 190)
+        loop.working = 20 <= i < 100 or i >= 190
+        watch.tick(TICK_S * i)
         doubts.append(watch.doubt(TICK_S * i))
     told = [i for i, doubt in enumerate(doubts) if doubt is not None]
     assert told == list(range(81, 100)) and doubts[81] == Reason(Doubt.PLANNING_LONG, (3.0,))
@@ -156,14 +183,11 @@ def test_the_thread_says_whether_it_works():
 SETTINGS = SafetySettings()
 
 
-class Always:
+class Always(Monitor):
     """A monitor with one doubt."""
 
     def __init__(self, doubt: Doubt | None) -> None:
         self._doubt = doubt
-
-    def take(self, event: Event, vehicle: VehicleState) -> None:
-        """Ignored."""
 
     def doubt(self, now_s: float) -> Reason[Doubt] | None:
         return None if self._doubt is None else Reason(self._doubt)

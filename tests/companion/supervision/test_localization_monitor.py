@@ -63,8 +63,8 @@ def test_a_jump_is_doubted_until_the_origin_is_heard_again(tmp_path: Path) -> No
     for _ in range(2):
         located.report(jump_m=5.0)
     assert located.doubt is Doubt.POSITION_JUMPED and len(located.notices.told) == 1
-    located.monitor.service(located.now_s)
-    located.monitor.service(located.now_s + ASK_PLACES_S / 2.0)
+    located.monitor.tick(located.now_s)
+    located.monitor.tick(located.now_s + ASK_PLACES_S / 2.0)
     assert located.autopilot.places_asked == 1
     located.hear_origin()
     assert located.doubt is Doubt.POSITION_JUMPED, "that answer may be older than the jump"
@@ -99,14 +99,6 @@ def test_a_position_that_wanders_again_and_again_is_not_driven_by(tmp_path: Path
         located.hear_origin()
     assert located.doubt is Doubt.POSITION_WANDERS
     located.clock.time_s += CALM_S
-    assert located.doubt is None
-
-
-def test_a_loop_that_stood_still_settles_first(tmp_path: Path) -> None:
-    located = Located(tmp_path)
-    located.monitor.stalled(located.now_s)
-    assert located.doubt is Doubt.LOOP_STOOD_STILL and not located.monitor.position_doubted
-    located.clock.time_s += SETTLED_S + 0.01
     assert located.doubt is None
 
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from companion.navigation.step_runner import InlineRunner
 from companion.supervision.monitors import make_monitors
+from tests.companion.safety.test_watchdogs import Loop
 from tests.support.desk import Desk
 
 
 def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None:
     desk = Desk(tmp_path)
     link: Any = desk.autopilot
-    monitors = make_monitors(desk.run, link, desk.settings, desk.notices)
+    monitors = make_monitors(desk.run, link, desk.settings, desk.notices, Loop(), InlineRunner())
     assert [type(monitor).__name__ for monitor in monitors.by_precedence] == [
         "SticksMonitor",
         "DataMonitor",
@@ -22,4 +24,6 @@ def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None
         "RivalMonitor",
         "FenceMonitor",
         "BorderMonitor",
+        "BatteryMonitor",
+        "MissionChangeMonitor",
     ]

@@ -24,7 +24,7 @@ from companion.vehicle.events import (
     TargetSeen,
     TextSeen,
 )
-from companion.vehicle.state import PARAMETERS_KEPT, EkfPart, VehicleState, fold
+from companion.vehicle.state import PARAMETERS_KEPT, EkfQuantity, VehicleState, fold
 
 PLACE = GeoPoint(-35.0, 149.0)
 SCAN = RangeScan(1.0, np.full(1, np.pi), np.ones(1), 0.2, 8.0, 0.1, "behind")
@@ -131,21 +131,21 @@ def test_speed_over_ground() -> None:
 @pytest.mark.parametrize(
     ("flags", "lacks"),
     [
-        (None, EkfPart.POSITION),
-        (0, EkfPart.POSITION),
-        (1024, EkfPart.POSITION),
+        (None, EkfQuantity.POSITION),
+        (0, EkfQuantity.POSITION),
+        (1024, EkfQuantity.POSITION),
         (831, None),
         (1 | 2 | 8, None),
         (1 | 2 | 16, None),
-        (831 & ~(8 | 16), EkfPart.POSITION),
-        (831 | 128, EkfPart.POSITION),
-        (167, EkfPart.POSITION),
-        (831 & ~1, EkfPart.ATTITUDE),
-        (831 & ~2, EkfPart.VELOCITY),
+        (831 & ~(8 | 16), EkfQuantity.POSITION),
+        (831 | 128, EkfQuantity.POSITION),
+        (167, EkfQuantity.POSITION),
+        (831 & ~1, EkfQuantity.ATTITUDE),
+        (831 & ~2, EkfQuantity.VELOCITY),
         (831 | 32768, None),
     ],
 )
-def test_ekf_flags(flags: int | None, lacks: EkfPart | None) -> None:
+def test_ekf_flags(flags: int | None, lacks: EkfQuantity | None) -> None:
     state = VehicleState() if flags is None else fold(VehicleState(), EkfStatusSeen(1.0, flags))
     assert state.ekf_lacks is lacks
 

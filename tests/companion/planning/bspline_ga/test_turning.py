@@ -11,7 +11,7 @@ from companion.core.grid import Cell
 from companion.planning.bspline_ga import bspline
 from companion.planning.bspline_ga.planner import BsplineGa
 from companion.planning.bspline_ga.turning import greatest_curvature_per_field
-from companion.planning.problem import Budget, PlanningProblem, VehicleMotion
+from companion.planning.problem import Budget, KinematicConstraints, PlanningProblem
 from companion.settings import PlannerSettings
 from tests.support.planning_maps import one_obstacle
 
@@ -24,7 +24,9 @@ def plan(problem, seed, budget=BUDGET, **changes):
 
 
 def turning(problem, radius, heading=None):
-    return PlanningProblem(problem.weights, problem.start, problem.target, motion=VehicleMotion(heading, radius))
+    return PlanningProblem(
+        problem.weights, problem.start, problem.target, kinematics=KinematicConstraints(heading, radius)
+    )
 
 
 def greatest_curvature(line):

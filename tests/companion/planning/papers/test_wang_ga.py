@@ -7,7 +7,7 @@ from companion.core.grid import BASE_WEIGHT, Cell
 from companion.planning.papers.wang_ga import planned
 from companion.planning.papers.wang_kernel import ranking, room_for, settle
 from companion.planning.papers.wang_operators import crossed, mutated, put, speed_mutated
-from companion.planning.problem import Budget, ObstacleTrajectory, PlanningProblem, PlanStatus, VehicleMotion
+from companion.planning.problem import Budget, KinematicConstraints, ObstacleTrajectory, PlanningProblem, PlanStatus
 from companion.planning.random_numbers import seeded
 from companion.planning.registry import make_planner
 from companion.settings import PlannerSettings
@@ -123,7 +123,7 @@ def test_one_obstacle_is_passed_on_the_shortest_way():
 def test_the_fastest_way_is_driven_at_the_highest_speed():
     path = plan(one_obstacle()).path
     assert path is not None and path.speeds_fields_s is not None
-    assert path.speeds_fields_s == pytest.approx(VehicleMotion().speeds_fields_s[1])
+    assert path.speeds_fields_s == pytest.approx(KinematicConstraints().speeds_fields_s[1])
     assert len(path.speeds_fields_s) == len(path.curve) - 1
 
 
@@ -138,7 +138,7 @@ def test_it_slows_down_for_an_obstacle_that_crosses():
         Cell(0, 10),
         Cell(59, 10),
         moving_obstacles=(crossing,),
-        motion=VehicleMotion(speeds_fields_s=(0.5, 1.5)),
+        kinematics=KinematicConstraints(speeds_fields_s=(0.5, 1.5)),
     )
     for seed in range(20):
         path = plan(problem, seed).path
