@@ -10,6 +10,7 @@ SOURCES := $(shell find companion sitl -name '*.py')
 # The forerunners of sedighi take an hour here, and no unknown map is made for them.
 NAVIGATORS := hybrid,bspline-ga,astar,theta-star,dstar-lite,dijkstra,achour,prm,vertex++
 CANDIDATES := python3.11 python3.12 python3.13 python3.14 python3 python
+GAME_MAPS := $(addprefix ../shared/data/movingai/dao/,arena.map lak104d.map)
 # For make fuzz: how long it searches.
 SECONDS := 600
 # Container images often set this. Without compiled bytecode each start of a program takes three times as long.
@@ -57,7 +58,7 @@ results: $(TOOLS)
 	$(BIN)/rover-sitl experiment navigation --runs 10 --planners $(NAVIGATORS) --docs docs
 	$(BIN)/rover-sitl experiment driving --runs 5 --docs docs
 	$(BIN)/rover-sitl experiment dead-companion --runs 6 --docs docs
-	$(BIN)/rover-companion bench $(wildcard $(addprefix ../shared/data/movingai/dao/,arena.map lak104d.map)) --cell-s 2 --docs docs
+	$(BIN)/rover-companion bench $(wildcard $(GAME_MAPS)) --cell-s 2 --docs docs
 
 soak: $(KERNELS)
 	$(BIN)/rover-sitl experiment soak --runs 100 --json out/soak.json --docs docs

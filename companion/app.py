@@ -71,7 +71,7 @@ class Companion:
         self.mission_run.speak(command, now_s)
         self._supervisor.conclude(task, now_s)
         self._autopilot.service(now_s)
-        self.outcome.step_seconds.append(self._pace.elapsed_s)
+        self.outcome.tick_seconds.append(self._pace.elapsed_s)
 
     def run(self, observe: Callable[[Status], None] = lambda status: None) -> Outcome:
         """Tick until the mission has ended."""

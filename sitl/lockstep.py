@@ -193,7 +193,7 @@ class Drive:
             if (p.north_m, p.east_m) != (q.north_m, q.east_m)
         ]
         report.driving_time_s = moving[-1] - moving[0] if moving else 0.0
-        seconds = sorted(companion.outcome.step_seconds)
+        seconds = sorted(companion.outcome.tick_seconds)
         report.tick_p99_ms = 1e3 * seconds[int(0.99 * (len(seconds) - 1))] if seconds else 0.0
         if report.collisions:
             report.outcome = DriveOutcome.COLLISION

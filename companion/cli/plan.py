@@ -211,7 +211,7 @@ def plan(
             grid.weights,
             place_of("--start", start, grid, top_left),
             place_of("--target", target, grid, top_left),
-            kinematics=kinematics_of(name, settings, turning_radius_m, heading_deg, grid),
+            kinematics=wanted_kinematics(name, settings, turning_radius_m, heading_deg, grid),
         )
         picture(image)
         answer = search(grid, problem, name, settings, seed, top_left)
@@ -236,7 +236,7 @@ def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, 
     return Answer(result, stopwatch_s() - began_s, seed, top_left, grid, problem.kinematics, settings)
 
 
-def kinematics_of(
+def wanted_kinematics(
     name: str, settings: Settings, radius_m: float, heading_deg: float | None, grid: Grid
 ) -> KinematicConstraints:
     """How the rover turns. Raises TurningError for a planner that ignores it, and UnknownPlannerError."""

@@ -1,6 +1,6 @@
 """The mission that the autopilot has stored: fetched before a run, and watched for changes during it.
 
-Nouns: mission fetcher.
+Nouns: mission fetcher, mission change monitor.
 """
 
 from __future__ import annotations

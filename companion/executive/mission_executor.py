@@ -247,7 +247,7 @@ class MissionExecutor:
         if self.progress.ended:
             return MissionTask.END
         if self.progress.phase in (MissionPhase.STAY, MissionPhase.WAIT):
-            self.phase = RunPhase.HOLDING if self.progress.phase is MissionPhase.STAY else RunPhase.WAY_BLOCKED
+            self.phase = RunPhase.STAYING if self.progress.phase is MissionPhase.STAY else RunPhase.WAY_BLOCKED
             self.driver.pause()
             return MissionTask.STAND
         if self.driver.goal != self.progress.goal:

@@ -16,7 +16,7 @@ from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec, Packet
 from companion.mavlink.confirmation import CommandTracker, TargetReadBack
 from companion.mavlink.download import Downloads
-from companion.mavlink.rates import RateFault, RateMonitor, wanted_rates
+from companion.mavlink.rates import RateFault, RateRequester, wanted_rates
 from companion.settings import LinkSettings
 from companion.vehicle.commands import Command, Heartbeat, NamedValue, RequestMessage, TimeSync
 from companion.vehicle.events import AckSeen, Event, HeartbeatSeen, HomeSeen, TargetSeen
@@ -65,7 +65,7 @@ class AutopilotLink:
         self._link = link
         self._codec = codec
         self._log = log or _NoLog()
-        self._rates = RateMonitor(wanted_rates(settings))
+        self._rates = RateRequester(wanted_rates(settings))
         self._acks = CommandTracker()
         self._read_back = TargetReadBack()
         self.downloads = Downloads()

@@ -80,7 +80,7 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
     )
 
 
-class RateMonitor:
+class RateRequester:
     """Requests every rate once, then measures; repeats the request with growing pauses while the rate is too low."""
 
     def __init__(self, wanted: tuple[WantedRate, ...]) -> None:

@@ -14,7 +14,7 @@ from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.decode import ROVERS
 from companion.mavlink.framing import AUTOPILOT, Packet
-from companion.mavlink.rates import RateMonitor, wanted_rates
+from companion.mavlink.rates import RateRequester, wanted_rates
 from companion.mavlink.signing import Signer, remedy
 from companion.settings import LinkSettings
 from companion.vehicle.commands import Command, ReadParameter, RequestMessage, RunPrearmChecks
@@ -51,7 +51,7 @@ class Surveyor:
         self._companion = settings.component_id
         other = OTHER_COMPONENT + (self._companion == OTHER_COMPONENT)
         self._codec = Codec(settings.model_copy(update={"component_id": other}), signer=signer)
-        self._rates = RateMonitor(wanted_rates(settings))
+        self._rates = RateRequester(wanted_rates(settings))
         self._mav: Any = mavlink.MAVLink(None)
         self._names = tuple(names)
         self._open = [name for _ in range(TRIES) for name in names]

@@ -24,7 +24,7 @@ NOT_FOLLOWED_S = 5.0
 """People are told when the autopilot's read-back has shown another target for this long."""
 FAULT_AFTER_S = 5.0
 """A message rate that is too low for a moment is not told."""
-STEPS_KEPT = 100_000
+TICKS_KEPT = 100_000
 """The times of this many of the newest ticks are kept."""
 SAID_KEPT = 1000
 """This many texts are remembered as said."""
@@ -62,10 +62,10 @@ class Status:
 
 @dataclass
 class Outcome:
-    """What the run came to. ``step_seconds``: how long the newest ticks took; ``said``: the newest texts."""
+    """What the run came to. ``tick_seconds``: how long the newest ticks took; ``said``: the newest texts."""
 
     targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
-    step_seconds: deque[float] = field(default_factory=lambda: deque(maxlen=STEPS_KEPT))
+    tick_seconds: deque[float] = field(default_factory=lambda: deque(maxlen=TICKS_KEPT))
     said: list[str] = field(default_factory=list)
     broken_off: Reason[PowerReason] | None = None
     """Why the mission was broken off; None if it was not."""

@@ -155,7 +155,7 @@ class RunPhase(Enum):
     CONNECTING = "connecting"
     WAITING = "waiting for {awaited}"
     DRIVING = "driving"
-    HOLDING = "holding"
+    STAYING = "staying at the target"
     WAY_BLOCKED = "waiting for the way to clear"
     STOPPED = "stopped: {reason}"
     STOPPED_AND_WAITING = "stopped: {reason}, waiting for {awaited}"

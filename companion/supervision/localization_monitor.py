@@ -65,8 +65,8 @@ class LocalizationMonitor(Monitor):
         return None if self._doubt is None else Reason(self._doubt)
 
     def tick(self, now_s: float) -> None:
-        """While there is a doubt, have the origin told again and again."""
-        if self._doubt is not None and now_s - self._asked_s >= ASK_PLACES_S:
+        """While there is a doubt, have the origin told again and again until the run ends."""
+        if self._doubt is not None and self._run.end is None and now_s - self._asked_s >= ASK_PLACES_S:
             self._asked_s = now_s
             self._autopilot.ask_places()
 

@@ -29,16 +29,16 @@ HORIZON_S = 6000.0
 
 @dataclass(frozen=True, slots=True)
 class Patrol:
-    """Through places and back again, for ever; leg i, forth or back, at ``speeds_m_s[i]``."""
+    """Through places and back again, for ever; stretch i, forth or back, at ``speeds_m_s[i]``."""
 
     places: tuple[Place, ...]
     speeds_m_s: tuple[float, ...]
 
     def track(self, came_from: Place | None = None) -> Track:
-        """Rows time, x, y from time 0, beginning at the first place, or elsewhere with a first leg to it."""
-        legs = len(self.speeds_m_s)
-        forth = [(self.places[leg + 1], self.speeds_m_s[leg]) for leg in range(legs)]
-        back = [(self.places[leg], self.speeds_m_s[leg]) for leg in reversed(range(legs))]
+        """Rows time, x, y from time 0, beginning at the first place, or elsewhere with a first stretch to it."""
+        stretches = len(self.speeds_m_s)
+        forth = [(self.places[i + 1], self.speeds_m_s[i]) for i in range(stretches)]
+        back = [(self.places[i], self.speeds_m_s[i]) for i in reversed(range(stretches))]
         first = [] if came_from is None else [(self.places[0], self.speeds_m_s[0])]
         x, y = self.places[0] if came_from is None else came_from
         rows = [(0.0, x, y)]

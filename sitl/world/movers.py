@@ -79,7 +79,7 @@ def fleet_of(movers: tuple[Mover, ...]) -> Fleet:
 
 
 @njit(cache=True, nogil=True)
-def kinematics_of(fleet: Fleet, mover: int, time_s: float) -> tuple[float, float, float, float]:
+def motion_of(fleet: Fleet, mover: int, time_s: float) -> tuple[float, float, float, float]:
     """Where a mover is, north and east in metres, and its velocity north and east in m/s."""
     rows, begins, _, periods_s = fleet
     low, high = begins[mover], begins[mover + 1] - 1
@@ -111,7 +111,7 @@ def shorten_rays(
     From inside a disc every ray is 0.
     """
     for mover in range(fleet.radii_m.size):
-        mover_n, mover_e, _, _ = kinematics_of(fleet, mover, time_s)
+        mover_n, mover_e, _, _ = motion_of(fleet, mover, time_s)
         to_n, to_e, radius_m = mover_n - north_m, mover_e - east_m, fleet.radii_m[mover]
         gap2 = to_n * to_n + to_e * to_e - radius_m * radius_m
         for sector in range(bearings_rad.shape[0]):
@@ -130,7 +130,7 @@ def nearest_mover(fleet: Fleet, time_s: float, north_m: float, east_m: float) ->
     """Metres from a place to the nearest mover's edge (negative inside) and its number; inf, -1 without movers."""
     nearest_m, which = math.inf, -1
     for mover in range(fleet.radii_m.size):
-        mover_n, mover_e, _, _ = kinematics_of(fleet, mover, time_s)
+        mover_n, mover_e, _, _ = motion_of(fleet, mover, time_s)
         gap_m = math.hypot(mover_n - north_m, mover_e - east_m) - fleet.radii_m[mover]
         if gap_m < nearest_m:
             nearest_m, which = gap_m, mover

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Grid
 from sitl.world.doors import Door, next_change_s
-from sitl.world.movers import Fleet, Mover, fleet_of, kinematics_of, nearest_mover, shorten_rays
+from sitl.world.movers import Fleet, Mover, fleet_of, motion_of, nearest_mover, shorten_rays
 
 Obstacles = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -256,7 +256,7 @@ class World:
 
     def mover_at(self, number: int, time_s: float) -> tuple[float, float, float, float]:
         """Where a mover is at a moment, north and east, and its velocity."""
-        return kinematics_of(self.fleet, number, time_s)
+        return motion_of(self.fleet, number, time_s)
 
     def clearance_m(self, north_m: float, east_m: float, reach_m: float, time_s: float = 0.0) -> float:
         """Metres from a place to the nearest obstacle that stands at a moment, at most ``reach_m``."""

@@ -289,3 +289,16 @@ def test_the_service_is_one_that_systemd_takes_and_the_program_understands(tmp_p
         path.write_text(text.replace(program, "/bin/true"))
         done = subprocess.run([analyze, "verify", path], capture_output=True, text=True, timeout=60, check=False)
         assert str(path) not in done.stderr and "rover-companion.service:" not in done.stderr, done.stderr
+
+
+GENERATED_PAGES = {"results.md", "benchmarks.md"}
+
+
+@pages
+def test_no_line_is_longer_than_the_limit(page: Path) -> None:
+    """As in the code. Exempt: tables, code, and what a command writes (whole pages, or between begin and end)."""
+    if page.name in GENERATED_PAGES:
+        pytest.skip("a command writes it")
+    limit = int(tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["ruff"]["line-length"])
+    text = re.sub(r"<!-- begin (\w+) -->.*?<!-- end \1 -->|^```.*?^```", "", page.read_text("utf-8"), flags=re.M | re.S)
+    assert [line for line in text.splitlines() if len(line) > limit and not line.startswith("|")] == []

@@ -60,7 +60,7 @@ def searching(rig: Rig) -> None:
 
 
 def holding_at_a_target(rig: Rig) -> None:
-    rig.until(lambda: rig.does(RunPhase.HOLDING), 100.0)
+    rig.until(lambda: rig.does(RunPhase.STAYING), 100.0)
 
 
 def waiting_for_the_way_to_clear(rig: Rig) -> None:

@@ -24,13 +24,13 @@ def test_systemd_is_told_that_it_is_ready_alive_and_ending(tmp_path: Path) -> No
         service = Service({"NOTIFY_SOCKET": str(tmp_path / "notify")})
         service.ready()
         for tick in range(41):
-            service.show(status(0.05 * tick, RunPhase.DRIVING if tick < 30 else RunPhase.HOLDING))
+            service.show(status(0.05 * tick, RunPhase.DRIVING if tick < 30 else RunPhase.STAYING))
         service.stopping()
         told = []
         while not told or told[-1] != "STOPPING=1":
             told.append(systemd.recv(1000).decode())
     assert told[0] == "READY=1"
-    assert told[1:-1] == [f"WATCHDOG=1\nSTATUS={doing}" for doing in ("driving", "driving", "holding")]
+    assert told[1:-1] == [f"WATCHDOG=1\nSTATUS={doing}" for doing in ("driving", "driving", "staying at the target")]
 
 
 def test_an_abstract_socket_is_found() -> None:

@@ -49,7 +49,7 @@ def test_a_leg_begins_once_and_a_stay_and_the_end_follow(desk: Desk) -> None:
     desk.at(desk.executor.progress.goal.point)
     assert step(desk) is MissionTask.DRIVE, "it is reached in this tick"
     assert desk.notices.texts[1:] == ["Reached gate"] and desk.executor.reached == 1
-    assert step(desk) is MissionTask.STAND and desk.executor.phase is RunPhase.HOLDING
+    assert step(desk) is MissionTask.STAND and desk.executor.phase is RunPhase.STAYING
     assert step(desk, 5.0) is MissionTask.END and desk.executor.progress.ended
 
 

@@ -129,7 +129,7 @@ SETS_MODE = Reason(WaitReason.PERSON_SETS_MODE, ("GUIDED",))
         (Activity(RunPhase.WAITING, awaited=Reason(WaitReason.ARMING)), "waiting for arming"),
         (Activity(RunPhase.WAITING), "waiting for "),
         (Activity(RunPhase.DRIVING), "driving"),
-        (Activity(RunPhase.HOLDING), "holding"),
+        (Activity(RunPhase.STAYING), "staying at the target"),
         (Activity(RunPhase.WAY_BLOCKED), "waiting for the way to clear"),
         (Activity(RunPhase.STOPPED, OLD), "stopped: position silent for over 1 s"),
         (Activity(RunPhase.STOPPED), "stopped: "),
