@@ -73,6 +73,8 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "FS_TIMEOUT": (1.5, REAL32),
     "GUID_OPTIONS": (0, INT32),
     "GUID_TIMEOUT": (3.0, REAL32),
+    "INS_ACCEL_FILTER": (10, INT16),
+    "INS_GYRO_FILTER": (4, INT16),
     "MAV_GCS_SYSID": (255, INT16),
     "MAV_SYSID": (1, INT16),
     "MIS_DONE_BEHAVE": (0, INT8),

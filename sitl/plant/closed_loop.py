@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sitl.autopilot.battery import FULL_A, RESISTANCE_OHM
+from sitl.autopilot.control.imu_filter import low_passed
 from sitl.autopilot.control.records import LOOP_S, MotionRecords
 from sitl.autopilot.control.tasks import run_task
 from sitl.plant.rover import drive, meet_movers
@@ -66,7 +67,6 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
     keep = math.exp(-LOOP_S / noise[5])
     estimate.bias_heading = keep * estimate.bias_heading + noise[4] * math.sqrt(1.0 - keep * keep) * draw[4]
     ahead_n, ahead_e = math.cos(rover.heading_rad), math.sin(rover.heading_rad)
-    side_m_s2 = rover.yaw_rate_rad_s * rover.speed_m_s
     estimate.north_m = rover.north_m - origin[0] + estimate.bias_n + noise[3] * draw[2] + estimate.offset_n
     estimate.east_m = rover.east_m - origin[1] + estimate.bias_e + noise[3] * draw[3] + estimate.offset_e
     estimate.vel_n = rover.speed_m_s * ahead_n + rate_n + estimate.offset_vn
@@ -74,11 +74,20 @@ def update_estimate(estimate: Any, rover: Any, origin: Any, noise: Any, draw: An
     if rover.slide_m_s != 0.0:
         estimate.vel_n -= rover.slide_m_s * ahead_e
         estimate.vel_e += rover.slide_m_s * ahead_n
-    estimate.accel_n = rover.accel_m_s2 * ahead_n - side_m_s2 * ahead_e
-    estimate.accel_e = rover.accel_m_s2 * ahead_e + side_m_s2 * ahead_n
+    estimate.accel_n = estimate.imu_ahead * ahead_n - estimate.imu_aside * ahead_e
+    estimate.accel_e = estimate.imu_ahead * ahead_e + estimate.imu_aside * ahead_n
     heading_rad = rover.heading_rad + estimate.bias_heading
     estimate.heading_rad = (heading_rad + math.pi) % (2.0 * math.pi) - math.pi
-    estimate.yaw_rate_rad_s = rover.yaw_rate_rad_s
+    estimate.yaw_rate_rad_s = estimate.imu_yaw_rate
+
+
+@njit(cache=True, nogil=True)
+def measure(estimate: Any, tuning: Any, yaw_rate_rad_s: float, ahead_m_s2: float, aside_m_s2: float) -> None:
+    """What gyro and accelerometer tell of one step of the plant, filtered: turn rate, acceleration ahead and aside."""
+    filters, hz, step_s = estimate.imu_filters, tuning.accel_filter_hz, LOOP_S / SUBSTEPS
+    estimate.imu_yaw_rate = low_passed(filters[0], yaw_rate_rad_s, tuning.gyro_filter_hz, step_s)
+    estimate.imu_ahead = low_passed(filters[1], ahead_m_s2, hz, step_s)
+    estimate.imu_aside = low_passed(filters[2], aside_m_s2, hz, step_s)
 
 
 @njit(cache=True, nogil=True)
@@ -111,6 +120,7 @@ def run_loops(
         first, third = control.servo_1 * rover.grip_1, control.servo_3 * rover.grip_3
         for _ in range(SUBSTEPS):
             drive(rover, surroundings, first, third, LOOP_S / SUBSTEPS)
+            measure(estimate, tuning, rover.yaw_rate_rad_s, rover.accel_m_s2, rover.yaw_rate_rad_s * rover.speed_m_s)
         if surroundings.fleet.radii_m.size > 0:
             meet_movers(rover, surroundings.fleet, time_s + (loop + 1) * LOOP_S)
         if control.arrived or control.timed_out or rover.contacts != contacts:

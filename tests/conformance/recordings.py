@@ -19,7 +19,6 @@ from sitl.world.world import World
 from tests.support.shared_data import SHARED
 from tests.support.sitl_client import HOME, Client
 
-TRANSCRIPTS = SHARED / "data" / "ardurover-4.7-transcripts"
 AUTOPILOT = (1, 1)
 STEP_S = 0.05
 WORLD_M = 60
@@ -34,6 +33,8 @@ class Recording:
     early_s: float = 0.0
     beams: tuple[Beam, ...] = ()
     post_m: tuple[float, float] | None = None
+    folder: str = "ardurover-4.7-transcripts"
+    parameters: tuple[tuple[str, float], ...] = ()
 
 
 RECORDINGS = (
@@ -49,6 +50,15 @@ RECORDINGS = (
         post_m=(14.7, 0.1),
     ),
 )
+
+
+FAST_SKID = (("WP_SPEED", 2.0), ("WP_RADIUS", 1.0))
+FAST = (
+    Recording("velocity-and-turn-rate", -10.0, folder="real-firmware"),
+    Recording("turns-at-speed-jerk-0", -10.0, folder="real-firmware", parameters=(*FAST_SKID, ("WP_JERK", 0.0))),
+    Recording("turns-at-speed-jerk-3", -10.0, folder="real-firmware", parameters=(*FAST_SKID, ("WP_JERK", 3.0))),
+)
+"""Recordings of motion alone, at up to 2 m/s: velocities with turn rates, and positions far to the side."""
 
 
 @dataclass(frozen=True)
@@ -112,7 +122,8 @@ def simulator_for(recording: Recording) -> Simulator:
     """The rover of a recording, without noise, on open ground or before its post."""
     heading_rad = math.radians(recording.heading_deg)
     if recording.post_m is None:
-        return Simulator(World.open(), SimStart(0.0, 0.0, heading_rad, HOME), "none", noise=False)
+        start, parameters = SimStart(0.0, 0.0, heading_rad, HOME), dict(recording.parameters)
+        return Simulator(World.open(), start, "none", parameters=parameters, noise=False)
     cell_m, middle_m = 0.1, WORLD_M / 2
     row, column = (int((metres + middle_m) / cell_m) for metres in recording.post_m)
     obstacles = np.zeros((int(WORLD_M / cell_m),) * 2, dtype=np.bool_)
@@ -124,7 +135,7 @@ def simulator_for(recording: Recording) -> Simulator:
 
 def replay(recording: Recording) -> Replay:
     """Send the recorded packets to the simulator at their vehicle times, and keep what it sends."""
-    real, sent = read(TRANSCRIPTS / f"{recording.name}.tlog")
+    real, sent = read(SHARED / "data" / recording.folder / f"{recording.name}.tlog")
     client = Client(simulator_for(recording), *source(sent[0][1]))
     ours: list[Heard] = []
 

@@ -40,7 +40,7 @@ def test_a_target_behind_is_faced_first_at_sixty_degrees_a_second() -> None:
 
     ahead_s, _ = seconds_to_drive(10.0)
     behind_s, rate_deg_s = seconds_to_drive(-10.0)
-    assert rate_deg_s == pytest.approx(60.0, abs=4.0)
+    assert rate_deg_s == pytest.approx(63.0, abs=2.0), "measured: 1.1 rad/s"
     # Measured from another start, perhaps with some speed: 4.3 s.
     assert behind_s - ahead_s == pytest.approx(4.3, abs=0.8)
 

@@ -16,6 +16,7 @@ from sitl.autopilot.control.records import LOOP_HZ
 from sitl.autopilot.control.tasks import run_task
 from sitl.autopilot.vehicle import Vehicle
 from sitl.firmware.physics import Physics
+from sitl.plant.closed_loop import SUBSTEPS, measure
 from sitl.plant.rover import new_rover
 from sitl.sensors.range_sensors import SUITES, RangeSensing
 from sitl.sim_link import SimLink
@@ -77,5 +78,8 @@ class SplitVehicle:
         ahead, right, _ = told["imu/accel_body"]
         believed["north_m"], believed["east_m"], _ = told["position"]
         believed["vel_n"], believed["vel_e"], _ = told["velocity"]
+        for _ in range(SUBSTEPS):
+            measure(believed[0], self.vehicle.tuning[0], told["imu/gyro"][2], ahead, right)
+        ahead, right = believed[0]["imu_ahead"], believed[0]["imu_aside"]
         believed["accel_n"], believed["accel_e"] = ahead * cosine - right * sine, ahead * sine + right * cosine
-        believed["heading_rad"], believed["yaw_rate_rad_s"] = heading_rad, told["imu/gyro"][2]
+        believed["heading_rad"], believed["yaw_rate_rad_s"] = heading_rad, believed["imu_yaw_rate"]

@@ -40,12 +40,15 @@ ESTIMATE = np.dtype(
         (name, "f8")
         for name in (
             "north_m", "east_m", "vel_n", "vel_e", "accel_n", "accel_e", "heading_rad", "yaw_rate_rad_s",
+            "imu_yaw_rate", "imu_ahead", "imu_aside",
             "bias_n", "bias_e", "drift_n", "drift_e", "bias_heading", "offset_n", "offset_e", "offset_vn", "offset_ve",
         )
     ]
+    + [("imu_filters", "f8", (3, 2))]
 )  # fmt: skip
 """The autopilot's estimate, in metres from the EKF origin, and the slowly wandering errors in it.
 
+``imu_...``: turn rate and acceleration as gyro and accelerometer tell them, with the state of their ``imu_filters``.
 ``offset_...``: what a faulty GPS adds to position and velocity.
 """
 
@@ -132,6 +135,8 @@ TUNING_NAMES = {
     "mix": "MOT_STR_THR_MIX",
     "turn_radius_m": "TURN_RADIUS",
     "steering_base_m_s": "MOT_SPD_SCA_BASE",
+    "gyro_filter_hz": "INS_GYRO_FILTER",
+    "accel_filter_hz": "INS_ACCEL_FILTER",
 }
 """Fields of a tuning record, and the parameters they come from."""
 

@@ -72,11 +72,15 @@ class Plant:
 
 
 def everything(changes: dict[str, float], radius_m: float = 0.0) -> np.ndarray[Any, Any]:
-    """Ahead, then to the right behind, then turning while driving, then with the sticks, forwards and backwards."""
+    """Ahead, to the right behind, turning while driving and on to a place, with the sticks, forwards and backwards."""
     plant = Plant(changes, radius_m)
     plant.drive_to(10.0, 0.0, 11.0)
     plant.drive_to(8.0, 8.0, 8.0)
     plant.turn(2.0, 1.5, 2.0)
+    plant.turn(1.5, -1.5, 0.8)
+    here = plant.rover[0]
+    ahead_n, ahead_e = math.cos(here["heading_rad"]), math.sin(here["heading_rad"])
+    plant.drive_to(here["north_m"] + 8.0 * ahead_n, here["east_m"] + 8.0 * ahead_e, 2.0)
     plant.turn(0.0, -1.5, 2.0)
     plant.push(0.9, 0.7, 2.0)
     plant.push(-0.6, -0.3, 2.0)
@@ -89,7 +93,8 @@ OTHERWISE = {
     "ATC_STOP_SPEED": 0.01, "ATC_STR_ACC_MAX": 60.0, "ATC_STR_ANG_P": 1.0, "ATC_STR_RAT_D": 0.01,
     "ATC_STR_RAT_FF": 0.5, "ATC_STR_RAT_FLTE": 1.0, "ATC_STR_RAT_FLTT": 1.0, "ATC_STR_RAT_I": 0.6,
     "ATC_STR_RAT_IMAX": 0.001, "ATC_STR_RAT_MAX": 30.0, "ATC_STR_RAT_P": 0.5, "ATC_TURN_MAX_G": 0.1,
-    "CRUISE_SPEED": 2.0, "CRUISE_THROTTLE": 40, "MOT_SLEWRATE": 20, "MOT_STR_THR_MIX": 1.0, "MOT_THR_MAX": 30,
+    "INS_ACCEL_FILTER": 1.0, "INS_GYRO_FILTER": 1.0, "CRUISE_SPEED": 2.0, "CRUISE_THROTTLE": 40,
+    "MOT_SLEWRATE": 20, "MOT_STR_THR_MIX": 1.0, "MOT_THR_MAX": 30,
     "MOT_THR_MIN": 15, "MOT_THST_ASYM": 2.0, "MOT_THST_EXPO": 0.6, "PSC_POS_P": 0.6, "PSC_VEL_FLTE": 1.0,
     "PSC_VEL_P": 0.3, "SERVO1_FUNCTION": 0, "SERVO3_FUNCTION": 73, "SERVO1_REVERSED": 1, "SERVO3_REVERSED": 1,
     "WP_ACCEL": 0.4, "WP_JERK": 0.2, "WP_PIVOT_ANGLE": 170.0, "WP_PIVOT_DELAY": 1, "WP_PIVOT_RATE": 30.0,
@@ -131,7 +136,7 @@ def test_a_slope_filter_counts_when_the_slope_does(name: str) -> None:
 
 
 def test_the_table_holds_every_parameter_of_motion() -> None:
-    prefixes = ("ATC_", "MOT_", "CRUISE_", "WP_", "TURN_", "PSC_", "SERVO", "FRAME_")
+    prefixes = ("ATC_", "MOT_", "CRUISE_", "WP_", "TURN_", "PSC_", "INS_", "SERVO", "FRAME_")
     motion = {name for name in DEFAULTS if name.startswith(prefixes)}
     assert motion - set(OTHERWISE) - set(ON_WHEELS) - set(TOGETHER) <= ELSEWHERE
 
@@ -164,7 +169,17 @@ def test_throttle_has_a_limit() -> None:
 def test_it_pivots_as_fast_as_it_may(rate_deg_s: float) -> None:
     plant = Plant({**SKID, "WP_PIVOT_RATE": rate_deg_s})
     plant.drive_to(0.5, 20.0, 4.0)
-    assert math.degrees(max(row[4] for row in plant.trace)) == pytest.approx(rate_deg_s, rel=0.05)
+    assert math.degrees(max(row[4] for row in plant.trace)) == pytest.approx(rate_deg_s, rel=0.08)
+
+
+def test_the_slower_the_gyros_filter_the_more_a_turn_rate_overshoots() -> None:
+    fastest = []
+    for hz in (2.0, 4.0, 80.0):
+        plant = Plant({**SKID, "WP_PIVOT_RATE": 40.0, "INS_GYRO_FILTER": hz})
+        plant.drive_to(0.5, 20.0, 4.0)
+        fastest.append(math.degrees(max(row[4] for row in plant.trace)))
+    assert fastest[0] > fastest[1] + 1.0 and fastest[1] > fastest[2] + 0.5
+    assert fastest[2] == pytest.approx(40.0, rel=0.03)
 
 
 @pytest.mark.parametrize(("angle_deg", "pivots"), [(60.0, True), (120.0, False), (0.0, False)])
