@@ -19,6 +19,7 @@ from sitl.faults.plan import FaultPlan, SensorFault
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.physics import Physics
 from sitl.plant.closed_loop import NoiseSettings
+from sitl.plant.rover import SIM_ROVER, Drivetrain, two_wheels
 from sitl.sensors.range_sensors import SensorSuite, suite_named
 from sitl.sensors.suites import suite_of
 from sitl.simulator import Simulator
@@ -51,6 +52,7 @@ class Scenario:
     faults: FaultPlan | None = None
     kept: dict[str, int] = field(default_factory=dict)
     """Types of those parameters that have no effect."""
+    drivetrain: Drivetrain = SIM_ROVER
     parameter_file: ParameterFile | None = None
     """The file from which some of the parameters come."""
 
@@ -72,13 +74,17 @@ class Scenario:
             turning_radius_m=self.turning_radius_m,
             faults=self.faults,
             kept=self.kept,
+            drivetrain=self.drivetrain,
         )
 
     def physics(self, seed: int, *, scans: bool = False) -> Physics:
         """The same rover and world for the real firmware. Raises ScenarioError for unsuitable sensors."""
         suite = suite_named(self.sensors) if isinstance(self.sensors, str) else self.sensors
         try:
-            return Physics(self.world, self.start, suite, seed, self.rover_radius_m, self.turning_radius_m, scans=scans)
+            return Physics(
+                self.world, self.start, suite, seed, self.rover_radius_m, self.turning_radius_m,
+                scans=scans, drivetrain=self.drivetrain,
+            )  # fmt: skip
         except ValueError as error:
             raise ScenarioError(f"sensors: {error}; describe fewer beams") from error
 
@@ -113,7 +119,9 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     parameters = {"WP_SPEED": mission.rover.cruise_speed_m_s, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
     turning_radius_m = _turning_radius_m(mission, spec, name)
     sensors = spec.sensors if isinstance(spec.sensors, str) else described
-    scenario = Scenario(world, start, sensors, radius_m, parameters)
+    motors = spec.drivetrain
+    drivetrain = SIM_ROVER if motors is None else two_wheels(motors.top_speed_m_s, motors.lag_s, motors.track_m)
+    scenario = Scenario(world, start, sensors, radius_m, parameters, drivetrain=drivetrain)
     if spec.parameters is None:
         return _steered(scenario, turning_radius_m)
     try:

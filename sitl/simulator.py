@@ -25,7 +25,7 @@ from sitl.faults.link_faults import LinkQueue
 from sitl.faults.plan import FaultPlan
 from sitl.faults.player import FaultPlayer
 from sitl.plant.closed_loop import NOISE_COLUMNS, NoiseSettings, run_loops
-from sitl.plant.rover import new_rover
+from sitl.plant.rover import SIM_ROVER, Drivetrain, new_rover
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite, suite_named
 from sitl.sim_link import SimLink
 from sitl.world import geodesy
@@ -53,6 +53,7 @@ class Simulator:
         turning_radius_m: float = 0.0,
         faults: FaultPlan | None = None,
         kept: Mapping[str, int] | None = None,
+        drivetrain: Drivetrain = SIM_ROVER,
     ) -> None:
         """``sensors``: a suite or its name; ``parameters``: ArduRover's, where they differ from the defaults.
 
@@ -75,7 +76,9 @@ class Simulator:
         self._noise = settings.as_array()
         self._rng = np.random.default_rng(motion_seed)
         self._sensing = RangeSensing(suite, world, settings.range_m, np.random.default_rng(range_seed))
-        self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m)
+        self._rover = new_rover(
+            start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m, drivetrain
+        )
         self._geo_start = (geodesy.to_units(start.home.lat_deg), geodesy.to_units(start.home.lon_deg))
         # Noise is drawn in blocks of fixed size, so that it does not depend on the batches of loops.
         self._draws = np.empty((NOISE_ROWS, NOISE_COLUMNS))

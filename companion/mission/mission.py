@@ -116,6 +116,15 @@ class MoverSpec:
 
 
 @dataclass(frozen=True, slots=True)
+class DrivetrainSpec:
+    """The simulated rover's motors: speed at full output, lag, distance between left and right wheels."""
+
+    top_speed_m_s: float
+    lag_s: float
+    track_m: float
+
+
+@dataclass(frozen=True, slots=True)
 class SitlSpec:
     """The simulator's table of a mission.
 
@@ -123,7 +132,8 @@ class SitlSpec:
     ``start``: the rover's field in the world; heading clockwise from north;
     ``home``: latitude and longitude of the start (None: planned home, else first target in degrees, else a default);
     ``parameters``: a file of ArduRover parameters;
-    ``steering``: skid or ackermann (None: ackermann if the rover has a turning radius).
+    ``steering``: skid or ackermann (None: ackermann if the rover has a turning radius);
+    ``drivetrain``: None for that of the firmware's own simulated rover.
     """
 
     world: Path | None = None
@@ -135,6 +145,7 @@ class SitlSpec:
     movers: tuple[MoverSpec, ...] = ()
     steering: str | None = None
     parameters: Path | None = None
+    drivetrain: DrivetrainSpec | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,6 +19,7 @@ from companion.mission.check import check_mission
 from companion.mission.ground_station_reader import load_ground_station_file
 from companion.mission.mission import (
     Area,
+    DrivetrainSpec,
     GridSpec,
     HomePoint,
     Mission,
@@ -182,6 +183,14 @@ class MoverTable(Table):
         return MoverSpec(name, self.radius_m, self.speed_m_s, route, self.start_s, self.repeat, self.announce)
 
 
+class DrivetrainTable(Table):
+    """``[sitl.drivetrain]``: motors unlike those of the firmware's own simulated rover."""
+
+    top_speed_m_s: Annotated[float, Field(gt=0.0, le=4.0)]
+    lag_s: Annotated[float, Field(ge=0.01, le=2.0)]
+    track_m: Annotated[float, Field(ge=0.1, le=5.0)]
+
+
 class SitlTable(Table):
     """``[sitl]``: a real rover ignores it."""
 
@@ -194,6 +203,7 @@ class SitlTable(Table):
     movers: Annotated[list[MoverTable], Field(max_length=100, default_factory=list)]
     steering: Literal["skid", "ackermann"] | None = None
     parameters: FileName | None = None
+    drivetrain: DrivetrainTable | None = None
 
 
 class MissionTable(Table):
@@ -269,6 +279,7 @@ def _sitl(table: SitlTable, path: Path) -> SitlSpec:
         movers=tuple(_named(path, "sitl.movers", i, partial(item.mover, i)) for i, item in enumerate(table.movers, 1)),
         steering=table.steering,
         parameters=path.parent / table.parameters if table.parameters else None,
+        drivetrain=None if table.drivetrain is None else DrivetrainSpec(**dict(table.drivetrain)),
     )
 
 

@@ -20,7 +20,7 @@ from numba import njit
 from sitl.autopilot.lidar import Scanner, ScannerPort
 from sitl.firmware.json_frames import COUNTS, RANGES_MOST, BodyState, ServoFrame, decode, encode
 from sitl.plant.closed_loop import NoiseSettings
-from sitl.plant.rover import GRAVITY_M_S2, drive, meet_movers, new_rover
+from sitl.plant.rover import GRAVITY_M_S2, SIM_ROVER, Drivetrain, drive, meet_movers, new_rover
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite
 from sitl.world.truth import Collision, SimStart, collision_of
 from sitl.world.world import Surroundings, World
@@ -105,6 +105,7 @@ class Physics:
     def __init__(
         self, world: World, start: SimStart, suite: SensorSuite, seed: int = 0, rover_radius_m: float = 0.35,
         turning_radius_m: float = 0.0, range_noise_m: float = NoiseSettings().range_m, *, scans: bool = False,
+        drivetrain: Drivetrain = SIM_ROVER,
     ) -> None:  # fmt: skip
         """``scans``: the lidar publishes on a link of its own, see ``take``; ``turning_radius_m``: 0 for skid steering.
 
@@ -115,6 +116,7 @@ class Physics:
         self.world, self.start, self.suite = world, start, suite
         self.tally = Tally()
         self._make = (seed, rover_radius_m, turning_radius_m, range_noise_m)
+        self._drivetrain = drivetrain
         self._scans = scans
         self._port = ScannerPort()
         self._outbox = bytearray()
@@ -130,7 +132,9 @@ class Physics:
         self.time_s = 0.0
         self._port.begin()
         self.collisions: tuple[Collision, ...] = ()
-        self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m)
+        self._rover = new_rover(
+            start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m, self._drivetrain
+        )
         rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
         self._sensing = RangeSensing(suite, self.world, noise_m, rng)
         self._scanner = Scanner(suite.lidar, self._sensing) if suite.lidar and self._scans else None

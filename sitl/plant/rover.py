@@ -1,19 +1,19 @@
 """The plant: the rover's motion in the world frame, and its contacts with obstacles (like SIM_Rover).
 
-Skid steering is that of the firmware's own simulated skid rover: speed follows the mean of both motors with a
-first-order lag, the turn rate follows their difference at once. Ackermann steering is the bicycle model: the same
-drive, and front wheels with a limited angle and rate, so the rover turns only while it moves.
+With skid steering the speed follows the mean of both motors with a first-order lag, and the turn rate their
+difference; ``Drivetrain`` says how fast. Ackermann steering is the bicycle model: the same drive, and front wheels with
+a limited angle and rate, so the rover turns only while it moves.
 
 On slippery ground both slide: the friction that changes the velocity is limited to grip times gravity. The rover then
 accelerates and brakes more slowly, and drifts sideways (skid steering) or understeers (steered wheels).
 
-Nouns: plant, SIM_Rover.
+Nouns: plant, drivetrain, SIM_Rover.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,9 +22,28 @@ from numpy.typing import NDArray
 from sitl.world.movers import Fleet, nearest_mover
 from sitl.world.world import TOP_SPEED_M_S, Surroundings, clearance_m, ground_under
 
-SPEED_LAG_S = 4.0 / 14.0
-TURN_RATE_RAD_S = math.radians(140.0)
-"""Turn rate when the outputs of left and right motor differ by 1."""
+
+class Drivetrain(NamedTuple):
+    """How motor outputs become motion.
+
+    ``top_speed_m_s``: at full output; ``turn_rate_rad_s``: when the outputs of left and right motor differ by 1;
+    ``speed_lag_s``, ``turn_lag_s``: time constants with which both follow the outputs.
+    """
+
+    top_speed_m_s: float
+    speed_lag_s: float
+    turn_rate_rad_s: float
+    turn_lag_s: float
+
+
+SIM_ROVER = Drivetrain(TOP_SPEED_M_S, 4.0 / 14.0, math.radians(140.0), 0.0)
+"""The firmware's own simulated skid rover, to which its default gains are tuned: it turns at once."""
+
+
+def two_wheels(top_speed_m_s: float, lag_s: float, track_m: float) -> Drivetrain:
+    """Two driven wheels (or tracks) at this distance from each other, whose motors follow with this lag."""
+    return Drivetrain(top_speed_m_s, lag_s, top_speed_m_s / track_m, lag_s)
+
 
 WHEEL_MOST_RAD = math.radians(35.0)
 """Steering angle at full lock, where the rover drives its turning radius; as in the firmware's simulated rover."""
@@ -59,6 +78,7 @@ ROVER = np.dtype(
         ("grip_3", "f8"),
         ("drawn_ah", "f8"),
     ]
+    + [(name, "f8") for name in Drivetrain._fields]
 )
 """The rover's true state, world frame, heading clockwise from north; ``contacts`` counts collisions so far.
 
@@ -72,14 +92,17 @@ RoverState = NDArray[Any]
 
 
 def new_rover(
-    north_m: float, east_m: float, heading_rad: float, radius_m: float, turning_radius_m: float = 0.0
-) -> RoverState:
+    north_m: float, east_m: float, heading_rad: float, radius_m: float, turning_radius_m: float = 0.0,
+    drivetrain: Drivetrain = SIM_ROVER,
+) -> RoverState:  # fmt: skip
     """A rover at rest: an array of one ``ROVER`` record. With a turning radius it has Ackermann steering."""
     state = np.zeros(1, dtype=ROVER)
     state["turning_radius_m"] = turning_radius_m
     state["grip_1"] = state["grip_3"] = 1.0
     state["north_m"], state["east_m"] = north_m, east_m
     state["heading_rad"], state["radius_m"] = heading_rad, radius_m
+    for name, value in drivetrain._asdict().items():
+        state[name] = value
     return state
 
 
@@ -129,16 +152,18 @@ def drive(rover: Any, surroundings: Surroundings, servo_1: float, servo_3: float
     """
     ackermann = rover.turning_radius_m > 0.0
     grip, pace = ground_under(surroundings.ground, surroundings.solid, rover.north_m, rover.east_m)
-    goal_m_s = servo_3 * TOP_SPEED_M_S if ackermann else 0.5 * (servo_1 + servo_3) * TOP_SPEED_M_S
+    goal_m_s = (servo_3 if ackermann else 0.5 * (servo_1 + servo_3)) * rover.top_speed_m_s
     before_m_s, aside_m_s = rover.speed_m_s, 0.0
-    speed_m_s = goal_m_s * pace + (before_m_s - goal_m_s * pace) * math.exp(-step_s / SPEED_LAG_S)
+    speed_m_s = goal_m_s * pace + (before_m_s - goal_m_s * pace) * math.exp(-step_s / rover.speed_lag_s)
     from_rad = rover.heading_rad
     if ackermann:
         turn_wheels(rover, servo_1, step_s)
         curvature_per_m = wheel_curvature_per_m(rover.wheel_rad, rover.turning_radius_m)
         yaw_rate_rad_s = 0.5 * (before_m_s + speed_m_s) * curvature_per_m
     else:
-        yaw_rate_rad_s = (servo_1 - servo_3) * TURN_RATE_RAD_S * pace
+        yaw_rate_rad_s = (servo_1 - servo_3) * rover.turn_rate_rad_s * pace
+        if rover.turn_lag_s > 0.0:
+            yaw_rate_rad_s += (rover.yaw_rate_rad_s - yaw_rate_rad_s) * math.exp(-step_s / rover.turn_lag_s)
     if grip < 1.0 or rover.slide_m_s != 0.0:
         speed_m_s, yaw_rate_rad_s, aside_m_s = slide(rover, grip, speed_m_s, yaw_rate_rad_s, step_s)
     rover.accel_m_s2 = (speed_m_s - before_m_s) / step_s

@@ -8,10 +8,9 @@ from companion.mission.load import load_mission
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from sitl.lockstep import Drive
-from sitl.plant.rover import TOP_SPEED_M_S
 from sitl.scenario import scenario_from_mission, with_sensors
 from sitl.view.picture import save_picture
-from sitl.world.world import ground_under
+from sitl.world.world import TOP_SPEED_M_S, ground_under
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.core.frames import GeoPoint
 from sitl.firmware.physics import LONGEST_STEP_S, Physics, servo_output
 from sitl.firmware.physics_log import PhysicsLog, summary
-from sitl.plant.rover import SPEED_LAG_S, TOP_SPEED_M_S, TURN_RATE_RAD_S, WHEEL_MOST_RAD, WHEEL_RATE_RAD_S
+from sitl.plant.rover import SIM_ROVER, WHEEL_MOST_RAD, WHEEL_RATE_RAD_S
 from sitl.sensors.range_flaws import Flaws
 from sitl.sensors.range_sensors import SUITES, Beam, SensorSuite
 from sitl.world.doors import Door
@@ -84,9 +84,9 @@ def test_the_answer_is_one_json_object_between_newlines_without_spaces() -> None
 def test_both_motors_alike_drive_straight_on(heading_deg: float) -> None:
     one = firmware(physics(heading_deg=heading_deg))
     one.drive(5.0, 1750, 1750)
-    speed_m_s = 0.5 * TOP_SPEED_M_S
+    speed_m_s = 0.5 * SIM_ROVER.top_speed_m_s
     ahead = (math.cos(math.radians(heading_deg)), math.sin(math.radians(heading_deg)))
-    way_m = speed_m_s * (5.0 - SPEED_LAG_S)
+    way_m = speed_m_s * (5.0 - SIM_ROVER.speed_lag_s)
     assert one.state["velocity"][:2] == pytest.approx([speed_m_s * part for part in ahead], abs=1e-3)
     assert one.state["position"][:2] == pytest.approx([way_m * part for part in ahead], abs=0.01)
     assert one.state["imu/gyro"][2] == 0.0
@@ -95,17 +95,17 @@ def test_both_motors_alike_drive_straight_on(heading_deg: float) -> None:
 def test_it_pulls_away_forwards_and_brakes_backwards() -> None:
     one = firmware(physics(heading_deg=30.0))
     one.update(2000, 2000)
-    assert one.state["imu/accel_body"][0] == pytest.approx(TOP_SPEED_M_S / SPEED_LAG_S, rel=0.01)
+    assert one.state["imu/accel_body"][0] == pytest.approx(SIM_ROVER.top_speed_m_s / SIM_ROVER.speed_lag_s, rel=0.01)
     one.drive(3.0, 2000, 2000)
     one.update(1500, 1500)
-    assert one.state["imu/accel_body"][0] == pytest.approx(-TOP_SPEED_M_S / SPEED_LAG_S, rel=0.01)
+    assert one.state["imu/accel_body"][0] == pytest.approx(-SIM_ROVER.top_speed_m_s / SIM_ROVER.speed_lag_s, rel=0.01)
     assert one.state["imu/accel_body"][1] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_motors_against_each_other_pivot_on_the_spot() -> None:
     one = firmware(physics())
     one.drive(0.5, 1600, 1400)
-    rate_rad_s = 0.4 * TURN_RATE_RAD_S
+    rate_rad_s = 0.4 * SIM_ROVER.turn_rate_rad_s
     assert one.state["imu/gyro"][2] == pytest.approx(rate_rad_s, abs=1e-5)
     assert one.heading_rad == pytest.approx(0.5 * rate_rad_s, abs=1e-6)
     assert one.state["position"] == [0.0, 0.0, 0.0]
@@ -114,7 +114,7 @@ def test_motors_against_each_other_pivot_on_the_spot() -> None:
 def test_a_faster_left_motor_turns_right_and_pushes_to_the_right() -> None:
     one = firmware(physics())
     one.drive(4.0, 1800, 1700)
-    speed_m_s, rate_rad_s = 0.5 * TOP_SPEED_M_S, 0.2 * TURN_RATE_RAD_S
+    speed_m_s, rate_rad_s = 0.5 * SIM_ROVER.top_speed_m_s, 0.2 * SIM_ROVER.turn_rate_rad_s
     assert math.hypot(*one.state["velocity"]) == pytest.approx(speed_m_s, rel=1e-3)
     assert one.state["imu/gyro"][2] == pytest.approx(rate_rad_s, rel=1e-5)
     assert one.state["imu/accel_body"] == pytest.approx([0.0, speed_m_s * rate_rad_s, -9.81], abs=0.01)
@@ -127,7 +127,7 @@ def test_steered_wheels_drive_the_turning_circle_and_never_pivot() -> None:
     assert one.state["position"] == [0.0, 0.0, 0.0]
     assert one.heading_rad == 0.0
     one.drive(4.0, 2000, 1625)
-    speed_m_s = 0.25 * TOP_SPEED_M_S
+    speed_m_s = 0.25 * SIM_ROVER.top_speed_m_s
     assert math.hypot(*one.state["velocity"]) == pytest.approx(speed_m_s, rel=1e-3)
     assert one.state["imu/gyro"][2] == pytest.approx(speed_m_s / RADIUS_M, rel=1e-3)
     assert one.state["imu/accel_body"][1] == pytest.approx(speed_m_s**2 / RADIUS_M, rel=0.01)

@@ -15,7 +15,7 @@ from companion.core.frames import GeoPoint
 from sitl.autopilot.lidar import ScannerPort
 from sitl.firmware.json_frames import decode
 from sitl.firmware.physics import Physics, frame_step_s
-from sitl.plant.rover import SPEED_LAG_S
+from sitl.plant.rover import SIM_ROVER
 from sitl.sensors.range_sensors import SUITES
 from sitl.world.truth import SimStart
 from sitl.world.world import World
@@ -76,7 +76,7 @@ def test_turn_rate_acceleration_velocity_and_place_fit_together(
             # The mean of both velocities, except for what turning and accelerating within the step may bend; and near
             # walls, except for speed that was gained within the step and lost again.
             slack_m = step_s * (math.dist(old, new) + FASTEST_M_S * abs(turned_rad)) + 1e-8
-            slack_m += FASTEST_M_S / SPEED_LAG_S * step_s**2 if walls else 0.0
+            slack_m += FASTEST_M_S / SIM_ROVER.speed_lag_s * step_s**2 if walls else 0.0
             assert math.dist(moved, [0.5 * (a + b) * step_s for a, b in zip(old, new, strict=True)]) <= slack_m
 
 
