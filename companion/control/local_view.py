@@ -15,13 +15,14 @@ from companion.settings import Settings
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LocalView:
-    """One moment, local frame. ``speed_m_s``: over ground, without a sign."""
+    """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive."""
 
     pose: Pose
     speed_m_s: float
     evidence: EvidenceMap
     rover: RoverLimits
     settings: Settings
+    yaw_rate_rad_s: float = 0.0
 
     def with_speeds(self, cruise_speed_m_s: float, fastest_m_s: float) -> LocalView:
         """The same moment with another cruise speed, and with the highest speed that is ever told on this way."""

@@ -16,7 +16,7 @@ from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, unseen_flank
-from companion.core.frames import Pose, wrap_pi_rad
+from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.map_queries import clearance_m, look_along
 from companion.settings import GuidanceSettings
@@ -30,8 +30,15 @@ ROLL_SHARES = (0.25, 0.5, 0.75, 1.0)
 """Directions, as shares of a turn, that are looked along before a rolling rover begins to turn."""
 
 
+OVERRUN_M = 0.3
+"""A rover that stands so far beyond the last position may not have reached it, for the autopilot."""
+STANDS_M_S = 0.1
+ANEW_S = 0.15
+"""Longer than the 0.1 s after which ArduRover shapes a position target from where the rover is."""
+
+
 class PointController:
-    """Remembers what it told last: the heading of a look, and whether it was braking.
+    """Remembers what it told last: the heading of a look, a position, and whether it was braking.
 
     A look is kept until its heading is reached, and a longer clear reach is wanted before the rover drives off
     again, so that a narrow sensor looks to both sides once and not at every step.
@@ -43,14 +50,35 @@ class PointController:
     def __init__(self) -> None:
         self._looking_rad: float | None = None
         self._braking = False
+        self._position: NedPoint | None = None
+        self._anew_s: float | None = None
+        """Since when the rover has been stopped so that its next position is begun anew."""
 
     def follow(self, path: ReferencePath, view: LocalView) -> ControlCommand:
         """The command for this moment. ``BLOCKED``: not even the next piece of the path is clear."""
         if view.speed_m_s > OVERSPEED * view.rover.fastest_m_s:
             return stop_for(Purpose.BRAKE)
-        command = self._command(path, view)
+        command = self._begun_anew(self._command(path, view), view)
         self._braking = command.purpose is Purpose.BRAKE
         self._looking_rad = command.setpoint.heading_rad if isinstance(command.setpoint, GuidedHeading) else None
+        return command
+
+    def _begun_anew(self, command: ControlCommand, view: LocalView) -> ControlCommand:
+        """The command; but a short stop first, if the rover stands beyond the last position and gets another one.
+
+        More than WP_RADIUS beyond it the position is not reached for ArduRover, and the inner target, which the rover
+        follows, stays there. For the next position it starts from behind the rover, which then overshoots by metres.
+        """
+        if not isinstance(command.setpoint, GuidedPosition):
+            self._position = self._anew_s = None
+            return command
+        pose, before = view.pose, self._position
+        if before is not None and self._anew_s is None and view.speed_m_s < STANDS_M_S:
+            beyond_m = -pose.point.distance_m(before) * math.cos(pose.point.bearing_rad(before) - pose.heading_rad)
+            self._anew_s = pose.time_s if beyond_m > OVERRUN_M else None
+        if self._anew_s is not None and pose.time_s - self._anew_s < ANEW_S:
+            return stop_for(Purpose.BRAKE)
+        self._position, self._anew_s = command.setpoint.point, None
         return command
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
@@ -93,7 +121,11 @@ class PointController:
         if error > turn_first_rad and pose.point.distance_m(reach.target) > 0.5:
             if close or _would_touch_turning(view, bearing):
                 return turn_to(bearing, view)
-            return ControlCommand(Purpose.LOOK, GuidedHeading(bearing), settings.min_speed_m_s)
+            return _turn_rolling(bearing, view)
+        if _is_swinging(view):
+            return (
+                turn_to(bearing, view) if close or _would_touch_turning(view, bearing) else _turn_rolling(bearing, view)
+            )
         if error > STRAIGHT_RAD and not arc_is_free(view, reach.target):
             return turn_to(bearing, view)
         limit_m_s = speed_limit_m_s(min(beside_m, reach.room_m), error, rover, settings)
@@ -109,6 +141,20 @@ def turn_to(bearing_rad: float, view: LocalView) -> ControlCommand:
     if view.speed_m_s > settings.roll_out_m_s:
         return stop_for(Purpose.BRAKE)
     return ControlCommand(Purpose.LOOK, GuidedHeading(bearing_rad), settings.min_speed_m_s)
+
+
+def _turn_rolling(bearing_rad: float, view: LocalView) -> ControlCommand:
+    """Turn while the rover rolls out: the autopilot brakes on a heading."""
+    return ControlCommand(Purpose.LOOK, GuidedHeading(bearing_rad), view.settings.guidance.min_speed_m_s)
+
+
+def _is_swinging(view: LocalView) -> bool:
+    """Whether the rover turns so fast while it rolls that a position given now would make it swing past.
+
+    ArduRover begins to shape a position target with the acceleration a that the rover has. In a turn that points to the
+    side, speed times turn rate, and falls off with WP_JERK j: until then it has become a speed of a² / 2j to that side.
+    """
+    return view.speed_m_s * abs(view.yaw_rate_rad_s) > view.settings.guidance.swing_m_s2
 
 
 def speed_limit_m_s(beside_m: float, bearing_error_rad: float, rover: RoverLimits, settings: GuidanceSettings) -> float:

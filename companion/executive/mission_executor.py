@@ -271,7 +271,8 @@ class MissionExecutor:
         pose = vehicle.pose_at(now_s)
         assert pose is not None
         settings = self._settings_for_link(vehicle.latency_s)
-        return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, settings)
+        rate_rad_s = 0.0 if vehicle.attitude is None else vehicle.attitude.yaw_rate_rad_s
+        return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s)
 
     def _moving(self, vehicle: VehicleState, view: LocalView) -> tuple[Moving, ...]:
         """All that moves round the rover, announced or seen."""

@@ -110,6 +110,9 @@ class GuidanceSettings(Section):
     roll_out_m_s: float = Field(
         0.3, ge=0.0, description="above this speed the rover brakes straight before it turns on the spot"
     )
+    swing_m_s2: float = Field(
+        1.0, gt=0.0, description="a rover whose speed times turn rate is more than this gets no position"
+    )
     reach_after_look_m: float = Field(
         2.5, gt=0.0, description="after a turn to look, drive off with this much clear way"
     )

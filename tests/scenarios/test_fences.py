@@ -83,7 +83,7 @@ def test_who_cannot_turn_on_the_spot_keeps_inside_a_narrow_strip_by_itself(tmp_p
     while not rig.companion.done:
         rig.companion.tick()
         pose = rig.companion.vehicle.pose_at(rig.now_s())
-        if pose is not None:
+        if pose is not None and abs(rig.simulator.truth.speed_m_s) > 0.1:  # where it stands the position wanders
             inside_m.append(min(3.0 - abs(pose.north_m), pose.east_m + 1.5, 16.0 - pose.east_m))
         assert rig.now_s() < 400.0
     assert rig.companion.outcome.complete and rig.companion.mission_run.setpoint_check.refused == {}

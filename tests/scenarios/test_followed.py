@@ -21,7 +21,7 @@ def test_a_target_that_is_not_taken_is_told_of(tmp_path: Path) -> None:
 
     rig.change = elsewhere
     rig.until_driven(2.0)
-    rig.run_for(NOT_FOLLOWED_S + 3.0)
+    rig.run_for(NOT_FOLLOWED_S + 8.0)
     assert rig.texts().count(ANOTHER) == 1
 
 

@@ -103,6 +103,39 @@ def test_creeping_between_beams_it_is_told_no_place_behind_what_stands_farther_o
     assert look_along(ground.map, pose.point, answer.setpoint.point, ROVER.radius_m).clear_m >= distance_m - 0.01
 
 
+@pytest.mark.parametrize(
+    ("speed_m_s", "rate_deg_s", "purpose"),
+    [(1.0, 58.0, Purpose.LOOK), (0.7, -90.0, Purpose.LOOK), (1.0, 57.0, Purpose.DRIVE), (0.6, 90.0, Purpose.DRIVE)],
+)
+def test_a_rover_that_rolls_and_turns_fast_is_given_no_position(speed_m_s: float, rate_deg_s: float, purpose: Purpose):
+    """As at the wall's end on the real firmware: the position made it swing past, into the wall."""
+    ground, aside = looked(), Pose(HERE.north_m, HERE.east_m, math.radians(20.0), 0.0)
+    moment = replace(view(ground, aside, speed_m_s), yaw_rate_rad_s=math.radians(rate_deg_s))
+    assert PointController().follow(northward(ground), moment).purpose is purpose
+
+
+def test_near_an_obstacle_a_rover_that_swings_is_stopped():
+    ground, aside = looked([(HERE.north_m, HERE.east_m + 1.0, 0.2)]), Pose(10.5, 10.5, math.radians(10.0), 0.0)
+    moment = replace(view(ground, aside, 0.5), yaw_rate_rad_s=2.1)
+    assert PointController().follow(northward(ground), moment).setpoint == GuidedVelocity(0.0, 0.0)
+
+
+@pytest.mark.parametrize(("overrun_m", "anew"), [(0.29, False), (0.31, True), (-1.0, False)])
+def test_a_rover_that_stands_beyond_its_position_is_stopped_before_the_next(overrun_m: float, anew: bool):
+    """Long enough for ArduRover to forget the inner target, once; the next position is ahead again."""
+    ground, controller = looked(), PointController()
+    path = northward(ground)
+    first = controller.follow(path, view(ground, speed_m_s=0.5, horizon_m=1.0)).setpoint
+    assert isinstance(first, GuidedPosition) and first.point.north_m < HERE.north_m + 3.0
+    there, told_s = Pose(first.point.north_m + overrun_m, first.point.east_m, 0.0, 5.0), []
+    path = northward(ground, there.point)
+    for i in range(8):
+        pose = replace(there, time_s=5.0 + 0.05 * i)
+        if controller.follow(path, view(ground, pose)).setpoint == GuidedVelocity(0.0, 0.0):
+            told_s.append(0.05 * i)
+    assert told_s == (pytest.approx([0.0, 0.05, 0.1]) if anew else [])
+
+
 def test_far_aside_it_turns_first():
     east = Pose(HERE.north_m, HERE.east_m, math.radians(120.0), 0.0)
     answer = told(looked(), east)
