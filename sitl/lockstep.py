@@ -94,6 +94,8 @@ class Report:
     stuck: int = 0
     distance_m: float = 0.0
     collisions: int = 0
+    contacts: list[dict[str, float | str]] = field(default_factory=list)
+    """Each collision: time, place from the start, speed, with what."""
     refused: int = 0
     """Setpoints rejected by the companion's own check before sending."""
     sim_time_s: float = 0.0
@@ -178,6 +180,7 @@ class Drive:
         report.said = companion.outcome.said
         report.targets = companion.statuses()
         report.collisions = len(self.simulator.collisions)
+        report.contacts = [collision.as_json(self.scenario.start) for collision in self.simulator.collisions]
         report.refused = companion.mission_run.setpoint_check.refused.total()
         report.distance_m = self.simulator.driven_m
         report.sim_time_s = self.simulator.time_s

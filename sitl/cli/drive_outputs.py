@@ -17,6 +17,9 @@ from companion.settings.versions import made_with
 from sitl.lockstep import Drive, Report
 from sitl.view.picture import save_picture
 
+CONTACTS_SHOWN = 3
+"""The table shows the first of them; --json has all."""
+
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
@@ -72,12 +75,25 @@ class Outputs:
         return f"figures: {self.json_file}"
 
 
+def _contacts_text(report: Report) -> str:
+    """How many, and the first few: when, with what, how fast, where."""
+    lines = [f"{report.collisions}"]
+    for contact in report.contacts[:CONTACTS_SHOWN]:
+        place = f"north {contact['north_m']} m, east {contact['east_m']} m of the start"
+        lines.append(f"{contact['time_s']} s: {contact['with']}, {contact['speed_m_s']} m/s, {place}")
+    return "\n".join(lines)
+
+
 def _end_record(recorder: Recorder | NullRecorder, run: Drive) -> str:
     if not isinstance(recorder, Recorder):
         return ""
     if recorder.problem:
         return recorder.problem  # a record that ends early does not change the result of the run
     run.companion.save_map(recorder.directory / "map")
+    if run.report.contacts:
+        file = recorder.directory / "collisions.json"
+        with written(file):
+            file.write_text(json.dumps(run.report.contacts, indent=2) + "\n", encoding="utf-8")
     return f"record:  {recorder.directory}"
 
 
@@ -94,7 +110,7 @@ def print_summary(report: Report, console: Console) -> None:
         table.add_row(f"target {name}", status)
     speed = report.distance_m / report.driving_time_s if report.driving_time_s else 0.0
     rows = {
-        "collisions": f"{report.collisions}",
+        "collisions": _contacts_text(report),
         "driven": f"{report.distance_m:.1f} m in {report.driving_time_s:.0f} s ({speed:.2f} m/s)",
         "steps": f"{report.steps} fields, {report.return_steps} of them going back, {report.searches} searches",
         "stuck": "never" if report.stuck == 0 else f"{report.stuck} x",

@@ -54,21 +54,28 @@ class Unattended:
 
 
 class Telling:
-    """Prints the companion's texts as they come."""
+    """Prints the companion's texts as they come, and collisions."""
 
     def __init__(self, run: Drive, console: Console) -> None:
         self._name = run.mission.name
         self._console = console
+        self._run = run
+        self._collisions = 0
 
     def tell(self, status: Status) -> None:
-        """Those said since the last call."""
+        """Those said since the last call, and collisions."""
+        collisions = self._run.simulator.collisions
+        for number, collision in enumerate(collisions[self._collisions :], self._collisions + 1):
+            told = collision.told(self._run.scenario.start)
+            self.line(f"{collision.time_s:6.1f} s  collision {number}: {told}", style="bold red")
+        self._collisions = len(collisions)
         for news in status.news:
             if news.own:
                 self.line(f"{status.time_s:6.1f} s  {news.text}")
 
-    def line(self, text: str) -> None:
+    def line(self, text: str, style: str | None = None) -> None:
         """One line of this run."""
-        self._console.print(f"{self._name}: {text}", soft_wrap=True, markup=False, highlight=False)
+        self._console.print(f"{self._name}: {text}", style=style, soft_wrap=True, markup=False, highlight=False)
 
 
 def run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:

@@ -49,6 +49,7 @@ class DriveView:
         self._run = run
         self._viewer = viewer
         self._watching = Watching(run.mission.name, run.simulator)
+        self._collisions = 0
         self._told_of = (-1, "")
         """The step and the reason of the last decision that was told."""
 
@@ -61,6 +62,10 @@ class DriveView:
 
     def _take_in(self, status: Status) -> None:
         self._watching.note()
+        collisions = self._run.simulator.collisions
+        for collision in collisions[self._collisions :]:
+            self._watching.tell(f"{collision.time_s:.0f} s: {collision.told(self._run.scenario.start)}")
+        self._collisions = len(collisions)
         for news in status.news:
             self._watching.tell(f"{status.time_s:.0f} s: {news.text}")
         decision = status.decision

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from sitl.firmware.physics import Physics
-from sitl.network.event_log import COLLISIONS_EVERY_S, collision_line
+from sitl.network.event_log import COLLISIONS_EVERY_S
 
 
 class PhysicsLog:
@@ -38,7 +38,7 @@ class PhysicsLog:
             self._tell_once("frames were lost; the rover's time does not count them")
         if len(collisions) > self._collisions and self._now_s() - self._collisions_told_s >= COLLISIONS_EVERY_S:
             self._collisions, self._collisions_told_s = len(collisions), self._now_s()
-            self._tell(collision_line(collisions[-1], len(collisions), self._physics.start))
+            self._tell(f"collision {len(collisions)}: {collisions[-1].told(self._physics.start)}")
 
     def _tell_once(self, line: str) -> None:
         if line not in self._reported:

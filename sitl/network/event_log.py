@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 
 from sitl.simulator import Simulator
-from sitl.world.truth import Collision, SimStart
 
 SILENT_S = 5.0
 """A UDP client that has been silent for this long counts as gone."""
@@ -50,12 +49,4 @@ class EventLog:
         collisions = simulator.collisions
         if len(collisions) > self._collisions and now_s - self._collisions_reported_s >= COLLISIONS_EVERY_S:
             self._collisions, self._collisions_reported_s = len(collisions), now_s
-            self._tell(collision_line(collisions[-1], len(collisions), simulator.start))
-
-
-def collision_line(collision: Collision, count: int, start: SimStart) -> str:
-    """What was touched, when and where; relative to the rover's start, like LOCAL_POSITION_NED."""
-    north_m, east_m = collision.north_m - start.north_m, collision.east_m - start.east_m
-    what = "an obstacle" if collision.mover is None else collision.mover
-    where = f"north {north_m:.1f} m, east {east_m:.1f} m of its start"
-    return f"collision {count}: the rover touched {what} at {collision.time_s:.1f} s, {where}"
+            self._tell(f"collision {len(collisions)}: {collisions[-1].told(simulator.start)}")

@@ -82,7 +82,7 @@ ROVER = np.dtype(
 )
 """The rover's true state, world frame, heading clockwise from north; ``contacts`` counts collisions so far.
 
-``struck``: number of the mover that it touches, from 1; ``struck_m_s``: the rover's own speed when that began.
+``struck``: number of the mover that it touches, from 1; ``struck_m_s``: the rover's own speed at the last contact.
 ``turning_radius_m``: 0 for skid steering; ``wheel_rad``: angle of the steered wheels, clockwise.
 ``slide_m_s``: sideways speed, to the right; 0 unless the ground is slippery.
 ``grip_1``, ``grip_3``: share of each servo output that reaches the ground; ``drawn_ah``: drawn from the battery so far.
@@ -183,6 +183,7 @@ def drive(rover: Any, surroundings: Surroundings, servo_1: float, servo_3: float
         if room_m <= here_m:
             if rover.touching == 0:
                 rover.contacts += 1
+                rover.struck_m_s = math.hypot(before_m_s, rover.slide_m_s)
             rover.touching = 1
             rover.speed_m_s = 0.0
             rover.slide_m_s = 0.0

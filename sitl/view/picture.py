@@ -46,17 +46,22 @@ def save_picture(run: Drive, path: Path) -> None:
     _draw_movers(axes, run)
     _draw_track(axes, north, east, [p.part for p in track])
     _draw_places(axes, run)
+    _draw_collisions(axes, run)
     axes.set_aspect("equal")
     axes.set_xlabel("east, m")
     axes.set_ylabel("north, m")
     report = run.report
     figure.suptitle(
         f"{run.mission.name}: {report.outcome} - {report.distance_m:.0f} m in {report.driving_time_s:.0f} s, "
-        f"{report.steps} steps ({report.return_steps} returning), {report.collisions} collisions, seed {report.seed}",
+        f"{report.steps} steps ({report.return_steps} returning), {_counted(report.collisions)}, seed {report.seed}",
         fontsize=12,
     )
     figure.legend(loc="outside lower center", ncols=LEGEND_COLUMNS, frameon=False)
     figure.savefig(path)
+
+
+def _counted(collisions: int) -> str:
+    return "1 collision" if collisions == 1 else f"{collisions} collisions"
 
 
 def _extent(world: World) -> tuple[float, float, float, float]:
@@ -161,6 +166,16 @@ def _draw_track(axes: Axes, north: NDArray[np.float64], east: NDArray[np.float64
     margin_m = 3.0
     axes.set_xlim(min(axes.get_xlim()[0], east.min() - margin_m), max(axes.get_xlim()[1], east.max() + margin_m))
     axes.set_ylim(min(axes.get_ylim()[0], north.min() - margin_m), max(axes.get_ylim()[1], north.max() + margin_m))
+
+
+def _draw_collisions(axes: Axes, run: Drive) -> None:
+    """A red cross where the rover touched something, with time and speed."""
+    for number, collision in enumerate(run.simulator.collisions):
+        place = (collision.east_m, collision.north_m)
+        label = "collision" if number == 0 else None
+        axes.plot(*place, "X", color="#ff0000", markeredgecolor="white", markersize=13, zorder=10, label=label)
+        text = f"{collision.time_s:.1f} s, {collision.speed_m_s:.1f} m/s"
+        axes.annotate(text, place, textcoords="offset points", xytext=(9, -12), color="#ff0000", fontsize=9, zorder=10)
 
 
 def _draw_places(axes: Axes, run: Drive) -> None:

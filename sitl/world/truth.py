@@ -5,7 +5,6 @@ Nouns: Collision, Truth.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -65,14 +64,35 @@ class Truth:
 class Collision:
     """The rover touched an obstacle: when, and where its centre was (world frame).
 
-    ``mover``: name of the moving obstacle, if it was one; ``speed_m_s``: the rover's own speed then.
+    ``mover``: name of the moving obstacle, if it was one; ``speed_m_s``: the rover's own speed then, without a sign.
     """
 
     time_s: float
     north_m: float
     east_m: float
-    mover: str | None = None
-    speed_m_s: float = math.nan
+    mover: str | None
+    speed_m_s: float
+
+    @property
+    def what(self) -> str:
+        """What was touched."""
+        return "an obstacle" if self.mover is None else self.mover
+
+    def told(self, start: SimStart) -> str:
+        """What was touched, how fast, when, and where from the rover's start, like LOCAL_POSITION_NED."""
+        north_m, east_m = self.north_m - start.north_m, self.east_m - start.east_m
+        where = f"north {north_m:.1f} m, east {east_m:.1f} m of its start"
+        return f"the rover touched {self.what} with {self.speed_m_s:.1f} m/s at {self.time_s:.1f} s, {where}"
+
+    def as_json(self, start: SimStart) -> dict[str, float | str]:
+        """The same, with metres from the rover's start."""
+        return {
+            "time_s": round(self.time_s, 2),
+            "north_m": round(self.north_m - start.north_m, 3),
+            "east_m": round(self.east_m - start.east_m, 3),
+            "speed_m_s": round(self.speed_m_s, 3),
+            "with": self.what,
+        }
 
 
 class Named(Protocol):
@@ -87,6 +107,4 @@ class Named(Protocol):
 def collision_of(rover: Any, movers: Sequence[Named], time_s: float) -> Collision:
     """The contact that the plant's record has just noted; ``movers``: the world's, in their order."""
     struck, here = int(rover["struck"]), (float(rover["north_m"]), float(rover["east_m"]))
-    if struck == 0:
-        return Collision(time_s, *here)
-    return Collision(time_s, *here, movers[struck - 1].name, float(rover["struck_m_s"]))
+    return Collision(time_s, *here, movers[struck - 1].name if struck else None, abs(float(rover["struck_m_s"])))

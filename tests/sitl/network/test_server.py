@@ -135,16 +135,18 @@ def test_collisions_are_told_of_with_their_place_not_more_than_one_a_second() ->
     touched: list[Collision] = []
     stand_in = SimpleNamespace(start=simulator.start, collisions=touched)
     start = simulator.start
-    touched.append(Collision(61.3, start.north_m + 3.0, start.east_m - 1.5))
+    touched.append(Collision(61.3, start.north_m + 3.0, start.east_m - 1.5, None, 0.62))
     log.look(cast(Simulator, stand_in))
-    assert said == ["collision 1: the rover touched an obstacle at 61.3 s, north 3.0 m, east -1.5 m of its start"]
+    assert said == [
+        "collision 1: the rover touched an obstacle with 0.6 m/s at 61.3 s, north 3.0 m, east -1.5 m of its start"
+    ]
     for _ in range(3):
-        touched.append(Collision(61.5, start.north_m, start.east_m, "cart"))
+        touched.append(Collision(61.5, start.north_m, start.east_m, "cart", 1.0))
         log.look(cast(Simulator, stand_in))
     assert len(said) == 1
     real_s = 1.5
     log.look(cast(Simulator, stand_in))
-    assert said[1].startswith("collision 4: the rover touched cart at 61.5 s")
+    assert said[1].startswith("collision 4: the rover touched cart with 1.0 m/s at 61.5 s")
 
 
 def test_a_rebooting_vehicle_drops_its_tcp_clients(bench: Bench) -> None:

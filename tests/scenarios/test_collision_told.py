@@ -1,0 +1,62 @@
+"""A collision is told wherever a run is looked at: its place, its time, how fast, and with what."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from sitl.cli.commands import app
+
+WORLD = """
+size_m = [30.0, 20.0]
+[[obstacle]]
+line_m = [[8.0, 14.0], [14.0, 14.0]]
+width_m = 0.3
+material = "glass"
+"""
+MISSION = """
+name = "Glass"
+[[target]]
+north_m = 0.0
+east_m = 16.0
+[sitl]
+world = "world.toml"
+start = [5, 10]
+"""
+
+
+def test_in_lines_table_figures_record_and_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("world.toml").write_text(WORLD)
+    Path("glass.toml").write_text(MISSION)
+    command = [
+        "drive",
+        "glass.toml",
+        "--time-limit-s",
+        "70",
+        "--json",
+        "figures.json",
+        "--record",
+        "run",
+        "--image",
+        "glass.png",
+    ]
+    result = CliRunner().invoke(app, command, env={"COLUMNS": "160"})
+    assert result.exit_code == 4
+    (contact,) = json.loads(Path("figures.json").read_text())["contacts"]
+    assert contact["with"] == "an obstacle" and 0.5 < contact["speed_m_s"] < 2.0
+    assert contact["east_m"] == pytest.approx(14.0 - 5.5 - 0.15 - 0.35, abs=0.1)
+    assert contact["north_m"] == pytest.approx(0.0, abs=0.3)
+    assert json.loads(Path("run/collisions.json").read_text()) == [contact]
+    line = (
+        f"collision 1: the rover touched an obstacle with {contact['speed_m_s']:.1f} m/s at {contact['time_s']:.1f} s"
+    )
+    assert line in result.output
+    assert f"{contact['time_s']} s: an obstacle, {contact['speed_m_s']} m/s" in result.output
+    pixels = np.array(Image.open("glass.png").convert("RGB"))
+    assert (pixels == (255, 0, 0)).all(axis=2).sum() > 100, "the red cross"
