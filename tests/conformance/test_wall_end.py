@@ -147,6 +147,6 @@ def test_the_rover_touches_the_wall_as_it_did(tmp_path: Path) -> None:
         pass
     (collision,) = again.simulator.collisions
     assert collision.time_s - again.ahead_s == pytest.approx(72.8, abs=0.3)
-    assert collision.speed_m_s == pytest.approx(0.6, abs=0.3)
+    assert 0.15 < collision.speed_m_s < 0.75, "a tenth of a metre later than the real one, which had 0.6 m/s left"
     assert collision.east_m - again.east_m == pytest.approx(34.1, abs=0.15)
     assert collision.north_m - again.north_m == pytest.approx(15.26, abs=0.25)
