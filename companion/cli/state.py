@@ -75,15 +75,14 @@ class RunState:
         self.previous: PreviousRun | None = None
         self._mission = mission
         self._resume = resume
+        self._named = directory is not None
+        self._say = say
         self._place: StateDirectory | None = None
         try:
             self._place = StateDirectory(directory or default_directory(os.environ))
             self._load(say)
         except StateDirectoryError as error:
-            self.close()
-            if directory is not None or resume:
-                raise
-            say(f"{error}; this run cannot be resumed")
+            self._do_without(error)
 
     @property
     def ended(self) -> bool:
@@ -112,7 +111,15 @@ class RunState:
         return list(zip(names, self.previous.state.progress.statuses, strict=True))
 
     def start(self, budget: ShutdownBudget | None = None) -> None:
-        """Start writing the state."""
+        """Start writing the state, when all else that a run needs is there. Without --resume an old one is set aside.
+
+        Raises StateDirectoryError like the constructor.
+        """
+        try:
+            if self._place is not None and not self._resume:
+                self._place.set_aside()
+        except StateDirectoryError as error:
+            self._do_without(error)
         if self._place is not None:
             writer = ThreadStateWriter(StateFile(self._place.file, OsDisk()), budget)
             self.checkpointer = Checkpointer(self._mission, writer, self.previous)
@@ -124,10 +131,15 @@ class RunState:
         if self._place is not None:
             self._place.close()
 
+    def _do_without(self, error: StateDirectoryError) -> None:
+        self.close()
+        self._place = None
+        if self._named or self._resume:
+            raise error
+        self._say(f"{error}; this run cannot be resumed")
+
     def _load(self, say: Callable[[str], None]) -> None:
-        assert self._place is not None
-        if not self._resume:
-            self._place.set_aside()
+        if not self._resume or self._place is None:
             return
         self.previous = self._place.load(self._mission)
         if self.previous is None:

@@ -13,6 +13,7 @@ FORMS = (
     "serial:DEVICE:BAUD, /dev/ttyNAME or /dev/ttyNAME,BAUD"
 )
 DEFAULT_BAUD = 115200
+LEAST_BAUD, MOST_BAUD = 300, 12_000_000
 
 __all__ = [
     "FORMS",
@@ -65,10 +66,17 @@ def _serial(place: str, url: str, clock: Clock) -> SerialLink:
     device, sign, baud = place.rpartition("," if "," in place else ":")
     if place == url and sign == ":" and not baud.isdigit():  # /dev/serial/by-path names have colons of their own
         device, sign = place, ""
-    return SerialLink(device or place, _number(baud, url, "baud rate") if sign else DEFAULT_BAUD, clock)
+    if place and not sign:
+        return SerialLink(place, DEFAULT_BAUD, clock)
+    if not device:
+        raise LinkError(f"'{url}' names no device; use {FORMS}")
+    rate = _number(baud, url, "baud rate", " (a device with a colon in its name needs one behind it)")
+    if not LEAST_BAUD <= rate <= MOST_BAUD:
+        raise LinkError(f"'{url}': {rate} is no baud rate from {LEAST_BAUD} to {MOST_BAUD}; use {FORMS}")
+    return SerialLink(device, rate, clock)
 
 
-def _number(text: str, url: str, what: str) -> int:
+def _number(text: str, url: str, what: str, hint: str = "") -> int:
     if not text.isascii() or not text.isdigit():
-        raise LinkError(f"'{url}': '{text}' is not a {what}; use {FORMS}")
+        raise LinkError(f"'{url}': '{text}' is not a {what}{hint}; use {FORMS}")
     return int(text)

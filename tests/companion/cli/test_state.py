@@ -50,6 +50,8 @@ def test_without_resume_a_mission_begins_anew_and_the_state_before_is_kept(tmp_p
     leave_state(tmp_path, mission).close()
     keeping = RunState(mission, tmp_path / "state", resume=False, say=print)
     assert keeping.previous is None
+    assert (tmp_path / "state" / "mission.state").exists(), "the run may still fail to begin: no link, no record"
+    keeping.start()
     keeping.close()
     assert sorted(path.name for path in (tmp_path / "state").iterdir()) == ["lock", "mission.state.before"]
 

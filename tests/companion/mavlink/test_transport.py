@@ -342,8 +342,14 @@ class TestUrls:
         link = open_link(form.format(name))
         assert link.description == f"serial:{name}:{baud}"
         link.close()
-        with pytest.raises(LinkError, match="the port does not take this baud rate"):
-            open_link(f"serial:{name}:99999999999")
+        for baud_text in ("0", "299", "12000001", "99999999999"):
+            with pytest.raises(LinkError, match="is no baud rate from 300 to 12000000"):
+                open_link(f"serial:{name}:{baud_text}")
+        with pytest.raises(LinkError, match=r"'1\.0' is not a baud rate .a device with a colon in its name needs one"):
+            open_link("serial:/dev/serial/by-path/pci-0000:00:14.0-usb-0:1:1.0")
+        for url in ("serial:", "serial::9600"):
+            with pytest.raises(LinkError, match="names no device"):
+                open_link(url)
         os.close(rover)
         os.close(device)
 
