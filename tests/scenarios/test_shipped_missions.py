@@ -25,7 +25,7 @@ SOLVABLE = [
 SUITES = ["lidar-90", "lidar-360", "beams"]
 ALWAYS = [
     *((name, "lidar-90") for name in SOLVABLE),
-    ("clutter.toml", "lidar-360"), ("dead-end.toml", "lidar-360"), ("field.waypoints", "lidar-360"),
+    ("dead-end.toml", "lidar-360"), ("field.waypoints", "lidar-360"),
     ("one-obstacle.toml", "beams"),
 ]  # fmt: skip
 """The others are driven by ``make test-all``."""

@@ -130,7 +130,6 @@ def test_a_record_of_the_real_firmware_that_an_older_version_made_replays_withou
     """Its settings have a key that is called otherwise today, and none for the rule that its contact has led to."""
     record = load_record(SHARED / "data" / "real-firmware" / "wall-end")
     assert "errand_reach_m" in str(record.meta.settings) and record.settings.safety.requested_goal_m == 300.0
-    assert replay(record).differences != [], "today it gets no position while it swings"
     guidance = record.settings.guidance.model_copy(update={"swing_m_s2": 1e9})
     result = replay(replace(record, settings=record.settings.model_copy(update={"guidance": guidance})))
     assert result.differences == []
