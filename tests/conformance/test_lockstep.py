@@ -64,7 +64,9 @@ def check_same_bytes(mission: str, environment: dict[str, str]) -> None:
     assert float(driven_m) > 10.0
 
 
-@pytest.mark.parametrize("mission", [EVERYTHING, AUTO], ids=["everything", "auto"])
+@pytest.mark.parametrize(
+    "mission", [EVERYTHING, pytest.param(AUTO, marks=pytest.mark.thorough)], ids=["everything", "auto"]
+)
 def test_the_same_seed_gives_the_same_bytes_with_another_c_library(mission: str) -> None:
     check_same_bytes(mission, NO_FMA)
 

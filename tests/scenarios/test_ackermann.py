@@ -29,7 +29,7 @@ def run_of(suite: str, seed: int) -> Drive:
     [
         pytest.param("lidar-360", 0, marks=pytest.mark.thorough),
         ("lidar-360", 2),
-        ("lidar-90", 0),
+        pytest.param("lidar-90", 0, marks=pytest.mark.thorough),
         pytest.param("lidar-90", 1, marks=pytest.mark.thorough),
     ],
 )

@@ -32,7 +32,8 @@ def test_crossing_is_driven_without_a_collision(planner: str, suite: str) -> Non
     assert run.report.exit_code == 0
 
 
-@pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.thorough) for seed in range(2, 7))])
+@pytest.mark.thorough
+@pytest.mark.parametrize("seed", range(1, 7))
 def test_other_seeds_meet_other_traffic_and_do_not_touch_it(seed: int) -> None:
     """Nothing there gives way, and one of the six announces nothing: with some seeds in twenty it is touched."""
     run = driven("hybrid", "lidar-90", seed)
