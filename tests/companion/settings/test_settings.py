@@ -95,3 +95,9 @@ def test_every_setting_is_read_somewhere() -> None:
     names = {(section, key) for section, part in Settings() if isinstance(part, BaseModel) for key, _ in part}
     unread = {(s, key) for s, key in names if not re.search(rf"\b{key}\b", text) and f".{key}" not in own}
     assert len(names) > 50 and unread == set()
+
+
+def test_a_whole_number_that_no_kernel_takes_is_refused() -> None:
+    assert parse_settings({"navigator": {"quick": {"max_epochs": 2**31 - 1}}}, "s.toml")
+    with pytest.raises(SettingsError, match=r"navigator\.quick: max_epochs should be at most 2147483647"):
+        parse_settings({"navigator": {"quick": {"max_epochs": 2**31}}}, "s.toml")
