@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from companion.app import Companion, Status
+from companion.checkpoint.checkpointer import Checkpointer
 from companion.core.clock import stopwatch_s
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
@@ -132,6 +133,8 @@ class Drive:
     seed: int
     recorder: Recorder | NullRecorder
     time_limit_s: float = 3600.0
+    checkpointer: Checkpointer | None = None
+    """Saves the companion's state."""
 
     def __post_init__(self) -> None:
         self.report = Report(self.seed)
@@ -140,13 +143,30 @@ class Drive:
         warm_up(self.settings, self.mission.rover.turning_radius_m)
         self.simulator = self.scenario.simulator(self.seed)
         self.report.compile_time_s = stopwatch_s() - began_s
+        self._start_companion()
+
+    def _start_companion(self) -> None:
         near, far = MemoryLink.pair()
         self.clock = LockstepClock(self.simulator, self.simulator.connect(name="companion"), far)
         codec = Codec(self.settings.link)
         autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder)
         self.companion = Companion(
-            autopilot, self.clock, self.mission, self.settings, InlineRunner(), self.recorder, seed=self.seed, arm=True
+            autopilot,
+            self.clock,
+            self.mission,
+            self.settings,
+            InlineRunner(),
+            self.recorder,
+            seed=self.seed,
+            arm=True,
+            checkpointer=self.checkpointer,
         )
+
+    def kill_companion(self, absent_s: float, resumed: Checkpointer) -> None:
+        """The companion says nothing more; ``absent_s`` later another one takes its place and resumes the run."""
+        self.simulator.advance_to_s(self.simulator.time_s + absent_s)
+        self.checkpointer = resumed
+        self._start_companion()
 
     def run(self, observe: Callable[[Status], None] = lambda status: None) -> Report:
         """Drive until the mission has ended or the time limit is reached."""

@@ -13,6 +13,7 @@ from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.mission import Mission, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS, REAL32, steered_wheels
 from sitl.faults.fault_file import load_faults
 from sitl.faults.plan import FaultPlan, SensorFault
@@ -116,7 +117,7 @@ def scenario_from_mission(mission: Mission) -> Scenario:
         which = f"sitl.movers {touching + 1 - own}" if touching >= own else f"{spec.world}: mover {touching + 1}"
         raise ScenarioError(f"{name}: {which}: starts where the rover stands; let it start farther from home")
     start = SimStart(*start_m, math.radians(spec.heading_deg), _home(mission, spec))
-    parameters = {"WP_SPEED": mission.rover.cruise_speed_m_s, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
+    parameters = {"WP_SPEED": mission.rover.cruise_speed_m_s, **RECOMMENDED_PARAMETERS}
     turning_radius_m = _turning_radius_m(mission, spec, name)
     sensors = spec.sensors if isinstance(spec.sensors, str) else described
     motors = spec.drivetrain

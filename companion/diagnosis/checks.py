@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.vehicle.events import RoverMode
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
 from companion.vehicle.survey import Survey
 
@@ -37,6 +38,7 @@ PARAMETERS = (
     "GUID_OPTIONS",
     "GUID_TIMEOUT",
     "WP_RADIUS",
+    "WP_JERK",
     "WP_SPEED",
     "PRX1_TYPE",
     "RNGFND1_TYPE",
@@ -277,10 +279,10 @@ def avoidance(seen: Survey) -> Iterator[Finding]:
     paths, simple = seen.parameters.get("OA_TYPE", 0.0), seen.parameters.get("AVOID_ENABLE", 0.0)
     if paths:
         says = "The autopilot plans ways round obstacles itself, and ignores new targets meanwhile."
-        yield to_set("oa-type", Level.STOP, says, "OA_TYPE", paths, 0.0)
+        yield to_set("oa-type", Level.STOP, says, "OA_TYPE", paths, RECOMMENDED_PARAMETERS["OA_TYPE"])
     if simple:
         says = "The autopilot's simple avoidance creeps towards obstacles and stays there, without a word."
-        yield to_set("avoid-enable", Level.STOP, says, "AVOID_ENABLE", simple, 0.0)
+        yield to_set("avoid-enable", Level.STOP, says, "AVOID_ENABLE", simple, RECOMMENDED_PARAMETERS["AVOID_ENABLE"])
 
 
 def guided(seen: Survey) -> Iterator[Finding]:
@@ -296,7 +298,13 @@ def guided(seen: Survey) -> Iterator[Finding]:
     radius_m = seen.parameters.get("WP_RADIUS", 1.0)
     if radius_m > RADIUS_M:
         says = f"The autopilot takes a target for reached {radius_m:g} m before it, and cuts corners so."
-        yield to_set("wp-radius", Level.WARN, says, "WP_RADIUS", radius_m, 1.0)
+        yield to_set("wp-radius", Level.WARN, says, "WP_RADIUS", radius_m, RECOMMENDED_PARAMETERS["WP_RADIUS"])
+    wanted_m_s3 = RECOMMENDED_PARAMETERS["WP_JERK"]
+    jerk_m_s3 = seen.parameters.get("WP_JERK", wanted_m_s3)
+    if jerk_m_s3 != wanted_m_s3:
+        how = "slowly" if jerk_m_s3 < wanted_m_s3 else "abruptly"
+        says = f"The rover begins and ends its way to a target {how}; the companion was tried with {wanted_m_s3:g}."
+        yield to_set("wp-jerk", Level.NOTE, says, "WP_JERK", jerk_m_s3, wanted_m_s3)
     if seen.parameters.get("WP_SPEED") == 0.0:
         yield to_set("wp-speed", Level.WARN, "Guided speed is left to CRUISE_SPEED.", "WP_SPEED", 0.0, 2.0)
 

@@ -24,6 +24,7 @@ EXPERIMENTS = (
     "navigation",
     "driving",
     "dead-companion",
+    "killed-companion",
     "wang-table4",
     "sedighi-table1",
     "achour-table1",
@@ -67,7 +68,7 @@ def experiment(
 ) -> None:
     """Run the experiment NAME and print its tables.
 
-    Exit code 2: bad input; 3: soak, dead-companion: a collision or a failure.
+    Exit code 2: bad input; 3: soak, dead-companion, killed-companion: a collision or a failure.
     """
     console = Console()
     try:

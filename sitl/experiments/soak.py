@@ -23,6 +23,7 @@ from companion.executive.mission_progress import TargetStatus
 from companion.recording.recorder import NullRecorder
 from companion.safety.reasons import Activity
 from companion.settings import Settings
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.modes import arm, arming_faults, set_mode
 from sitl.autopilot.state import Mode
 from sitl.experiments import soak_faults, soak_worlds
@@ -126,7 +127,7 @@ def soaked(seed: int) -> Soaked:
     plan = soak_faults.plan_of(rng)
     assert mission.sitl is not None
     start = SimStart(*ground.start_m, np.radians(mission.sitl.heading_deg), SOMEWHERE)
-    parameters = {"WP_SPEED": 2.0, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0, "BATT_LOW_VOLT": 10.5}
+    parameters = {"WP_SPEED": 2.0, **RECOMMENDED_PARAMETERS, "BATT_LOW_VOLT": 10.5}
     scenario = Scenario(ground.world, start, suite, parameters=parameters, faults=plan)
     result = Soaked(seed, ground.kind, suite, tuple(type(fault).__name__ for fault in plan.faults))
     try:

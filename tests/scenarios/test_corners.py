@@ -15,6 +15,7 @@ import pytest
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.lockstep import Drive
 from sitl.plant.rover import SIM_ROVER, Drivetrain, two_wheels
 from sitl.scenario import SOMEWHERE, Scenario
@@ -24,7 +25,7 @@ from sitl.world.world import World
 EAGER = two_wheels(3.46, 0.25, 0.6)
 FINE_M = 0.25
 WIDTH_M, HEIGHT_M = 50.0, 36.0
-PARAMETERS = {"WP_SPEED": 2.0, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
+PARAMETERS = {"WP_SPEED": 2.0, **RECOMMENDED_PARAMETERS}
 FOUND = 94
 """Without the rule for swinging rovers, the eager one touches a wall's end here."""
 

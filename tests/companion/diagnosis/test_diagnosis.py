@@ -32,8 +32,8 @@ LIDAR = RangeSource("OBSTACLE_DISTANCE", 196, 0, None, 0.1, 8.0, 10.0)
 BEAM = RangeSource("DISTANCE_SENSOR", 1, 0, 0, 0.2, 20.0, 10.0)
 WELL_SET = {
     "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0, "GUID_OPTIONS": 0.0, "GUID_TIMEOUT": 3.0, "WP_RADIUS": 1.0, "WP_SPEED": 2.0,
-    "PRX1_TYPE": 0.0, "RNGFND1_TYPE": 0.0, "FS_GCS_ENABLE": 1.0, "FENCE_ENABLE": 0.0, "MAV_GCS_SYSID": 255.0,
-    "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0,
+    "WP_JERK": 3.0, "PRX1_TYPE": 0.0, "RNGFND1_TYPE": 0.0, "FS_GCS_ENABLE": 1.0, "FENCE_ENABLE": 0.0,
+    "MAV_GCS_SYSID": 255.0, "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0,
 }  # fmt: skip
 WELL = Survey(
     place="memory",
@@ -81,6 +81,8 @@ CASES: list[tuple[str, Level, Survey]] = [
     ("guid-options", S, with_set(GUID_OPTIONS=72.0)),
     ("guid-timeout", W, with_set(GUID_TIMEOUT=20.0)),
     ("wp-radius", W, with_set(WP_RADIUS=3.0)),
+    ("wp-jerk", N, with_set(WP_JERK=0.0)),
+    ("wp-jerk", N, with_set(WP_JERK=20.0)),
     ("wp-speed", W, with_set(WP_SPEED=0.0)),
     ("echo", N, with_set(PRX1_TYPE=2.0)),
     ("gcs-failsafe", N, with_set(FS_GCS_ENABLE=0.0)),

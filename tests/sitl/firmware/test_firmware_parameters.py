@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS, steered_wheels
 from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
 from sitl.firmware.parameter_files import ParameterFile
 from sitl.firmware.physics import servo_output
 from sitl.sensors.range_sensors import SUITES
 
-MISSION = {"WP_SPEED": 2.0, "WP_RADIUS": 1.0, "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0}
+MISSION = {"WP_SPEED": 2.0, **RECOMMENDED_PARAMETERS}
 
 
 @pytest.mark.parametrize("suite", ["none", "beams", "lidar-360"])

@@ -1,0 +1,248 @@
+"""A companion that is killed again and again and resumes its run: every shipped mission, with every suite of sensors.
+
+Each drive is made with the firmware's own simulated rover, and with one that turns faster than it is told
+(``EAGER``). The next death comes at a random moment; for as long as a program takes to start, nobody leads the rover.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, replace
+from enum import StrEnum
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import ClassVar
+
+import numpy as np
+from rich.table import Table
+
+from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
+from companion.checkpoint.state_directory import StateDirectory
+from companion.checkpoint.state_writer import StateFile
+from companion.mission.mission import DrivetrainSpec, Mission, SitlSpec
+from companion.recording.recorder import NullRecorder
+from companion.settings import Settings
+from companion.storage.files import OsDisk
+from sitl.experiments.dead_companion import STOOD_M_S, SUITES, shipped, with_suite
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, each
+from sitl.experiments.results_page import markdown_table, terminal_table
+from sitl.experiments.soak import Person
+from sitl.lockstep import Drive
+from sitl.scenario import scenario_from_mission
+
+NAME = "killed-companion"
+EAGER = DrivetrainSpec(top_speed_m_s=3.46, lag_s=0.25, track_m=0.6)
+"""Drives 0.9 of the top speed and turns 2.4 times as fast as the default gains are for (docs/sitl.md)."""
+
+
+class Motors(StrEnum):
+    """Which rover is driven."""
+
+    OWN = "own"
+    """The mission's."""
+    EAGER = "eager"
+
+
+HEAD = ("mission", "drives", "deaths", "touched", "run into", "ended", "person")
+TIME_LIMIT_S = 1800.0
+LIVES_S = (2.0, 20.0)
+"""A companion lives for so long, drawn evenly, from the moment at which it leads the rover."""
+ABSENT_S = (1.0, 8.0)
+"""So long it takes until another one listens: on the firmware, driving went on after 1.9 to 4.5 s."""
+
+
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """One contact, and what had happened before it."""
+
+    time_s: float
+    speed_m_s: float
+    mover: str | None
+    since_death_s: float | None
+    """None before the first death."""
+
+
+@dataclass(slots=True)
+class KilledDrive:
+    """One drive."""
+
+    mission: str
+    suite: str
+    motors: Motors
+    seed: int
+    deaths: list[float] = field(default_factory=list)
+    """Seconds since the autopilot's start."""
+    contacts: list[Contact] = field(default_factory=list)
+    ended: bool = False
+    """The mission ended by itself within the time limit."""
+    person: int = 0
+
+    @property
+    def touched(self) -> int:
+        """Contacts of the rover while it moved on, not those of things that ran into it."""
+        return len(self.contacts) - self.run_into
+
+    @property
+    def run_into(self) -> int:
+        """It stood, and something that moves came along."""
+        return sum(one.mover is not None and abs(one.speed_m_s) < STOOD_M_S for one in self.contacts)
+
+
+class _InlineStateWriter:
+    """Writes at once: what a killed program has not handed over is lost."""
+
+    busy = False
+
+    def __init__(self, file: StateFile) -> None:
+        self._file = file
+
+    @property
+    def problem(self) -> str:
+        return self._file.problem
+
+    def put(self, update: StateUpdate) -> None:
+        self._file.apply(update)
+
+    def close(self) -> None:
+        """Nothing is left to write."""
+
+
+def kept_in(directory: Path, mission: Mission) -> Checkpointer:
+    """What ``run --resume --state DIR`` would start with."""
+    place = StateDirectory(directory)
+    previous = place.load(mission)
+    place.close()  # a process that is killed loses its lock
+    return Checkpointer(mission, _InlineStateWriter(StateFile(place.file, OsDisk())), previous)
+
+
+def drive_with_deaths(mission: Mission, motors: Motors, seed: int) -> KilledDrive:
+    """Drive a mission to its end while its companion is killed every few seconds."""
+    suite = str(mission.sitl.sensors) if mission.sitl is not None else ""
+    result, rng, person = KilledDrive(mission.name, suite, motors, seed), np.random.default_rng((seed, 13)), Person()
+    with TemporaryDirectory() as folder:
+        place = Path(folder)
+        drive = Drive(
+            mission,
+            scenario_from_mission(mission),
+            Settings(),
+            seed,
+            NullRecorder(),
+            TIME_LIMIT_S,
+            kept_in(place, mission),
+        )
+        simulator = drive.simulator
+        dies_s: float | None = None
+        while not drive.companion.done and simulator.time_s < TIME_LIMIT_S:
+            drive.companion.tick()
+            person.look(drive, drive.companion.status().activity)
+            if dies_s is None:
+                leads = drive.companion.driver is not None and simulator.truth.speed_m_s != 0.0
+                dies_s = simulator.time_s + float(rng.uniform(*LIVES_S)) if leads else None
+            elif simulator.time_s >= dies_s:
+                result.deaths.append(simulator.time_s)
+                drive.kill_companion(float(rng.uniform(*ABSENT_S)), kept_in(place, mission))
+                dies_s = None
+        result.ended, result.person = drive.companion.done, person.helped
+    for hit in simulator.collisions:
+        before = [death_s for death_s in result.deaths if death_s <= hit.time_s]
+        since_s = hit.time_s - before[-1] if before else None
+        result.contacts.append(Contact(hit.time_s, hit.speed_m_s, hit.mover, since_s))
+    return result
+
+
+def deaths_of(mission: Mission, motors: Motors, seed: int, count: int) -> list[KilledDrive]:
+    """As many drives as it takes to die so often."""
+    drives: list[KilledDrive] = []
+    while sum(len(one.deaths) for one in drives) < count and len(drives) < count:
+        drives.append(drive_with_deaths(mission, motors, seed + len(drives)))
+    return drives
+
+
+@dataclass(frozen=True)
+class KilledReport(ExperimentReport):
+    """See ``ExperimentReport``."""
+
+    name: ClassVar[str] = NAME
+    options: Options
+    drives: tuple[KilledDrive, ...]
+
+    def tables(self) -> list[Table]:
+        """One for each suite of sensors."""
+        return [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in SUITES]
+
+    @property
+    def failure(self) -> str:
+        """Contacts."""
+        touched = sum(drive.touched for drive in self.drives)
+        return f"{touched} contacts of a rover whose companion was killed and resumed" if touched else ""
+
+    def as_json(self) -> dict[str, object]:
+        """Every drive."""
+        drives = [asdict(drive) for drive in self.drives]
+        return {"experiment": NAME, "seed": self.options.seed, "runs": self.options.runs, "drives": drives}
+
+    def _rows(self, suite: str) -> list[list[str]]:
+        own = [drive for drive in self.drives if drive.suite == suite]
+        kinds = dict.fromkeys((drive.mission, drive.motors) for drive in own)
+        rows = [
+            _row(f"{name}, {motors}", [drive for drive in own if (drive.mission, drive.motors) == (name, motors)])
+            for name, motors in kinds
+        ]
+        return [*rows, _row("all", own)]
+
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
+        tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in SUITES)
+        deaths = sum(len(drive.deaths) for drive in self.drives)
+        touched, run_into = sum(d.touched for d in self.drives), sum(d.run_into for d in self.drives)
+        return f"""## A companion that is killed and resumed
+
+`{self.options.command(NAME)}`
+
+{deaths} deaths in {len(self.drives)} drives: each mission with each suite of sensors, with the firmware's own
+simulated rover and with an eager one ({EAGER.top_speed_m_s:g} m/s, {EAGER.lag_s:g} s, {EAGER.track_m:g} m: it turns
+faster than it is told), until the companion had died {self.options.runs} times. It lives for {LIVES_S[0]:g} to
+{LIVES_S[1]:g} s from when the rover moves, and is missing for {ABSENT_S[0]:g} to {ABSENT_S[1]:g} s. *touched*: contacts
+while the rover moved: **{touched}**; *run into*: it stood, and something that moves came along: {run_into}; *ended*:
+drives whose mission ended by itself within {TIME_LIMIT_S:g} s; *person*: how often somebody had to set GUIDED or arm.
+
+{tables}
+"""
+
+
+def _row(name: str, drives: Iterable[KilledDrive]) -> list[str]:
+    own = list(drives)
+    return [
+        name,
+        f"{len(own)}",
+        f"{sum(len(d.deaths) for d in own)}",
+        f"{sum(d.touched for d in own)}",
+        f"{sum(d.run_into for d in own)}",
+        f"{sum(d.ended for d in own)}",
+        f"{sum(d.person for d in own)}",
+    ]
+
+
+def run(options: Options, advance: Advance) -> KilledReport:
+    """Each mission with each suite and both rovers, killed as many times as there are runs."""
+    missions = [
+        (with_motors(with_suite(mission, suite), motors), motors)
+        for mission in shipped(options)
+        for suite in SUITES
+        for motors in Motors
+        if motors is Motors.OWN or mission.rover.turning_radius_m <= 0.0
+    ]
+    drives: list[KilledDrive] = []
+    seeds = range(options.seed, options.seed + 100 * len(missions), 100)
+    tasks = ((mission, motors, seed, options.runs) for (mission, motors), seed in zip(missions, seeds, strict=True))
+    for done, some in enumerate(each(options.jobs, deaths_of, tasks), start=1):
+        drives += some
+        advance(done, len(missions))
+    return KilledReport(options, tuple(drives))
+
+
+def with_motors(mission: Mission, motors: Motors) -> Mission:
+    """The same mission with the eager rover, if that is wanted."""
+    if motors is Motors.OWN:
+        return mission
+    return replace(mission, sitl=replace(mission.sitl or SitlSpec(), drivetrain=EAGER))
