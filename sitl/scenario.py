@@ -78,13 +78,13 @@ class Scenario:
             drivetrain=self.drivetrain,
         )
 
-    def physics(self, seed: int, *, scans: bool = False) -> Physics:
+    def physics(self, seed: int, *, linked: bool = False) -> Physics:
         """The same rover and world for the real firmware. Raises ScenarioError for unsuitable sensors."""
         suite = suite_named(self.sensors) if isinstance(self.sensors, str) else self.sensors
         try:
             return Physics(
                 self.world, self.start, suite, seed, self.rover_radius_m, self.turning_radius_m,
-                scans=scans, drivetrain=self.drivetrain,
+                linked=linked, drivetrain=self.drivetrain,
             )  # fmt: skip
         except ValueError as error:
             raise ScenarioError(f"sensors: {error}; describe fewer beams") from error

@@ -13,6 +13,7 @@ import math
 
 from companion.control.braking import braking_distance_m, fastest_within_m, stopping_distance_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
+from companion.control.drag import DragWatch
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, unseen_flank
@@ -30,6 +31,8 @@ ROLL_SHARES = (0.25, 0.5, 0.75, 1.0)
 """Directions, as shares of a turn, that are looked along before a rolling rover begins to turn."""
 
 
+SWUNG_SHARE = 0.5
+"""Of guidance.swing_m_s2: below it a rover that swung is as good as straight."""
 OVERRUN_M = 0.3
 """A rover that stands so far beyond the last position may not have reached it, for the autopilot."""
 STANDS_M_S = 0.1
@@ -50,6 +53,10 @@ class PointController:
     def __init__(self) -> None:
         self._looking_rad: float | None = None
         self._braking = False
+        self._swinging = False
+        self._drag = DragWatch()
+        self._held_m = 0.0
+        self._told: ControlCommand | None = None
         self._position: NedPoint | None = None
         self._anew_s: float | None = None
         """Since when the rover has been stopped so that its next position is begun anew."""
@@ -58,7 +65,10 @@ class PointController:
         """The command for this moment. ``BLOCKED``: not even the next piece of the path is clear."""
         if view.speed_m_s > OVERSPEED * view.rover.fastest_m_s:
             return stop_for(Purpose.BRAKE)
+        self._swinging = _is_swinging(view, was_swinging=self._swinging)
+        self._held_m = self._drag.overshoot_m(self._told, view)
         command = self._begun_anew(self._command(path, view), view)
+        self._told = command
         self._braking = command.purpose is Purpose.BRAKE
         self._looking_rad = command.setpoint.heading_rad if isinstance(command.setpoint, GuidedHeading) else None
         return command
@@ -93,7 +103,7 @@ class PointController:
         needed_m = braking_distance_m(view.speed_m_s, settings)
         if _would_touch(view, needed_m):
             return stop_for(Purpose.BRAKE)
-        reach = farthest_clear(path, view)
+        reach = farthest_clear(path, view, self._held_m)
         distance_m = pose.point.distance_m(path.end)
         at_end = _is_at_end(path)
         rolling = view.speed_m_s > settings.roll_out_m_s
@@ -117,12 +127,14 @@ class PointController:
         error = abs(wrap_pi_rad(bearing - pose.heading_rad))
         beside_m = clearance_m(view.evidence, pose.point, settings.slow_within_m + rover.radius_m) - rover.radius_m
         close = beside_m < settings.slow_within_m
-        turn_first_rad = _turn_first_rad(close, self._looking_rad is not None, settings)
+        # Thin beams do not see the flanks: near something the rover turns on the spot before it drives.
+        turns_first = self._looking_rad is not None or (close and rover.narrow_sight)
+        turn_first_rad = _turn_first_rad(close, turns_first, settings)
         if error > turn_first_rad and pose.point.distance_m(reach.target) > 0.5:
             if close or _would_touch_turning(view, bearing):
                 return turn_to(bearing, view)
             return _turn_rolling(bearing, view)
-        if _is_swinging(view):
+        if self._swinging:
             return (
                 turn_to(bearing, view) if close or _would_touch_turning(view, bearing) else _turn_rolling(bearing, view)
             )
@@ -148,13 +160,16 @@ def _turn_rolling(bearing_rad: float, view: LocalView) -> ControlCommand:
     return ControlCommand(Purpose.LOOK, GuidedHeading(bearing_rad), view.settings.guidance.min_speed_m_s)
 
 
-def _is_swinging(view: LocalView) -> bool:
+def _is_swinging(view: LocalView, *, was_swinging: bool) -> bool:
     """Whether the rover turns so fast while it rolls that a position given now would make it swing past.
+
+    Once it does, it must come nearly straight: a position in between would set it swinging again.
 
     ArduRover begins to shape a position target with the acceleration a that the rover has. In a turn that points to the
     side, speed times turn rate, and falls off with WP_JERK j: until then it has become a speed of a² / 2j to that side.
     """
-    return view.speed_m_s * abs(view.yaw_rate_rad_s) > view.settings.guidance.swing_m_s2
+    limit_m_s2 = view.settings.guidance.swing_m_s2 * (SWUNG_SHARE if was_swinging else 1.0)
+    return view.speed_m_s * abs(view.yaw_rate_rad_s) > limit_m_s2
 
 
 def speed_limit_m_s(beside_m: float, bearing_error_rad: float, rover: RoverLimits, settings: GuidanceSettings) -> float:

@@ -28,6 +28,7 @@ from companion.navigation.field_step import (
     Part,
     SearchKind,
     abandon_path,
+    follows_clear_path,
     initial_state,
     is_clear,
     retrace,
@@ -94,7 +95,7 @@ class GoalDriver:
         seed = (self.seed + self._epoch) % 2**63
         self._state = initial_state(cell, goal.cell, seed, navigator.better_every_fields)
         if way:
-            self._state = retrace(self._state, way)
+            self._state = retrace(self._state, way, view.evidence.grid)
         self.path = None
         self.decision = None
         self._doubts_left = navigator.doubts
@@ -290,8 +291,7 @@ class GoalDriver:
             return True
         if self._state.returning:
             return not is_clear(view.evidence.grid, self._state.past[:-4:-1])
-        current = self._state.current
-        return current is None or not is_clear(view.evidence.grid, current.cell_array[self._state.index :])
+        return not follows_clear_path(self._state, view.evidence.grid)
 
     def _lay_path(self, decision: Decision, view: LocalView) -> None:
         """The reference path for a decision; a planned path that goes on keeps its own."""

@@ -221,6 +221,8 @@ class MissionExecutor:
     def go_back(self, reason: str, rally: list[NedPoint], pose: Pose) -> None:
         """Give the mission up: to the nearest rally point, or back the way the rover came. ``reason`` is told."""
         planner = make_planner("dijkstra", self._settings.current.planner)
+        # The rover may have entered a field since the last tick.
+        self.trail.enter(self.evidence.base.cell_at(pose.point))
         self._refuges = refuges(self.progress.home, self.trail, rally, pose.point, self.evidence, planner)
         missed = [name for name, status in self.statuses() if status is not TargetStatus.REACHED]
         text = f"Returning: {reason}. Missed: {', '.join(missed) or 'nothing'}"
@@ -251,7 +253,7 @@ class MissionExecutor:
             self.driver.pause()
             return MissionTask.STAND
         if self.driver.goal != self.progress.goal:
-            if self._is_refused(now_s):
+            if self._is_refused(now_s) or self._rolls_on(view):
                 return MissionTask.STAND
             self._notifier.tell(f"Heading for {self.progress.goal.name}", Severity.INFO)
             self.driver.head_for(self.progress.goal, view, self._way_back(view.pose))
@@ -296,6 +298,11 @@ class MissionExecutor:
         navigator = self._settings.current.navigator
         self.progress = on_unreachable(self.progress, now_s, navigator.wait_retry_s, navigator.wait_limit_s)
         return True
+
+    def _rolls_on(self, view: LocalView) -> bool:
+        """Whether the rover leaves the place where its way back begins: that is laid from where it comes to stand."""
+        follows = bool(self._refuges) and bool(self._refuges[0].way)
+        return follows and abs(view.speed_m_s) > view.settings.guidance.roll_out_m_s
 
     def _way_back(self, pose: Pose) -> tuple[Cell, ...]:
         """The fields to follow to a refuge, where they are known and the rover has not left that way."""

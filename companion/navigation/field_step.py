@@ -79,7 +79,8 @@ class NavState:
     ``past``: the walk from the start to the last field entered. ``current``: the path that is followed; ``index``: the
     rover's place on it. ``returning``: part A. ``until_search``: fields until its next search. ``since_better``: fields
     since the last search for a better path, ``better_every``: after how many it is due. ``draws``: state of the random
-    choice of two or three.
+    choice of two or three. ``proven``: obstacles in the map that the rover has driven through: it passed beside what
+    is there.
     """
 
     target: Cell
@@ -91,6 +92,7 @@ class NavState:
     since_better: int = 0
     draws: int = 0
     better_every: int = 5
+    proven: frozenset[Cell] = frozenset()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -120,14 +122,15 @@ def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavSt
         return state, Decision(Action.REACHED, Part.EXPLORE, (), None, DecisionReason.REACHED)
     if state.returning:
         return _return(state, grid, search, entered=entered)
-    if state.current is not None and is_clear(grid, state.current.cell_array[state.index :]):
+    if follows_clear_path(state, grid):
         return _explore(state, grid, search, entered=entered)
     return _search(state, grid, search)
 
 
-def retrace(state: NavState, way: tuple[Cell, ...]) -> NavState:
-    """Follow fields from here to the target that were driven before, while they stay clear, without better paths."""
-    return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER)
+def retrace(state: NavState, way: tuple[Cell, ...], grid: Grid) -> NavState:
+    """Follow fields from here to the target that were driven before, without better paths, while they stay as clear."""
+    proven = frozenset(cell for cell in way if grid.is_obstacle(cell))
+    return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER, proven=proven)
 
 
 def abandon_path(state: NavState) -> NavState:
@@ -135,8 +138,16 @@ def abandon_path(state: NavState) -> NavState:
     return replace(state, current=None)
 
 
-def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...]) -> bool:
-    """Whether none of these fields but the first (where the rover is) is an obstacle, and no step cuts a corner."""
+def follows_clear_path(state: NavState, grid: Grid) -> bool:
+    """Whether there is a current path, and what is left of it is clear."""
+    return state.current is not None and is_clear(grid, state.current.cell_array[state.index :], state.proven)
+
+
+def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...], proven: frozenset[Cell] = frozenset()) -> bool:
+    """Whether none of these fields but the first (where the rover is) is an obstacle, and no step cuts a corner.
+
+    Steps into ``proven`` fields are clear.
+    """
     if len(cells) < 2:
         return True
     x, y = np.asarray(cells).T
@@ -145,7 +156,10 @@ def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...]) -> bool:
     ahead = grid.weights[y[1:], x[1:]]
     corners = np.maximum(grid.weights[y[:-1], x[1:]], grid.weights[y[1:], x[:-1]])
     diagonal = (x[1:] != x[:-1]) & (y[1:] != y[:-1])
-    return not bool((ahead >= 1.0).any() or (corners[diagonal] >= 1.0).any())
+    blocked = (ahead >= 1.0) | (diagonal & (corners >= 1.0))
+    if proven and blocked.any():
+        blocked &= [(int(at_x), int(at_y)) not in proven for at_x, at_y in zip(x[1:], y[1:], strict=True)]
+    return not bool(blocked.any())
 
 
 def simplified(past: tuple[Cell, ...]) -> tuple[Cell, ...]:
@@ -239,7 +253,7 @@ def _repair_past(
 def _follow_new(
     state: NavState, path: Path, part: Part, searches: tuple[SearchKind, ...], reason: DecisionReason
 ) -> tuple[NavState, Decision]:
-    state = replace(state, current=path, index=0, returning=False, since_better=0, until_search=0)
+    state = replace(state, current=path, index=0, returning=False, since_better=0, until_search=0, proven=frozenset())
     return state, Decision(Action.FOLLOW, part, path.cells, path, reason, searches)
 
 

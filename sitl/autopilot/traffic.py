@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
-from typing import Any
+from typing import Any, Protocol
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from sitl.autopilot.channel import Channel, new_codec, packed
+from sitl.autopilot.channel import new_codec, packed
 from sitl.autopilot.routing import AUTOPILOT
 from sitl.world import geodesy
 from sitl.world.geodesy import ALTITUDE_M
@@ -26,6 +26,9 @@ INTERVALS_S = {Announcement.VEHICLE: 0.25, Announcement.ADSB: 1.0, Announcement.
 
 HEARTBEAT_S = 1.0
 
+ADSB = 156
+"""Component id of a receiver of its own."""
+
 GENERIC, GROUND_ROVER, ACTIVE = 0, 10, 4
 
 SURFACE_SERVICE = 18
@@ -38,6 +41,38 @@ ADSB_FLAGS = (
 )
 
 AIS_FLAGS = mavlink.AIS_FLAGS_VALID_COG | mavlink.AIS_FLAGS_VALID_VELOCITY | mavlink.AIS_FLAGS_VALID_DIMENSIONS
+
+
+class Outlet(Protocol):
+    """Where announcements go out: a channel of the autopilot, or a link to one elsewhere."""
+
+    outbox: bytearray
+
+    def send(self, message: Any) -> None:
+        """Queue what the autopilot's receivers heard, as its own message."""
+        ...
+
+
+class TrafficPort:
+    """A link to an autopilot elsewhere: what its receivers would have heard comes from ``ADSB`` of its system."""
+
+    def __init__(self) -> None:
+        self.outbox = bytearray()
+        self._codec = new_codec(ADSB)
+
+    def belong_to(self, system: int) -> None:
+        """The autopilot's system id."""
+        self._codec.srcSystem = system
+
+    def send(self, message: Any) -> None:
+        """See Outlet."""
+        self.outbox += packed(message, self._codec)
+
+    def take(self) -> bytes:
+        """What was sent since the last call."""
+        data = bytes(self.outbox)
+        self.outbox.clear()
+        return data
 
 
 class Traffic:
@@ -63,8 +98,8 @@ class Traffic:
         """Time of the next packet; inf without announced movers."""
         return min(self._due_s.values(), default=math.inf)
 
-    def send_due(self, time_s: float, channels: Iterable[Channel]) -> None:
-        """Send what is due at this moment on the autopilot's channels."""
+    def send_due(self, time_s: float, channels: Iterable[Outlet]) -> None:
+        """Send what is due at this moment."""
         channels = tuple(channels)
         for number in self._talkers:
             if time_s < self._due_s[number] - 1e-9:

@@ -66,7 +66,7 @@ def physics() -> None:
     from companion.mission.mission import Mission
     from sitl.scenario import scenario_from_mission
 
-    scenario_from_mission(Mission("", ())).physics(0, scans=False).rehearse()
+    scenario_from_mission(Mission("", ())).physics(0, linked=False).rehearse()
 
 
 FOR_A_DRIVE: Sequence[Job] = (genetic_planner, simulator, graph_searches, drive)

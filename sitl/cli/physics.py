@@ -31,7 +31,8 @@ def physics(
     port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port at which the firmware asks.")] = 9002,
     host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 for other computers.")] = "127.0.0.1",
     mavlink: Annotated[
-        str | None, typer.Option(metavar="URL", help=f"Where the lidar publishes its scans: {FORMS}.")
+        str | None,
+        typer.Option(metavar="URL", help=f"Where the lidar's scans and what moving things announce go: {FORMS}."),
     ] = None,
     params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
     write_params: Annotated[
@@ -46,7 +47,7 @@ def physics(
     link: ClientLink | None = None
     try:
         scenario = scenario_from_mission(equipped(load_mission(mission_file), sensors, params))
-        behind = scenario.physics(seed, scans=mavlink is not None)
+        behind = scenario.physics(seed, linked=mavlink is not None)
         _write_parameters(scenario, behind, write_params)
         link = open_link(mavlink) if mavlink else None
         # Compile everything before the firmware waits for answers.
@@ -98,6 +99,8 @@ def _greeting(behind: Physics, host: str, port: int, mavlink: str | None, parame
     ]
     if behind.suite.lidar and mavlink is None:
         lines.append("the lidar is not published: give --mavlink URL, for instance tcp:127.0.0.1:5762")
+    if behind.announces and mavlink is None:
+        lines.append("moving things announce nothing: give --mavlink URL, for instance tcp:127.0.0.1:5762")
     if behind.suite.proximity:
         lines.append("the proximity sectors are left out: the firmware computes its own from rangefinders or scans")
     return lines

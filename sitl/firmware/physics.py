@@ -18,10 +18,12 @@ import numpy as np
 from numba import njit
 
 from sitl.autopilot.lidar import Scanner, ScannerPort
+from sitl.autopilot.traffic import Traffic, TrafficPort
 from sitl.firmware.json_frames import COUNTS, RANGES_MOST, BodyState, ServoFrame, decode, encode
 from sitl.plant.closed_loop import NoiseSettings
 from sitl.plant.rover import GRAVITY_M_S2, SIM_ROVER, Drivetrain, drive, meet_movers, new_rover
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite
+from sitl.world import geodesy
 from sitl.world.truth import Collision, SimStart, collision_of
 from sitl.world.world import Surroundings, World
 
@@ -104,10 +106,10 @@ class Physics:
 
     def __init__(
         self, world: World, start: SimStart, suite: SensorSuite, seed: int = 0, rover_radius_m: float = 0.35,
-        turning_radius_m: float = 0.0, range_noise_m: float = NoiseSettings().range_m, *, scans: bool = False,
+        turning_radius_m: float = 0.0, range_noise_m: float = NoiseSettings().range_m, *, linked: bool = False,
         drivetrain: Drivetrain = SIM_ROVER,
     ) -> None:  # fmt: skip
-        """``scans``: the lidar publishes on a link of its own, see ``take``; ``turning_radius_m``: 0 for skid steering.
+        """``linked``: scans and announcements go out, see ``take``; ``turning_radius_m``: 0 for skid steering.
 
         Raises ValueError for more rangefinders than the firmware accepts.
         """
@@ -117,7 +119,8 @@ class Physics:
         self.tally = Tally()
         self._make = (seed, rover_radius_m, turning_radius_m, range_noise_m)
         self._drivetrain = drivetrain
-        self._scans = scans
+        self._linked = linked
+        self._traffic_port = TrafficPort()
         self._port = ScannerPort()
         self._outbox = bytearray()
         self._sender: object = None
@@ -137,7 +140,9 @@ class Physics:
         )
         rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
         self._sensing = RangeSensing(suite, self.world, noise_m, rng)
-        self._scanner = Scanner(suite.lidar, self._sensing) if suite.lidar and self._scans else None
+        self._scanner = Scanner(suite.lidar, self._sensing) if suite.lidar and self._linked else None
+        place = (geodesy.to_units(start.home.lat_deg), geodesy.to_units(start.home.lon_deg))
+        self._traffic = Traffic(self.world, place, (start.north_m, start.east_m))
         self._surroundings, self._doors_move_s = self.world.surroundings(0.0), self.world.next_change_s(0.0)
         self._ranges_m = [math.nan] * len(suite.beams)
         self._measured = 0
@@ -187,23 +192,28 @@ class Physics:
         self._move(0.0, 0.0, PLANT_STEP_S)
         self._measure(self.motion)
         self._outbox.clear()
-        self._port = ScannerPort()
+        self._port, self._traffic_port = ScannerPort(), TrafficPort()
         self._begin()
 
     @property
     def system(self) -> int | None:
-        """System id of the autopilot heard on the lidar's link; None if none was."""
+        """System id of the autopilot heard on the link; None if none was."""
         return self._port.system
 
     def hear(self, data: bytes) -> None:
-        """Take in bytes from the lidar's link."""
+        """Take in bytes from the link."""
         self._port.hear(data)
 
     def take(self) -> bytes:
-        """The packets that the lidar has sent since the last call."""
+        """The scans and announcements since the last call."""
         data = bytes(self._outbox)
         self._outbox.clear()
         return data
+
+    @property
+    def announces(self) -> bool:
+        """Whether something that moves announces itself."""
+        return self._traffic.talks
 
     @property
     def motion(self) -> Motion:
@@ -272,3 +282,7 @@ class Physics:
         time_us = round(self.time_s * 1e6)
         if self._scanner is not None and time_us >= self._scanner.next_due_us():
             self._outbox += self._port.packed(self._scanner.due(time_us, *here))
+        if self._linked and self.time_s >= self._traffic.next_due_s():
+            self._traffic_port.belong_to(self.system or 1)
+            self._traffic.send_due(self.time_s, (self._traffic_port,))
+            self._outbox += self._traffic_port.take()

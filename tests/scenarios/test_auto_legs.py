@@ -223,7 +223,7 @@ def test_what_is_no_leg_of_ours_is_not_driven(tmp_path: Path, fields: dict[str, 
     rig.until(lambda: item(rig) == 2, 60.0)
     driven_m = rig.simulator.driven_m
     rig.run_for(8.0)
-    assert rig.simulator.driven_m - driven_m < 1.0
+    assert rig.simulator.driven_m - driven_m < 1.3, "it rolls out"
     assert not any(one.is_setpoint and not one.is_standstill for one in rig.sent)
     assert ("lat_int" in fields) == any("not in the mission as it was read" in text for text in rig.texts())
 

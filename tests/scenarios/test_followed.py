@@ -6,13 +6,13 @@ from pathlib import Path
 from typing import Any
 
 from companion.operator.notifications import NOT_FOLLOWED_S
-from tests.support.rig import GUIDED, HOLD, Rig, yard
+from tests.support.rig import GATE, GUIDED, HOLD, Rig, yard
 
 ANOTHER = "The autopilot follows another target than the one sent"
 
 
 def test_a_target_that_is_not_taken_is_told_of(tmp_path: Path) -> None:
-    rig = Rig(yard(tmp_path), late_s=45.0)
+    rig = Rig(yard(tmp_path, GATE + "speed_m_s = 0.8\n"), late_s=45.0)
 
     def elsewhere(message: Any) -> Any:
         if message.get_type() == "POSITION_TARGET_GLOBAL_INT":

@@ -58,7 +58,7 @@ def test_the_same_autopilot_drives_over_the_interface_as_in_the_simulator(
 def test_the_companion_drives_a_mission_over_the_interface_by_the_published_lidar() -> None:
     mission = load_mission(ROOT / "missions" / "one-obstacle.toml")
     scenario = scenario_from_mission(mission)
-    behind = scenario.physics(0, scans=True)
+    behind = scenario.physics(0, linked=True)
     split = cast(Any, SplitVehicle(behind, scenario.parameters))
     settings = Settings()
     warm_up(settings, mission.rover.turning_radius_m)

@@ -18,6 +18,7 @@ from companion.navigation.field_step import (
     abandon_path,
     initial_state,
     is_clear,
+    retrace,
     simplified,
     step,
 )
@@ -286,6 +287,16 @@ def test_a_new_path_is_followed_for_five_fields_before_the_next_look():
     search = Scripted(NEVER)
     step(state, blocked, Cell(7, 1), search)
     assert search.kinds == [BETTER]
+
+
+def test_a_way_driven_before_is_gone_back_through_fields_that_were_marked_then_and_no_others():
+    beside = ground("..........", "..........", "....#.....")
+    state = retrace(initial_state(ROW[0], TARGET), ROW, beside)
+    state, decision = step(state, beside, ROW[1], unused)
+    assert decision.part is Part.EXPLORE and decision.path == ROW[1:]
+    shut = ground("..........", "..........", "....#.#...")
+    _, decision = step(state, shut, ROW[2], Scripted(NEVER))
+    assert decision.part is not Part.EXPLORE
 
 
 def test_the_number_of_fields_between_looks_is_a_setting():

@@ -127,10 +127,10 @@ def test_an_answer_is_taken_in_the_round_in_which_the_run_took_it(tmp_path: Path
 
 @needs_shared
 def test_a_record_of_the_real_firmware_that_an_older_version_made_replays_without_a_difference() -> None:
-    """Its settings have a key that is called otherwise today, and none for the rule that its contact has led to."""
+    """Its settings have a key that is called otherwise today, and none for the rules that contacts have led to."""
     record = load_record(SHARED / "data" / "real-firmware" / "wall-end")
     assert "errand_reach_m" in str(record.meta.settings) and record.settings.safety.requested_goal_m == 300.0
-    guidance = record.settings.guidance.model_copy(update={"swing_m_s2": 1e9})
+    guidance = record.settings.guidance.model_copy(update={"swing_m_s2": 1e9, "held_overshoot_s": 0.0})
     result = replay(replace(record, settings=record.settings.model_copy(update={"guidance": guidance})))
     assert result.differences == []
     assert result.ticks > 3000 and result.decisions > 200

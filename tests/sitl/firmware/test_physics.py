@@ -18,7 +18,7 @@ from sitl.plant.rover import SIM_ROVER, WHEEL_MOST_RAD, WHEEL_RATE_RAD_S
 from sitl.sensors.range_flaws import Flaws
 from sitl.sensors.range_sensors import SUITES, Beam, SensorSuite
 from sitl.world.doors import Door
-from sitl.world.movers import Mover, timed_track
+from sitl.world.movers import Announcement, Mover, timed_track
 from sitl.world.truth import SimStart
 from sitl.world.world import World
 from tests.support.firmware import NEW, OLD, Firmware, frame
@@ -33,11 +33,11 @@ def physics(
     *,
     turning_radius_m: float = 0.0,
     heading_deg: float = 0.0,
-    scans: bool = False,
+    linked: bool = False,
     seed: int = 0,
 ) -> Physics:
     start = replace(START, heading_rad=math.radians(heading_deg))
-    return Physics(world or World.open(), start, suite, seed, turning_radius_m=turning_radius_m, scans=scans)
+    return Physics(world or World.open(), start, suite, seed, turning_radius_m=turning_radius_m, linked=linked)
 
 
 def walled(north_m: float = 15.0) -> World:
@@ -241,7 +241,7 @@ def test_a_restarted_firmware_finds_the_world_as_at_first() -> None:
     world = replace(
         walled(), movers=(Mover("cart", 0.3, timed_track([(14.0, 5.0), (14.0, 15.0)], 1.0, 0.0, repeats=True)),)
     )
-    behind = physics(world, SUITES["beams"], scans=True)
+    behind = physics(world, SUITES["beams"], linked=True)
     first = [behind.answer(frame(count, 1700, 1600)) for count in range(300)]
     again = [behind.answer(frame(count, 1700, 1600)) for count in range(300)]
     assert again == first
@@ -363,7 +363,7 @@ def messages(data: bytes) -> list[mavlink.MAVLink_message]:
 
 
 def test_the_lidar_publishes_scans_and_heartbeats_as_component_196() -> None:
-    behind = physics(walled(), SUITES["lidar-90"], scans=True)
+    behind = physics(walled(), SUITES["lidar-90"], linked=True)
     one = firmware(behind)
     one.drive(5.0)
     said = messages(behind.take())
@@ -379,14 +379,36 @@ def test_the_lidar_publishes_scans_and_heartbeats_as_component_196() -> None:
     assert nearer.distances[36] == pytest.approx(100.0 * (5.0 - one.state["position"][0]), abs=15)
 
 
-def test_without_a_line_the_lidar_is_silent() -> None:
-    behind = physics(walled(), SUITES["lidar-90"])
+def test_moving_things_announce_themselves_on_the_link_even_without_a_lidar() -> None:
+    track = timed_track([(14.0, 5.0), (14.0, 15.0)], 1.0, 0.0, repeats=True)
+    movers = tuple(Mover(kind.value, 0.3, track, announce=kind) for kind in Announcement)
+    behind = physics(replace(walled(), movers=movers), SUITES["none"], linked=True)
+    firmware(behind).drive(3.0)
+    said = messages(behind.take())
+    senders = {message.get_type(): (message.get_srcSystem(), message.get_srcComponent()) for message in said}
+    vehicle, receiver = (101, 1), (1, 156)
+    assert senders == {
+        "HEARTBEAT": vehicle, "GLOBAL_POSITION_INT": vehicle, "ADSB_VEHICLE": receiver, "AIS_VESSEL": receiver,
+    }  # fmt: skip
+    places = [message for message in said if message.get_type() == "GLOBAL_POSITION_INT"]
+    assert 11 <= len(places) <= 13
+    assert places[-1].vy == pytest.approx(100, abs=1) and places[-1].lon > places[0].lon
+    beat = mavlink.MAVLink_heartbeat_message(10, 3, 0, 0, 4, 3)
+    behind.hear(beat.pack(mavlink.MAVLink(None, 7, 1)))
+    firmware(behind).drive(3.0)
+    assert {m.get_srcSystem() for m in messages(behind.take()) if m.get_type() == "ADSB_VEHICLE"} == {7}
+
+
+def test_without_a_line_the_lidar_is_silent_and_so_is_what_moves() -> None:
+    track = timed_track([(14.0, 5.0), (14.0, 15.0)], 1.0, 0.0, repeats=True)
+    cart = Mover("cart", 0.3, track, announce=Announcement.VEHICLE)
+    behind = physics(replace(walled(), movers=(cart,)), SUITES["lidar-90"])
     firmware(behind).drive(2.0)
     assert behind.take() == b""
 
 
 def test_the_lidar_takes_the_system_id_of_the_first_autopilot_it_hears() -> None:
-    behind = physics(walled(), SUITES["lidar-90"], scans=True)
+    behind = physics(walled(), SUITES["lidar-90"], linked=True)
     one = firmware(behind)
     one.drive(0.5)
     assert {message.get_srcSystem() for message in messages(behind.take())} == {1}
@@ -410,7 +432,7 @@ def test_the_lidar_takes_the_system_id_of_the_first_autopilot_it_hears() -> None
 
 
 def test_noise_on_the_lidars_line_hurts_nothing() -> None:
-    behind = physics(walled(), SUITES["lidar-90"], scans=True)
+    behind = physics(walled(), SUITES["lidar-90"], linked=True)
     beat = mavlink.MAVLink_heartbeat_message(10, 3, 0, 0, 4, 3).pack(mavlink.MAVLink(None, 7, 1))
     behind.hear(bytes(range(256)) * 3)
     for _ in range(30):
@@ -420,7 +442,7 @@ def test_noise_on_the_lidars_line_hurts_nothing() -> None:
 
 
 def test_rehearsing_leaves_no_trace() -> None:
-    rehearsed, fresh = (physics(walled(), SUITES["lidar-360"], scans=True) for _ in range(2))
+    rehearsed, fresh = (physics(walled(), SUITES["lidar-360"], linked=True) for _ in range(2))
     rehearsed.rehearse()
     for count in range(100):
         assert rehearsed.answer(frame(count, 1700, 1600)) == fresh.answer(frame(count, 1700, 1600))
