@@ -20,6 +20,8 @@ APPROACH_M = 1.0
 AHEAD_RAD = math.radians(30.0)
 """A position farther aside is not driven to at full speed."""
 FORGOTTEN_S = 2.0
+PAUSE_S = 0.5
+"""After so long without a command the one before counts no more."""
 MOST_M = 1.5
 
 
@@ -36,6 +38,8 @@ class DragWatch:
         now_s, speed_m_s = view.pose.time_s, view.speed_m_s
         passed_s = 0.0 if self._time_s is None else max(now_s - self._time_s, 0.0)
         self._time_s = now_s
+        if passed_s > PAUSE_S:
+            told = None  # somebody else had the rover meanwhile, or it stayed at a target
         wanted_m_s = 0.0 if told is None else _wanted_m_s(told, view)
         ramp_m_s = self._expected_m_s + view.settings.guidance.deceleration_m_s2 * passed_s
         self._expected_m_s = max(min(wanted_m_s, ramp_m_s), speed_m_s)

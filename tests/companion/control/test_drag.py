@@ -46,6 +46,12 @@ def test_what_held_it_is_forgotten_slowly() -> None:
     assert 0.5 * held_m < watched(watch, FAR, [1.7] * 20, 4.0) < 0.7 * held_m
 
 
+def test_after_a_pause_it_gets_going_again() -> None:
+    watch = DragWatch()
+    assert watched(watch, FAR, [1.7] * 20) == 0.0
+    assert watched(watch, FAR, [0.0, 0.0, 0.0], 30.0) == 0.0
+
+
 @pytest.mark.parametrize(
     "told", [None, stop_for(Purpose.BRAKE), ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(2.0, 6.0)), 2.0)]
 )
