@@ -147,7 +147,8 @@ class Drive:
 
     def _start_companion(self) -> None:
         near, far = MemoryLink.pair()
-        self.clock = LockstepClock(self.simulator, self.simulator.connect(name="companion"), far)
+        self._link = self.simulator.connect(name="companion")
+        self.clock = LockstepClock(self.simulator, self._link, far)
         codec = Codec(self.settings.link)
         autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder)
         self.companion = Companion(
@@ -164,6 +165,7 @@ class Drive:
 
     def kill_companion(self, absent_s: float, resumed: Checkpointer) -> None:
         """The companion says nothing more; ``absent_s`` later another one takes its place and resumes the run."""
+        self.simulator.disconnect(self._link)
         self.simulator.advance_to_s(self.simulator.time_s + absent_s)
         self.checkpointer = resumed
         self._start_companion()

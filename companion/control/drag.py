@@ -1,7 +1,9 @@
-"""How much slower the rover is than it was told to be, for longer than it takes to get going: it is held by the ground.
+"""Drag watch: how much slower the rover is than it was told, for longer than it takes to get going.
 
-ArduRover then opens the throttle ever wider. Where the rough ground ends the rover shoots ahead, past its position. So
-the more it is held, the more room its positions get.
+Such a rover is held by the ground. ArduRover then opens the throttle ever wider. Where the rough ground ends the rover
+shoots ahead, past its position. So the more it is held, the more room its positions get.
+
+Nouns: drag watch.
 """
 
 from __future__ import annotations
@@ -14,7 +16,11 @@ from companion.core.frames import wrap_pi_rad
 from companion.vehicle.commands import GuidedPosition
 
 SLACK_M_S = 0.3
-"""A rover that gets going is so much slower than the ramp that it was told."""
+"""A rover on firm ground may be so much slower than expected."""
+GAINS_M_S2 = 0.5
+"""A rover on firm ground gains speed at least this fast once it rolls."""
+SETS_OFF_S = 1.0
+"""So long after the first position it may go on as before: braking, or standing."""
 APPROACH_M = 1.0
 """ArduRover approaches a place d metres away with at most sqrt(d - 1) m/s."""
 AHEAD_RAD = math.radians(30.0)
@@ -26,22 +32,31 @@ MOST_M = 1.5
 
 
 class DragWatch:
-    """Follows what the rover was told and what it does."""
+    """Compares what the rover does with what it was told."""
 
     def __init__(self) -> None:
-        self._time_s: float | None = None
+        self._told: ControlCommand | None = None
+        self._time_s = -math.inf
+        self._idle_s = -math.inf
         self._expected_m_s = 0.0
         self._held_m_s = 0.0
 
-    def overshoot_m(self, told: ControlCommand | None, view: LocalView) -> float:
-        """Once a tick: how much farther the rover may shoot past a position. ``told``: the command before."""
+    def tell(self, command: ControlCommand | None) -> None:
+        """What the rover has been told in this tick; None for nothing that drives it."""
+        self._told = command
+
+    def overshoot_m(self, view: LocalView) -> float:
+        """Once a tick: how much farther the rover may shoot past a position."""
         now_s, speed_m_s = view.pose.time_s, view.speed_m_s
-        passed_s = 0.0 if self._time_s is None else max(now_s - self._time_s, 0.0)
+        passed_s = now_s - self._time_s
         self._time_s = now_s
-        if passed_s > PAUSE_S:
-            told = None  # somebody else had the rover meanwhile, or it stayed at a target
+        # After a pause somebody else had the rover meanwhile, or it stayed at a target.
+        told = None if passed_s > PAUSE_S else self._told
         wanted_m_s = 0.0 if told is None else _wanted_m_s(told, view)
-        ramp_m_s = self._expected_m_s + view.settings.guidance.deceleration_m_s2 * passed_s
+        if wanted_m_s == 0.0:
+            self._idle_s = now_s
+        sets_off = now_s - self._idle_s < SETS_OFF_S
+        ramp_m_s = 0.0 if sets_off else self._expected_m_s + GAINS_M_S2 * passed_s
         self._expected_m_s = max(min(wanted_m_s, ramp_m_s), speed_m_s)
         held_m_s = max(min(wanted_m_s, self._expected_m_s) - speed_m_s - SLACK_M_S, 0.0)
         self._held_m_s = max(held_m_s, self._held_m_s * math.exp(-passed_s / FORGOTTEN_S))

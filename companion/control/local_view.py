@@ -15,7 +15,10 @@ from companion.settings import Settings
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LocalView:
-    """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive."""
+    """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
+
+    ``held_overshoot_m``: it may shoot so much farther past a position than usual, because the ground holds it.
+    """
 
     pose: Pose
     speed_m_s: float
@@ -23,6 +26,7 @@ class LocalView:
     rover: RoverLimits
     settings: Settings
     yaw_rate_rad_s: float = 0.0
+    held_overshoot_m: float = 0.0
 
     def with_speeds(self, cruise_speed_m_s: float, fastest_m_s: float) -> LocalView:
         """The same moment with another cruise speed, and with the highest speed that is ever told on this way."""

@@ -13,7 +13,6 @@ import math
 
 from companion.control.braking import braking_distance_m, fastest_within_m, stopping_distance_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.drag import DragWatch
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, unseen_flank
@@ -29,10 +28,8 @@ STRAIGHT_RAD = math.radians(2.0)
 """A target that is no farther aside is reached straight."""
 ROLL_SHARES = (0.25, 0.5, 0.75, 1.0)
 """Directions, as shares of a turn, that are looked along before a rolling rover begins to turn."""
-
-
 SWUNG_SHARE = 0.5
-"""Of guidance.swing_m_s2: below it a rover that swung is as good as straight."""
+"""Below this share of guidance.swing_m_s2 a rover that swung counts as straight."""
 OVERRUN_M = 0.3
 """A rover that stands so far beyond the last position may not have reached it, for the autopilot."""
 STANDS_M_S = 0.1
@@ -54,9 +51,6 @@ class PointController:
         self._looking_rad: float | None = None
         self._braking = False
         self._swinging = False
-        self._drag = DragWatch()
-        self._held_m = 0.0
-        self._told: ControlCommand | None = None
         self._position: NedPoint | None = None
         self._anew_s: float | None = None
         """Since when the rover has been stopped so that its next position is begun anew."""
@@ -66,9 +60,7 @@ class PointController:
         if view.speed_m_s > OVERSPEED * view.rover.fastest_m_s:
             return stop_for(Purpose.BRAKE)
         self._swinging = _is_swinging(view, was_swinging=self._swinging)
-        self._held_m = self._drag.overshoot_m(self._told, view)
         command = self._begun_anew(self._command(path, view), view)
-        self._told = command
         self._braking = command.purpose is Purpose.BRAKE
         self._looking_rad = command.setpoint.heading_rad if isinstance(command.setpoint, GuidedHeading) else None
         return command
@@ -103,7 +95,7 @@ class PointController:
         needed_m = braking_distance_m(view.speed_m_s, settings)
         if _would_touch(view, needed_m):
             return stop_for(Purpose.BRAKE)
-        reach = farthest_clear(path, view, self._held_m)
+        reach = farthest_clear(path, view)
         distance_m = pose.point.distance_m(path.end)
         at_end = _is_at_end(path)
         rolling = view.speed_m_s > settings.roll_out_m_s

@@ -38,15 +38,15 @@ class Reach:
     room_m: float
 
 
-def farthest_clear(path: ReferencePath, view: LocalView, further_m: float = 0.0) -> Reach:
-    """The farthest place of the path in clear sight; ``further_m``: it may overshoot by so much more than usual.
+def farthest_clear(path: ReferencePath, view: LocalView) -> Reach:
+    """The farthest place of the path in clear sight.
 
     With wide room where there is that much, with less only where that leads farther. From walls that thin beams
     have seen more distance is kept: such a wall stays in the map where the position was wrong at that moment.
     """
     settings, here = view.settings.guidance, view.pose.point
     best = Reach(here, 0.0, 0.0)
-    search = _Search(path, view, further_m)
+    search = _Search(path, view)
     for extra_m, enough_m in settings.clearances:
         if view.rover.narrow_sight and extra_m < settings.narrow_clearance_m:
             break
@@ -64,8 +64,7 @@ class _Search:
     The rover stops there, or a little farther, on ground seen free (``reach_kernels.may_stop_at``).
     """
 
-    def __init__(self, path: ReferencePath, view: LocalView, further_m: float) -> None:
-        self._further_m = further_m
+    def __init__(self, path: ReferencePath, view: LocalView) -> None:
         settings, frame = view.settings.guidance, view.evidence.frame
         self._path, self._view = path, view
         self._last = min(len(path.points) - 1, path.progress + int(settings.horizon_m / STEP_M))
@@ -112,7 +111,8 @@ class _Search:
             radius=radius_m,
             map_radius=evidence.rover_radius_m,
             room=room_m,
-            overshoot=self._view.settings.guidance.overshoot_m + self._further_m,
+            overshoot=self._view.settings.guidance.overshoot_m,
+            held=self._view.held_overshoot_m,
             flank=radius_m + FLANK_M,
             near=radius_m + FLANK_NEAR_M,
             slack=ROLLED_M,

@@ -6,12 +6,13 @@ Nouns: mission run, order, stop.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 
 import numpy as np
 
 from companion.control.controller import STANDSTILL, ControlCommand
+from companion.control.drag import DragWatch
 from companion.control.setpoint_check import SetpointCheck
 from companion.core.frames import Pose
 from companion.core.scan import RangeScan
@@ -97,6 +98,7 @@ class MissionRun:
         self.end: Reason[EndReason] | None = None
         """Why the run ends; None while it goes on."""
         self.setpoint_check = SetpointCheck(notifier)
+        self._drag = DragWatch()
         self.legs = AutoModeLegs(notifier)
         self._settings = settings
         self._make_executor = make_executor
@@ -162,12 +164,14 @@ class MissionRun:
         if task is MissionTask.END or self.executor is None:
             return None
         executor, view = self.executor, self.executor.view(self.vehicle, now_s)
+        view = replace(view, held_overshoot_m=self._drag.overshoot_m(view))
         wanted = executor.guide(task, self.vehicle, view)
         wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
 
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:
         """Send it, if it is new or due again."""
+        self._drag.tell(command if isinstance(command, ControlCommand) else None)
         self.sender.speak(command, now_s)
 
 

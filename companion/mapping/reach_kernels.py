@@ -17,15 +17,17 @@ class Stopping(NamedTuple):
     """How the rover comes to a target and stands.
 
     ``radius``: of the rover. ``map_radius``: of the rover that the map was made for. ``room``: kept beside it on the
-    way. ``overshoot``: at most so far beyond the target it stands, and at most a tenth of the distance. ``flank``:
-    so far beside the middle the ground must have been seen, from ``near`` on. ``slack``: lengths that differ by less
-    are equal. ``edge``: left between a place and the edge of the map.
+    way. ``overshoot``: at most so far beyond the target it stands, and at most a tenth of the distance. ``held``: so much
+    farther, whatever the distance, because the ground holds it. ``flank``: so far beside the middle the ground must
+    have been seen, from ``near`` on. ``slack``: lengths that differ by less are equal. ``edge``: left between a place
+    and the edge of the map.
     """
 
     radius: float
     map_radius: float
     room: float
     overshoot: float
+    held: float
     flank: float
     near: float
     slack: float
@@ -46,7 +48,8 @@ def may_stop_at(ground, start, target, stopping):
     clear, seen = _look(ground, start, target, stopping.radius + stopping.room, stopping)
     if min(clear, seen) < distance - stopping.slack:
         return False
-    stands = moved_within_map(ground, target, ahead, min(stopping.overshoot, 0.1 * distance), stopping.edge)
+    overshoot = min(stopping.overshoot, 0.1 * distance) + stopping.held
+    stands = moved_within_map(ground, target, ahead, overshoot, stopping.edge)
     length = math.hypot(stands[0] - start[0], stands[1] - start[1])
     # The flanks first: with thin beams they fail most often.
     if first_unseen(ground.log_odds, start, stands, stopping.flank, stopping.near)[0] < length - 1e-6:

@@ -14,7 +14,7 @@ from companion.app import Companion
 from companion.core.frames import Pose
 from companion.core.grid import Grid
 from companion.mapping.evidence_map import known_fields
-from companion.navigation.field_step import Decision, NavState, is_clear
+from companion.navigation.field_step import Decision, NavState, follows_clear_path
 from companion.navigation.turning_cost import with_turning_cost
 from companion.planning.hybrid import Hybrid
 from companion.planning.planner import Capabilities, Planner
@@ -129,7 +129,7 @@ def _rest_of_path(scene: _Scene) -> Candidate:
     assert scene.state.current is not None
     current = scene.state.current
     ahead = current.cell_array[scene.state.index :]
-    note = "clear" if is_clear(scene.grid, ahead) else "blocked"
+    note = "clear" if follows_clear_path(scene.state, scene.grid) else "blocked"
     cost = cost_of(scene.weighed, ahead)
     return Candidate("what is left of the current path", note, Path(ahead, cost), cost)
 

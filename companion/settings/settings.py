@@ -137,7 +137,9 @@ class GuidanceSettings(Section):
         0.35, ge=0.0, description="how far beyond a guided position the rover may stop (ArduRover: 0.30 m)"
     )
     held_overshoot_s: float = Field(
-        1.0, ge=0.0, description="so much farther for each m/s that the ground holds the rover back (metres per m/s)"
+        1.0,
+        ge=0.0,
+        description="so much farther for each m/s that the ground holds it back; in all a tenth of the distance at most",
     )
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
     change_after_s: float = Field(0.1, ge=0.0, description="minimum time between targets that differ")

@@ -21,13 +21,19 @@ def watched(watch: DragWatch, told: ControlCommand | None, speeds_m_s: Any, sinc
     further_m = 0.0
     for tick, speed_m_s in enumerate(speeds_m_s):
         pose = Pose(2.0, 2.0, 0.0, since_s + tick * TICK_S)
-        further_m = watch.overshoot_m(told, view(ground(), pose, speed_m_s=float(speed_m_s)))
+        watch.tell(told)
+        further_m = watch.overshoot_m(view(ground(), pose, speed_m_s=float(speed_m_s)))
     return further_m
 
 
-def test_a_rover_that_gets_going_as_it_should_is_not_held() -> None:
-    speeds_m_s = [min(max(0.0, 0.8 * (tick * TICK_S - 0.3)), 1.7) for tick in range(100)]
+@pytest.mark.parametrize(("dead_s", "gain_m_s2"), [(0.3, 0.8), (0.9, 0.6), (0.5, 1.5)])
+def test_a_rover_that_gets_going_as_it_should_is_not_held(dead_s: float, gain_m_s2: float) -> None:
+    speeds_m_s = [min(max(0.0, gain_m_s2 * (tick * TICK_S - dead_s)), 1.7) for tick in range(100)]
     assert watched(DragWatch(), FAR, speeds_m_s) == 0.0
+
+
+def test_a_rover_that_does_not_set_off_is_held() -> None:
+    assert watched(DragWatch(), FAR, [0.0] * 80) > 1.0
 
 
 def test_a_rover_that_stays_slow_needs_room_for_the_speed_that_it_lacks() -> None:

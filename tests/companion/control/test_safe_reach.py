@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from companion.control.braking import blind_distance_m
 from companion.control.local_view import LocalView
@@ -48,6 +50,14 @@ def test_the_target_leaves_room_for_front_and_overshoot_before_what_was_not_seen
         reached_m = reach_m(ground(8.0), speed_m_s)
         assert 2.5 <= reached_m <= 4.0 - 0.35 - GUIDANCE.overshoot_m + 0.11
     assert reach_m(ground()) >= GUIDANCE.horizon_m - STEP_M
+
+
+def test_a_rover_that_the_ground_holds_gets_so_much_more_room_however_near_its_position_is() -> None:
+    for seen_north_m in (8.0, 11.0):
+        free = view(ground(seen_north_m))
+        held = replace(free, held_overshoot_m=1.0)
+        nearer_m = farthest_clear(NORTHWARD, free).distance_m - farthest_clear(NORTHWARD, held).distance_m
+        assert nearer_m == pytest.approx(1.0, abs=0.2)
 
 
 def test_a_flank_that_was_not_seen_ends_it_however_far_away() -> None:
