@@ -260,7 +260,7 @@ def _straight_on(outlook: Outlook) -> list[Option]:
 def _may_stand(view: LocalView, there: NedPoint) -> bool:
     """Whether the way to a place, and a little farther, is clear and seen."""
     here, guidance = view.pose.point, view.settings.guidance
-    reach_m = here.distance_m(there) + guidance.overshoot_m + view.held_overshoot_m
+    reach_m = here.distance_m(there) + guidance.overshoot_m + view.further_m
     beyond = here.moved(here.bearing_rad(there), reach_m)
     line = look_along(view.evidence, here, beyond, view.rover.radius_m + guidance.clearance_m)
     return min(line.clear_m, line.seen_m) >= reach_m - 0.05

@@ -28,7 +28,8 @@ AHEAD_RAD = math.radians(30.0)
 FORGOTTEN_S = 2.0
 PAUSE_S = 0.5
 """After so long without a command the one before counts no more."""
-MOST_M = 1.5
+DOES_M_S = 0.15
+"""A rover so little slower than told does what it was told."""
 
 
 class DragWatch:
@@ -45,8 +46,8 @@ class DragWatch:
         """What the rover has been told in this tick; None for nothing that drives it."""
         self._told = command
 
-    def overshoot_m(self, view: LocalView) -> float:
-        """Once a tick: how much farther the rover may shoot past a position."""
+    def held_m_s(self, view: LocalView) -> float:
+        """Once a tick: how much slower than it should be the rover has been, lately or until it does as it is told."""
         now_s, speed_m_s = view.pose.time_s, view.speed_m_s
         passed_s = now_s - self._time_s
         self._time_s = now_s
@@ -59,8 +60,9 @@ class DragWatch:
         ramp_m_s = 0.0 if sets_off else self._expected_m_s + GAINS_M_S2 * passed_s
         self._expected_m_s = max(min(wanted_m_s, ramp_m_s), speed_m_s)
         held_m_s = max(min(wanted_m_s, self._expected_m_s) - speed_m_s - SLACK_M_S, 0.0)
-        self._held_m_s = max(held_m_s, self._held_m_s * math.exp(-passed_s / FORGOTTEN_S))
-        return min(view.settings.guidance.held_overshoot_s * self._held_m_s, MOST_M)
+        kept = 1.0 if speed_m_s < wanted_m_s - DOES_M_S else math.exp(-passed_s / FORGOTTEN_S)
+        self._held_m_s = max(held_m_s, kept * self._held_m_s)
+        return self._held_m_s
 
 
 def _wanted_m_s(told: ControlCommand, view: LocalView) -> float:

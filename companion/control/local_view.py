@@ -12,12 +12,14 @@ from companion.core.rover_limits import RoverLimits
 from companion.mapping.evidence_map import EvidenceMap
 from companion.settings import Settings
 
+MOST_FURTHER_M = 1.5
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LocalView:
     """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
 
-    ``held_overshoot_m``: it may shoot so much farther past a position than usual, because the ground holds it.
+    ``held_m_s``: so much slower than it was told the ground holds it.
     """
 
     pose: Pose
@@ -26,7 +28,12 @@ class LocalView:
     rover: RoverLimits
     settings: Settings
     yaw_rate_rad_s: float = 0.0
-    held_overshoot_m: float = 0.0
+    held_m_s: float = 0.0
+
+    @property
+    def further_m(self) -> float:
+        """So much farther than usual the rover may shoot past a position: where rough ground ends, if it is held."""
+        return min(self.settings.guidance.held_overshoot_s * self.held_m_s, MOST_FURTHER_M)
 
     def with_speeds(self, cruise_speed_m_s: float, fastest_m_s: float) -> LocalView:
         """The same moment with another cruise speed, and with the highest speed that is ever told on this way."""

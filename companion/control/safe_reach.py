@@ -112,7 +112,7 @@ class _Search:
             map_radius=evidence.rover_radius_m,
             room=room_m,
             overshoot=self._view.settings.guidance.overshoot_m,
-            held=self._view.held_overshoot_m,
+            held=self._view.further_m,
             flank=radius_m + FLANK_M,
             near=radius_m + FLANK_NEAR_M,
             slack=ROLLED_M,

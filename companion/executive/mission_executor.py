@@ -56,6 +56,10 @@ ORIGIN_MOVED_M = 0.2
 """The autopilot tells its origin in whole 1e-7 degrees (1 cm): more than this is another origin."""
 VERDICT_S = 15.0
 """After a jump of the position no target is given up for this long: most receivers are right again by then."""
+ROLLS_OUT_S = 10.0
+"""So long at most a rover is awaited that is to stand."""
+SLOW_M_S = 0.1
+"""Slower than this it stands."""
 WATCHED_SCANS = 20
 """After a wait, obstacles that are not in this many newest scans are forgotten: a door may have opened."""
 
@@ -105,6 +109,7 @@ class MissionExecutor:
         self.trail = Trail()
         """The way back to where the mission began."""
         self._refuges: list[Refuge] = []
+        self._rolls_until_s: float | None = None
         rover, given = mission.rover, settings.current
         margin_m = given.guidance.narrow_margin_m if scan.is_narrow else 0.0
         self._limits = RoverLimits(
@@ -232,6 +237,7 @@ class MissionExecutor:
     def _seek_refuge(self) -> None:
         """The next place to try."""
         refuge = self._refuges[0]
+        self._rolls_until_s = None
         self.progress = returning(self.progress, refuge.place)
         along = " along the way it came" if refuge.way else ""
         self._notifier.tell(f"Back to {refuge.place.name}, {refuge.length_m:.0f} m{along}", Severity.WARNING)
@@ -300,9 +306,17 @@ class MissionExecutor:
         return True
 
     def _rolls_on(self, view: LocalView) -> bool:
-        """Whether the rover leaves the place where its way back begins: that is laid from where it comes to stand."""
-        follows = bool(self._refuges) and bool(self._refuges[0].way)
-        return follows and abs(view.speed_m_s) > view.settings.guidance.roll_out_m_s
+        """Whether the rover leaves the place where its way back begins: that is laid from where it comes to stand.
+
+        No longer than ``ROLLS_OUT_S``: a speed that never becomes zero must not keep it here.
+        """
+        refuge = self._refuges[0] if self._refuges else None
+        if refuge is None or not refuge.way or self.progress.goal != refuge.place:
+            return False
+        if self._rolls_until_s is None:
+            self._rolls_until_s = view.pose.time_s + ROLLS_OUT_S
+        rolls = view.speed_m_s > max(view.settings.guidance.roll_out_m_s, SLOW_M_S)
+        return rolls and view.pose.time_s < self._rolls_until_s
 
     def _way_back(self, pose: Pose) -> tuple[Cell, ...]:
         """The fields to follow to a refuge, where they are known and the rover has not left that way."""

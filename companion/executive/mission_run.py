@@ -164,7 +164,7 @@ class MissionRun:
         if task is MissionTask.END or self.executor is None:
             return None
         executor, view = self.executor, self.executor.view(self.vehicle, now_s)
-        view = replace(view, held_overshoot_m=self._drag.overshoot_m(view))
+        view = replace(view, held_m_s=self._drag.held_m_s(view))
         wanted = executor.guide(task, self.vehicle, view)
         wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)

@@ -17,10 +17,10 @@ class Stopping(NamedTuple):
     """How the rover comes to a target and stands.
 
     ``radius``: of the rover. ``map_radius``: of the rover that the map was made for. ``room``: kept beside it on the
-    way. ``overshoot``: at most so far beyond the target it stands, and at most a tenth of the distance. ``held``: so much
-    farther, whatever the distance, because the ground holds it. ``flank``: so far beside the middle the ground must
-    have been seen, from ``near`` on. ``slack``: lengths that differ by less are equal. ``edge``: left between a place
-    and the edge of the map.
+    way. ``overshoot``: at most so far beyond the target it stands, and at most a tenth of the distance. ``held``: so
+    much farther, whatever the distance, because the ground holds it. ``flank``: so far beside the middle the ground
+    must have been seen, from ``near`` on. ``slack``: lengths that differ by less are equal. ``edge``: left between a
+    place and the edge of the map.
     """
 
     radius: float

@@ -13,11 +13,13 @@ Nouns: navigator, part, decision, dead end, past path.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from itertools import compress, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.core.grid import Cell, Grid
 from companion.planning.problem import Path, PlanResult, PlanStatus
@@ -79,7 +81,7 @@ class NavState:
     ``past``: the walk from the start to the last field entered. ``current``: the path that is followed; ``index``: the
     rover's place on it. ``returning``: part A. ``until_search``: fields until its next search. ``since_better``: fields
     since the last search for a better path, ``better_every``: after how many it is due. ``draws``: state of the random
-    choice of two or three. ``proven``: obstacles in the map that the rover has driven through: it passed beside what
+    choice of two or three. ``driven``: steps that the map bars though the rover has driven them: it passed beside what
     is there.
     """
 
@@ -92,7 +94,7 @@ class NavState:
     since_better: int = 0
     draws: int = 0
     better_every: int = 5
-    proven: frozenset[Cell] = frozenset()
+    driven: frozenset[tuple[Cell, Cell]] = frozenset()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -129,8 +131,8 @@ def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavSt
 
 def retrace(state: NavState, way: tuple[Cell, ...], grid: Grid) -> NavState:
     """Follow fields from here to the target that were driven before, without better paths, while they stay as clear."""
-    proven = frozenset(cell for cell in way if grid.is_obstacle(cell))
-    return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER, proven=proven)
+    driven = frozenset(_steps(way, _barred(grid, way)))
+    return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER, driven=driven)
 
 
 def abandon_path(state: NavState) -> NavState:
@@ -140,26 +142,37 @@ def abandon_path(state: NavState) -> NavState:
 
 def follows_clear_path(state: NavState, grid: Grid) -> bool:
     """Whether there is a current path, and what is left of it is clear."""
-    return state.current is not None and is_clear(grid, state.current.cell_array[state.index :], state.proven)
+    return state.current is not None and is_clear(grid, state.current.cell_array[state.index :], state.driven)
 
 
-def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...], proven: frozenset[Cell] = frozenset()) -> bool:
+def is_clear(
+    grid: Grid, cells: CellArray | tuple[Cell, ...], driven: frozenset[tuple[Cell, Cell]] = frozenset()
+) -> bool:
     """Whether none of these fields but the first (where the rover is) is an obstacle, and no step cuts a corner.
 
-    Steps into ``proven`` fields are clear.
+    Steps in ``driven`` are clear.
     """
     if len(cells) < 2:
         return True
+    barred = _barred(grid, cells)
+    return not barred.any() or driven.issuperset(_steps(cells, barred))
+
+
+def _steps(cells: CellArray | tuple[Cell, ...], chosen: NDArray[np.bool_]) -> Iterator[tuple[Cell, Cell]]:
+    fields = [Cell(int(x), int(y)) for x, y in cells]
+    return compress(pairwise(fields), chosen)
+
+
+def _barred(grid: Grid, cells: CellArray | tuple[Cell, ...]) -> NDArray[np.bool_]:
+    """For each step whether it leads into an obstacle, cuts a corner of one, or leaves the map (then all do)."""
     x, y = np.asarray(cells).T
     if x.min() < 0 or y.min() < 0 or x.max() >= grid.width or y.max() >= grid.height:
-        return False
+        return np.ones(len(x) - 1, dtype=np.bool_)
     ahead = grid.weights[y[1:], x[1:]]
     corners = np.maximum(grid.weights[y[:-1], x[1:]], grid.weights[y[1:], x[:-1]])
     diagonal = (x[1:] != x[:-1]) & (y[1:] != y[:-1])
-    blocked = (ahead >= 1.0) | (diagonal & (corners >= 1.0))
-    if proven and blocked.any():
-        blocked &= [(int(at_x), int(at_y)) not in proven for at_x, at_y in zip(x[1:], y[1:], strict=True)]
-    return not bool(blocked.any())
+    barred: NDArray[np.bool_] = (ahead >= 1.0) | (diagonal & (corners >= 1.0))
+    return barred
 
 
 def simplified(past: tuple[Cell, ...]) -> tuple[Cell, ...]:
@@ -253,7 +266,7 @@ def _repair_past(
 def _follow_new(
     state: NavState, path: Path, part: Part, searches: tuple[SearchKind, ...], reason: DecisionReason
 ) -> tuple[NavState, Decision]:
-    state = replace(state, current=path, index=0, returning=False, since_better=0, until_search=0, proven=frozenset())
+    state = replace(state, current=path, index=0, returning=False, since_better=0, until_search=0, driven=frozenset())
     return state, Decision(Action.FOLLOW, part, path.cells, path, reason, searches)
 
 

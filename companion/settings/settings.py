@@ -139,7 +139,7 @@ class GuidanceSettings(Section):
     held_overshoot_s: float = Field(
         1.0,
         ge=0.0,
-        description="so much farther for each m/s that the ground holds it back; in all a tenth of the distance at most",
+        description="so much farther for each m/s that the ground holds the rover back",
     )
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
     change_after_s: float = Field(0.1, ge=0.0, description="minimum time between targets that differ")

@@ -68,7 +68,7 @@ def experiment(
 ) -> None:
     """Run the experiment NAME and print its tables.
 
-    Exit code 2: bad input; 3: soak, dead-companion, killed-companion: a collision or a failure.
+    Exit code 2: bad input; 3: soak: a collision, an error, growing memory; dead-companion, killed-companion: a contact.
     """
     console = Console()
     try:

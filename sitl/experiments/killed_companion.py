@@ -44,6 +44,7 @@ class Motors(StrEnum):
 
 
 HEAD = ("mission", "drives", "deaths", "touched", "run into", "ended", "person")
+CONTACT_HEAD = ("drive", "seed", "at s", "m/s", "with", "s after a death")
 TIME_LIMIT_S = 1800.0
 LIVES_S = (2.0, 20.0)
 """A companion lives for so long, drawn evenly, from the moment at which it leads the rover."""
@@ -167,8 +168,10 @@ class KilledReport(ExperimentReport):
     drives: tuple[KilledDrive, ...]
 
     def tables(self) -> list[Table]:
-        """One for each suite of sensors."""
-        return [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in SUITES]
+        """One for each suite of sensors, and one of contacts."""
+        suites = [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in SUITES]
+        contacts = self._contacts()
+        return [*suites, terminal_table(f"{NAME}: contacts", CONTACT_HEAD, contacts)] if contacts else suites
 
     @property
     def failure(self) -> str:
@@ -190,9 +193,26 @@ class KilledReport(ExperimentReport):
         ]
         return [*rows, _row("all", own)]
 
+    def _contacts(self) -> list[list[str]]:
+        return [
+            [
+                f"{drive.mission}, {drive.suite}, {drive.motors}",
+                f"{drive.seed}",
+                f"{one.time_s:.1f}",
+                f"{one.speed_m_s:.2f}",
+                one.mover or "what stands",
+                "-" if one.since_death_s is None else f"{one.since_death_s:.1f}",
+            ]
+            for drive in self.drives
+            for one in drive.contacts
+        ]
+
     def section(self) -> str:
         """See ``ExperimentReport``."""
         tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in SUITES)
+        contacts = self._contacts()
+        if contacts:
+            tables += f"\n\nContacts:\n\n{markdown_table(CONTACT_HEAD, contacts)}"
         deaths = sum(len(drive.deaths) for drive in self.drives)
         touched, run_into = sum(d.touched for d in self.drives), sum(d.run_into for d in self.drives)
         return f"""## A companion that is killed and resumed

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.drag import MOST_M, DragWatch
+from companion.control.drag import DragWatch
+from companion.control.local_view import MOST_FURTHER_M
 from companion.core.frames import NedPoint, Pose
 from companion.vehicle.commands import GuidedPosition
 from tests.companion.control.test_safe_reach import ground, view
@@ -17,13 +19,13 @@ FAR = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(6.0, 2.0)), 2.0)
 
 
 def watched(watch: DragWatch, told: ControlCommand | None, speeds_m_s: Any, since_s: float = 0.0) -> float:
-    """Ticks at a place four metres before the position; gives the room for overshoot after the last."""
-    further_m = 0.0
+    """Ticks at a place four metres before the position; gives by how much the rover is held after the last."""
+    held_m_s = 0.0
     for tick, speed_m_s in enumerate(speeds_m_s):
         pose = Pose(2.0, 2.0, 0.0, since_s + tick * TICK_S)
         watch.tell(told)
-        further_m = watch.overshoot_m(view(ground(), pose, speed_m_s=float(speed_m_s)))
-    return further_m
+        held_m_s = watch.held_m_s(view(ground(), pose, speed_m_s=float(speed_m_s)))
+    return held_m_s
 
 
 @pytest.mark.parametrize(("dead_s", "gain_m_s2"), [(0.3, 0.8), (0.9, 0.6), (0.5, 1.5)])
@@ -41,15 +43,17 @@ def test_a_rover_that_stays_slow_needs_room_for_the_speed_that_it_lacks() -> Non
     assert watched(DragWatch(), FAR, [0.7] * 80) == pytest.approx(1.73 - 0.7 - 0.3, abs=0.01)
 
 
-def test_it_is_never_more_than_that() -> None:
-    fast = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(60.0, 2.0)), 6.0)
-    assert watched(DragWatch(), fast, [0.3] * 300) == MOST_M
-
-
-def test_what_held_it_is_forgotten_slowly() -> None:
+def test_what_held_it_is_forgotten_slowly_once_it_does_as_told_and_not_before() -> None:
     watch = DragWatch()
-    held_m = watched(watch, FAR, [0.7] * 80)
-    assert 0.5 * held_m < watched(watch, FAR, [1.7] * 20, 4.0) < 0.7 * held_m
+    held_m_s = watched(watch, FAR, [0.7] * 80)
+    slower = replace(FAR, speed_m_s=1.0)
+    assert watched(watch, slower, [0.7] * 80, 4.0) == held_m_s
+    assert 0.5 * held_m_s < watched(watch, slower, [1.0] * 20, 8.0) < 0.7 * held_m_s
+
+
+def test_the_room_that_it_needs_has_an_end() -> None:
+    held = replace(view(ground()), held_m_s=1.2)
+    assert held.further_m == 1.2 and replace(held, held_m_s=5.0).further_m == MOST_FURTHER_M
 
 
 def test_after_a_pause_it_gets_going_again() -> None:

@@ -114,6 +114,23 @@ def test_a_rover_that_rolls_and_turns_fast_is_given_no_position(speed_m_s: float
     assert PointController().follow(northward(ground), moment).purpose is purpose
 
 
+def test_once_it_swings_it_must_come_nearly_straight():
+    ground, aside, controller = looked(), Pose(HERE.north_m, HERE.east_m, math.radians(20.0), 0.0), PointController()
+    purposes = []
+    for rate_deg_s in (57.0, 60.0, 57.0, 30.0, 27.0, 57.0):  # at 1 m/s; the limit is 57.3 and half of that
+        moment = replace(view(ground, aside, 1.0), yaw_rate_rad_s=math.radians(rate_deg_s))
+        purposes.append(controller.follow(northward(ground), moment).purpose)
+    assert purposes == [Purpose.DRIVE, Purpose.LOOK, Purpose.LOOK, Purpose.LOOK, Purpose.DRIVE, Purpose.DRIVE]
+
+
+@pytest.mark.parametrize(("narrow", "beside_m", "turns"), [(True, 1.0, True), (False, 1.0, False), (True, 3.5, False)])
+def test_thin_beams_turn_on_the_spot_near_something(narrow: bool, beside_m: float, turns: bool):
+    ground = looked([(HERE.north_m - 0.3, HERE.east_m + beside_m, 0.2)])
+    aside, beams = Pose(HERE.north_m, HERE.east_m, math.radians(-15.0), 0.0), replace(ROVER, narrow_sight=narrow)
+    answer = PointController().follow(northward(ground), view(ground, aside, rover=beams))
+    assert isinstance(answer.setpoint, GuidedHeading if turns else GuidedPosition)
+
+
 def test_near_an_obstacle_a_rover_that_swings_is_stopped():
     ground, aside = looked([(HERE.north_m, HERE.east_m + 1.0, 0.2)]), Pose(10.5, 10.5, math.radians(10.0), 0.0)
     moment = replace(view(ground, aside, 0.5), yaw_rate_rad_s=2.1)

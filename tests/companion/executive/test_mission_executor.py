@@ -10,7 +10,7 @@ import pytest
 
 from companion.core.frames import LocalFrame, NedPoint
 from companion.core.grid import Cell
-from companion.executive.mission_executor import MissionTask
+from companion.executive.mission_executor import ROLLS_OUT_S, MissionTask
 from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import OnBlocked
@@ -96,6 +96,40 @@ def test_a_low_battery_leads_back_the_way_it_came(desk: Desk) -> None:
     desk.stand(0.0, 0.0)
     step(desk)
     assert step(desk) is MissionTask.END and desk.executor.progress.statuses == (TargetStatus.SKIPPED,)
+
+
+def test_the_way_back_is_laid_from_where_the_rover_comes_to_stand(desk: Desk) -> None:
+    step(desk)
+    desk.stand(2.0, 0.0)
+    step(desk)
+    pose = desk.run.vehicle.pose_at(desk.now_s)
+    assert pose is not None
+    desk.executor.go_back("battery at 12 %", [], pose)
+    rolls(desk, 1.0)
+    assert desk.executor.decide(desk.run.vehicle, desk.now_s) is MissionTask.STAND
+    desk.clock.time_s += ROLLS_OUT_S
+    rolls(desk, 0.2)
+    assert desk.executor.decide(desk.run.vehicle, desk.now_s) is MissionTask.DRIVE, "a speed that is never zero"
+
+
+def test_a_rover_that_goes_elsewhere_rolls_on(desk: Desk) -> None:
+    step(desk)
+    desk.stand(2.0, 0.0)
+    step(desk)
+    pose = desk.run.vehicle.pose_at(desk.now_s)
+    assert pose is not None
+    desk.executor.go_back("battery at 12 %", [], pose)
+    goal = ResolvedTarget("requested goal 1", NedPoint(3.0, 0.0), Cell(2, 10), 0.0, OnBlocked.SKIP, None)
+    desk.executor.request(goal)
+    rolls(desk, 1.0)
+    assert desk.executor.decide(desk.run.vehicle, desk.now_s) is MissionTask.DRIVE
+
+
+def rolls(desk: Desk, north_m_s: float) -> None:
+    position = desk.run.vehicle.position
+    assert position is not None
+    position = replace(position, time_s=desk.now_s, boot_s=desk.now_s, north_m_s=north_m_s)
+    desk.run.vehicle = replace(desk.run.vehicle, position=position)
 
 
 def test_a_map_is_forgotten_and_laid_out_anew_when_the_frame_moves(desk: Desk) -> None:

@@ -307,6 +307,16 @@ def test_the_number_of_fields_between_looks_is_a_setting():
     assert [start.x for _, start, _ in search.asked] == [2, 4, 6]
 
 
+def test_a_corner_that_was_cut_before_it_was_marked_is_cut_again():
+    way = (Cell(0, 0), Cell(1, 0), Cell(2, 1), Cell(3, 1))
+    marked = ground("..#.......", "..........")
+    state = retrace(initial_state(way[0], Cell(3, 1)), way, marked)
+    state, decision = step(state, marked, way[1], unused)
+    assert decision.part is Part.EXPLORE and decision.path == way[1:]
+    assert not is_clear(marked, way) and is_clear(marked, way, state.driven)
+    assert not is_clear(marked, tuple(reversed(way)), state.driven), "another step"
+
+
 @pytest.mark.parametrize(("cost", "taken"), [(1.99, True), (2.0, False), (3.0, False)])
 def test_better_is_compared_with_what_remains_of_the_current_path(cost, taken):
     """Of the current path 4 fields of weight 0.5 remain: 2.0, though it began with a cost of 4.5."""
