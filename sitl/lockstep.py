@@ -186,6 +186,11 @@ class Drive:
         self._sum_up()
         return self.report
 
+    @property
+    def contacts(self) -> list[dict[str, float | str]]:
+        """All collisions so far: time, place from the start, speed, with what."""
+        return [collision.as_json(self.scenario.start) for collision in self.simulator.collisions]
+
     def take_status(self) -> Status:
         """The companion's status, with all that has been said since the last call."""
         news, self._news = tuple(self._news), []
@@ -202,7 +207,7 @@ class Drive:
         report.said = companion.outcome.said
         report.targets = companion.statuses()
         report.collisions = len(self.simulator.collisions)
-        report.contacts = [collision.as_json(self.scenario.start) for collision in self.simulator.collisions]
+        report.contacts = self.contacts
         report.refused = companion.mission_run.setpoint_check.refused.total()
         report.distance_m = self.simulator.driven_m
         report.sim_time_s = self.simulator.time_s

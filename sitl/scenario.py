@@ -11,7 +11,7 @@ from pathlib import Path
 
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
-from companion.mission.mission import Mission, SitlSpec
+from companion.mission.mission import Mission, RoverSpec, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS, REAL32, steered_wheels
@@ -20,6 +20,7 @@ from sitl.faults.plan import FaultPlan, SensorFault
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.physics import Physics
 from sitl.plant.closed_loop import NoiseSettings
+from sitl.plant.outline import DISC, Outline, OutlinePose, mover_room_m, room_m
 from sitl.plant.rover import SIM_ROVER, Drivetrain, two_wheels
 from sitl.sensors.range_sensors import SensorSuite, suite_named
 from sitl.sensors.suites import suite_of
@@ -46,7 +47,7 @@ class Scenario:
     world: World
     start: SimStart
     sensors: str | SensorSuite = "lidar-90"
-    rover_radius_m: float = 0.35
+    outline: Outline = DISC
     parameters: dict[str, float] = field(default_factory=dict)
     turning_radius_m: float = 0.0
     """0: skid steering; else Ackermann steering."""
@@ -69,7 +70,7 @@ class Scenario:
             self.start,
             self.sensors,
             seed,
-            self.rover_radius_m,
+            self.outline,
             self.parameters,
             noise,
             turning_radius_m=self.turning_radius_m,
@@ -83,7 +84,7 @@ class Scenario:
         suite = suite_named(self.sensors) if isinstance(self.sensors, str) else self.sensors
         try:
             return Physics(
-                self.world, self.start, suite, seed, self.rover_radius_m, self.turning_radius_m,
+                self.world, self.start, suite, seed, self.outline, self.turning_radius_m,
                 linked=linked, drivetrain=self.drivetrain,
             )  # fmt: skip
         except ValueError as error:
@@ -104,16 +105,17 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     except ValueError as error:
         raise ScenarioError(f"{name}: sitl.sensors: {error}") from error
     world, start_m = _ground(mission, spec, name)
-    radius_m = mission.rover.radius_m
-    if world.clearance_m(*start_m, radius_m) < radius_m:
+    outline = outline_of(mission.rover)
+    pose = OutlinePose(*start_m, math.radians(spec.heading_deg))
+    if room_m(world.layers().solid, outline, pose, 0.0) < 0.0:
         raise ScenarioError(
-            f"{name}: sitl.start: a rover of {radius_m} m radius touches an obstacle of {spec.world} there; "
+            f"{name}: sitl.start: a rover of {size_in_words(mission.rover)} touches an obstacle of {spec.world} there; "
             "choose a free field"
         )
     own = len(world.movers)
     world = replace(world, movers=world.movers + movers_of(list(spec.movers), start_m))
-    gap_m, touching = world.mover_gap_m(*start_m, 0.0)
-    if gap_m < radius_m:
+    gap_m, touching = mover_room_m(world.fleet, outline, pose, 0.0)
+    if gap_m < 0.0:
         which = f"sitl.movers {touching + 1 - own}" if touching >= own else f"{spec.world}: mover {touching + 1}"
         raise ScenarioError(f"{name}: {which}: starts where the rover stands; let it start farther from home")
     start = SimStart(*start_m, math.radians(spec.heading_deg), _home(mission, spec))
@@ -122,7 +124,7 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     sensors = spec.sensors if isinstance(spec.sensors, str) else described
     motors = spec.drivetrain
     drivetrain = SIM_ROVER if motors is None else two_wheels(motors.top_speed_m_s, motors.lag_s, motors.track_m)
-    scenario = Scenario(world, start, sensors, radius_m, parameters, drivetrain=drivetrain)
+    scenario = Scenario(world, start, sensors, outline, parameters, drivetrain=drivetrain)
     if spec.parameters is None:
         return _steered(scenario, turning_radius_m)
     try:
@@ -133,6 +135,21 @@ def scenario_from_mission(mission: Mission) -> Scenario:
     kept = {name: file.types.get(name, REAL32) for name in file.unknown}
     parameters = {**scenario.parameters, **file.known, **file.unknown}
     return replace(scenario, parameters=parameters, kept=kept, parameter_file=file)
+
+
+def outline_of(rover: RoverSpec) -> Outline:
+    """The outline of a mission's rover."""
+    if rover.rectangle is None:
+        return Outline(rover.radius_m)
+    return Outline(0.0, rover.rectangle.front_m, rover.rectangle.rear_m, rover.rectangle.half_width_m)
+
+
+def size_in_words(rover: RoverSpec) -> str:
+    """Its radius, or length and width."""
+    if rover.rectangle is None:
+        return f"{rover.radius_m} m radius"
+    rectangle = rover.rectangle
+    return f"{rectangle.front_m + rectangle.rear_m:g} x {2.0 * rectangle.half_width_m:g} m"
 
 
 def _steered(scenario: Scenario, turning_radius_m: float) -> Scenario:

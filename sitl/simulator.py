@@ -25,7 +25,8 @@ from sitl.faults.link_faults import LinkQueue
 from sitl.faults.plan import FaultPlan
 from sitl.faults.player import FaultPlayer
 from sitl.plant.closed_loop import NOISE_COLUMNS, NoiseSettings, run_loops
-from sitl.plant.rover import SIM_ROVER, Drivetrain, new_rover
+from sitl.plant.outline import DISC, Outline, OutlinePose, mover_room_m, room_m
+from sitl.plant.rover import SIM_ROVER, Drivetrain, new_rover, outline_of
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite, suite_named
 from sitl.sim_link import SimLink
 from sitl.world import geodesy
@@ -33,6 +34,7 @@ from sitl.world.truth import Collision, SimStart, Truth, collision_of
 from sitl.world.world import World
 
 NOISE_ROWS = 500
+ROOM_REACH_M = 5.0
 REHEARSAL_S = 4.0
 """After this time every range sensor has measured."""
 
@@ -46,7 +48,7 @@ class Simulator:
         start: SimStart,
         sensors: str | SensorSuite = "lidar-90",
         seed: int = 0,
-        rover_radius_m: float = 0.35,
+        outline: Outline = DISC,
         parameters: Mapping[str, float] | None = None,
         noise: bool | NoiseSettings = True,
         lidar_rate_hz: float | None = None,
@@ -76,9 +78,7 @@ class Simulator:
         self._noise = settings.as_array()
         self._rng = np.random.default_rng(motion_seed)
         self._sensing = RangeSensing(suite, world, settings.range_m, np.random.default_rng(range_seed))
-        self._rover = new_rover(
-            start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m, drivetrain
-        )
+        self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, outline, turning_radius_m, drivetrain)
         self._geo_start = (geodesy.to_units(start.home.lat_deg), geodesy.to_units(start.home.lon_deg))
         # Noise is drawn in blocks of fixed size, so that it does not depend on the batches of loops.
         self._draws = np.empty((NOISE_ROWS, NOISE_COLUMNS))
@@ -146,13 +146,16 @@ class Simulator:
 
     @property
     def clearance_m(self) -> float:
-        """Metres between the rover's circle and the nearest obstacle, moving or not; 0 to 5."""
-        rover = self._rover[0]
-        reach_m = 5.0 + float(rover["radius_m"])
-        here = (float(rover["north_m"]), float(rover["east_m"]))
-        stands_m = self.world.clearance_m(*here, reach_m, self.time_s)
-        room_m = min(stands_m, self.world.mover_gap_m(*here, self.time_s)[0])
-        return max(room_m - float(rover["radius_m"]), 0.0)
+        """Metres between the rover's outline and the nearest obstacle, moving or not; 0 to 5."""
+        truth = self.truth
+        return max(self.world_room_m(OutlinePose(truth.north_m, truth.east_m, truth.heading_rad)), 0.0)
+
+    def world_room_m(self, pose: OutlinePose) -> float:
+        """Metres that the rover's outline would have at a pose, negative where it would touch; at most 5."""
+        outline = self.outline
+        solid = self.world.layers(self.time_s).solid
+        stands_m = float(room_m(solid, outline, pose, ROOM_REACH_M))
+        return min(stands_m, float(mover_room_m(self.world.fleet, outline, pose, self.time_s)[0]))
 
     @property
     def vehicle(self) -> Vehicle:
@@ -160,9 +163,9 @@ class Simulator:
         return self._vehicle
 
     @property
-    def rover_radius_m(self) -> float:
-        """Radius of the rover's circle."""
-        return float(self._rover[0]["radius_m"])
+    def outline(self) -> Outline:
+        """The rover's."""
+        return outline_of(self._rover.view(np.recarray)[0])
 
     @property
     def links(self) -> tuple[SimLink, ...]:

@@ -36,23 +36,21 @@ class DragWatch:
     """Compares what the rover does with what it was told."""
 
     def __init__(self) -> None:
-        self._told: ControlCommand | None = None
         self._time_s = -math.inf
         self._idle_s = -math.inf
         self._expected_m_s = 0.0
         self._held_m_s = 0.0
 
-    def tell(self, command: ControlCommand | None) -> None:
-        """What the rover has been told in this tick; None for nothing that drives it."""
-        self._told = command
+    def held_m_s(self, told: ControlCommand | None, view: LocalView) -> float:
+        """Once a tick: how much slower than it should be the rover has been, lately or until it does as it is told.
 
-    def held_m_s(self, view: LocalView) -> float:
-        """Once a tick: how much slower than it should be the rover has been, lately or until it does as it is told."""
+        ``told``: what it was told in the tick before; None for nothing that drives it.
+        """
         now_s, speed_m_s = view.pose.time_s, view.speed_m_s
         passed_s = now_s - self._time_s
         self._time_s = now_s
         # After a pause somebody else had the rover meanwhile, or it stayed at a target.
-        told = None if passed_s > PAUSE_S else self._told
+        told = None if passed_s > PAUSE_S else told
         wanted_m_s = 0.0 if told is None else _wanted_m_s(told, view)
         if wanted_m_s == 0.0:
             self._idle_s = now_s

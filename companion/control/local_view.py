@@ -11,6 +11,7 @@ from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.evidence_map import EvidenceMap
 from companion.settings import Settings
+from companion.vehicle.commands import Setpoint
 
 MOST_FURTHER_M = 1.5
 
@@ -19,7 +20,8 @@ MOST_FURTHER_M = 1.5
 class LocalView:
     """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
 
-    ``held_m_s``: so much slower than it was told the ground holds it.
+    ``told``: the setpoint of the tick before; None where there was none. ``held_m_s``: so much slower than it was told
+    the ground holds it.
     """
 
     pose: Pose
@@ -29,6 +31,7 @@ class LocalView:
     settings: Settings
     yaw_rate_rad_s: float = 0.0
     held_m_s: float = 0.0
+    told: Setpoint | None = None
 
     @property
     def further_m(self) -> float:

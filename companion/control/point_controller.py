@@ -15,8 +15,8 @@ from companion.control.braking import braking_distance_m, fastest_within_m, stop
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, ReferencePath
-from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, unseen_flank
-from companion.core.frames import NedPoint, Pose, wrap_pi_rad
+from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, overshoot_m, unseen_flank
+from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.map_queries import clearance_m, look_along
 from companion.settings import GuidanceSettings
@@ -33,12 +33,14 @@ SWUNG_SHARE = 0.5
 OVERRUN_M = 0.3
 """A rover that stands so far beyond the last position may not have reached it, for the autopilot."""
 STANDS_M_S = 0.1
+CREEPS_M = 0.1
+"""It does not creep less far."""
 ANEW_S = 0.15
 """Longer than the 0.1 s after which ArduRover shapes a position target from where the rover is."""
 
 
 class PointController:
-    """Remembers what it told last: the heading of a look, a position, and whether it was braking.
+    """Remembers the heading of a look, and whether it was braking or swinging.
 
     A look is kept until its heading is reached, and a longer clear reach is wanted before the rover drives off
     again, so that a narrow sensor looks to both sides once and not at every step.
@@ -51,7 +53,6 @@ class PointController:
         self._looking_rad: float | None = None
         self._braking = False
         self._swinging = False
-        self._position: NedPoint | None = None
         self._anew_s: float | None = None
         """Since when the rover has been stopped so that its next position is begun anew."""
 
@@ -72,15 +73,16 @@ class PointController:
         follows, stays there. For the next position it starts from behind the rover, which then overshoots by metres.
         """
         if not isinstance(command.setpoint, GuidedPosition):
-            self._position = self._anew_s = None
+            self._anew_s = None
             return command
-        pose, before = view.pose, self._position
-        if before is not None and self._anew_s is None and view.speed_m_s < STANDS_M_S:
+        pose, told = view.pose, view.told
+        if self._anew_s is None and isinstance(told, GuidedPosition) and view.speed_m_s < STANDS_M_S:
+            before = told.point
             beyond_m = -pose.point.distance_m(before) * math.cos(pose.point.bearing_rad(before) - pose.heading_rad)
             self._anew_s = pose.time_s if beyond_m > OVERRUN_M else None
         if self._anew_s is not None and pose.time_s - self._anew_s < ANEW_S:
             return stop_for(Purpose.BRAKE)
-        self._position, self._anew_s = command.setpoint.point, None
+        self._anew_s = None
         return command
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
@@ -229,10 +231,19 @@ def _look_or_blocked(path: ReferencePath, view: LocalView) -> ControlCommand:
         # It has looked, and nothing is there but ground between the beams: creep, up to the next obstacle.
         bearing = pose.point.bearing_rad(ahead)
         creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
-        clear_m = look_along(evidence, pose.point, pose.point.moved(bearing, creep_m), radius_m).clear_m
-        target = pose.point.moved(bearing, min(creep_m, clear_m))
-        return ControlCommand(Purpose.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
+        creep_m = _stops_before(creep_m, bearing, view)
+        if creep_m >= CREEPS_M:
+            target = pose.point.moved(bearing, creep_m)
+            return ControlCommand(Purpose.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
     return stop_for(Purpose.BLOCKED)
+
+
+def _stops_before(distance_m: float, bearing_rad: float, view: LocalView) -> float:
+    """That far, or less if the rover would otherwise overshoot into something that stands there."""
+    pose, beyond_m = view.pose, overshoot_m(distance_m, view)
+    there = pose.point.moved(bearing_rad, distance_m + beyond_m)
+    clear_m = look_along(view.evidence, pose.point, there, view.rover.radius_m).clear_m
+    return min(distance_m, clear_m - beyond_m)
 
 
 def _limit_by_heading(view: LocalView) -> float:

@@ -38,6 +38,11 @@ class Reach:
     room_m: float
 
 
+def overshoot_m(distance_m: float, view: LocalView) -> float:
+    """How far beyond a position at that distance the rover may come to stand."""
+    return min(view.settings.guidance.overshoot_m, 0.1 * distance_m) + view.further_m
+
+
 def farthest_clear(path: ReferencePath, view: LocalView) -> Reach:
     """The farthest place of the path in clear sight.
 

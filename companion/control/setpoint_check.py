@@ -28,6 +28,8 @@ SLACK_M = 0.1
 """The controllers look in steps, and let a line end a few centimetres before an obstacle."""
 NEARER_M = 0.05
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
+OVERSHOT_SHARE = 0.1
+"""A near position is overshot by no more than this share of the distance."""
 ARC_PIECES = 8
 """Straight pieces that an arc is made of where borders are concerned."""
 
@@ -38,7 +40,9 @@ Rule = Callable[[Setpoint, LocalView, Bounds], Fault | None]
 
 
 def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault | None:
-    """A guided position lies within horizon and stopping distance, and the straight way there is clear and seen.
+    """A guided position lies within horizon and stopping distance, the straight way there is clear and seen.
+
+    So is the ground beyond it onto which the rover may overshoot, as far as clear is concerned.
 
     It may lie beyond seen ground by what the slowest rover needs to brake, which creeps where a look shows nothing.
     """
@@ -49,8 +53,12 @@ def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fa
     distance_m = here.distance_m(there)
     if not distance_m <= farthest_m(view.speed_m_s, settings) + SLACK_M:
         return Reason(SetpointFault.BEYOND_HORIZON)
-    line = look_along(evidence, here, there, evidence.rover_radius_m)
-    if line.clear_m < distance_m - SLACK_M:
+    overshoots_m = min(settings.overshoot_m, OVERSHOT_SHARE * distance_m) + view.further_m
+    stands = here.moved(here.bearing_rad(there), distance_m + overshoots_m)
+    if not evidence.base.contains(evidence.base.cell_at(stands)):
+        stands, overshoots_m = there, 0.0  # nothing is known beyond the edge of the map
+    line = look_along(evidence, here, stands, evidence.rover_radius_m)
+    if line.clear_m < distance_m + overshoots_m - SLACK_M:
         return Reason(SetpointFault.BEHIND_OBSTACLE)
     beyond_m = braking_distance_m(settings.min_speed_m_s, settings)
     if line.seen_m + beyond_m < distance_m - SLACK_M:

@@ -91,7 +91,8 @@ def others(seen: Survey) -> Iterator[Finding]:
     if len(systems) > 1:
         ids = ", ".join(map(str, systems))
         says = f"Autopilots with the system ids {ids} are heard; a run takes the first rover it hears."
-        yield Finding("several-autopilots", Level.WARN, says, "give each its own line, or switch the others off")
+        remedy = "leave it so for vehicles that announce themselves; give another rover its own line, or switch it off"
+        yield Finding("several-autopilots", Level.WARN, says, remedy)
     if seen.rover_heard and seen.signing:
         yield Finding("signing", Level.WARN, f"{seen.signing}.", "see docs/signing.md")
 

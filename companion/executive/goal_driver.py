@@ -27,6 +27,7 @@ from companion.navigation.field_step import (
     NavState,
     Part,
     SearchKind,
+    Steps,
     abandon_path,
     follows_clear_path,
     initial_state,
@@ -86,8 +87,13 @@ class GoalDriver:
         self._replanned_s = -math.inf
         self._avoidance = CollisionAvoidance()
 
-    def head_for(self, goal: ResolvedTarget, view: LocalView, way: tuple[Cell, ...] = ()) -> None:
-        """Begin a leg from here. ``way``: the fields to follow, if they have been driven before."""
+    def head_for(
+        self, goal: ResolvedTarget, view: LocalView, way: tuple[Cell, ...] = (), driven: Steps = frozenset()
+    ) -> None:
+        """Begin a leg from here.
+
+        ``way``: the fields to follow, if they have been driven before; ``driven``: the steps that the map barred then.
+        """
         navigator = view.settings.navigator
         self._goal = goal
         self._epoch += 1
@@ -95,7 +101,7 @@ class GoalDriver:
         seed = (self.seed + self._epoch) % 2**63
         self._state = initial_state(cell, goal.cell, seed, navigator.better_every_fields)
         if way:
-            self._state = retrace(self._state, way, view.evidence.grid)
+            self._state = retrace(self._state, way, driven)
         self.path = None
         self.decision = None
         self._doubts_left = navigator.doubts

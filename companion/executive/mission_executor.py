@@ -58,8 +58,8 @@ VERDICT_S = 15.0
 """After a jump of the position no target is given up for this long: most receivers are right again by then."""
 ROLLS_OUT_S = 10.0
 """So long at most a rover is awaited that is to stand."""
-SLOW_M_S = 0.1
-"""Slower than this it stands."""
+ROLLS_M_S = 0.1
+"""However small roll_out_m_s is: slower than this it does not roll."""
 WATCHED_SCANS = 20
 """After a wait, obstacles that are not in this many newest scans are forgotten: a door may have opened."""
 
@@ -227,7 +227,7 @@ class MissionExecutor:
         """Give the mission up: to the nearest rally point, or back the way the rover came. ``reason`` is told."""
         planner = make_planner("dijkstra", self._settings.current.planner)
         # The rover may have entered a field since the last tick.
-        self.trail.enter(self.evidence.base.cell_at(pose.point))
+        self.trail.enter(self.evidence.base.cell_at(pose.point), self.evidence.grid)
         self._refuges = refuges(self.progress.home, self.trail, rally, pose.point, self.evidence, planner)
         missed = [name for name, status in self.statuses() if status is not TargetStatus.REACHED]
         text = f"Returning: {reason}. Missed: {', '.join(missed) or 'nothing'}"
@@ -247,7 +247,7 @@ class MissionExecutor:
     def decide(self, vehicle: VehicleState, now_s: float) -> MissionTask:
         """What to do for the mission now, and by which path: legs begin and end here, and the navigator decides."""
         view = self.view(vehicle, now_s)
-        self.trail.enter(self.evidence.base.cell_at(view.pose.point))
+        self.trail.enter(self.evidence.base.cell_at(view.pose.point), self.evidence.grid)
         waited = self.progress.phase is MissionPhase.WAIT
         self.progress = on_time(self.progress, now_s)
         if waited and self.progress.phase is MissionPhase.TRAVEL:
@@ -262,7 +262,8 @@ class MissionExecutor:
             if self._is_refused(now_s) or self._rolls_on(view):
                 return MissionTask.STAND
             self._notifier.tell(f"Heading for {self.progress.goal.name}", Severity.INFO)
-            self.driver.head_for(self.progress.goal, view, self._way_back(view.pose))
+            self.driver.head_for(self.progress.goal, view, self._way_back(view.pose), self.trail.driven)
+        self._rolls_until_s = None
         self.phase = RunPhase.DRIVING
         decision = self.driver.decide(view, self._moving(vehicle, view))
         if decision is not None:
@@ -315,7 +316,7 @@ class MissionExecutor:
             return False
         if self._rolls_until_s is None:
             self._rolls_until_s = view.pose.time_s + ROLLS_OUT_S
-        rolls = view.speed_m_s > max(view.settings.guidance.roll_out_m_s, SLOW_M_S)
+        rolls = view.speed_m_s > max(view.settings.guidance.roll_out_m_s, ROLLS_M_S)
         return rolls and view.pose.time_s < self._rolls_until_s
 
     def _way_back(self, pose: Pose) -> tuple[Cell, ...]:

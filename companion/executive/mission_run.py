@@ -99,6 +99,8 @@ class MissionRun:
         """Why the run ends; None while it goes on."""
         self.setpoint_check = SetpointCheck(notifier)
         self._drag = DragWatch()
+        self._told: ControlCommand | None = None
+        """What was sent, or still held, in the tick before."""
         self.legs = AutoModeLegs(notifier)
         self._settings = settings
         self._make_executor = make_executor
@@ -164,14 +166,15 @@ class MissionRun:
         if task is MissionTask.END or self.executor is None:
             return None
         executor, view = self.executor, self.executor.view(self.vehicle, now_s)
-        view = replace(view, held_m_s=self._drag.held_m_s(view))
+        told = None if self._told is None else self._told.setpoint
+        view = replace(view, held_m_s=self._drag.held_m_s(self._told, view), told=told)
         wanted = executor.guide(task, self.vehicle, view)
         wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
 
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:
         """Send it, if it is new or due again."""
-        self._drag.tell(command if isinstance(command, ControlCommand) else None)
+        self._told = command if isinstance(command, ControlCommand) else None
         self.sender.speak(command, now_s)
 
 

@@ -15,11 +15,11 @@ from itertools import pairwise
 import numpy as np
 
 from companion.core.frames import NedPoint
-from companion.core.grid import OBSTACLE, Cell
+from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.mapping.evidence_map import EvidenceMap
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
-from companion.navigation.field_step import fields_between
+from companion.navigation.field_step import Steps, fields_between, is_clear
 from companion.planning.planner import Planner
 from companion.planning.problem import Budget, PlanningProblem
 
@@ -36,15 +36,29 @@ class Trail:
     def __init__(self) -> None:
         self._cells: list[Cell] = []
         self._places: dict[Cell, int] = {}
+        self._driven: set[tuple[Cell, Cell]] = set()
 
-    def enter(self, cell: Cell) -> None:
-        """The rover is in this field now. Entering a field anew cuts off all that came after it."""
+    def enter(self, cell: Cell, grid: Grid | None = None) -> None:
+        """The rover is in this field now. Entering a field anew cuts off all that came after it.
+
+        ``grid``: the map as it is known in this moment; None for a moment of an earlier run.
+        """
         if self._cells and self._cells[-1] == cell:
             return
         if self._cells:
-            for between in fields_between(self._cells[-1], cell):
+            fields = (self._cells[-1], *fields_between(self._cells[-1], cell), cell)
+            if grid is not None:
+                # Both ways: what bars a step back may be the field that it began in.
+                steps = {step for a, b in pairwise(fields) for step in ((a, b), (b, a))}
+                self._driven |= {step for step in steps if not is_clear(grid, step)}
+            for between in fields[1:-1]:
                 self._append(between)
         self._append(cell)
+
+    @property
+    def driven(self) -> Steps:
+        """Steps between fields, either way, that the map barred in the moment when the rover made them."""
+        return frozenset(self._driven)
 
     def back(self) -> tuple[Cell, ...]:
         """From the field the rover is in to the first one."""

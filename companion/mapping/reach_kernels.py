@@ -54,7 +54,7 @@ def may_stop_at(ground, start, target, stopping):
     # The flanks first: with thin beams they fail most often.
     if first_unseen(ground.log_odds, start, stands, stopping.flank, stopping.near)[0] < length - 1e-6:
         return False
-    if _look(ground, start, stands, stopping.radius, stopping)[0] < length - stopping.slack:
+    if min(_look(ground, start, stands, stopping.radius, stopping)) < length - stopping.slack:
         return False
     front = moved_within_map(ground, stands, ahead, stopping.radius, stopping.edge)
     seen = _look(ground, stands, front, 0.0, stopping)[1]

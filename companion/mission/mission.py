@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 
+from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.sensor_tables import Sensors
@@ -68,12 +69,19 @@ class GridSpec:
 class RoverSpec:
     """The vehicle: everything within ``radius_m`` of its centre must stay clear.
 
-    ``turning_radius_m``: the tightest arc of its centre; 0: it turns on the spot.
+    ``turning_radius_m``: the tightest arc of its centre; 0: it turns on the spot. ``rectangle``: its outline, if that
+    is not the circle; ``radius_m`` is then that of the circle round it.
     """
 
     radius_m: float = 0.35
     cruise_speed_m_s: float = 2.0
     turning_radius_m: float = 0.0
+    rectangle: Footprint | None = None
+
+    @property
+    def footprint(self) -> Footprint:
+        """Its outline."""
+        return self.rectangle or Footprint.circle(self.radius_m)
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,9 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, model_validator
 
+from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.check import check_mission
@@ -149,11 +150,35 @@ class GridTable(Table):
 
 
 class RoverTable(Table):
-    """``[rover]``."""
+    """``[rover]``: a circle, or a rectangle."""
 
-    radius_m: Annotated[float, Field(gt=0.0, le=20.0)] = RoverSpec().radius_m
+    radius_m: Annotated[float, Field(gt=0.0, le=20.0)] | None = None
+    length_m: Annotated[float, Field(gt=0.0, le=20.0)] | None = None
+    width_m: Annotated[float, Field(gt=0.0, le=20.0)] | None = None
+    centre_forward_m: Annotated[float, Field(ge=-10.0, le=10.0)] = 0.0
     cruise_speed_m_s: Annotated[float, Field(gt=0.0, le=50.0)] = RoverSpec().cruise_speed_m_s
     turning_radius_m: Annotated[float, Field(ge=0.0, le=100.0)] = RoverSpec().turning_radius_m
+
+    @model_validator(mode="after")
+    def _outline(self) -> RoverTable:
+        if (self.length_m is None) != (self.width_m is None):
+            raise ValueError("length_m and width_m are given together")
+        if self.length_m is not None and self.radius_m is not None:
+            raise ValueError("give length_m and width_m, or radius_m")
+        if self.length_m is None and self.centre_forward_m != 0.0:
+            raise ValueError("centre_forward_m needs length_m and width_m")
+        if self.length_m is not None and abs(self.centre_forward_m) >= 0.5 * self.length_m:
+            raise ValueError("centre_forward_m must be less than half of length_m")
+        return self
+
+    @property
+    def rover(self) -> RoverSpec:
+        """The vehicle."""
+        if self.length_m is None or self.width_m is None:
+            radius_m = RoverSpec().radius_m if self.radius_m is None else self.radius_m
+            return RoverSpec(radius_m, self.cruise_speed_m_s, self.turning_radius_m)
+        rectangle = Footprint.rectangle(self.length_m, self.width_m, self.centre_forward_m)
+        return RoverSpec(rectangle.radius_m, self.cruise_speed_m_s, self.turning_radius_m, rectangle)
 
 
 class GeoTable(Table):
@@ -246,7 +271,7 @@ def _mission(table: MissionTable, path: Path) -> Mission:
             None if table.grid.home is None else Cell(*table.grid.home),
             table.grid.margin_m,
         ),
-        rover=RoverSpec(table.rover.radius_m, table.rover.cruise_speed_m_s, table.rover.turning_radius_m),
+        rover=table.rover.rover,
         keep_out=keep_out + (fences.keep_out if fences else ()),
         keep_in=keep_in + (fences.keep_in if fences else ()),
         weighted=tuple(

@@ -54,6 +54,9 @@ class Action(StrEnum):
     UNREACHABLE = "unreachable"
 
 
+Steps = frozenset[tuple[Cell, Cell]]
+"""Steps from a field to a neighbour."""
+
 Search = Callable[[SearchKind, Cell, Cell], PlanResult]
 """Find a path from the first field to the second."""
 
@@ -81,8 +84,8 @@ class NavState:
     ``past``: the walk from the start to the last field entered. ``current``: the path that is followed; ``index``: the
     rover's place on it. ``returning``: part A. ``until_search``: fields until its next search. ``since_better``: fields
     since the last search for a better path, ``better_every``: after how many it is due. ``draws``: state of the random
-    choice of two or three. ``driven``: steps that the map bars though the rover has driven them: it passed beside what
-    is there.
+    choice of two or three. ``driven``: steps that the rover drove though the map barred them: it passed beside what
+    stood there.
     """
 
     target: Cell
@@ -94,7 +97,7 @@ class NavState:
     since_better: int = 0
     draws: int = 0
     better_every: int = 5
-    driven: frozenset[tuple[Cell, Cell]] = frozenset()
+    driven: Steps = frozenset()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -129,9 +132,11 @@ def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavSt
     return _search(state, grid, search)
 
 
-def retrace(state: NavState, way: tuple[Cell, ...], grid: Grid) -> NavState:
-    """Follow fields from here to the target that were driven before, without better paths, while they stay as clear."""
-    driven = frozenset(_steps(way, _barred(grid, way)))
+def retrace(state: NavState, way: tuple[Cell, ...], driven: Steps = frozenset()) -> NavState:
+    """Follow fields from here to the target that were driven before, without better paths, while they are clear.
+
+    ``driven``: steps that may be driven again, because the map barred them when they were driven.
+    """
     return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER, driven=driven)
 
 
@@ -145,9 +150,7 @@ def follows_clear_path(state: NavState, grid: Grid) -> bool:
     return state.current is not None and is_clear(grid, state.current.cell_array[state.index :], state.driven)
 
 
-def is_clear(
-    grid: Grid, cells: CellArray | tuple[Cell, ...], driven: frozenset[tuple[Cell, Cell]] = frozenset()
-) -> bool:
+def is_clear(grid: Grid, cells: CellArray | tuple[Cell, ...], driven: Steps = frozenset()) -> bool:
     """Whether none of these fields but the first (where the rover is) is an obstacle, and no step cuts a corner.
 
     Steps in ``driven`` are clear.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -20,7 +21,7 @@ from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import SettingsError
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_turning_on_the_spot
-from sitl.cli.drive_outputs import outputs, print_summary
+from sitl.cli.drive_outputs import outputs, print_summary, write_collisions
 from sitl.cli.drive_progress import Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.cli.viewer import Viewer, ViewError, terminal
@@ -93,6 +94,9 @@ def drive(
         raise typer.Exit(EXIT_BAD_INPUT) from error
     except KeyboardInterrupt:
         recorder.close()
+        if run is not None and isinstance(recorder, Recorder):
+            with contextlib.suppress(OutputError):  # the program ends with what it can say
+                write_collisions(run, recorder)
         raise StoppedError(_stopped(run, recorder)) from None
     recorder.close()
     print_summary(report, console)
@@ -117,7 +121,9 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
     else:
         reached = sum(status is TargetStatus.REACHED for _, status in run.companion.statuses())
         targets = f"{reached} of {len(run.mission.targets)} targets reached"
-        what = f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}"
+        touched = len(run.simulator.collisions)
+        told = f", {touched} collision{'s' * (touched != 1)}" if touched else ""
+        what = f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}{told}"
     kept = f"record so far: {recorder.directory}" if isinstance(recorder, Recorder) else "nothing was written"
     return f"{what}; {kept}"
 

@@ -81,6 +81,9 @@ def _contacts_text(report: Report) -> str:
     for contact in report.contacts[:CONTACTS_SHOWN]:
         place = f"north {contact['north_m']} m, east {contact['east_m']} m of the start"
         lines.append(f"{contact['time_s']} s: {contact['with']}, {contact['speed_m_s']} m/s, {place}")
+    more = len(report.contacts) - CONTACTS_SHOWN
+    if more > 0:
+        lines.append(f"and {more} more: --json has all, and so has collisions.json of a record")
     return "\n".join(lines)
 
 
@@ -90,11 +93,17 @@ def _end_record(recorder: Recorder | NullRecorder, run: Drive) -> str:
     if recorder.problem:
         return recorder.problem  # a record that ends early does not change the result of the run
     run.companion.save_map(recorder.directory / "map")
-    if run.report.contacts:
+    write_collisions(run, recorder)
+    return f"record:  {recorder.directory}"
+
+
+def write_collisions(run: Drive, recorder: Recorder) -> None:
+    """The file of a record that lists all contacts, if there are any. Raises OutputError."""
+    contacts = run.contacts
+    if contacts:
         file = recorder.directory / "collisions.json"
         with written(file):
-            file.write_text(json.dumps(run.report.contacts, indent=2) + "\n", encoding="utf-8")
-    return f"record:  {recorder.directory}"
+            file.write_text(json.dumps(contacts, indent=2) + "\n", encoding="utf-8")
 
 
 def outputs(image: Path | None, map_stem: Path | None, json_file: Path | None) -> Outputs:

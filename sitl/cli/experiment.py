@@ -94,7 +94,7 @@ def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: 
     """Refuse options without effect. Raises ExperimentError."""
     if name not in ON_ANY_MAP:
         if planners:
-            raise ExperimentError(f"--planners: {name} compares its own; the option is for navigation and driving")
+            raise ExperimentError(f"--planners: {name} does not take it; the option is for navigation and driving")
         if world:
             raise ExperimentError(f"--world: {name} has its own maps; the option is for navigation and driving")
     if maps is not None and name in OWN_ENVIRONMENTS:

@@ -64,13 +64,14 @@ def physics(
         link = LoggedLink(link, mavlink, tell, lambda: behind.system)
     for line in _greeting(behind, host, port, mavlink, write_params):
         tell(line)
-    stop = stop_signals()
+    stop, log = stop_signals(), PhysicsLog(behind, tell, clock.now_s)
     try:
-        run(behind, listening, link, clock.now_s, lambda: not stop, PhysicsLog(behind, tell, clock.now_s).look)
+        run(behind, listening, link, clock.now_s, lambda: not stop, log.look)
     finally:
         listening.close()
         if link is not None:
             link.close()
+    log.end()
     tell(summary(behind))
 
 

@@ -80,8 +80,10 @@ def serve(
     finally:
         for endpoint in endpoints:
             endpoint.close()
+    log.end(simulator)
     if not quiet:
-        say(f"stopped after {simulator.time_s:.0f} s of the rover's time")
+        touched = len(simulator.collisions)
+        say(f"stopped after {simulator.time_s:.0f} s of the rover's time and {touched} collision{'s' * (touched != 1)}")
 
 
 def _scenario(

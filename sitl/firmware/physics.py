@@ -21,6 +21,7 @@ from sitl.autopilot.lidar import Scanner, ScannerPort
 from sitl.autopilot.traffic import Traffic, TrafficPort
 from sitl.firmware.json_frames import COUNTS, RANGES_MOST, BodyState, ServoFrame, decode, encode
 from sitl.plant.closed_loop import NoiseSettings
+from sitl.plant.outline import DISC, Outline
 from sitl.plant.rover import GRAVITY_M_S2, SIM_ROVER, Drivetrain, drive, meet_movers, new_rover
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite
 from sitl.world import geodesy
@@ -105,7 +106,7 @@ class Physics:
     """Answers the firmware's frames."""
 
     def __init__(
-        self, world: World, start: SimStart, suite: SensorSuite, seed: int = 0, rover_radius_m: float = 0.35,
+        self, world: World, start: SimStart, suite: SensorSuite, seed: int = 0, outline: Outline = DISC,
         turning_radius_m: float = 0.0, range_noise_m: float = NoiseSettings().range_m, *, linked: bool = False,
         drivetrain: Drivetrain = SIM_ROVER,
     ) -> None:  # fmt: skip
@@ -117,7 +118,7 @@ class Physics:
             raise ValueError(f"{len(suite.beams)} rangefinders: the firmware accepts at most {RANGES_MOST}")
         self.world, self.start, self.suite = world, start, suite
         self.tally = Tally()
-        self._make = (seed, rover_radius_m, turning_radius_m, range_noise_m)
+        self._make = (seed, outline, turning_radius_m, range_noise_m)
         self._drivetrain = drivetrain
         self._linked = linked
         self._traffic_port = TrafficPort()
@@ -130,13 +131,13 @@ class Physics:
 
     def _begin(self) -> None:
         """Put the rover at its start, at rest, at time 0."""
-        seed, rover_radius_m, turning_radius_m, noise_m = self._make
+        seed, outline, turning_radius_m, noise_m = self._make
         start, suite = self.start, self.suite
         self.time_s = 0.0
         self._port.begin()
         self.collisions: tuple[Collision, ...] = ()
         self._rover = new_rover(
-            start.north_m, start.east_m, start.heading_rad, rover_radius_m, turning_radius_m, self._drivetrain
+            start.north_m, start.east_m, start.heading_rad, outline, turning_radius_m, self._drivetrain
         )
         rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(2)[1])
         self._sensing = RangeSensing(suite, self.world, noise_m, rng)

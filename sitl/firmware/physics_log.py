@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 from sitl.firmware.physics import Physics
-from sitl.network.event_log import COLLISIONS_EVERY_S
+from sitl.network.collision_log import CollisionLog
 
 
 class PhysicsLog:
@@ -15,19 +14,18 @@ class PhysicsLog:
     def __init__(self, physics: Physics, tell: Callable[[str], None], now_s: Callable[[], float]) -> None:
         self._physics = physics
         self._tell = tell
-        self._now_s = now_s
         self._starts = 0
         self._reported: set[str] = set()
-        self._collisions = 0
-        self._collisions_told_s = -math.inf
+        self._collisions = CollisionLog(tell, now_s)
 
     def look(self) -> None:
         """Report what is new."""
-        tally, collisions = self._physics.tally, self._physics.collisions
+        tally = self._physics.tally
         if tally.starts != self._starts:
             again = "again: the rover is back at its start, the time is 0" if self._starts else "and is answered"
             self._tell(f"the firmware has started {again}")
-            self._starts, self._collisions = tally.starts, 0
+            self._starts = tally.starts
+            self._collisions.forget()
         if tally.bad:
             self._tell_once("a datagram was no frame of ArduPilot's JSON interface; ignored, like all that follow")
         if tally.strangers:
@@ -36,9 +34,11 @@ class PhysicsLog:
             )
         if tally.lost:
             self._tell_once("frames were lost; the rover's time does not count them")
-        if len(collisions) > self._collisions and self._now_s() - self._collisions_told_s >= COLLISIONS_EVERY_S:
-            self._collisions, self._collisions_told_s = len(collisions), self._now_s()
-            self._tell(f"collision {len(collisions)}: {collisions[-1].told(self._physics.start)}")
+        self._collisions.look(self._physics.collisions, self._physics.start)
+
+    def end(self) -> None:
+        """The last look: report the collisions that have not been told."""
+        self._collisions.look(self._physics.collisions, self._physics.start, last=True)
 
     def _tell_once(self, line: str) -> None:
         if line not in self._reported:

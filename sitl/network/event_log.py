@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
+from sitl.network.collision_log import CollisionLog
 from sitl.simulator import Simulator
 
 SILENT_S = 5.0
 """A UDP client that has been silent for this long counts as gone."""
-COLLISIONS_EVERY_S = 1.0
-"""Minimum time between lines about collisions: a rover that scrapes along a wall touches it many times."""
 
 
 class EventLog:
@@ -22,8 +20,7 @@ class EventLog:
         self._tell = tell
         self._now_s = now_s
         self._heard_s: dict[tuple[str, str], float] = {}
-        self._collisions = 0
-        self._collisions_reported_s = -math.inf
+        self._collisions = CollisionLog(tell, now_s)
 
     def connected(self, client: str, url: str) -> None:
         """A client has connected."""
@@ -46,7 +43,8 @@ class EventLog:
             if now_s - last_s > SILENT_S:
                 del self._heard_s[client, url]
                 self._tell(f"{client} has been silent for {SILENT_S:g} s ({url})")
-        collisions = simulator.collisions
-        if len(collisions) > self._collisions and now_s - self._collisions_reported_s >= COLLISIONS_EVERY_S:
-            self._collisions, self._collisions_reported_s = len(collisions), now_s
-            self._tell(f"collision {len(collisions)}: {collisions[-1].told(simulator.start)}")
+        self._collisions.look(simulator.collisions, simulator.start)
+
+    def end(self, simulator: Simulator) -> None:
+        """The last look: report the collisions that have not been told."""
+        self._collisions.look(simulator.collisions, simulator.start, last=True)

@@ -19,8 +19,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sitl.world.movers import Fleet, nearest_mover
-from sitl.world.world import TOP_SPEED_M_S, Surroundings, clearance_m, ground_under
+from sitl.plant.outline import Outline, OutlinePose, mover_room_m, room_m
+from sitl.world.movers import Fleet
+from sitl.world.world import TOP_SPEED_M_S, Surroundings, ground_under
 
 
 class Drivetrain(NamedTuple):
@@ -67,6 +68,9 @@ ROVER = np.dtype(
         ("yaw_rate_rad_s", "f8"),
         ("driven_m", "f8"),
         ("radius_m", "f8"),
+        ("front_m", "f8"),
+        ("rear_m", "f8"),
+        ("half_width_m", "f8"),
         ("touching", "i8"),
         ("contacts", "i8"),
         ("struck", "i8"),
@@ -82,6 +86,8 @@ ROVER = np.dtype(
 )
 """The rover's true state, world frame, heading clockwise from north; ``contacts`` counts collisions so far.
 
+``radius_m`` to ``half_width_m``: its outline.
+
 ``struck``: number of the mover that it touches, from 1; ``struck_m_s``: the rover's own speed at the last contact.
 ``turning_radius_m``: 0 for skid steering; ``wheel_rad``: angle of the steered wheels, clockwise.
 ``slide_m_s``: sideways speed, to the right; 0 unless the ground is slippery.
@@ -92,7 +98,7 @@ RoverState = NDArray[Any]
 
 
 def new_rover(
-    north_m: float, east_m: float, heading_rad: float, radius_m: float, turning_radius_m: float = 0.0,
+    north_m: float, east_m: float, heading_rad: float, outline: Outline, turning_radius_m: float = 0.0,
     drivetrain: Drivetrain = SIM_ROVER,
 ) -> RoverState:  # fmt: skip
     """A rover at rest: an array of one ``ROVER`` record. With a turning radius it has Ackermann steering."""
@@ -100,10 +106,16 @@ def new_rover(
     state["turning_radius_m"] = turning_radius_m
     state["grip_1"] = state["grip_3"] = 1.0
     state["north_m"], state["east_m"] = north_m, east_m
-    state["heading_rad"], state["radius_m"] = heading_rad, radius_m
-    for name, value in drivetrain._asdict().items():
+    state["heading_rad"] = heading_rad
+    for name, value in (outline._asdict() | drivetrain._asdict()).items():
         state[name] = value
     return state
+
+
+@njit(cache=True, nogil=True)
+def outline_of(rover: Any) -> Outline:
+    """The outline of a ``ROVER`` record."""
+    return Outline(rover.radius_m, rover.front_m, rover.rear_m, rover.half_width_m)
 
 
 @njit(cache=True, nogil=True)
@@ -176,11 +188,11 @@ def drive(rover: Any, surroundings: Surroundings, servo_1: float, servo_3: float
     if aside_m_s != 0.0:
         north_m -= aside_m_s * step_s * math.sin(rover.heading_rad)
         east_m += aside_m_s * step_s * math.cos(rover.heading_rad)
-    reach_m = rover.radius_m + RELEASE_M
-    room_m = clearance_m(surroundings.solid, north_m, east_m, reach_m)
-    if room_m < rover.radius_m:
-        here_m = clearance_m(surroundings.solid, rover.north_m, rover.east_m, reach_m)
-        if room_m <= here_m:
+    outline = outline_of(rover)
+    there_m = room_m(surroundings.solid, outline, OutlinePose(north_m, east_m, rover.heading_rad), RELEASE_M)
+    if there_m < 0.0:
+        here_m = room_m(surroundings.solid, outline, OutlinePose(rover.north_m, rover.east_m, from_rad), RELEASE_M)
+        if there_m <= here_m:
             if rover.touching == 0:
                 rover.contacts += 1
                 rover.struck_m_s = math.hypot(before_m_s, rover.slide_m_s)
@@ -188,11 +200,11 @@ def drive(rover: Any, surroundings: Surroundings, servo_1: float, servo_3: float
             rover.speed_m_s = 0.0
             rover.slide_m_s = 0.0
             rover.accel_m_s2 = 0.0
-            if ackermann:
+            if ackermann or outline.radius_m == 0.0:
                 rover.heading_rad = from_rad
                 rover.yaw_rate_rad_s = 0.0
             return
-    elif room_m >= reach_m:
+    elif there_m >= RELEASE_M:
         rover.touching = 0
     rover.speed_m_s = speed_m_s
     rover.slide_m_s = aside_m_s
@@ -204,10 +216,11 @@ def drive(rover: Any, surroundings: Surroundings, servo_1: float, servo_3: float
 @njit(cache=True, nogil=True)
 def meet_movers(rover: Any, fleet: Fleet, time_s: float) -> None:
     """Note a contact with a mover: it counts once and stops the rover; the mover drives on."""
-    gap_m, mover = nearest_mover(fleet, time_s, rover.north_m, rover.east_m)
-    if gap_m >= rover.radius_m + RELEASE_M:
+    pose = OutlinePose(rover.north_m, rover.east_m, rover.heading_rad)
+    gap_m, mover = mover_room_m(fleet, outline_of(rover), pose, time_s)
+    if gap_m >= RELEASE_M:
         rover.struck = 0
-    elif gap_m < rover.radius_m and rover.struck != mover + 1:
+    elif gap_m < 0.0 and rover.struck != mover + 1:
         rover.contacts += 1
         rover.struck = mover + 1
         rover.struck_m_s = rover.speed_m_s

@@ -97,7 +97,7 @@ class Watching:
         start = Place("start", simulator.start.north_m, simulator.start.east_m, PlaceState.START)
         return Scene(
             layers=world_layers(world, simulator.time_s),
-            rover=Disc(truth.north_m, truth.east_m, simulator.rover_radius_m),
+            rover=Disc(truth.north_m, truth.east_m, simulator.outline.reach_m),
             heading_rad=truth.heading_rad,
             track=self.track,
             movers=movers_of(world, simulator.time_s),

@@ -123,15 +123,3 @@ def shorten_rays(
                     lengths_m[sector] = 0.0
                 elif along > 0.0 and root >= 0.0:
                     lengths_m[sector] = min(lengths_m[sector], along - math.sqrt(root))
-
-
-@njit(cache=True, nogil=True)
-def nearest_mover(fleet: Fleet, time_s: float, north_m: float, east_m: float) -> tuple[float, int]:
-    """Metres from a place to the nearest mover's edge (negative inside) and its number; inf, -1 without movers."""
-    nearest_m, which = math.inf, -1
-    for mover in range(fleet.radii_m.size):
-        mover_n, mover_e, _, _ = motion_of(fleet, mover, time_s)
-        gap_m = math.hypot(mover_n - north_m, mover_e - east_m) - fleet.radii_m[mover]
-        if gap_m < nearest_m:
-            nearest_m, which = gap_m, mover
-    return nearest_m, which

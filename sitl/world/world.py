@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from companion.core.grid import OBSTACLE, Grid
 from sitl.world.doors import Door, next_change_s
-from sitl.world.movers import Fleet, Mover, fleet_of, motion_of, nearest_mover, shorten_rays
+from sitl.world.movers import Fleet, Mover, fleet_of, motion_of, shorten_rays
 
 Obstacles = NDArray[np.bool_]
 Floats = NDArray[np.float64]
@@ -248,11 +248,6 @@ class World:
     ) -> None:
         if self.movers:
             shorten_rays(self.fleet, time_s, north_m, east_m, bearings_rad, lengths_m)
-
-    def mover_gap_m(self, north_m: float, east_m: float, time_s: float) -> tuple[float, int]:
-        """Metres from a place to the nearest mover's edge (negative inside) and its number; inf, -1 without movers."""
-        gap_m, which = nearest_mover(self.fleet, time_s, north_m, east_m)
-        return float(gap_m), int(which)
 
     def mover_at(self, number: int, time_s: float) -> tuple[float, float, float, float]:
         """Where a mover is at a moment, north and east, and its velocity."""

@@ -10,6 +10,7 @@ from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
 from companion.mission.mission import GridSpec, Mission, RoverSpec, SitlSpec, Target
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
+from sitl.plant.outline import Outline
 from sitl.scenario import SOMEWHERE, ScenarioError, scenario_from_mission
 from tests.support.rays import ray_m
 
@@ -48,7 +49,7 @@ def test_the_start_is_home_unless_said_otherwise(world_file: Path) -> None:
 
 def test_the_rover_of_the_mission_is_driven(world_file: Path) -> None:
     scenario = scenario_from_mission(replace(mission(world_file), rover=RoverSpec(radius_m=0.5, cruise_speed_m_s=1.5)))
-    assert scenario.rover_radius_m == 0.5
+    assert scenario.outline == Outline(0.5)
     assert scenario.parameters == {"WP_SPEED": 1.5, **RECOMMENDED_PARAMETERS}
     assert scenario.parameters["WP_JERK"] == 3.0
     assert scenario.sensors == "beams"

@@ -17,6 +17,7 @@ from sitl.autopilot.control.tasks import run_task
 from sitl.autopilot.vehicle import Vehicle
 from sitl.firmware.physics import Physics
 from sitl.plant.closed_loop import SUBSTEPS, measure
+from sitl.plant.outline import DISC
 from sitl.plant.rover import new_rover
 from sitl.sensors.range_sensors import SUITES, RangeSensing
 from sitl.sim_link import SimLink
@@ -35,7 +36,8 @@ class SplitVehicle:
         blind = RangeSensing(SUITES["none"], World.open(), 0.0, np.random.default_rng(0))
         self.behind = behind
         self.firmware = Firmware(behind.answer, rate_hz=LOOP_HZ)
-        self.vehicle = Vehicle(new_rover(*here, start.heading_rad, 0.35), origin, here, blind, parameters or {})
+        rover = new_rover(*here, start.heading_rad, DISC)
+        self.vehicle = Vehicle(rover, origin, here, blind, parameters or {})
         self.vehicle.control["tick"] = 0
         self.autopilot = Autopilot(self.vehicle)
         self._links: list[SimLink] = []

@@ -23,8 +23,7 @@ def watched(watch: DragWatch, told: ControlCommand | None, speeds_m_s: Any, sinc
     held_m_s = 0.0
     for tick, speed_m_s in enumerate(speeds_m_s):
         pose = Pose(2.0, 2.0, 0.0, since_s + tick * TICK_S)
-        watch.tell(told)
-        held_m_s = watch.held_m_s(view(ground(), pose, speed_m_s=float(speed_m_s)))
+        held_m_s = watch.held_m_s(told, view(ground(), pose, speed_m_s=float(speed_m_s)))
     return held_m_s
 
 

@@ -146,11 +146,31 @@ def test_a_rover_that_stands_beyond_its_position_is_stopped_before_the_next(over
     assert isinstance(first, GuidedPosition) and first.point.north_m < HERE.north_m + 3.0
     there, told_s = Pose(first.point.north_m + overrun_m, first.point.east_m, 0.0, 5.0), []
     path = northward(ground, there.point)
+    told = first
     for i in range(8):
         pose = replace(there, time_s=5.0 + 0.05 * i)
-        if controller.follow(path, view(ground, pose)).setpoint == GuidedVelocity(0.0, 0.0):
+        told = controller.follow(path, replace(view(ground, pose), told=told)).setpoint
+        if told == GuidedVelocity(0.0, 0.0):
             told_s.append(0.05 * i)
     assert told_s == (pytest.approx([0.0, 0.05, 0.1]) if anew else [])
+
+
+@pytest.mark.parametrize("held_m_s", [0.0, 1.0, 1.5])
+@pytest.mark.parametrize("wall_m", [1.2, 1.375, 1.5, 1.625, 2.0])
+def test_whatever_holds_it_it_is_sent_nowhere_where_it_would_overshoot_into_a_wall(wall_m: float, held_m_s: float):
+    """All ground is seen; also where it only creeps."""
+    ground = looked()
+    row = int((HERE.north_m + wall_m) * ground.map.subdivisions)
+    ground.map.log_odds[:] = -1.0
+    ground.map.log_odds[row : row + 4] = 3.0
+    moment = replace(view(ground), held_m_s=held_m_s)
+    answer = PointController().follow(northward(ground), moment)
+    if isinstance(answer.setpoint, GuidedPosition):
+        distance_m = HERE.point.distance_m(answer.setpoint.point)
+        beyond_m = min(SETTINGS.overshoot_m, 0.1 * distance_m) + moment.further_m
+        assert distance_m + beyond_m <= row / ground.map.subdivisions - HERE.north_m - ROVER.radius_m + 0.07
+    else:
+        assert wall_m < 2.0 or held_m_s > 0.0
 
 
 def test_far_aside_it_turns_first():

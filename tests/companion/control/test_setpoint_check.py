@@ -62,6 +62,17 @@ def fault(output: Output, evidence: EvidenceMap, *bounds: Bound) -> SetpointFaul
     return None if found is None else found.kind
 
 
+def test_a_position_is_not_behind_the_wall_into_which_the_rover_would_overshoot() -> None:
+    evidence, pose = open_ground(), Pose(4.0, MIDDLE, 0.0, 0.0)
+    patched(evidence, 8.0, MIDDLE - 2.0, 4.0, 3.0)
+    for distance_m, kind in ((3.3, None), (3.6, SetpointFault.BEHIND_OBSTACLE)):
+        there = GuidedPosition(NedPoint(4.0 + distance_m, MIDDLE))
+        assert fault(Output(there, pose, 0.0), evidence) is kind
+    held = replace(view(evidence, pose), held_m_s=1.0)
+    found = fault_of(GuidedPosition(NedPoint(6.7, MIDDLE)), held, Bounds(()))
+    assert found is not None and found.kind is SetpointFault.BEHIND_OBSTACLE
+
+
 def patched(evidence: EvidenceMap, north_m: float, east_m: float, size_m: float, value: float) -> None:
     y, x = (round(v / evidence.evidence_m) for v in (north_m, east_m))
     size = max(1, round(size_m / evidence.evidence_m))

@@ -13,7 +13,7 @@ from companion.executive.mission_progress import TargetStatus
 from companion.executive.mission_run import LocatedScan, MissionRun, Order, Stop
 from companion.safety.mode_latch import Reaction, Verdict
 from companion.safety.reasons import Activity, Doubt, EndReason, Reason, RunPhase, WaitReason
-from companion.vehicle.commands import SetMode
+from companion.vehicle.commands import GuidedPosition, SetMode
 from companion.vehicle.events import RoverMode
 from tests.support.desk import Desk
 
@@ -61,6 +61,31 @@ def test_a_mission_that_drives_speaks_setpoints_that_were_checked(tmp_path: Path
     desk.run.speak(command, desk.now_s)
     assert desk.autopilot.taken()[0] == command.setpoint
     assert desk.run.setpoint_check.refused.total() == 0
+
+
+def test_positions_come_nearer_once_the_ground_holds_the_rover(tmp_path: Path) -> None:
+    """Told to drive, and standing for five seconds; what was not sent does not count."""
+    ways_m = {}
+    for spoken in (True, False):
+        desk = Desk(tmp_path, '[[target]]\nname = "north"\nfield = [2, 14]\n')
+        desk.begin()
+        places_m = []
+        for tick in range(100):
+            desk.clock.time_s += 0.05
+            seen = desk.stand(0.0, 0.0)
+            pose = seen.pose_at(desk.now_s)
+            assert pose is not None and seen.scan is not None
+            if tick < 3:
+                desk.run.map([LocatedScan(pose, 0.0, seen.scan.scan)])
+                evidence = desk.executor.evidence
+                evidence.log_odds[round((7.5 + 6.0) / evidence.evidence_m) :] = 0.0  # unseen from 6 m on
+            command = desk.run.guide(desk.run.decide(DRIVE, desk.now_s), desk.now_s)
+            assert isinstance(command, ControlCommand)
+            desk.run.speak(command if spoken else None, desk.now_s)
+            if isinstance(command.setpoint, GuidedPosition):
+                places_m.append(pose.point.distance_m(command.setpoint.point))
+        ways_m[spoken] = places_m[-1] - places_m[0]
+    assert ways_m[True] < -0.8 and ways_m[False] == pytest.approx(0.0, abs=0.05)
 
 
 @pytest.mark.parametrize("stands", ["stopped", "ending"])

@@ -15,6 +15,7 @@ from companion.executive.return_path import Refuge, Trail, refuges
 from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
+from companion.navigation.field_step import is_clear
 from companion.planning.registry import make_planner
 from companion.settings import MappingSettings, PlannerSettings
 
@@ -35,6 +36,25 @@ def test_the_trail_leads_back_over_every_field_between() -> None:
 def test_loops_are_cut_off() -> None:
     assert trail((0, 0), (1, 0), (2, 0), (2, 1), (1, 1), (1, 0), (1, -1)).back() == ((1, -1), (1, 0), (0, 0))
     assert trail((0, 0), (0, 0), (3, 0), (0, 0)).back() == ((0, 0),)
+
+
+def test_steps_that_the_map_barred_then_are_remembered_either_way_and_later_ones_are_not() -> None:
+    found, then, later = Trail(), ground((2, 1)).grid, ground((2, 1), (4, 1)).grid
+    for x in range(6):
+        found.enter(Cell(x, 1), then)
+    assert found.driven == {
+        (Cell(1, 1), Cell(2, 1)), (Cell(2, 1), Cell(1, 1)), (Cell(3, 1), Cell(2, 1)), (Cell(2, 1), Cell(3, 1))
+    } & found.driven  # fmt: skip
+    assert (Cell(1, 1), Cell(2, 1)) in found.driven and (Cell(3, 1), Cell(2, 1)) in found.driven
+    back = found.back()
+    assert is_clear(then, back, found.driven) and not is_clear(later, back, found.driven)
+
+
+def test_fields_off_the_map_are_never_clear() -> None:
+    found, grid = Trail(), ground().grid
+    for y in (2, 1, 0, -1):
+        found.enter(Cell(4, y), grid)
+    assert not is_clear(ground((4, 1)).grid, found.back(), found.driven)
 
 
 Steps = st.lists(st.tuples(st.integers(-4, 4), st.integers(-4, 4)), min_size=1, max_size=60)

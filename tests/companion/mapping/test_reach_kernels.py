@@ -61,6 +61,13 @@ def test_an_unseen_place_beside_the_way_refuses_it() -> None:
     assert may_stop_at(ground, START, (24.0, 20.0), STOPPING), "it ends before"
 
 
+def test_so_does_an_unseen_strip_between_the_target_and_where_it_may_come_to_stand() -> None:
+    ground, held = seen(), STOPPING._replace(held=12.0)
+    assert may_stop_at(ground, START, (24.0, 30.0), held)
+    ground.log_odds[31:42, 23:26] = 0.0
+    assert not may_stop_at(ground, START, (24.0, 30.0), held)
+
+
 def test_the_first_target_that_is_near_enough_is_taken() -> None:
     targets = np.array([[24.0, 60.0], [24.0, 45.0], [24.0, 36.0], [24.0, 20.0]])
     assert first_to_stop_at(seen(40), START, targets, 99.0, STOPPING) == 2

@@ -291,7 +291,9 @@ def test_a_new_path_is_followed_for_five_fields_before_the_next_look():
 
 def test_a_way_driven_before_is_gone_back_through_fields_that_were_marked_then_and_no_others():
     beside = ground("..........", "..........", "....#.....")
-    state = retrace(initial_state(ROW[0], TARGET), ROW, beside)
+    driven = frozenset(step for step in pairwise(ROW) if not is_clear(beside, step))
+    assert len(driven) > 0
+    state = retrace(initial_state(ROW[0], TARGET), ROW, driven)
     state, decision = step(state, beside, ROW[1], unused)
     assert decision.part is Part.EXPLORE and decision.path == ROW[1:]
     shut = ground("..........", "..........", "....#.#...")
@@ -307,10 +309,10 @@ def test_the_number_of_fields_between_looks_is_a_setting():
     assert [start.x for _, start, _ in search.asked] == [2, 4, 6]
 
 
-def test_a_corner_that_was_cut_before_it_was_marked_is_cut_again():
+def test_a_corner_that_was_cut_though_it_was_marked_is_cut_again():
     way = (Cell(0, 0), Cell(1, 0), Cell(2, 1), Cell(3, 1))
     marked = ground("..#.......", "..........")
-    state = retrace(initial_state(way[0], Cell(3, 1)), way, marked)
+    state = retrace(initial_state(way[0], Cell(3, 1)), way, frozenset({(way[1], way[2])}))
     state, decision = step(state, marked, way[1], unused)
     assert decision.part is Part.EXPLORE and decision.path == way[1:]
     assert not is_clear(marked, way) and is_clear(marked, way, state.driven)

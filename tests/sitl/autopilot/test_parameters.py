@@ -19,6 +19,7 @@ from sitl.autopilot.control.records import (
 )
 from sitl.autopilot.parameters import DEFAULTS, Parameters, steered_wheels
 from sitl.plant.closed_loop import NOISE_COLUMNS, NoiseSettings, run_loops
+from sitl.plant.outline import Outline
 from sitl.plant.rover import new_rover
 from sitl.world.world import World
 from tests.support.sitl_client import READY_S, Client, open_ground
@@ -32,7 +33,7 @@ class Plant:
 
     def __init__(self, changes: dict[str, float], radius_m: float = 0.0) -> None:
         self.rover, self.estimate, self.control = (
-            new_rover(0.0, 0.0, 0.0, 0.35, radius_m),
+            new_rover(0.0, 0.0, 0.0, Outline(0.35), radius_m),
             new_estimate(),
             new_control(),
         )

@@ -126,7 +126,7 @@ def test_a_udp_partner_that_falls_silent_is_told_of_once(bench: Bench) -> None:
         assert len(bench.said) == 3 and "has connected" in bench.said[2]
 
 
-def test_collisions_are_told_of_with_their_place_not_more_than_one_a_second() -> None:
+def test_every_collision_is_told_of_with_its_place_once_a_second_and_at_the_end() -> None:
     said: list[str] = []
     real_s = 0.0
     log = EventLog(said.append, lambda: real_s)
@@ -146,7 +146,12 @@ def test_collisions_are_told_of_with_their_place_not_more_than_one_a_second() ->
     assert len(said) == 1
     real_s = 1.5
     log.look(cast(Simulator, stand_in))
-    assert said[1].startswith("collision 4: the rover touched cart with 1.0 m/s at 61.5 s")
+    assert [line[:35] for line in said[1:]] == [f"collision {n}: the rover touched cart" for n in (2, 3, 4)]
+    touched.append(Collision(61.6, start.north_m, start.east_m, "cart", 1.0))
+    log.look(cast(Simulator, stand_in))
+    assert len(said) == 4
+    log.end(cast(Simulator, stand_in))
+    assert len(said) == 5 and said[4].endswith("at 61.6 s, north 0.0 m, east 0.0 m of its start")
 
 
 def test_a_rebooting_vehicle_drops_its_tcp_clients(bench: Bench) -> None:

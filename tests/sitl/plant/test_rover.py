@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from companion.core.grid import Grid
 from companion.mission.mission import HomePoint, Mission, RoverSpec, SitlSpec, Target
 from sitl.autopilot.parameters import steered_wheels
+from sitl.plant.outline import Outline
 from sitl.plant.rover import WHEEL_MOST_RAD, drive, new_rover
 from sitl.scenario import ScenarioError, scenario_from_mission
 from sitl.simulator import Simulator
@@ -48,7 +49,7 @@ def track(client: Client, seconds: float, again: float = 0.5, **target: float) -
 @pytest.mark.parametrize("throttle", [0.5, -0.5])
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_full_lock_drives_a_circle_of_the_turning_radius(throttle: float, side: float) -> None:
-    rover = new_rover(0.0, 0.0, 0.0, 0.3, RADIUS_M)
+    rover = new_rover(0.0, 0.0, 0.0, Outline(0.3), RADIUS_M)
     pushed(rover, side, 0.0, 1.0)
     assert rover[0]["heading_rad"] == 0.0, "wheels turn, the rover does not"
     assert rover[0]["wheel_rad"] == pytest.approx(side * WHEEL_MOST_RAD)
@@ -62,7 +63,7 @@ def test_full_lock_drives_a_circle_of_the_turning_radius(throttle: float, side: 
 
 
 def test_the_wheels_take_their_time() -> None:
-    rover = new_rover(0.0, 0.0, 0.0, 0.3, RADIUS_M)
+    rover = new_rover(0.0, 0.0, 0.0, Outline(0.3), RADIUS_M)
     assert pushed(rover, 1.0, 0.0, 0.3)["wheel_rad"] == pytest.approx(math.radians(18.0))
     assert pushed(rover, 1.0, 0.0, 0.3)["wheel_rad"] == pytest.approx(WHEEL_MOST_RAD)
     assert pushed(rover, -1.0, 0.0, 0.5)["wheel_rad"] == pytest.approx(math.radians(5.0))
@@ -71,7 +72,7 @@ def test_the_wheels_take_their_time() -> None:
 @settings(deadline=None, max_examples=30)
 @given(st.lists(st.tuples(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0)), min_size=1, max_size=8), st.floats(0.5, 6.0))
 def test_no_outputs_turn_it_tighter_than_its_radius(outputs: list[tuple[float, float]], radius_m: float) -> None:
-    rover = new_rover(0.0, 0.0, 0.0, 0.3, radius_m)
+    rover = new_rover(0.0, 0.0, 0.0, Outline(0.3), radius_m)
     for steering, throttle in outputs:
         heading, driven = float(rover[0]["heading_rad"]), float(rover[0]["driven_m"])
         pushed(rover, steering, throttle, 0.3)
@@ -83,7 +84,7 @@ def test_what_it_runs_into_does_not_turn_it() -> None:
     weights = np.full((20, 20), 0.5)
     weights[10:] = 1.0
     world = World.from_grid(Grid(weights, 1.0))
-    rover = new_rover(9.0, 10.0, 0.0, 0.3, RADIUS_M)
+    rover = new_rover(9.0, 10.0, 0.0, Outline(0.3), RADIUS_M)
     for _ in range(400):
         drive(rover[0], world.surroundings(0.0), 1.0, 0.5, 0.005)
     heading = float(rover[0]["heading_rad"])

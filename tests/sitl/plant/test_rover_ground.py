@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from sitl.plant.outline import Outline
 from sitl.plant.rover import GRAVITY_M_S2, drive, new_rover
 from sitl.simulator import Simulator
 from sitl.world.truth import SimStart
@@ -36,7 +37,7 @@ def velocity(rover: Any) -> complex:
 
 
 def rolling(speed_m_s: float, turning_radius_m: float = 0.0, north_m: float = 0.5) -> Any:
-    rover = new_rover(north_m, 0.5, 0.0, 0.35, turning_radius_m).view(np.recarray)
+    rover = new_rover(north_m, 0.5, 0.0, Outline(0.35), turning_radius_m).view(np.recarray)
     rover[0].speed_m_s = speed_m_s
     return rover
 

@@ -1,0 +1,143 @@
+"""BARN worlds: cylinders on a lattice before a rover that is to get to the other side (Perille et al. 2020).
+
+A file of worlds is a NumPy archive: ``number`` (n,), ``lattice`` (n, rows, columns), True where a cylinder stands, and
+for each number N ``path_N`` (m, 2), the reference path in steps of the lattice. Our own worlds are made from seeds, of
+the same kind: a cellular automaton fills the lattice and smooths it.
+
+Frame of the benchmark: x to the right, y ahead, metres. World frame: north = y, east = x.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.core.grid import Cell
+from companion.planning.problem import Budget, PlanningProblem
+from companion.planning.registry import make_planner
+from companion.settings import PlannerSettings
+from sitl.experiments.experiment import ExperimentError
+from sitl.world.world import World
+
+Lattice = NDArray[np.bool_]
+
+STEP_M = 0.15
+"""Side of a lattice cell."""
+CYLINDER_M = 0.075
+"""Radius of a cylinder."""
+FINE_M = 0.025
+"""Side of a field of the simulated world."""
+START_M, GOAL_M = (-2.25, 3.0), (-2.25, 13.0)
+"""Where a run begins, heading ahead, and ends: x, y."""
+SCORED_X_M = -2.0
+"""The challenge's scorer lets the path begin and end there."""
+FAR_M = 15.6
+"""The sides go on to here, and then the way is shut."""
+PATH_X_M, PATH_Y_M = -4.575, 5.075
+"""Where step (0, 0) of a reference path lies."""
+ROWS, COLUMNS = 64, 30
+FIRST_ROW = 30
+"""The obstacles begin at this row of the lattice."""
+BODY_M = 0.27
+"""Our own worlds have a way for a disc of this radius."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class BarnWorld:
+    """One world: its number, where cylinders stand, and its reference path, shape (n, 2), x and y in metres."""
+
+    number: int
+    lattice: Lattice
+    path_m: NDArray[np.float64]
+
+    @property
+    def optimal_s(self) -> float:
+        """The time of the reference path at 2 m/s, as the challenge counts it."""
+        ends = np.array([[SCORED_X_M, START_M[1]]]), np.array([[SCORED_X_M, GOAL_M[1]]])
+        steps = np.diff(np.vstack((ends[0], self.path_m, ends[1])), axis=0)
+        return float(np.hypot(steps[:, 0], steps[:, 1]).sum()) / 2.0
+
+    def world(self) -> World:
+        """The simulated world; the sides go on beyond the lattice, and it is shut at the far end."""
+        rows = math.ceil(FAR_M / STEP_M)
+        standing = np.zeros((rows, self.lattice.shape[1]), dtype=np.bool_)
+        standing[: len(self.lattice)] = self.lattice
+        standing[:, [0, -1]] = True
+        standing[-1] = True
+        pieces = round(STEP_M / FINE_M)
+        middle = (np.arange(pieces) + 0.5) * FINE_M - 0.5 * STEP_M
+        disc = np.hypot(middle[:, None], middle[None, :]) <= CYLINDER_M
+        # Columns count to the left, from x = 0.
+        solid = np.kron(standing[:, ::-1], disc.astype(np.int8)).astype(np.bool_)
+        return World(solid, FINE_M, 0.0, -STEP_M * standing.shape[1])
+
+
+def read_worlds(file: Path) -> list[BarnWorld]:
+    """The worlds of a file, in its order. Raises ExperimentError."""
+    try:
+        with np.load(file) as archive:
+            worlds = [
+                BarnWorld(int(number), np.asarray(lattice, dtype=np.bool_), _path_m(archive[f"path_{number}"]))
+                for number, lattice in zip(archive["number"], archive["lattice"], strict=True)
+            ]
+    except (OSError, ValueError, KeyError) as error:
+        raise ExperimentError(
+            f"{file}: no archive of BARN worlds ({error}); give a .npz as described in the docs"
+        ) from error
+    if not worlds:
+        raise ExperimentError(f"{file}: has no world")
+    return worlds
+
+
+def made_world(seed: int) -> BarnWorld:
+    """A world of our own making: between 14 and 28 % of its middle filled, smoothed, and with a way through."""
+    rng = np.random.default_rng([seed, 250])
+    planner = make_planner("astar", PlannerSettings())
+    while True:
+        lattice = _filled(rng)
+        weights = _swollen(lattice)
+        start, target = Cell(COLUMNS // 2, 20), Cell(COLUMNS // 2, ROWS + 15)
+        found = planner.plan(PlanningProblem(weights, start, target), Budget(), np.random.default_rng(0)).path
+        if found is not None:
+            cells = np.array([(cell.x, cell.y) for cell in found.cells if FIRST_ROW <= cell.y < ROWS])
+            middle_m = (cells + 0.5) * STEP_M - (COLUMNS * STEP_M, 0.0)
+            return BarnWorld(seed, lattice, middle_m.astype(np.float64))
+
+
+def _filled(rng: np.random.Generator) -> Lattice:
+    """The lattice with its walls; a cell stays filled where at least five of the nine round it are."""
+    lattice = np.zeros((ROWS, COLUMNS), dtype=np.bool_)
+    middle = rng.random((ROWS - FIRST_ROW, COLUMNS)) < rng.uniform(0.14, 0.28)
+    for _ in range(int(rng.integers(1, 4))):
+        padded = np.pad(middle, 1)
+        near = sum(
+            padded[y : y + middle.shape[0], x : x + middle.shape[1]].astype(np.int8) for y in range(3) for x in range(3)
+        )
+        middle = (near >= 4) | (middle & (near >= 2))
+    lattice[FIRST_ROW:] = middle
+    lattice[:, [0, -1]] = True
+    lattice[0] = True
+    # The frame counts columns to the left; a made world is stored as a file's would be.
+    return lattice
+
+
+def _swollen(lattice: Lattice) -> NDArray[np.float64]:
+    """Weights of a grid of the lattice's cells (x from the left), obstacles grown by the disc that must get through."""
+    standing = np.zeros((ROWS + 20, COLUMNS), dtype=np.bool_)
+    standing[:ROWS] = lattice[:, ::-1]
+    standing[:, [0, -1]] = True
+    grown = standing.copy()
+    reach = math.ceil((BODY_M + CYLINDER_M) / STEP_M)
+    for dy in range(-reach, reach + 1):
+        for dx in range(-reach, reach + 1):
+            if math.hypot(dx, dy) * STEP_M < BODY_M + CYLINDER_M:
+                grown |= np.roll(standing, (dy, dx), axis=(0, 1))
+    return np.where(grown, 1.0, 0.5)
+
+
+def _path_m(steps: NDArray[np.integer]) -> NDArray[np.float64]:
+    return np.column_stack((PATH_X_M + STEP_M * steps[:, 0], PATH_Y_M + STEP_M * steps[:, 1])).astype(np.float64)
