@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.storage.files import read_at_most
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.control.servo_outputs import (
     GROUND_STEERING,
     THROTTLE,
@@ -104,8 +105,13 @@ class ParameterFile:
             if written.get(name, value) != value
         )
         unknown = list(self.unknown)
-        passed = f"{self.path}: {len(unknown)} unknown parameters are passed on unchanged: {_some(unknown)}"
-        return (*self.likely_mistakes, *changed, *((passed,) if unknown else ()))
+        passed = f"{self.path}: unknown and passed on unchanged: {_some(unknown)}"
+        unwanted = tuple(
+            f"{self.path}: {name} {self.values[name]:g}: the companion wants {wanted:g} (rover-companion doctor says why)"
+            for name, wanted in RECOMMENDED_PARAMETERS.items()
+            if self.values.get(name, wanted) != wanted
+        )
+        return (*self.likely_mistakes, *changed, *unwanted, *((passed,) if unknown else ()))
 
     @property
     def likely_mistakes(self) -> tuple[str, ...]:

@@ -53,13 +53,15 @@ def test_a_users_own_parameters_count_but_where_the_plant_is_wired() -> None:
 
 def test_what_becomes_of_a_users_own_parameters_is_told() -> None:
     own = {"SERVO1_FUNCTION": 74.0, "SERVO3_FUNCTION": 74.0, "FOO": 3.0, "CRUISE_SPEED": 200.0, "RNGFND1_TYPE": 10.0}
+    own |= {"OA_TYPE": 1.0, "WP_JERK": 3.0}
     file = ParameterFile(Path("x.parm"), own, {})
     told = firmware_parameters(own, SUITES["beams"], steered=False)
     assert file.firmware_notes(told) == (
         "x.parm: outside the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); is that intended?",
         "x.parm: SERVO1_FUNCTION 74 becomes 73, as the simulated rover is built",
         "x.parm: RNGFND1_TYPE 10 becomes 100, as the simulated rover is built",
-        "x.parm: 1 unknown parameters are passed on unchanged: FOO",
+        "x.parm: OA_TYPE 1: the companion wants 0 (rover-companion doctor says why)",
+        "x.parm: unknown and passed on unchanged: FOO",
     )
     (note,) = ParameterFile(Path("x.parm"), {"FOO": 3.0}, {}).firmware_notes(None)
     assert "--write-params FILE writes the other parameters" in note
