@@ -107,7 +107,7 @@ class ParameterFile:
         unknown = list(self.unknown)
         passed = f"{self.path}: unknown and passed on unchanged: {_some(unknown)}"
         unwanted = tuple(
-            f"{self.path}: {name} {self.values[name]:g}: the companion wants {wanted:g} (rover-companion doctor says why)"
+            f"{self.path}: {name} {self.values[name]:g}: the companion wants {wanted:g} (see rover-companion doctor)"
             for name, wanted in RECOMMENDED_PARAMETERS.items()
             if self.values.get(name, wanted) != wanted
         )

@@ -60,7 +60,7 @@ def test_what_becomes_of_a_users_own_parameters_is_told() -> None:
         "x.parm: outside the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); is that intended?",
         "x.parm: SERVO1_FUNCTION 74 becomes 73, as the simulated rover is built",
         "x.parm: RNGFND1_TYPE 10 becomes 100, as the simulated rover is built",
-        "x.parm: OA_TYPE 1: the companion wants 0 (rover-companion doctor says why)",
+        "x.parm: OA_TYPE 1: the companion wants 0 (see rover-companion doctor)",
         "x.parm: unknown and passed on unchanged: FOO",
     )
     (note,) = ParameterFile(Path("x.parm"), {"FOO": 3.0}, {}).firmware_notes(None)
