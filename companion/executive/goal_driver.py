@@ -92,7 +92,7 @@ class GoalDriver:
     ) -> None:
         """Begin a leg from here.
 
-        ``way``: the fields to follow, if they have been driven before; ``driven``: the steps that the map barred then.
+        ``way``: the fields to follow, if they have been driven before; ``driven``: steps of it that the map bars.
         """
         navigator = view.settings.navigator
         self._goal = goal

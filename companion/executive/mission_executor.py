@@ -227,7 +227,7 @@ class MissionExecutor:
         """Give the mission up: to the nearest rally point, or back the way the rover came. ``reason`` is told."""
         planner = make_planner("dijkstra", self._settings.current.planner)
         # The rover may have entered a field since the last tick.
-        self.trail.enter(self.evidence.base.cell_at(pose.point), self.evidence.grid)
+        self.trail.enter(self.evidence.base.cell_at(pose.point), pose.point)
         self._refuges = refuges(self.progress.home, self.trail, rally, pose.point, self.evidence, planner)
         missed = [name for name, status in self.statuses() if status is not TargetStatus.REACHED]
         text = f"Returning: {reason}. Missed: {', '.join(missed) or 'nothing'}"
@@ -247,7 +247,7 @@ class MissionExecutor:
     def decide(self, vehicle: VehicleState, now_s: float) -> MissionTask:
         """What to do for the mission now, and by which path: legs begin and end here, and the navigator decides."""
         view = self.view(vehicle, now_s)
-        self.trail.enter(self.evidence.base.cell_at(view.pose.point), self.evidence.grid)
+        self.trail.enter(self.evidence.base.cell_at(view.pose.point), view.pose.point)
         waited = self.progress.phase is MissionPhase.WAIT
         self.progress = on_time(self.progress, now_s)
         if waited and self.progress.phase is MissionPhase.TRAVEL:
@@ -262,7 +262,9 @@ class MissionExecutor:
             if self._is_refused(now_s) or self._rolls_on(view):
                 return MissionTask.STAND
             self._notifier.tell(f"Heading for {self.progress.goal.name}", Severity.INFO)
-            self.driver.head_for(self.progress.goal, view, self._way_back(view.pose), self.trail.driven)
+            way = self._way_back(view.pose)
+            driven = self.trail.driven(self.evidence) if way else frozenset()
+            self.driver.head_for(self.progress.goal, view, way, driven)
         self._rolls_until_s = None
         self.phase = RunPhase.DRIVING
         decision = self.driver.decide(view, self._moving(vehicle, view))

@@ -15,14 +15,19 @@ from itertools import pairwise
 import numpy as np
 
 from companion.core.frames import NedPoint
-from companion.core.grid import OBSTACLE, Cell, Grid
+from companion.core.grid import OBSTACLE, Cell
 from companion.mapping.evidence_map import EvidenceMap
+from companion.mapping.map_queries import clearance_m
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Steps, fields_between, is_clear
 from companion.planning.planner import Planner
 from companion.planning.problem import Budget, PlanningProblem
 
+POINTS_M = 0.2
+"""Places of the track are kept so far apart."""
+TOUCH_M = 0.1
+"""Evidence of what the rover passed may seem nearer than it was by so much."""
 MOST_TRIED = 3
 """This many rally points, the nearest in a straight line, are looked at."""
 
@@ -36,29 +41,37 @@ class Trail:
     def __init__(self) -> None:
         self._cells: list[Cell] = []
         self._places: dict[Cell, int] = {}
-        self._driven: set[tuple[Cell, Cell]] = set()
+        self._points: dict[Cell, list[NedPoint]] = {}
 
-    def enter(self, cell: Cell, grid: Grid | None = None) -> None:
-        """The rover is in this field now. Entering a field anew cuts off all that came after it.
+    def enter(self, cell: Cell, point: NedPoint | None = None) -> None:
+        """The rover is in this field now, at this place (None: not known any more, from an earlier run).
 
-        ``grid``: the map as it is known in this moment; None for a moment of an earlier run.
+        Entering a field anew cuts off all that came after it.
         """
-        if self._cells and self._cells[-1] == cell:
-            return
-        if self._cells:
-            fields = (self._cells[-1], *fields_between(self._cells[-1], cell), cell)
-            if grid is not None:
-                # Both ways: what bars a step back may be the field that it began in.
-                steps = {step for a, b in pairwise(fields) for step in ((a, b), (b, a))}
-                self._driven |= {step for step in steps if not is_clear(grid, step)}
-            for between in fields[1:-1]:
-                self._append(between)
-        self._append(cell)
+        if not self._cells or self._cells[-1] != cell:
+            if self._cells:
+                for between in fields_between(self._cells[-1], cell):
+                    self._append(between)
+            self._append(cell)
+        if point is not None:
+            points = self._points.setdefault(cell, [])
+            if not points or points[-1].distance_m(point) >= POINTS_M:
+                points.append(point)
 
-    @property
-    def driven(self) -> Steps:
-        """Steps between fields, either way, that the map barred in the moment when the rover made them."""
-        return frozenset(self._driven)
+    def driven(self, evidence: EvidenceMap) -> Steps:
+        """Steps of this way, either way, that the map bars although the track that the rover left there is clear on it.
+
+        It passed beside what stands there, nearer than a rover could that stands in the middle of the field.
+        """
+        steps = {step for a, b in pairwise(self._cells) for step in ((a, b), (b, a))}
+        barred = [step for step in steps if not is_clear(evidence.grid, step)]
+        return frozenset(step for step in barred if all(self._is_clear(cell, evidence) for cell in step))
+
+    def _is_clear(self, cell: Cell, evidence: EvidenceMap) -> bool:
+        points, room_m = self._points.get(cell, []), evidence.rover_radius_m - TOUCH_M
+        if not points or not evidence.base.contains(cell) or evidence.base.is_obstacle(cell):
+            return False
+        return all(clearance_m(evidence, point, room_m) >= room_m for point in points)
 
     def back(self) -> tuple[Cell, ...]:
         """From the field the rover is in to the first one."""
@@ -77,6 +90,7 @@ class Trail:
             return
         for gone in self._cells[place + 1 :]:
             del self._places[gone]
+            self._points.pop(gone, None)
         del self._cells[place + 1 :]
 
 

@@ -84,8 +84,8 @@ class NavState:
     ``past``: the walk from the start to the last field entered. ``current``: the path that is followed; ``index``: the
     rover's place on it. ``returning``: part A. ``until_search``: fields until its next search. ``since_better``: fields
     since the last search for a better path, ``better_every``: after how many it is due. ``draws``: state of the random
-    choice of two or three. ``driven``: steps that the rover drove though the map barred them: it passed beside what
-    stood there.
+    choice of two or three. ``driven``: steps that the map bars, but not the track that the rover left there: it passed
+    beside what stands there.
     """
 
     target: Cell
@@ -135,7 +135,7 @@ def step(state: NavState, grid: Grid, cell: Cell, search: Search) -> tuple[NavSt
 def retrace(state: NavState, way: tuple[Cell, ...], driven: Steps = frozenset()) -> NavState:
     """Follow fields from here to the target that were driven before, without better paths, while they are clear.
 
-    ``driven``: steps that may be driven again, because the map barred them when they were driven.
+    ``driven``: steps that may be driven again though the map bars them.
     """
     return replace(state, current=Path(way, 0.0), index=0, better_every=NEVER, driven=driven)
 

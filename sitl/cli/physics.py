@@ -14,6 +14,7 @@ from companion.core.clock import WallClock
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.cli.serve import BAD_INPUT, say, stop_signals
 from sitl.firmware.firmware_parameters import firmware_parameters, parameter_file
 from sitl.firmware.parameter_files import ParameterFileError
@@ -84,7 +85,7 @@ def _write_parameters(scenario: Scenario, behind: Physics, file: Path | None) ->
         with written(file):
             file.write_text(parameter_file(parameters), encoding="ascii")
     if scenario.parameter_file is not None:
-        for note in scenario.parameter_file.firmware_notes(parameters):
+        for note in scenario.parameter_file.firmware_notes(parameters, RECOMMENDED_PARAMETERS):
             typer.echo(note, err=True)
 
 

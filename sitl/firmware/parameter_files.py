@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.storage.files import read_at_most
-from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.control.servo_outputs import (
     GROUND_STEERING,
     THROTTLE,
@@ -89,10 +88,11 @@ class ParameterFile:
         wrong = f"{self.path}: {', '.join(odd)}: {wired_as}"
         return (*(text for text in (self.note(),) if text), *self.likely_mistakes, *((wrong,) if odd else ()))
 
-    def firmware_notes(self, written: Mapping[str, float] | None) -> tuple[str, ...]:
+    def firmware_notes(self, written: Mapping[str, float] | None, recommended: Mapping[str, float]) -> tuple[str, ...]:
         """Remarks about this file for the real firmware, one line each.
 
-        ``written``: all parameters written for the firmware; None if none are.
+        ``written``: all parameters written for the firmware; None if none are. ``recommended``: what the companion
+        wants.
         """
         if written is None:
             only = (
@@ -108,7 +108,7 @@ class ParameterFile:
         passed = f"{self.path}: unknown and passed on unchanged: {_some(unknown)}"
         unwanted = tuple(
             f"{self.path}: {name} {self.values[name]:g}: the companion wants {wanted:g} (see rover-companion doctor)"
-            for name, wanted in RECOMMENDED_PARAMETERS.items()
+            for name, wanted in recommended.items()
             if self.values.get(name, wanted) != wanted
         )
         return (*self.likely_mistakes, *changed, *unwanted, *((passed,) if unknown else ()))

@@ -17,6 +17,7 @@ from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.lockstep import Drive
+from sitl.plant.outline import Outline
 from sitl.plant.rover import SIM_ROVER, Drivetrain, two_wheels
 from sitl.scenario import SOMEWHERE, Scenario
 from sitl.world.truth import SimStart
@@ -73,7 +74,7 @@ def drive(seed: int, drivetrain: Drivetrain, jerk_m_s3: float = PARAMETERS["WP_J
         sitl=SitlSpec(heading_deg=heading_deg, sensors=suite),
     )  # fmt: skip
     start = SimStart(*start_m, math.radians(heading_deg), SOMEWHERE)
-    scenario = Scenario(world, start, suite, 0.4, PARAMETERS | {"WP_JERK": jerk_m_s3}, drivetrain=drivetrain)
+    scenario = Scenario(world, start, suite, Outline(0.4), PARAMETERS | {"WP_JERK": jerk_m_s3}, drivetrain=drivetrain)
     run = Drive(mission, scenario, Settings(), seed, NullRecorder(), 900.0)
     run.run()
     return run

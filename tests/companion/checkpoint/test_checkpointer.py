@@ -128,7 +128,7 @@ def bench(mission: Mission) -> Bench:
     progress = plan_progress(layout.targets, layout.start)
     driver = Driver(progress.goal, initial_state(Cell(2, 7), progress.goal.cell, 9, 5))
     executor, writer = Executor(layout, driver, progress), Writer()
-    executor.trail.enter(Cell(2, 7), executor.evidence.grid)
+    executor.trail.enter(Cell(2, 7))
     return Bench(Checkpointer(mission, writer), writer, executor)
 
 

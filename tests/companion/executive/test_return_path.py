@@ -38,23 +38,35 @@ def test_loops_are_cut_off() -> None:
     assert trail((0, 0), (0, 0), (3, 0), (0, 0)).back() == ((0, 0),)
 
 
-def test_steps_that_the_map_barred_then_are_remembered_either_way_and_later_ones_are_not() -> None:
-    found, then, later = Trail(), ground((2, 1)).grid, ground((2, 1), (4, 1)).grid
-    for x in range(6):
-        found.enter(Cell(x, 1), then)
-    assert found.driven == {
-        (Cell(1, 1), Cell(2, 1)), (Cell(2, 1), Cell(1, 1)), (Cell(3, 1), Cell(2, 1)), (Cell(2, 1), Cell(3, 1))
-    } & found.driven  # fmt: skip
-    assert (Cell(1, 1), Cell(2, 1)) in found.driven and (Cell(3, 1), Cell(2, 1)) in found.driven
-    back = found.back()
-    assert is_clear(then, back, found.driven) and not is_clear(later, back, found.driven)
+def driven_past(evidence: EvidenceMap, east_m: float) -> Trail:
+    """North along a column of fields, at this distance east of the map's edge."""
+    found = Trail()
+    for north_m in np.arange(1.5, 7.6, 0.1):
+        point = NedPoint(float(north_m), east_m)
+        found.enter(evidence.base.cell_at(point), point)
+    return found
+
+
+@pytest.mark.parametrize(("stands_east_m", "open_again"), [(4.6, True), (4.0, False)])
+def test_what_the_rover_passed_beside_does_not_bar_its_way_back_and_what_came_after_does(
+    stands_east_m: float, open_again: bool
+) -> None:
+    evidence = ground()
+    found = driven_past(evidence, 4.05)
+    y, x = (int(v / evidence.evidence_m) for v in (4.5, stands_east_m))
+    evidence.log_odds[y, x] = 3.0
+    evidence.grid.weights[4, 4] = OBSTACLE
+    assert not is_clear(evidence.grid, found.back())
+    assert is_clear(evidence.grid, found.back(), found.driven(evidence)) is open_again
+    assert found.driven(ground((4, 4))) == frozenset(), "what the mission closed stays closed"
 
 
 def test_fields_off_the_map_are_never_clear() -> None:
-    found, grid = Trail(), ground().grid
+    found, evidence = Trail(), ground()
     for y in (2, 1, 0, -1):
-        found.enter(Cell(4, y), grid)
-    assert not is_clear(ground((4, 1)).grid, found.back(), found.driven)
+        found.enter(Cell(4, y), NedPoint(y + 0.5, 4.5))
+    evidence.grid.weights[1, 4] = OBSTACLE
+    assert not is_clear(evidence.grid, found.back(), found.driven(evidence))
 
 
 Steps = st.lists(st.tuples(st.integers(-4, 4), st.integers(-4, 4)), min_size=1, max_size=60)

@@ -56,14 +56,14 @@ def test_what_becomes_of_a_users_own_parameters_is_told() -> None:
     own |= {"OA_TYPE": 1.0, "WP_JERK": 3.0}
     file = ParameterFile(Path("x.parm"), own, {})
     told = firmware_parameters(own, SUITES["beams"], steered=False)
-    assert file.firmware_notes(told) == (
+    assert file.firmware_notes(told, RECOMMENDED_PARAMETERS) == (
         "x.parm: outside the range that ArduRover documents: CRUISE_SPEED 200 (0 to 100); is that intended?",
         "x.parm: SERVO1_FUNCTION 74 becomes 73, as the simulated rover is built",
         "x.parm: RNGFND1_TYPE 10 becomes 100, as the simulated rover is built",
         "x.parm: OA_TYPE 1: the companion wants 0 (see rover-companion doctor)",
         "x.parm: unknown and passed on unchanged: FOO",
     )
-    (note,) = ParameterFile(Path("x.parm"), {"FOO": 3.0}, {}).firmware_notes(None)
+    (note,) = ParameterFile(Path("x.parm"), {"FOO": 3.0}, {}).firmware_notes(None, {})
     assert "--write-params FILE writes the other parameters" in note
 
 
