@@ -73,6 +73,7 @@ radius_m = 1.2
 CORNERS = ((2.2, 15.3), (-2.3, 15.2), (-2.3, 0.5), (2.3, 14.0))
 
 
+@pytest.mark.thorough
 def test_who_cannot_turn_on_the_spot_keeps_inside_a_narrow_strip_by_itself(tmp_path: Path) -> None:
     """Targets in the corners: it must back out again and again. The check of setpoints has nothing to refuse."""
     Image.new("L", (30, 20), 255).save(tmp_path / "strip.png")
