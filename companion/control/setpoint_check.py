@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
+from itertools import pairwise
 
 from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
@@ -30,6 +31,9 @@ NEARER_M = 0.05
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
 OVERSHOT_SHARE = 0.1
 """A near position is overshot by no more than this share of the distance."""
+WAY_STEP_S = 0.1
+GAINS_FASTER = 1.3
+"""A rover that is left alone may gain speed so much faster than its settings say."""
 ARC_PIECES = 8
 """Straight pieces that an arc is made of where borders are concerned."""
 
@@ -73,6 +77,8 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
     forward_m_s, yaw_rate_rad_s = setpoint.forward_m_s, setpoint.yaw_rate_rad_s
     if not math.isfinite(forward_m_s) or not math.isfinite(yaw_rate_rad_s):
         return Reason(SetpointFault.NOT_A_NUMBER)
+    if view.settings.guidance.controller != "points":
+        return _way_is_blocked(_way_alone(setpoint, view), view)
     base_m_s = max(view.speed_m_s, view.settings.steering.scale_base_m_s)
     reach_m = blind_distance_m(abs(forward_m_s), view.settings.guidance)
     arcs = ArcQueries(view.evidence, view.pose)
@@ -80,6 +86,42 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
     course_rad = _course_rad(setpoint, view)
     if arcs.arc_clear_m(course_rad, yaw_rate_rad_s / base_m_s, room_m, reach_m, Until.BLOCKED) < reach_m - SLACK_M:
         return Reason(SetpointFault.INTO_OBSTACLE)
+    return None
+
+
+def _way_alone(setpoint: GuidedVelocity, view: LocalView) -> list[NedPoint]:
+    """Places on the way of a rover that is told nothing more: it goes on until the velocity expires, then it brakes."""
+    guidance, motion, pose = view.settings.guidance, view.settings.motion, view.pose
+    before = view.told.forward_m_s if isinstance(view.told, GuidedVelocity) else 0.0
+    speed_m_s, turn_rad_s = math.copysign(view.speed_m_s, before), view.yaw_rate_rad_s
+    heading_rad, point, places = pose.heading_rad, pose.point, [pose.point]
+    gains_m_s = GAINS_FASTER * motion.acceleration_m_s2 * WAY_STEP_S
+    gains_rad_s = motion.turn_acceleration_rad_s2 * WAY_STEP_S
+    for step in range(math.ceil((motion.dead_s + guidance.velocity_lasts_s) / WAY_STEP_S)):
+        if step * WAY_STEP_S >= motion.dead_s:
+            speed_m_s += min(max(setpoint.forward_m_s - speed_m_s, -gains_m_s), gains_m_s)
+            turn_rad_s += min(max(setpoint.yaw_rate_rad_s - turn_rad_s, -gains_rad_s), gains_rad_s)
+        point = point.moved(heading_rad + 0.5 * turn_rad_s * WAY_STEP_S, speed_m_s * WAY_STEP_S)
+        heading_rad += turn_rad_s * WAY_STEP_S
+        places.append(point)
+    stops_s = abs(speed_m_s) / motion.deceleration_m_s2
+    for share in (0.25, 0.5, 0.75, 1.0):
+        # It turns on for as long as it takes to stop turning, while it brakes.
+        part_s = 0.25 * stops_s
+        mean_m_s = speed_m_s * (1.125 - share)
+        turn_rad_s -= math.copysign(min(gains_rad_s * part_s / WAY_STEP_S, abs(turn_rad_s)), turn_rad_s)
+        point = point.moved(heading_rad + 0.5 * turn_rad_s * part_s, mean_m_s * part_s)
+        heading_rad += turn_rad_s * part_s
+        places.append(point)
+    return places
+
+
+def _way_is_blocked(places: list[NedPoint], view: LocalView) -> Fault | None:
+    radius_m = view.evidence.rover_radius_m - NEARER_M
+    for here, there in pairwise(places):
+        length_m = here.distance_m(there)
+        if look_along(view.evidence, here, there, radius_m).clear_m < length_m - 0.5 * SLACK_M:
+            return Reason(SetpointFault.INTO_OBSTACLE)
     return None
 
 

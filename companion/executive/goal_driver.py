@@ -12,9 +12,12 @@ from companion.control.arc_controller import ArcController
 from companion.control.collision_avoidance import CollisionAvoidance
 from companion.control.controller import STANDSTILL, ControlCommand, Controller
 from companion.control.local_view import LocalView
+from companion.control.motion_controller import MotionController
+from companion.control.motion_planners import MotionKind, motion_planner
 from companion.control.point_controller import PointController
 from companion.control.reference_path import ReferencePath, advanced, reference_path
 from companion.control.stuck_recovery import StuckRecovery
+from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
 from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
@@ -41,6 +44,7 @@ from companion.navigation.turning_cost import with_turning_cost
 from companion.perception.moving_obstacles import Moving, motion_changed, planners_movers
 from companion.planning import problem
 from companion.planning.problem import PlanResult
+from companion.settings import ControllerKind
 
 DOUBT_REACH_M = 2.5
 
@@ -54,8 +58,10 @@ class Tally:
     stuck: int = 0
 
 
-def controller_for(rover: RoverLimits) -> Controller:
-    """The controller of a rover that turns on the spot, or of one that drives arcs."""
+def controller_for(rover: RoverLimits, footprint: Footprint, kind: ControllerKind, seed: int) -> Controller:
+    """What leads the rover along paths. ``seed``: of a motion planner's random choices."""
+    if kind != "points":
+        return MotionController(footprint, motion_planner(MotionKind(kind), seed))
     return ArcController() if rover.turning_radius_m > 0.0 else PointController()
 
 

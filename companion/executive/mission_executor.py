@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from companion.control.braking import counted_s, for_link
-from companion.control.controller import ControlCommand
+from companion.control.controller import ControlCommand, Controller
 from companion.control.local_view import LocalView
 from companion.core.frames import GeoPoint, NedPoint, Pose
 from companion.core.grid import Cell
@@ -124,7 +124,7 @@ class MissionExecutor:
             notifier.tell(text, Severity.WARNING)
         planner = make_planner(given.navigator.planner, given.planner)
         searcher = PathSearcher(planner, rng)
-        self.driver = GoalDriver(controller_for(self._limits), searcher, runner)
+        self.driver = GoalDriver(self._controller(rng), searcher, runner)
         self._tracker = ObjectTracker(layout.evidence)
 
     @property
@@ -152,6 +152,12 @@ class MissionExecutor:
         """Every target's name and what has become of it so far."""
         return [(t.name, status) for t, status in zip(self.progress.targets, self.progress.statuses, strict=True)]
 
+    def _controller(self, rng: np.random.Generator) -> Controller:
+        """A new one. Only those that draw random numbers take their seed from the run's."""
+        kind = self._settings.current.guidance.controller
+        seed = 0 if kind == "points" else int(rng.integers(2**63))
+        return controller_for(self._limits, self._mission.rover.footprint, kind, seed)
+
     # The map and the ground --------------------------------------------------------------------------------------
 
     def map_scan(self, pose: Pose, yaw_rate_rad_s: float, scan: RangeScan) -> None:
@@ -174,7 +180,7 @@ class MissionExecutor:
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
-        self.driver = GoalDriver(controller_for(self._limits), searcher, self._runner, seed)
+        self.driver = GoalDriver(self._controller(searcher.rng), searcher, self._runner, seed)
         self.driver.go_on(before.tally, before.epoch)
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
         self._tracker = ObjectTracker(self.evidence)

@@ -47,7 +47,7 @@ def lay(
     frame = LocalFrame(origin)
     resolved = resolve(mission, frame, frame.to_ned(home), fence)
     start = _start(pose.point, resolved.ground)
-    evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
+    evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), settings)
     return MissionLayout(origin, home, resolved.targets, start, evidence, fence, resolved.bounds, resolved.refused)
 
 
@@ -64,7 +64,7 @@ def lay_again(
     if requested is not None:
         point = frame.to_ned(before.to_geo(requested.point))
         requested = replace(requested, point=point, cell=resolved.ground.cell_at(point))
-    evidence = new_map(_base(mission, resolved), mission.rover.radius_m, settings)
+    evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), settings)
     again = MissionLayout(
         origin, layout.home, resolved.targets, start, evidence, layout.fence, resolved.bounds, resolved.refused
     )
@@ -93,6 +93,12 @@ def apart_m(here: GeoPoint, there: GeoPoint) -> float:
 
 def _start(point: NedPoint, grid: Grid) -> ResolvedTarget:
     return ResolvedTarget("start", point, grid.cell_at(point), 0.0, OnBlocked.HOLD, None)
+
+
+def _map_radius_m(mission: Mission, settings: MappingSettings) -> float:
+    """What the rover's middle keeps from obstacles, by ``mapping.keeps``."""
+    rover = mission.rover
+    return rover.radius_m if settings.keeps == "circle" else rover.footprint.discs()[1] + settings.beside_m
 
 
 def _base(mission: Mission, resolved: ResolvedMission) -> Grid:

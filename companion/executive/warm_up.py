@@ -13,10 +13,13 @@ from numba.core import event
 from companion.control.arc_controller import ArcController
 from companion.control.collision_avoidance import first_near, least_room_m
 from companion.control.local_view import LocalView
+from companion.control.motion_controller import MotionController
+from companion.control.motion_planners import MotionKind, motion_planner
 from companion.control.motion_prediction import steered
 from companion.control.reference_path import ReferencePath
 from companion.control.safe_reach import farthest_clear
 from companion.control.setpoint_check import velocity_stops_in_time
+from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -55,6 +58,22 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     velocity_stops_in_time(GuidedVelocity(0.2, 0.1), at, Bounds())
     if turning_radius_m > 0.0:
         _steer(settings)
+    if settings.guidance.controller != "points":
+        _plan_motions(settings)
+
+
+def _plan_motions(settings: Settings) -> None:
+    """Two ticks on ground that is seen, and one with something before the rover."""
+    evidence = new_map(empty_grid(16, 16), 0.35, settings.mapping)
+    evidence.log_odds.fill(-1.0)
+    path = ReferencePath(np.column_stack((np.linspace(3.0, 12.0, 37), np.full(37, 8.0))))
+    planner = motion_planner(MotionKind(settings.guidance.controller))
+    controller, rover = MotionController(Footprint.rectangle(0.7, 0.5), planner), RoverLimits(0.35, 2.0, 8.0)
+    for tick in range(3):
+        view = LocalView(Pose(3.0, 8.0, 0.0, 0.2 * tick), 1.0, evidence, rover, settings)
+        velocity_stops_in_time(GuidedVelocity(0.2, 0.1), view, Bounds())
+        controller.follow(path, view)
+        evidence.log_odds[40:44] = 3.0
 
 
 def settle() -> None:

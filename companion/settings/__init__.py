@@ -3,10 +3,12 @@
 from companion.settings.planners import PlannerSettings
 from companion.settings.section import Section, SettingsError
 from companion.settings.settings import (
+    ControllerKind,
     FenceSettings,
     GuidanceSettings,
     LinkSettings,
     MappingSettings,
+    MotionSettings,
     NavigatorSettings,
     PowerSettings,
     SafetySettings,
@@ -18,10 +20,12 @@ from companion.settings.settings import (
 from companion.settings.settings_file import load_settings, parse_settings
 
 __all__ = [
+    "ControllerKind",
     "FenceSettings",
     "GuidanceSettings",
     "LinkSettings",
     "MappingSettings",
+    "MotionSettings",
     "NavigatorSettings",
     "PlannerSettings",
     "PowerSettings",

@@ -58,6 +58,12 @@ class MappingSettings(Section):
     evidence_m: float = Field(
         0.125, gt=0.0, description="side of an evidence cell; a field's side is a whole number of them"
     )
+    keeps: Literal["circle", "outline"] = Field(
+        "circle",
+        description="the rover's middle keeps from obstacles the radius of the circle round it, or what its outline "
+        "needs where it points along its way (for controllers that plan motions)",
+    )
+    beside_m: float = Field(0.03, ge=0.0, description="room beside that outline")
     hit: float = Field(0.9, gt=0.0, description="log-odds added at the end of a beam")
     miss: float = Field(0.3, gt=0.0, description="log-odds removed along a beam")
     occupied_at: float = Field(0.6, gt=0.0, description="log-odds from which evidence counts as an obstacle")
@@ -84,6 +90,9 @@ class MappingSettings(Section):
     soft_cost: float = Field(0.4, ge=0.0, lt=0.5, description="weight added beside obstacles")
     soft_reach_m: float = Field(2.0, ge=0.0, description="how far from an obstacle the soft cost reaches")
     max_yaw_rate_deg_s: float = Field(120.0, gt=0.0, description="scans taken while turning faster are dropped")
+
+
+ControllerKind = Literal["points", "motion-ga", "dwa", "mppi"]
 
 
 class GuidanceSettings(Section):
@@ -159,6 +168,11 @@ class GuidanceSettings(Section):
     back_out_m: float = Field(0.8, ge=0.0, description="distance to back out")
     back_out_speed_m_s: float = Field(0.4, gt=0.0, description="speed of backing out")
     arrival_m: float = Field(0.5, gt=0.0, description="a target is reached within this distance")
+    controller: ControllerKind = Field(
+        "points",
+        description="what leads the rover along its path: `points` sends positions (arcs where it cannot turn on the "
+        "spot); the others plan motions and send velocities",
+    )
 
     @model_validator(mode="after")
     def _slowest_below_fastest(self) -> Self:
@@ -168,6 +182,17 @@ class GuidanceSettings(Section):
                 "lower the one or raise the other"
             )
         return self
+
+
+class MotionSettings(Section):
+    """How the autopilot and the rover follow a speed and a turn rate, for controllers that plan motions."""
+
+    dead_s: float = Field(0.3, ge=0.0, le=2.0, description="time until a new speed or turn rate begins to show")
+    acceleration_m_s2: float = Field(1.0, gt=0.0, le=20.0, description="ArduRover's ATC_ACCEL_MAX")
+    deceleration_m_s2: float = Field(1.0, gt=0.0, le=20.0, description="ArduRover's ATC_DECEL_MAX (0: ATC_ACCEL_MAX)")
+    turn_acceleration_rad_s2: float = Field(2.1, gt=0.0, le=50.0, description="ArduRover's ATC_STR_ACC_MAX, in radians")
+    turn_rad_s: float = Field(1.5, gt=0.0, le=10.0, description="the fastest turn that is told")
+    backwards_m_s: float = Field(0.5, ge=0.0, le=10.0, description="the fastest speed backwards that is told")
 
 
 class SteeringSettings(Section):
@@ -329,6 +354,7 @@ class Settings(Section):
     mapping: MappingSettings = MappingSettings()
     guidance: GuidanceSettings = GuidanceSettings()
     steering: SteeringSettings = SteeringSettings()
+    motion: MotionSettings = MotionSettings()
     safety: SafetySettings = SafetySettings()
     fence: FenceSettings = FenceSettings()
     power: PowerSettings = PowerSettings()

@@ -61,6 +61,15 @@ def manoeuvres() -> None:
     warm_up(Settings(), turning_radius_m=1.0)
 
 
+def motions() -> None:
+    """Guidance that plans motions."""
+    from companion.executive.warm_up import warm_up
+    from companion.settings import Settings
+
+    for kind in ("motion-ga", "dwa", "mppi"):
+        warm_up(Settings.model_validate({"guidance": {"controller": kind}}))
+
+
 def physics() -> None:
     """The world behind the real firmware."""
     from companion.mission.mission import Mission
@@ -79,6 +88,7 @@ FOR_ALL: Sequence[Job] = (
     drive,
     physics,
     manoeuvres,
+    motions,
 )
 """Those that take longest and that others wait for come first."""
 
@@ -87,6 +97,7 @@ AFTER: Mapping[Job, Sequence[Job]] = {
     drive: (genetic_planner, graph_searches),
     physics: (simulator,),
     manoeuvres: (drive,),
+    motions: (drive,),
 }
 """Jobs that use the kernels of others. Side by side, both would compile them."""
 

@@ -25,6 +25,7 @@ EXPERIMENTS = (
     "driving",
     "dead-companion",
     "killed-companion",
+    "barn",
     "wang-table4",
     "sedighi-table1",
     "achour-table1",
@@ -60,6 +61,12 @@ def experiment(
     planners: Annotated[
         str, typer.Option(help="navigation, driving: names, separated by commas; default: all that apply.")
     ] = "",
+    worlds: Annotated[
+        Path | None, typer.Option(help="barn: a file of BARN worlds (.npz); default: worlds of our own making.")
+    ] = None,
+    controllers: Annotated[
+        str, typer.Option(help="barn: what leads the rover, names separated by commas; default: all.")
+    ] = "",
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
         Path | None,
@@ -78,8 +85,10 @@ def experiment(
         writable(json_file)
         writable(docs and docs / "results.md")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
-        names = tuple(planner.strip() for planner in planners.split(",") if planner.strip())
-        options = Options(runs, seed, jobs, maps, tuple(world or ()), names)
+        if name != "barn" and (worlds or controllers):
+            raise ExperimentError(f"--worlds, --controllers: {name} does not take them; they are for barn")
+        leads = _names(controllers)
+        options = Options(runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, leads)
         report = _with_progress(name, options, console)
         _put_out(report, console, json_file, docs)
         if isinstance(report, Checked) and report.failure:
@@ -88,6 +97,10 @@ def experiment(
     except (ExperimentError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
+
+
+def _names(listed: str) -> tuple[str, ...]:
+    return tuple(name.strip() for name in listed.split(",") if name.strip())
 
 
 def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: Path | None) -> None:

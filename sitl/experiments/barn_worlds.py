@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,7 +85,7 @@ def read_worlds(file: Path) -> list[BarnWorld]:
                 BarnWorld(int(number), np.asarray(lattice, dtype=np.bool_), _path_m(archive[f"path_{number}"]))
                 for number, lattice in zip(archive["number"], archive["lattice"], strict=True)
             ]
-    except (OSError, ValueError, KeyError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise ExperimentError(
             f"{file}: no archive of BARN worlds ({error}); give a .npz as described in the docs"
         ) from error

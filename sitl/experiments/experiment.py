@@ -47,10 +47,16 @@ class Options:
     maps: Path | None = None
     worlds: tuple[Path, ...] = ()
     planners: tuple[str, ...] = ()
+    archive: Path | None = None
+    """``barn``: a file of worlds; None: worlds of our own making."""
+    controllers: tuple[str, ...] = ()
+    """``barn``: what leads the rover; none: all there are."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""
         chosen = f" --planners {','.join(self.planners)}" if self.planners else ""
+        chosen += f" --controllers {','.join(self.controllers)}" if self.controllers else ""
+        chosen += f" --worlds {self.archive.name}" if self.archive else ""
         return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"
 
 

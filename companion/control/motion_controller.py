@@ -1,0 +1,167 @@
+"""Controller that plans motions: each tick a motion planner finds what to do next, and its beginning is told.
+
+It is told only as long as the rover may be left alone with it: held for as long as a velocity lasts
+(``guidance.velocity_lasts_s``), and braked then, the rover stays on ground that is free and seen.
+
+Nouns: motion controller.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.control.controller import ControlCommand, Purpose, stop_for
+from companion.control.local_view import LocalView
+from companion.control.motion_ground import Window, look_round
+from companion.control.motion_kernels import Body, MotionProblem, RoverModel, Start, Weights, may_be_last
+from companion.control.motion_planners import MotionPlanner
+from companion.control.reference_path import ReferencePath
+from companion.core.footprint import Footprint
+from companion.vehicle.commands import GuidedVelocity
+
+HORIZON_S, STEP_S = 2.5, 0.1
+LOOKS_S = 0.09
+"""The ground is looked at anew after so long."""
+WEIGHTS = Weights(margin_m=0.03, margin_s=0.02, near_m=0.25, risk=1.0, unseen=0.3, turn=0.5, change=0.1)
+GAINS = (1.0, 0.7, 1.3)
+"""The rover may turn so much more or less than it is told."""
+SHARES = (1.0, 0.7, 0.4, 0.15)
+"""Of the speed that was planned, tried in turn until the rover may be left alone with it."""
+BRAKE_TURNS = (0.0, -0.5, 0.5, -1.0, 1.0)
+"""Turn rates to brake with, as shares of the fastest."""
+OFF_MODEL = 0.3
+"""The rover may differ from its model by this share."""
+BRAKES_S = 0.3
+"""So long it is looked how braking goes on."""
+STANDS_M_S = 0.05
+NEAR_M = 0.3
+"""A rover that stands too near to something finds its way from so far away."""
+PLANNED_SHARE = 0.8
+"""Motions are planned with so much of the braking there should be, so that the last look seldom says no."""
+
+
+class Told(NamedTuple):
+    """A command, and when it was told."""
+
+    time_s: float
+    speed_m_s: float
+    turn_rad_s: float
+
+
+class MotionController:
+    """Remembers what it told in the last second, and when the rover could last be left alone with it."""
+
+    backwards = False
+    """It drives backwards for a moment at a time, never along a path."""
+
+    def __init__(self, footprint: Footprint, planner: MotionPlanner) -> None:
+        places_m, radius_m = footprint.discs()
+        self._body = Body(places_m, radius_m)
+        self._planner = planner
+        self._told: deque[Told] = deque()
+        self._window: Window | None = None
+        self._looked_s = self._safe_s = self._time_s = -math.inf
+        self.cost_s = math.nan
+        """Of the motion under way."""
+
+    def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
+        """The path itself."""
+        return path
+
+    def reset(self) -> None:
+        """The path is void, and what was planned along it."""
+        self._planner.forget()
+        self._window = None
+
+    def follow(self, path: ReferencePath, view: LocalView) -> ControlCommand:
+        """The beginning of the best motion, or of a slower one, or to brake."""
+        now_s, model = view.pose.time_s, rover_model(view)
+        passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
+        self._time_s = now_s
+        problem = self._problem(path, view, model)
+        if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
+            self._told.append(Told(now_s, 0.0, 0.0))
+            return stop_for(Purpose.BLOCKED)
+        motion, self.cost_s = self._planner.plan(problem, passed_s)
+        told = self._safe(motion[0], view.settings.guidance.velocity_lasts_s, problem)
+        self._told.append(told)
+        if abs(told.speed_m_s) < 1e-6:
+            if view.speed_m_s > STANDS_M_S:
+                return ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, told.turn_rad_s), 0.0)
+            if told.turn_rad_s == 0.0:
+                return stop_for(Purpose.BLOCKED)
+        return ControlCommand(Purpose.DRIVE, GuidedVelocity(told.speed_m_s, told.turn_rad_s), abs(told.speed_m_s))
+
+    def _problem(self, path: ReferencePath, view: LocalView, model: RoverModel) -> MotionProblem:
+        now_s, pose = view.pose.time_s, view.pose
+        if self._window is None or now_s - self._looked_s >= LOOKS_S:
+            keeps_m = self._body.radius_m + WEIGHTS.margin_m
+            self._window = look_round(view.evidence, pose.point, path, keeps_m, model.fastest_m_s)
+            self._looked_s = now_s
+        backwards = bool(self._told) and self._told[-1].speed_m_s < 0.0
+        speed_m_s = -view.speed_m_s if backwards else view.speed_m_s
+        start = Start(*self._window.place(pose.point), pose.heading_rad, speed_m_s, view.yaw_rate_rad_s)
+        pending = self._pending(now_s, model.dead_s)
+        return MotionProblem(start, pending, self._window.ground, self._body, model, WEIGHTS, HORIZON_S, STEP_S)
+
+    def _pending(self, now_s: float, dead_s: float) -> NDArray[np.float64]:
+        """What was told and has not had its effect yet, one row a step."""
+        while self._told and self._told[0].time_s < now_s - dead_s - 1.0:
+            self._told.popleft()
+        rows = np.zeros((round(dead_s / STEP_S), 2))
+        for step, row in enumerate(rows):
+            then_s = now_s - dead_s + (step + 0.5) * STEP_S
+            for told in self._told:
+                if told.time_s <= then_s:
+                    row[:] = told.speed_m_s, told.turn_rad_s
+        return rows
+
+    def _safe(self, wanted: NDArray[np.float64], lasts_s: float, problem: MotionProblem) -> Told:
+        """This command, or a slower one, or the best way to brake."""
+        now_s, speed_m_s, turn_rad_s = self._time_s, float(wanted[0]), float(wanted[1])
+        problem = problem._replace(model=worst_model(problem.model))
+        for share in SHARES:
+            # On the same arc; a rover that hardly moves keeps its turn rate.
+            told = Told(now_s, share * speed_m_s, (share if abs(speed_m_s) > 0.1 else 1.0) * turn_rad_s)
+            if all(
+                may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, problem) for gain in GAINS
+            ):
+                self._safe_s = now_s
+                return told
+        fastest_rad_s = problem.model.turn_fastest_rad_s
+        for share in BRAKE_TURNS:
+            if may_be_last(0.0, share * fastest_rad_s, BRAKES_S, 1.0, 0.0, problem):
+                rolls = abs(problem.start.speed_m_s) > STANDS_M_S
+                return Told(now_s, 0.0, share * fastest_rad_s if rolls else 0.0)
+        if self._told and now_s - self._safe_s < lasts_s:
+            return self._told[-1]._replace(time_s=now_s)  # with this it could be left alone
+        return Told(now_s, 0.0, 0.0)
+
+
+def _leads_on(problem: MotionProblem) -> bool:
+    """Whether a way to the end is known from the rover's place or from one near by."""
+    ground, start = problem.ground, problem.start
+    x, y, near = (round(v / ground.togo_cell_m) for v in (start.x_m, start.y_m, NEAR_M))
+    around = ground.togo_s[max(y - near, 0) : y + near + 1, max(x - near, 0) : x + near + 1]
+    return bool(np.isfinite(around).any())
+
+
+def worst_model(model: RoverModel) -> RoverModel:
+    """A rover that gathers speed faster and brakes worse than it should."""
+    return model._replace(
+        accel_m_s2=model.accel_m_s2 * (1.0 + OFF_MODEL), decel_m_s2=model.decel_m_s2 * (1.0 - OFF_MODEL) / PLANNED_SHARE
+    )
+
+
+def rover_model(view: LocalView) -> RoverModel:
+    """How the rover follows commands, by the settings."""
+    own = view.settings.motion
+    return RoverModel(
+        own.dead_s, own.acceleration_m_s2, PLANNED_SHARE * own.deceleration_m_s2, own.turn_acceleration_rad_s2,
+        view.rover.cruise_speed_m_s, min(own.backwards_m_s, view.rover.cruise_speed_m_s), own.turn_rad_s,
+    )  # fmt: skip

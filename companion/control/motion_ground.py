@@ -1,0 +1,94 @@
+"""The ground round the rover as motions are judged by it: distances to what stands and what is unseen, and time to go.
+
+Made from the map's evidence cells in a window round the rover and the next metres of its path.
+
+Nouns: window.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.control.motion_kernels import MotionGround
+from companion.control.reference_path import STEP_M, ReferencePath
+from companion.core.frames import NedPoint
+from companion.mapping.cost_to_go import cost_to_go
+from companion.mapping.distance_field import distance_field
+from companion.mapping.evidence_map import EvidenceMap
+
+Floats = NDArray[np.float64]
+
+AHEAD_M = 12.0
+"""The place of the path so far ahead is where the time to go counts to."""
+AROUND_M = 2.0
+"""Ground looked at round the rover and the path up to there."""
+ROOMY_M = 0.5
+"""With so much room beside it the rover drives at full speed."""
+SLOWEST_SHARE = 0.25
+"""Of full speed, where there is no room at all."""
+UNSEEN_FACTOR = 1.3
+"""Unseen ground takes so much longer."""
+COARSE = 2
+"""Evidence cells along the side of a cell that has a time to go."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Window:
+    """The rasters, and where their south-west corner lies."""
+
+    ground: MotionGround
+    corner: NedPoint
+
+    def place(self, point: NedPoint) -> tuple[float, float]:
+        """Metres east and north of the corner."""
+        return point.east_m - self.corner.east_m, point.north_m - self.corner.north_m
+
+
+def look_round(
+    evidence: EvidenceMap, here: NedPoint, path: ReferencePath, body_radius_m: float, fastest_m_s: float
+) -> Window:
+    """The window as the map is now. ``body_radius_m``: what the rover's middle keeps from obstacles where it passes."""
+    ahead = path.points[path.progress : path.progress + round(AHEAD_M / STEP_M) + 1]
+    (left, low), (right, high) = _window(evidence, np.vstack((ahead, (here.north_m, here.east_m))))
+    log_odds = evidence.log_odds[low:high, left:right]
+    cell_m, unseen = evidence.evidence_m, log_odds == 0.0
+    blocked = (log_odds >= evidence.settings.occupied_at) | _closed(evidence, (left, low), (right, high))
+    # To the surface: the map marks what lies a little behind it.
+    behind_m = np.float32(max(0.5 * cell_m, evidence.settings.hit_depth_m))
+    gap_m = distance_field(blocked) * np.float32(cell_m) - behind_m
+    seen_m = distance_field(blocked | unseen) * np.float32(cell_m) - behind_m
+    blocks = (gap_m.shape[0] // COARSE, COARSE, gap_m.shape[1] // COARSE, COARSE)
+    room_m = gap_m.reshape(blocks).mean(axis=(1, 3)).astype(np.float64)
+    pace = _pace(room_m - body_radius_m, COARSE * cell_m, fastest_m_s)
+    pace[unseen.reshape(blocks).any(axis=(1, 3))] *= UNSEEN_FACTOR
+    goal = np.floor((evidence.frame.xys(ahead[-1:]) - (left, low)) / COARSE).astype(np.int64)
+    ground = MotionGround(gap_m, seen_m, cell_m, cost_to_go(pace, goal), COARSE * cell_m)
+    return Window(ground, evidence.frame.point(left, low))
+
+
+def _window(evidence: EvidenceMap, places: Floats) -> tuple[tuple[int, int], tuple[int, int]]:
+    """From which evidence cell (x, y) to which: round the places, whole coarse cells, on the map."""
+    cells, margin = evidence.frame.xys(places), evidence.frame.cells(AROUND_M)
+    height, width = evidence.log_odds.shape
+    low = np.maximum(np.floor(cells.min(axis=0) - margin), 0.0).astype(np.int64) // COARSE * COARSE
+    high = np.minimum(np.ceil(cells.max(axis=0) + margin), (width, height)).astype(np.int64)
+    low = np.minimum(low, np.array((width, height)) // COARSE * COARSE - COARSE)
+    high = low + np.maximum((high - low) // COARSE, 1) * COARSE
+    return (int(low[0]), int(low[1])), (int(high[0]), int(high[1]))
+
+
+def _closed(evidence: EvidenceMap, first: tuple[int, int], last: tuple[int, int]) -> NDArray[np.bool_]:
+    """Evidence cells of fields that the mission, a fence or experience closed."""
+    rows = np.arange(first[1], last[1]) // evidence.subdivisions
+    columns = np.arange(first[0], last[0]) // evidence.subdivisions
+    closed: NDArray[np.bool_] = (evidence.base.weights + evidence.penalty)[np.ix_(rows, columns)] >= 1.0
+    return closed
+
+
+def _pace(room_m: Floats, cell_m: float, fastest_m_s: float) -> Floats:
+    """Seconds to cross a cell: slower where it is narrow; inf where the rover's middle cannot be."""
+    share = SLOWEST_SHARE + (1.0 - SLOWEST_SHARE) * np.clip(room_m / ROOMY_M, 0.0, 1.0)
+    return np.where(room_m > 0.0, cell_m / (fastest_m_s * share), np.inf)

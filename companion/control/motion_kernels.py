@@ -1,0 +1,324 @@
+"""Compiled motions: what becomes of a rover that follows a sequence of speeds and turn rates, and what that costs.
+
+A motion is ``knots``, shape (n, 2): forward speed (m/s) and turn rate (rad/s, clockwise), told at equal times over the
+horizon, with straight lines between them. Its cost is in seconds: how long it takes, what is then left to go, and what
+is added for ground that is narrow or unseen, and for the time to turn and to gather speed at its end. Places are x
+(east) and y (north) in metres from the corner of a ``MotionGround``; headings clockwise from north.
+
+Nouns: motion, motion ground, rover model.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+BLOCKED_S = 1e3
+"""Added to the cost of a motion that touches something; more the earlier it does."""
+NO_WAY_S = 60.0
+"""The time left where no way is known to lead on."""
+FAR_M = 10.0
+"""The clearance off the edges of the ground that is looked at."""
+ARRIVED_S = 0.1
+"""With so little time left, the rest of a motion does not count."""
+NEARER_M = 0.01
+"""A rover that is too near to something may come nearer by no more than this, so that it gets away."""
+
+
+class MotionGround(NamedTuple):
+    """The ground round the rover: rasters of one shape, a cell's side, and a raster of coarser cells.
+
+    ``gap_m``: from a cell to the nearest obstacle. ``seen_m``: to the nearest obstacle or unseen place. ``togo_s``:
+    time left from a cell of ``togo_cell_m``; inf where no way leads.
+    """
+
+    gap_m: Any
+    seen_m: Any
+    cell_m: float
+    togo_s: Any
+    togo_cell_m: float
+
+
+class RoverModel(NamedTuple):
+    """How the autopilot and the rover follow commands: after ``dead_s``, with limited changes, within limits."""
+
+    dead_s: float
+    accel_m_s2: float
+    decel_m_s2: float
+    turn_accel_rad_s2: float
+    fastest_m_s: float
+    backwards_m_s: float
+    turn_fastest_rad_s: float
+
+
+class Body(NamedTuple):
+    """The rover's outline: discs so far ahead of its place, all of one radius."""
+
+    ahead_m: Any
+    radius_m: float
+
+
+class Weights(NamedTuple):
+    """What the cost of a motion is made of.
+
+    ``margin_m``: kept from obstacles, and ``margin_s`` more for each m/s. ``near_m``: risk counts below this clearance;
+    ``risk``: seconds a second at none. ``unseen``: seconds a second on unseen ground. ``turn``: seconds for each radian
+    that the rover does not yet point where it must go. ``change``: seconds for a first command that differs from the
+    last one by 1 m/s or 1 rad/s.
+    """
+
+    margin_m: float
+    margin_s: float
+    near_m: float
+    risk: float
+    unseen: float
+    turn: float
+    change: float
+
+
+class Start(NamedTuple):
+    """The rover now: place, heading, forward speed (signed) and turn rate."""
+
+    x_m: float
+    y_m: float
+    heading_rad: float
+    speed_m_s: float
+    turn_rad_s: float
+
+
+class MotionProblem(NamedTuple):
+    """What motions are judged by.
+
+    ``pending``: shape (n, 2), the commands told that have not had their effect yet, one a step.
+    """
+
+    start: Start
+    pending: Any
+    ground: MotionGround
+    body: Body
+    model: RoverModel
+    weights: Weights
+    horizon_s: float
+    step_s: float
+
+
+@njit(cache=True, nogil=True)
+def at_place(raster, cell_m, x_m, y_m, outside):
+    """A raster's value between the middles of four cells; ``outside`` off its edges."""
+    height, width = raster.shape
+    x, y = x_m / cell_m - 0.5, y_m / cell_m - 0.5
+    left, low = int(math.floor(x)), int(math.floor(y))
+    if left < 0 or low < 0 or left + 1 >= width or low + 1 >= height:
+        return outside
+    u, v = x - left, y - low
+    return (1.0 - v) * ((1.0 - u) * raster[low, left] + u * raster[low, left + 1]) + v * (
+        (1.0 - u) * raster[low + 1, left] + u * raster[low + 1, left + 1]
+    )
+
+
+@njit(cache=True, nogil=True)
+def clearance_m(raster, cell_m, body, x_m, y_m, heading_rad):
+    """Metres between the rover's outline and what a raster of distances counts from."""
+    nearest = FAR_M
+    sine, cosine = math.sin(heading_rad), math.cos(heading_rad)
+    for disc in range(body.ahead_m.size):
+        ahead_m = body.ahead_m[disc]
+        nearest = min(nearest, at_place(raster, cell_m, x_m + ahead_m * sine, y_m + ahead_m * cosine, FAR_M))
+    return nearest - body.radius_m
+
+
+@njit(cache=True, nogil=True)
+def told_at(knots, share):
+    """The command at a share (0 to 1) of the horizon."""
+    last = knots.shape[0] - 1
+    at = min(max(share, 0.0), 1.0) * last
+    low = min(int(at), last - 1)
+    part = at - low
+    return (
+        knots[low, 0] + part * (knots[low + 1, 0] - knots[low, 0]),
+        knots[low, 1] + part * (knots[low + 1, 1] - knots[low, 1]),
+    )
+
+
+@njit(cache=True, nogil=True)
+def moved(state, told_m_s, told_rad_s, model, step_s):
+    """The rover a step later: place, heading, speed, turn rate."""
+    x, y, heading, speed, turn = state
+    change = told_m_s - speed
+    most = (model.decel_m_s2 if change * speed < 0.0 else model.accel_m_s2) * step_s
+    most_turn = model.turn_accel_rad_s2 * step_s
+    speed += min(max(change, -most), most)
+    after = turn + min(max(told_rad_s - turn, -most_turn), most_turn)
+    middle = heading + 0.25 * (turn + after) * step_s
+    heading += 0.5 * (turn + after) * step_s
+    return x + speed * step_s * math.sin(middle), y + speed * step_s * math.cos(middle), heading, speed, after
+
+
+@njit(cache=True, nogil=True)
+def cost_s(knots, problem):
+    """The cost of a motion."""
+    start, ground, body, model = problem.start, problem.ground, problem.body, problem.model
+    pending, weights, step_s = problem.pending, problem.weights, problem.step_s
+    state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
+    early = pending.shape[0]
+    steps = early + int(round(problem.horizon_s / step_s))
+    extra = 0.0
+    if early > 0:
+        last = pending[early - 1]
+        extra = weights.change * (abs(knots[0, 0] - last[0]) + abs(knots[0, 1] - last[1]))
+    least = clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - NEARER_M
+    for step in range(steps):
+        if step < early:
+            told_m_s, told_rad_s = pending[step, 0], pending[step, 1]
+        else:
+            told_m_s, told_rad_s = told_at(knots, (step - early) * step_s / problem.horizon_s)
+        state = moved(state, told_m_s, told_rad_s, model, step_s)
+        x, y, heading, speed = state[0], state[1], state[2], abs(state[3])
+        room = clearance_m(ground.gap_m, ground.cell_m, body, x, y, heading)
+        if room < min(weights.margin_m + weights.margin_s * speed, least):
+            return BLOCKED_S * (2.0 - step / steps) + left_s(ground, x, y)
+        if room < weights.near_m:
+            short = 1.0 - max(room, 0.0) / weights.near_m
+            extra += weights.risk * short * short * (0.3 + speed) * step_s
+        if weights.unseen > 0.0 and clearance_m(ground.seen_m, ground.cell_m, body, x, y, heading) < 0.0:
+            extra += weights.unseen * step_s
+        if left_s(ground, x, y) < ARRIVED_S:
+            return step * step_s + extra
+    return steps * step_s + extra + _after_s(state, least, problem)
+
+
+@njit(cache=True, nogil=True)
+def _after_s(state, least, problem):
+    """What comes after the horizon: the way that is left, once the rover points along it and has gathered speed.
+
+    From there it must be able to brake, too.
+    """
+    ground, model, weights = problem.ground, problem.model, problem.weights
+    x, y, heading, speed = state[0], state[1], state[2], state[3]
+    brakes_m = speed * abs(speed) / (2.0 * model.decel_m_s2)
+    for piece in range(1, 4):
+        to_x = x + brakes_m * piece / 3.0 * math.sin(heading)
+        to_y = y + brakes_m * piece / 3.0 * math.cos(heading)
+        if clearance_m(ground.gap_m, ground.cell_m, problem.body, to_x, to_y, heading) < min(weights.margin_m, least):
+            return BLOCKED_S + left_s(ground, x, y)
+    left = left_s(ground, x, y)
+    lacks = model.fastest_m_s - max(speed, 0.0)
+    slow = lacks * lacks / (2.0 * model.accel_m_s2 * model.fastest_m_s)
+    turned = weights.turn * _off_course_rad(ground, x, y, heading)
+    return left + min(slow + turned, left + 1.0)
+
+
+@njit(cache=True, nogil=True)
+def left_s(ground, x_m, y_m):
+    """The time that is left from a place."""
+    left = at_place(ground.togo_s, ground.togo_cell_m, x_m, y_m, NO_WAY_S)
+    if left < NO_WAY_S:
+        return left
+    # Beside ground from which no way leads: the best of the cells round it.
+    height, width = ground.togo_s.shape
+    x, y = int(x_m / ground.togo_cell_m), int(y_m / ground.togo_cell_m)
+    best = NO_WAY_S
+    for row in range(max(0, y - 1), min(height, y + 2)):
+        for column in range(max(0, x - 1), min(width, x + 2)):
+            best = min(best, ground.togo_s[row, column] + ARRIVED_S)
+    return best
+
+
+@njit(cache=True, nogil=True)
+def _off_course_rad(ground, x_m, y_m, heading_rad):
+    """How far the heading is from where the time that is left falls fastest; 0 where that is not known."""
+    reach = 1.5 * ground.togo_cell_m
+    east = left_s(ground, x_m + reach, y_m) - left_s(ground, x_m - reach, y_m)
+    north = left_s(ground, x_m, y_m + reach) - left_s(ground, x_m, y_m - reach)
+    if abs(east) + abs(north) < 1e-6 or max(abs(east), abs(north)) > 0.5 * NO_WAY_S:
+        return 0.0
+    off = math.atan2(-east, -north) - heading_rad
+    return abs((off + math.pi) % (2.0 * math.pi) - math.pi)
+
+
+@njit(cache=True, nogil=True)
+def costs_s(motions, problem):
+    """The costs of motions, shape (m, n, 2)."""
+    costs = np.empty(motions.shape[0])
+    for one in range(motions.shape[0]):
+        costs[one] = cost_s(motions[one], problem)
+    return costs
+
+
+@njit(cache=True, nogil=True)
+def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, problem):
+    """Whether a command may be the last: held so long, then braked, it leads over ground that is free and seen.
+
+    ``gain``: the rover turns by this factor more than it is told.
+    """
+    start, ground, body, model = problem.start, problem.ground, problem.body, problem.model
+    pending, step_s = problem.pending, problem.step_s
+    state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
+    early, held = pending.shape[0], int(math.ceil(lasts_s / step_s))
+    least = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2]) - NEARER_M
+    step = 0
+    while step < early + held or abs(state[3]) > 0.02:
+        now_m_s, now_rad_s = 0.0, 0.0
+        if step < early:
+            now_m_s, now_rad_s = pending[step, 0], pending[step, 1]
+        elif step < early + held:
+            now_m_s, now_rad_s = told_m_s, told_rad_s
+        state = moved(state, now_m_s, gain * now_rad_s, model, step_s)
+        if clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2]) < min(margin_m, least):
+            return False
+        step += 1
+    return True
+
+
+@njit(cache=True, nogil=True)
+def begin_later(motions, share):
+    """The same motions begun a share of the horizon later, in place; what lies beyond its end stays as it is there."""
+    count, size, _ = motions.shape
+    for one in range(count):
+        for knot in range(size):
+            # A knot is made from itself and later ones, which are still as they were.
+            speed, turn = told_at(motions[one], knot / (size - 1) + share)
+            motions[one, knot, 0], motions[one, knot, 1] = speed, turn
+
+
+@njit(cache=True, nogil=True)
+def keep_within(motion, model):
+    """Keep a motion's commands within the rover's limits."""
+    for knot in range(motion.shape[0]):
+        motion[knot, 0] = min(max(motion[knot, 0], -model.backwards_m_s), model.fastest_m_s)
+        motion[knot, 1] = min(max(motion[knot, 1], -model.turn_fastest_rad_s), model.turn_fastest_rad_s)
+
+
+@njit(cache=True, nogil=True)
+def next_generation(motions, costs, best, chances, kicks, sizes, problem):
+    """One generation, in place: the best quarter stays, the rest become its children by crossover and mutation.
+
+    ``best``: how many stay. ``chances``: shape (m, n + 4), even in 0 to 1. ``kicks``: shape (m, n, 2), normal.
+    ``sizes``: of mutations, m/s and rad/s. The paper's operators (Kwasniewski & Gosiewski 2018, section 3), on knots
+    of a motion instead of control points of a curve.
+    """
+    count, size, _ = motions.shape
+    order = np.argsort(costs)
+    parents, kept = motions[order[:best]].copy(), costs[order[:best]].copy()
+    motions[:best] = parents
+    costs[:best] = kept
+    for one in range(best, count):
+        chance = chances[one]
+        mother, father = parents[int(chance[0] * best)], parents[int(chance[1] * best)]
+        cut = int(chance[2] * (size + 1))
+        for knot in range(size):
+            parent = mother if knot < cut else father
+            kicked = chance[4 + knot] < MUTATED
+            for part in range(2):
+                motions[one, knot, part] = parent[knot, part]
+                if kicked:
+                    motions[one, knot, part] += sizes[part] * (0.2 + chance[3]) * kicks[one, knot, part]
+        keep_within(motions[one], problem.model)
+        costs[one] = cost_s(motions[one], problem)
+
+
+MUTATED = 0.4
+"""So large a share of a child's knots is changed."""

@@ -1,0 +1,156 @@
+"""Motion planners: which motion to begin now. A genetic algorithm, and two to compare it with.
+
+Each is asked every tick and may go on from what it found the tick before. All judge motions by the same cost
+(``motion_kernels.cost_s``), so that they differ only in how they search.
+
+Nouns: motion planner.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from companion.control.motion_kernels import (
+    MotionProblem,
+    RoverModel,
+    begin_later,
+    costs_s,
+    keep_within,
+    next_generation,
+)
+
+Motions = NDArray[np.float64]
+"""Shape (m, n, 2): m motions of n knots, each a speed (m/s) and a turn rate (rad/s)."""
+
+KNOTS = 6
+
+
+class MotionKind(StrEnum):
+    """The planners by name."""
+
+    GA = "motion-ga"
+    DWA = "dwa"
+    MPPI = "mppi"
+
+
+class MotionPlanner(Protocol):
+    """Finds the motion to begin now."""
+
+    def plan(self, problem: MotionProblem, passed_s: float) -> tuple[Motions, float]:
+        """One motion, shape (n, 2), and its cost in seconds. ``passed_s``: since the last call."""
+        ...
+
+    def forget(self) -> None:
+        """What was found before does not count any more."""
+        ...
+
+
+class MotionGa:
+    """A genetic algorithm on motions: a population that lives from tick to tick, and seeds of constant commands."""
+
+    POPULATION = 64
+    GENERATIONS = 5
+    SEEDS = 8
+    SIZES = np.array([0.5, 0.8])
+    """Of mutations, m/s and rad/s."""
+
+    def __init__(self, seed: int = 0) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._motions = np.zeros((self.POPULATION, KNOTS, 2))
+        self._costs = np.zeros(self.POPULATION)
+
+    def plan(self, problem: MotionProblem, passed_s: float) -> tuple[Motions, float]:
+        """See ``MotionPlanner``."""
+        motions, rng = self._motions, self._rng
+        begin_later(motions, passed_s / problem.horizon_s)
+        seeds = constant_motions(problem.model)
+        best = np.argsort(costs_s(seeds, problem))[: self.SEEDS]
+        motions[np.argsort(self._costs)[-self.SEEDS :]] = seeds[best]
+        costs = costs_s(motions, problem)
+        chances = rng.random((self.GENERATIONS, self.POPULATION, KNOTS + 4))
+        kicks = rng.standard_normal((self.GENERATIONS, self.POPULATION, KNOTS, 2))
+        for chance, kick in zip(chances, kicks, strict=True):
+            next_generation(motions, costs, self.POPULATION // 4, chance, kick, self.SIZES, problem)
+        self._costs = costs
+        found = int(np.argmin(costs))
+        return motions[found].copy(), float(costs[found])
+
+    def forget(self) -> None:
+        """See ``MotionPlanner``."""
+        self._motions[:] = 0.0
+
+
+class DynamicWindow:
+    """Constant commands that can be reached soon (Fox, Burgard & Thrun 1997, "The dynamic window approach")."""
+
+    WINDOW_S = 0.5
+    SPEEDS, TURNS = 9, 21
+
+    def plan(self, problem: MotionProblem, passed_s: float) -> tuple[Motions, float]:
+        """See ``MotionPlanner``."""
+        model, start = problem.model, problem.start
+        slower, faster = model.decel_m_s2 * self.WINDOW_S, model.accel_m_s2 * self.WINDOW_S
+        turns = model.turn_accel_rad_s2 * self.WINDOW_S
+        speeds = np.linspace(start.speed_m_s - slower, start.speed_m_s + faster, self.SPEEDS)
+        rates = np.linspace(start.turn_rad_s - turns, start.turn_rad_s + turns, self.TURNS)
+        grid = np.array([(0.0, 0.0), *((speed, rate) for speed in speeds for rate in (*rates, 0.0))])
+        keep_within(grid, model)
+        motions = np.repeat(grid[:, None, :], KNOTS, axis=1)
+        costs = costs_s(motions, problem)
+        found = int(np.argmin(costs))
+        return motions[found], float(costs[found])
+
+    def forget(self) -> None:
+        """See ``MotionPlanner``."""
+
+
+class Mppi:
+    """Model predictive path integral (Williams et al. 2017): a mean motion, moved towards better noisy copies."""
+
+    SAMPLES = 320
+    """As many as the genetic algorithm judges."""
+    TEMPERATURE_S = 0.3
+    SIZES = np.array([0.4, 0.6])
+
+    def __init__(self, seed: int = 0) -> None:
+        self._rng = np.random.default_rng(seed)
+        self._mean = np.zeros((1, KNOTS, 2))
+
+    def plan(self, problem: MotionProblem, passed_s: float) -> tuple[Motions, float]:
+        """See ``MotionPlanner``."""
+        begin_later(self._mean, passed_s / problem.horizon_s)
+        motions = self._mean + self.SIZES * self._rng.standard_normal((self.SAMPLES, KNOTS, 2))
+        motions[0], motions[1] = self._mean[0], 0.0
+        for motion in motions:
+            keep_within(motion, problem.model)
+        costs = costs_s(motions, problem)
+        weights = np.exp(-(costs - costs.min()) / self.TEMPERATURE_S)
+        self._mean = np.einsum("m,mnc->nc", weights / weights.sum(), motions)[None]
+        return self._mean[0].copy(), float(costs_s(self._mean, problem)[0])
+
+    def forget(self) -> None:
+        """See ``MotionPlanner``."""
+        self._mean[:] = 0.0
+
+
+def motion_planner(kind: MotionKind, seed: int = 0) -> MotionPlanner:
+    """The planner with this name. ``seed``: of its random choices."""
+    match kind:
+        case MotionKind.GA:
+            return MotionGa(seed)
+        case MotionKind.DWA:
+            return DynamicWindow()
+        case MotionKind.MPPI:
+            return Mppi(seed)
+
+
+def constant_motions(model: RoverModel) -> Motions:
+    """Motions of one command each, over all that the rover can do; standing and turning on the spot among them."""
+    speeds = (-model.backwards_m_s, 0.0, *(model.fastest_m_s * np.array([0.125, 0.25, 0.5, 0.75, 1.0])))
+    turns = np.linspace(-1.0, 1.0, 9) * model.turn_fastest_rad_s
+    grid = np.array([(speed, turn) for speed in speeds for turn in turns])
+    return np.repeat(grid[:, None, :], KNOTS, axis=1)

@@ -1,0 +1,59 @@
+"""Distance field: how far each cell of a raster is from the nearest marked one, exactly.
+
+Two passes of parabolas' lower envelopes (Felzenszwalb & Huttenlocher 2012, "Distance transforms of sampled functions").
+
+Nouns: distance field.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+import math
+
+import numpy as np
+from numba import njit
+
+FAR = 1e6
+"""The distance where nothing is marked, in cells."""
+
+
+@njit(cache=True, nogil=True)
+def distance_field(marked):
+    """Distances between middles of cells, in cells, shape as ``marked``; ``FAR`` where nothing is marked."""
+    height, width = marked.shape
+    squares = np.empty((height, width), np.float64)
+    # Along columns two sweeps do: each cell's distance to the nearest marked one of its column.
+    for x in range(width):
+        gap = FAR
+        for y in range(height):
+            gap = 0.0 if marked[y, x] else gap + 1.0
+            squares[y, x] = gap
+        gap = FAR
+        for y in range(height - 1, -1, -1):
+            gap = 0.0 if marked[y, x] else gap + 1.0
+            squares[y, x] = min(squares[y, x], gap) ** 2
+    distances = np.empty((height, width), np.float32)
+    tops = np.empty(width, np.int64)
+    bounds = np.empty(width + 1, np.float64)
+    for y in range(height):
+        row = squares[y]
+        last = 0
+        tops[0], bounds[0], bounds[1] = 0, -np.inf, np.inf
+        for x in range(1, width):
+            at = _crossing(row, tops[last], x)
+            while at <= bounds[last]:
+                last -= 1
+                at = _crossing(row, tops[last], x)
+            last += 1
+            tops[last], bounds[last], bounds[last + 1] = x, at, np.inf
+        piece = 0
+        for x in range(width):
+            while bounds[piece + 1] < x:
+                piece += 1
+            distances[y, x] = min(math.sqrt((x - tops[piece]) ** 2 + row[tops[piece]]), FAR)
+    return distances
+
+
+@njit(cache=True, nogil=True)
+def _crossing(row, left, right):
+    """Where the parabolas over two places of a row cross."""
+    return ((row[right] + right * right) - (row[left] + left * left)) / (2.0 * (right - left))

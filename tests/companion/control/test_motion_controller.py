@@ -1,0 +1,132 @@
+"""The controller that plans motions, driving the model of a rover over ground drawn by hand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from companion.control.controller import Purpose
+from companion.control.local_view import LocalView
+from companion.control.motion_controller import MotionController, rover_model
+from companion.control.motion_kernels import clearance_m, moved
+from companion.control.motion_planners import MotionKind, motion_planner
+from companion.control.reference_path import ReferencePath, advanced
+from companion.core.footprint import Footprint
+from companion.core.frames import NedPoint, Pose
+from companion.core.rover_limits import RoverLimits
+from companion.mapping.distance_field import distance_field
+from companion.mapping.evidence_map import EvidenceMap
+from companion.settings import Settings
+from companion.vehicle.commands import GuidedVelocity
+from tests.companion.control.test_motion_ground import PATH, ground, wall
+
+FOOTPRINT = Footprint.rectangle(0.6, 0.4)
+TICK_S = 0.05
+GUARDED = Settings.model_validate({"guidance": {"controller": "motion-ga", "velocity_lasts_s": 0.3}})
+STRICT = Settings.model_validate({"guidance": {"controller": "motion-ga"}})
+
+
+def view(evidence: EvidenceMap, pose: Pose, speed_m_s: float = 0.0, settings: Settings = GUARDED) -> LocalView:
+    return LocalView(pose, speed_m_s, evidence, RoverLimits(FOOTPRINT.radius_m, 2.0, 8.0), settings)
+
+
+def controller(seed: int = 0) -> MotionController:
+    return MotionController(FOOTPRINT, motion_planner(MotionKind.GA, seed))
+
+
+def driven(
+    evidence: EvidenceMap, seed: int, gain: float = 1.0, settings: Settings = GUARDED
+) -> tuple[float, float, float]:
+    """Drives until it is there or 30 s are over: how far from the end it is, how near it came to anything, seconds.
+
+    ``gain``: the rover accelerates, brakes and turns by this factor more than its settings say.
+    """
+    leads, start = controller(seed), Pose(3.0, 10.0, 0.0, 0.0)
+    body = leads._body
+    blocked = evidence.log_odds >= evidence.settings.occupied_at
+    gap_m = distance_field(blocked) * np.float32(evidence.evidence_m) - np.float32(0.5 * evidence.evidence_m)
+    state, told = (start.east_m, start.north_m, 0.0, 0.0, 0.0), [(0.0, 0.0)] * 6
+    least_m, left_m, now_s, path = math.inf, math.inf, 0.0, PATH
+    while now_s < 30.0 and left_m > 0.5:
+        x, y, heading, speed, turn = state
+        at = replace(view(evidence, Pose(y, x, heading, now_s), abs(speed), settings), yaw_rate_rad_s=turn)
+        path = advanced(path, at.pose)
+        setpoint = leads.follow(path, at).setpoint
+        assert isinstance(setpoint, GuidedVelocity)
+        told.append((setpoint.forward_m_s, setpoint.yaw_rate_rad_s))
+        model = rover_model(at)
+        model = model._replace(
+            accel_m_s2=gain * model.accel_m_s2, decel_m_s2=gain * settings.motion.deceleration_m_s2,
+            turn_accel_rad_s2=gain * model.turn_accel_rad_s2,
+        )  # fmt: skip
+        forward_m_s, turn_rad_s = told[-6]
+        state = moved(state, forward_m_s, gain * turn_rad_s, model, TICK_S)
+        now_s += TICK_S
+        least_m = min(least_m, clearance_m(gap_m, evidence.evidence_m, body, state[0], state[1], state[2]))
+        left_m = NedPoint(state[1], state[0]).distance_m(PATH.end)
+    return left_m, least_m, now_s
+
+
+def posts(seed: int) -> EvidenceMap:
+    """Twelve posts where the path leads through, none at its ends."""
+    evidence, rng = ground(), np.random.default_rng(seed)
+    for north_m, east_m in zip(rng.uniform(5.0, 15.0, 12), rng.uniform(7.0, 13.0, 12), strict=True):
+        y, x = int(north_m / evidence.evidence_m), int(east_m / evidence.evidence_m)
+        evidence.log_odds[y : y + 2, x : x + 2] = 3.0
+    return evidence
+
+
+@pytest.mark.parametrize("gain", [0.7, 1.0, 1.3])
+def test_it_gets_through_posts_and_touches_none_whatever_the_rover_is(gain: float) -> None:
+    """Six grounds for each rover; the discs reach 2 cm beyond its sides."""
+    results = [driven(posts(seed), seed, gain) for seed in range(6)]
+    assert all(least_m > 0.0 for _, least_m, _ in results), results
+    assert sum(left_m <= 0.5 for left_m, _, _ in results) >= 5, results
+    assert np.median([seconds for left_m, _, seconds in results if left_m <= 0.5]) < 14.0
+
+
+def test_without_a_guard_it_goes_slower_and_touches_nothing_either() -> None:
+    guarded, strict = driven(posts(1), 1), driven(posts(1), 1, settings=STRICT)
+    assert strict[1] > 0.0 and strict[2] > guarded[2]
+
+
+def test_it_stops_before_ground_that_was_not_seen() -> None:
+    evidence = ground()
+    evidence.log_odds[round(8.0 / evidence.evidence_m) :] = 0.0
+    leads, pose = controller(), Pose(6.5, 10.0, 0.0, 0.0)
+    told = leads.follow(PATH, view(evidence, pose, 1.5)).setpoint
+    assert isinstance(told, GuidedVelocity) and told.forward_m_s <= 0.2
+
+
+def test_shut_in_it_says_that_it_is_blocked() -> None:
+    evidence = ground()
+    for north_m in (2.5, 3.5):
+        wall(evidence, north_m, 9.5, 10.6)
+    for east_m in (9.5, 10.5):
+        x = round(east_m / evidence.evidence_m)
+        evidence.log_odds[round(2.5 / evidence.evidence_m) : round(3.6 / evidence.evidence_m), x] = 3.0
+    leads, purposes = controller(), set()
+    for tick in range(10):
+        purposes.add(leads.follow(PATH, view(evidence, Pose(3.0, 10.0, 0.0, TICK_S * tick))).purpose)
+    assert Purpose.BLOCKED in purposes
+
+
+def test_it_turns_round_where_the_path_lies_behind() -> None:
+    leads, pose = controller(), Pose(10.0, 10.0, math.pi, 0.0)
+    turned, path = [], ReferencePath(PATH.points, 28)
+    for tick in range(5):
+        told = leads.follow(path, view(ground(), replace(pose, time_s=TICK_S * tick))).setpoint
+        assert isinstance(told, GuidedVelocity)
+        turned.append(abs(told.yaw_rate_rad_s))
+    assert max(turned) > 0.5
+
+
+def test_a_seed_gives_the_same_commands() -> None:
+    told = []
+    for _ in range(2):
+        leads = controller(5)
+        told.append([leads.follow(PATH, view(posts(2), Pose(3.0, 10.0, 0.0, TICK_S * i))) for i in range(5)])
+    assert told[0] == told[1]

@@ -1,0 +1,95 @@
+"""The window of ground that motions are judged on, from maps drawn by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from companion.control.motion_ground import AHEAD_M, AROUND_M, Window, look_round
+from companion.control.reference_path import STEP_M, ReferencePath
+from companion.core.frames import NedPoint
+from companion.core.grid import empty_grid
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.settings import Settings
+
+SETTINGS = Settings()
+HERE = NedPoint(3.0, 10.0)
+PATH = ReferencePath(np.column_stack((np.arange(3.0, 17.1, STEP_M), np.full(57, 10.0))))
+
+
+def ground() -> EvidenceMap:
+    """20 x 20 m, all seen free."""
+    evidence = new_map(empty_grid(20, 20), 0.35, SETTINGS.mapping)
+    evidence.log_odds.fill(-1.0)
+    return evidence
+
+
+def wall(evidence: EvidenceMap, north_m: float, west_m: float, east_m: float, value: float = 3.0) -> None:
+    y, left, right = (round(v / evidence.evidence_m) for v in (north_m, west_m, east_m))
+    evidence.log_odds[y, left:right] = value
+
+
+def seen(evidence: EvidenceMap) -> Window:
+    return look_round(evidence, HERE, PATH, 0.3, 2.0)
+
+
+def togo_s(window: Window, point: NedPoint) -> float:
+    x, y = (int(v / window.ground.togo_cell_m) for v in window.place(point))
+    return float(window.ground.togo_s[y, x])
+
+
+def test_it_holds_the_path_and_its_surroundings_and_counts_to_its_far_end() -> None:
+    window = seen(ground())
+    height_m, width_m = (cells * window.ground.cell_m for cells in window.ground.gap_m.shape)
+    assert height_m == pytest.approx(AHEAD_M + 2 * AROUND_M, abs=0.6) and width_m == pytest.approx(
+        2 * AROUND_M, abs=0.6
+    )
+    assert togo_s(window, NedPoint(HERE.north_m + AHEAD_M - 0.1, HERE.east_m)) < 0.2
+    assert togo_s(window, HERE) == pytest.approx(AHEAD_M / 2.0, rel=0.05)
+
+
+def test_gaps_are_told_from_the_surface() -> None:
+    evidence = ground()
+    wall(evidence, 6.0, 8.0, 12.0)
+    window = seen(evidence)
+    x, y = (int(v / window.ground.cell_m) for v in window.place(NedPoint(5.0, 10.0)))
+    assert window.ground.gap_m[y, x] == pytest.approx(1.0 - 0.0625, abs=0.13)
+    assert window.ground.seen_m[y, x] == window.ground.gap_m[y, x]
+
+
+def test_a_wall_is_gone_round_and_a_narrow_gap_in_it_is_no_way() -> None:
+    evidence = ground()
+    wall(evidence, 8.0, 7.0, 11.0)
+    free_s, round_s = togo_s(seen(ground()), HERE), togo_s(seen(evidence), HERE)
+    assert np.isfinite(round_s) and round_s > free_s + 0.1
+    wall(evidence, 8.0, 0.0, 20.0)
+    wall(evidence, 8.0, 9.75, 10.25, -1.0)
+    assert np.isinf(togo_s(seen(evidence), HERE))
+
+
+def test_unseen_ground_takes_longer_and_counts_as_near() -> None:
+    evidence = ground()
+    evidence.log_odds[round(7.0 / evidence.evidence_m) : round(9.0 / evidence.evidence_m)] = 0.0
+    window = seen(evidence)
+    assert togo_s(seen(ground()), HERE) < togo_s(window, HERE) < 1.3 * togo_s(seen(ground()), HERE)
+    x, y = (int(v / window.ground.cell_m) for v in window.place(NedPoint(6.5, 10.0)))
+    assert window.ground.seen_m[y, x] < 0.6 < window.ground.gap_m[y, x]
+
+
+def test_what_the_mission_or_experience_closed_is_an_obstacle() -> None:
+    evidence = ground()
+    evidence.base.weights[8, :] = 1.0
+    assert np.isinf(togo_s(seen(evidence), HERE))
+    evidence = ground()
+    evidence.penalty[8, :] = 0.6
+    assert np.isinf(togo_s(seen(evidence), HERE))
+
+
+@pytest.mark.parametrize("east_m", [0.1, 19.9])
+def test_at_the_edge_of_the_map_it_is_smaller(east_m: float) -> None:
+    path = replace(PATH, points=np.column_stack((PATH.points[:, 0], np.full(57, east_m))))
+    window = look_round(ground(), NedPoint(3.0, east_m), path, 0.3, 2.0)
+    assert window.ground.gap_m.shape[1] * window.ground.cell_m == pytest.approx(AROUND_M, abs=0.6)
+    assert window.ground.togo_s.shape[0] * 2 == window.ground.gap_m.shape[0]

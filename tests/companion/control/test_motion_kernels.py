@@ -1,0 +1,141 @@
+"""What motions cost, and when a command may be the last."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from companion.control.motion_kernels import (
+    BLOCKED_S,
+    Body,
+    MotionGround,
+    MotionProblem,
+    RoverModel,
+    Start,
+    Weights,
+    at_place,
+    begin_later,
+    clearance_m,
+    cost_s,
+    may_be_last,
+    moved,
+    next_generation,
+    told_at,
+)
+from companion.mapping.cost_to_go import cost_to_go
+from companion.mapping.distance_field import distance_field
+
+CELL_M = 0.1
+SIDE = 100
+MODEL = RoverModel(0.2, 1.0, 1.0, 2.0, 2.0, 0.5, 1.5)
+BODY = Body(np.array([-0.1, 0.1]), 0.25)
+STANDING = Start(5.0, 2.0, 0.0, 0.0, 0.0)
+WEIGHTS = Weights(0.03, 0.02, 0.25, 1.0, 0.3, 0.5, 0.0)
+
+
+def problem(*walls: tuple[int, int, int, int], start: Start = STANDING, unseen_from: int = SIDE) -> MotionProblem:
+    """10 x 10 m, north is up; ``walls``: first and last row, first and last column. The goal lies 8.5 m north."""
+    blocked = np.zeros((SIDE, SIDE), dtype=np.bool_)
+    for low, high, left, right in walls:
+        blocked[low:high, left:right] = True
+    unseen = np.zeros_like(blocked)
+    unseen[unseen_from:] = True
+    gap_m = distance_field(blocked) * np.float32(CELL_M) - np.float32(0.5 * CELL_M)
+    seen_m = distance_field(blocked | unseen) * np.float32(CELL_M) - np.float32(0.5 * CELL_M)
+    pace = np.where(gap_m > BODY.radius_m, CELL_M / MODEL.fastest_m_s, np.inf)
+    ground = MotionGround(gap_m, seen_m, CELL_M, cost_to_go(pace, np.array([[50, 85]])), CELL_M)
+    return MotionProblem(start, np.zeros((2, 2)), ground, BODY, MODEL, WEIGHTS, 2.5, 0.1)
+
+
+def constant(speed_m_s: float, turn_rad_s: float = 0.0) -> np.ndarray:
+    return np.tile((speed_m_s, turn_rad_s), (6, 1)).astype(np.float64)
+
+
+def test_getting_on_is_cheaper_than_standing_and_standing_than_going_back() -> None:
+    ground = problem()
+    ahead, stands, back = (cost_s(constant(speed), ground) for speed in (2.0, 0.0, -0.5))
+    assert ahead < stands < back < BLOCKED_S
+    # 6.5 m at 2 m/s, the time to gather speed, and the dead time.
+    assert ahead == pytest.approx(3.25 + 1.0 + 0.2, abs=0.3)
+
+
+def test_what_touches_something_is_blocked_and_the_earlier_the_dearer() -> None:
+    far, near = problem((50, 52, 0, SIDE)), problem((35, 37, 0, SIDE))
+    assert BLOCKED_S < cost_s(constant(2.0), far) < cost_s(constant(2.0), near)
+    assert cost_s(constant(0.0), near) < BLOCKED_S
+
+
+def test_a_motion_that_could_not_brake_at_its_end_is_blocked() -> None:
+    slow, fast = constant(1.0), constant(1.0)
+    fast[-1, 0] = 2.0
+    ground = problem((51, 53, 0, SIDE))
+    assert cost_s(slow, ground) < BLOCKED_S <= cost_s(fast, ground)
+
+
+def test_narrow_and_unseen_ground_cost_more() -> None:
+    free = cost_s(constant(1.0), problem())
+    assert free < cost_s(constant(1.0), problem((25, 45, 54, 56))) < BLOCKED_S
+    assert free < cost_s(constant(1.0), problem(unseen_from=30))
+
+
+@pytest.mark.parametrize("margin_m", [0.0, 0.05])
+def test_a_rover_that_is_too_near_already_may_get_away_but_come_no_nearer(margin_m: float) -> None:
+    ground = problem((23, 25, 0, SIDE))  # 5 cm before its front
+    assert cost_s(constant(-0.3), ground) < BLOCKED_S < cost_s(constant(0.3), ground)
+    assert may_be_last(-0.3, 0.0, 0.3, 1.0, margin_m, ground) and not may_be_last(0.5, 0.0, 0.3, 1.0, margin_m, ground)
+
+
+def test_a_command_may_be_the_last_if_the_way_it_leads_to_a_stop_is_free_and_seen() -> None:
+    rolling = Start(5.0, 2.0, 0.0, 1.0, 0.0)
+    # 0.2 s pending, which brakes; 0.3 s held; then 1 m/s² down: 1.1 m and the front.
+    for unseen_from, may in ((36, True), (31, False)):
+        assert may_be_last(1.0, 0.0, 0.3, 1.0, 0.0, problem(start=rolling, unseen_from=unseen_from)) is may
+    assert not may_be_last(1.0, 0.0, 3.0, 1.0, 0.0, problem(start=rolling, unseen_from=36))
+    turns = problem((20, 40, 57, 59), start=rolling)
+    assert may_be_last(1.0, 0.5, 0.5, 1.0, 0.0, turns) and not may_be_last(1.0, 0.5, 3.0, 1.0, 0.0, turns)
+
+
+def test_the_model_follows_with_limited_changes() -> None:
+    state = (0.0, 0.0, 0.0, 0.0, 0.0)
+    for _ in range(10):
+        state = moved(state, 2.0, 1.0, MODEL, 0.1)
+    assert state[3] == pytest.approx(1.0) and state[4] == pytest.approx(1.0)
+    assert state[2] == pytest.approx(0.75), "half a second to 1 rad/s, then half a second of it"
+    assert 0.3 < math.hypot(state[0], state[1]) < 0.55
+
+
+def test_knots_are_joined_by_straight_lines_and_begun_later() -> None:
+    motion = np.column_stack((np.arange(6.0), np.zeros(6)))
+    assert told_at(motion, 0.5)[0] == pytest.approx(2.5) and told_at(motion, 1.7)[0] == 5.0
+    motions = motion[None].copy()
+    begin_later(motions, 0.1)
+    assert motions[0, :, 0] == pytest.approx([0.5, 1.5, 2.5, 3.5, 4.5, 5.0])
+
+
+def test_rasters_are_read_between_cells() -> None:
+    raster = np.array([[0.0, 1.0], [2.0, 3.0]])
+    assert at_place(raster, 1.0, 1.0, 1.0, -1.0) == 1.5 and at_place(raster, 1.0, 0.6, 0.5, -1.0) == pytest.approx(0.1)
+    assert at_place(raster, 1.0, 5.0, 0.5, -1.0) == -1.0
+    wall = problem((60, 62, 0, SIDE)).ground
+    # The wall's near side lies 6 m north; the front disc reaches 0.35 m ahead.
+    assert clearance_m(wall.gap_m, CELL_M, BODY, 5.0, 5.0, 0.0) == pytest.approx(0.65, abs=0.03)
+    assert clearance_m(wall.gap_m, CELL_M, BODY, 5.0, 5.0, 0.5 * math.pi) == pytest.approx(0.75, abs=0.03)
+
+
+def test_a_generation_keeps_its_best_and_stays_within_limits() -> None:
+    rng, ground = np.random.default_rng(0), problem((40, 42, 20, 60))
+    motions = rng.standard_normal((32, 6, 2))
+    costs = np.array([cost_s(motion, ground) for motion in motions])
+    bests = [costs.min()]
+    for _ in range(12):
+        next_generation(
+            motions, costs, 8, rng.random((32, 10)), rng.standard_normal((32, 6, 2)), np.array([0.5, 0.8]), ground
+        )
+        assert costs == pytest.approx([cost_s(motion, ground) for motion in motions])
+        bests.append(costs.min())
+    assert all(b <= a for a, b in pairwise(bests)) and bests[-1] < bests[0] - 0.3
+    assert motions[8:, :, 0].max() <= 2.0 and motions[8:, :, 0].min() >= -0.5
+    assert np.abs(motions[8:, :, 1]).max() <= 1.5

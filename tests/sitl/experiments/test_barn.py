@@ -1,0 +1,109 @@
+"""The BARN benchmark: its score against the challenge's logs, its worlds, and runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sitl.experiments.barn import (
+    FASTEST,
+    OLD_FASTEST,
+    BarnReport,
+    BarnRun,
+    RunEnd,
+    drive,
+    off_model,
+    run,
+    score,
+    standard,
+    with_interval,
+    worst,
+)
+from sitl.experiments.barn_worlds import BODY_M, START_M, BarnWorld, made_world, read_worlds
+from sitl.experiments.experiment import ExperimentError, Options
+from sitl.plant.rover import SIM_ROVER
+from tests.support.shared_data import SHARED
+
+BARN = SHARED / "data" / "barn"
+needs_barn = pytest.mark.skipif(not BARN.is_dir(), reason="no BARN worlds beside the checkout")
+
+
+@pytest.fixture(scope="module")
+def worlds() -> list[BarnWorld]:
+    return read_worlds(BARN / "worlds.npz")
+
+
+@needs_barn
+@pytest.mark.parametrize(
+    ("log", "success", "old", "new"), [("dwa_out.txt", 0.850, 0.158, 0.159), ("drl_vo_out.txt", 0.936, 0.234, 0.372)]
+)
+def test_the_score_is_that_of_the_challenge(
+    worlds: list[BarnWorld], log: str, success: float, old: float, new: float
+) -> None:
+    """Two planners' 500 runs: world, success, collision, time-out, seconds, score, as the challenge counted them."""
+    optimal_s = {world.number: world.optimal_s for world in worlds}
+    runs = np.loadtxt(BARN / log)
+    assert {int(number) for number in runs[:, 0]} == {world.number for world in standard(worlds)}
+    assert runs[:, 1].mean() == pytest.approx(success)
+    for fastest, expected in ((OLD_FASTEST, old), (FASTEST, new)):
+        scores = [score(bool(one[1]), one[4], optimal_s[int(one[0])], fastest) for one in runs]
+        assert np.mean(scores) == pytest.approx(expected, abs=6e-4)
+
+
+@needs_barn
+def test_its_worlds_are_where_the_challenge_has_them(worlds: list[BarnWorld]) -> None:
+    assert len(worlds) == 250
+    for world in worlds[::50]:
+        ground = world.world()
+        assert ground.clearance_m(START_M[1], START_M[0], 1.0) > 0.9
+        for x, y in world.path_m:
+            assert ground.clearance_m(float(y), float(x), 1.0) > 0.15, "its path is free"
+
+
+@pytest.mark.parametrize("seed", [0, 1, 7])
+def test_our_own_worlds_come_from_their_seed_and_have_a_way(seed: int) -> None:
+    world, again = made_world(seed), made_world(seed)
+    assert np.array_equal(world.lattice, again.lattice) and 5.0 < world.optimal_s < 9.0
+    share = world.lattice[30:, 1:-1].mean()
+    assert 0.02 < share < 0.4
+    ground = world.world()
+    assert min(ground.clearance_m(float(y), float(x), 1.0) for x, y in world.path_m) > BODY_M - 0.1
+
+
+def test_a_rover_off_its_model_is_off_by_no_more_than_that() -> None:
+    drivetrain, limits = off_model(np.random.default_rng(3), 0.3)
+    assert 0.7 <= drivetrain.top_speed_m_s / SIM_ROVER.top_speed_m_s <= 1.3
+    assert 0.7 <= limits["ATC_ACCEL_MAX"] <= 1.3 and 84.0 <= limits["ATC_STR_ACC_MAX"] <= 156.0
+    assert off_model(np.random.default_rng(3), 0.0)[0] == SIM_ROVER
+
+
+def test_planned_motions_lead_through_narrow_ground_in_a_third_of_the_time() -> None:
+    world = made_world(3)
+    ends = {name: drive(world, name, 0) for name in ("motion-ga", "points")}
+    assert ends["motion-ga"].end is RunEnd.REACHED
+    assert ends["motion-ga"].seconds < 0.5 * ends["points"].seconds
+    assert ends["motion-ga"].track_m[0] == pytest.approx(START_M)
+    report = BarnReport(Options(1), (world,), {name: (one,) for name, one in ends.items()})
+    assert "not an entry" in report.section() and "motion-ga" in report.section()
+    assert report.pictures()["barn-worst"].axes and len(report.as_json()["runs"]) == 2  # type: ignore[arg-type]
+
+
+def test_intervals_and_the_worst() -> None:
+    def one(world: int, end: RunEnd, seconds: float) -> BarnRun:
+        return BarnRun("dwa", world, 0, end, seconds, 5.0, np.zeros((1, 2)))
+
+    runs = [one(0, RunEnd.REACHED, 6.0), one(1, RunEnd.CONTACT, 2.0), one(2, RunEnd.REACHED, 50.0)]
+    assert [run.world for run in worst(runs)] == [1, 2, 0]
+    assert with_interval(runs, lambda run: run.score()) == "0.208 (0.000 to 0.500)"
+
+
+@pytest.mark.parametrize("content", [b"", b"no archive"])
+def test_a_file_that_is_no_archive_is_refused_in_one_line(tmp_path: Path, content: bytes) -> None:
+    file = tmp_path / "worlds.npz"
+    file.write_bytes(content)
+    with pytest.raises(ExperimentError, match=r"worlds\.npz: no archive of BARN worlds"):
+        run(Options(1, archive=file), lambda done, total: None)
+    with pytest.raises(ExperimentError, match="--controllers: 'best' is unknown"):
+        run(Options(1, controllers=("best",)), lambda done, total: None)
