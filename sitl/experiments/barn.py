@@ -174,7 +174,7 @@ class BarnReport(ExperimentReport):
 
     def tables(self) -> list[Table]:
         """One row a controller."""
-        return [terminal_table(f"{NAME}: {len(self.worlds)} worlds", HEAD, self._rows())]
+        return [terminal_table(f"{NAME}: {len(self.worlds)} worlds", HEAD, self._rows(plain=True))]
 
     def as_json(self) -> dict[str, object]:
         """Every run."""
@@ -185,8 +185,10 @@ class BarnReport(ExperimentReport):
         ]
         return {"experiment": NAME, "seed": self.options.seed, "runs": runs}
 
-    def _rows(self) -> list[list[str]]:
-        return [_row(name, runs) for name, runs in self.series.items()]
+    def _rows(self, *, plain: bool = False) -> list[list[str]]:
+        """``plain``: without intervals."""
+        rows = [_row(name, runs) for name, runs in self.series.items()]
+        return [[cell.partition(" (")[0] for cell in row] for row in rows] if plain else rows
 
     def pictures(self) -> dict[str, Figure]:
         """The worst runs of the best controller."""
