@@ -208,9 +208,9 @@ class BarnReport(ExperimentReport):
 of 270 degrees and 10 m, the limits of ArduRover as shipped (1 m/s² and 2.1 rad/s²), the protocol and score of the BARN
 challenge at ICRA. **In our simulator, not an entry.** In each run the rover's speed, lag and turn rate, and its limits
 of acceleration, braking and turning, are off by up to {100.0 * OFF_MODEL:.0f} % from what the companion takes them for.
-Planned motions are driven as with a guard on the autopilot that stops the rover {GUARD_S:g} s after the companion's last
-packet. *score*: as counted since 2026, at most 0.5; *old score*: as before, at most 0.25; *t / OT*: mean time over the
-optimal time, of runs that reached the goal. In brackets: 95 % intervals, by resampling worlds.
+Planned motions are driven as with a guard on the autopilot that stops the rover {GUARD_S:g} s after the last packet of
+the companion. *score*: as counted since 2026, at most 0.5; *old score*: as before, at most 0.25; *t / OT*: mean time
+over the optimal time, of runs that reached the goal. In brackets: 95 % intervals, by resampling worlds.
 
 {markdown_table(HEAD, self._rows())}
 
