@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from companion.control.told import Told
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.evidence_map import EvidenceMap
@@ -20,8 +21,8 @@ MOST_FURTHER_M = 1.5
 class LocalView:
     """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
 
-    ``told``: the setpoint of the tick before; None where there was none. ``held_m_s``: so much slower than it was told
-    the ground holds it.
+    ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
+    ``held_m_s``: so much slower than it was told the ground holds it.
     """
 
     pose: Pose
@@ -32,6 +33,7 @@ class LocalView:
     yaw_rate_rad_s: float = 0.0
     held_m_s: float = 0.0
     told: Setpoint | None = None
+    lately: Told = ()
 
     @property
     def further_m(self) -> float:

@@ -9,8 +9,6 @@ Nouns: motion controller.
 from __future__ import annotations
 
 import math
-from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,13 +19,16 @@ from companion.control.motion_ground import Window, look_round
 from companion.control.motion_kernels import Body, MotionProblem, RoverModel, Start, Weights, may_be_last
 from companion.control.motion_planners import MotionPlanner
 from companion.control.reference_path import ReferencePath
+from companion.control.setpoint_check import velocity_stops_in_time
+from companion.control.told import ToldVelocity, in_force
 from companion.core.footprint import Footprint
+from companion.mission.bounds import Bounds
 from companion.vehicle.commands import GuidedVelocity
 
 HORIZON_S, STEP_S = 2.5, 0.1
 LOOKS_S = 0.09
 """The ground is looked at anew after so long."""
-WEIGHTS = Weights(margin_m=0.03, margin_s=0.02, near_m=0.25, risk=1.0, unseen=0.3, turn=0.5, change=0.1)
+WEIGHTS = Weights(margin_m=0.03, margin_s=0.06, tight=4.0, near_m=0.4, risk=0.5, unseen=0.3, turn=0.5, change=0.1)
 GAINS = (1.0, 0.7, 1.3)
 """The rover may turn so much more or less than it is told."""
 SHARES = (1.0, 0.7, 0.4, 0.15)
@@ -39,22 +40,16 @@ OFF_MODEL = 0.3
 BRAKES_S = 0.3
 """So long it is looked how braking goes on."""
 STANDS_M_S = 0.05
+FASTER_S = 0.05
+"""Left alone, the rover keeps so much more room for each m/s."""
 NEAR_M = 0.3
 """A rover that stands too near to something finds its way from so far away."""
 PLANNED_SHARE = 0.8
 """Motions are planned with so much of the braking there should be, so that the last look seldom says no."""
 
 
-class Told(NamedTuple):
-    """A command, and when it was told."""
-
-    time_s: float
-    speed_m_s: float
-    turn_rad_s: float
-
-
 class MotionController:
-    """Remembers what it told in the last second, and when the rover could last be left alone with it."""
+    """Remembers the ground it looked at, and when the rover could last be left alone with what it was told."""
 
     backwards = False
     """It drives backwards for a moment at a time, never along a path."""
@@ -63,7 +58,6 @@ class MotionController:
         places_m, radius_m = footprint.discs()
         self._body = Body(places_m, radius_m)
         self._planner = planner
-        self._told: deque[Told] = deque()
         self._window: Window | None = None
         self._looked_s = self._safe_s = self._time_s = -math.inf
         self.cost_s = math.nan
@@ -85,11 +79,9 @@ class MotionController:
         self._time_s = now_s
         problem = self._problem(path, view, model)
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
-            self._told.append(Told(now_s, 0.0, 0.0))
             return stop_for(Purpose.BLOCKED)
         motion, self.cost_s = self._planner.plan(problem, passed_s)
-        told = self._safe(motion[0], view.settings.guidance.velocity_lasts_s, problem)
-        self._told.append(told)
+        told = self._safe(motion[0], view, problem)
         if abs(told.speed_m_s) < 1e-6:
             if view.speed_m_s > STANDS_M_S:
                 return ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, told.turn_rad_s), 0.0)
@@ -103,44 +95,56 @@ class MotionController:
             keeps_m = self._body.radius_m + WEIGHTS.margin_m
             self._window = look_round(view.evidence, pose.point, path, keeps_m, model.fastest_m_s)
             self._looked_s = now_s
-        backwards = bool(self._told) and self._told[-1].speed_m_s < 0.0
-        speed_m_s = -view.speed_m_s if backwards else view.speed_m_s
+        before = in_force(view.lately, now_s)
+        speed_m_s = -view.speed_m_s if before is not None and before.speed_m_s < 0.0 else view.speed_m_s
         start = Start(*self._window.place(pose.point), pose.heading_rad, speed_m_s, view.yaw_rate_rad_s)
-        pending = self._pending(now_s, model.dead_s)
+        pending = _pending(view, model.dead_s)
         return MotionProblem(start, pending, self._window.ground, self._body, model, WEIGHTS, HORIZON_S, STEP_S)
 
-    def _pending(self, now_s: float, dead_s: float) -> NDArray[np.float64]:
-        """What was told and has not had its effect yet, one row a step."""
-        while self._told and self._told[0].time_s < now_s - dead_s - 1.0:
-            self._told.popleft()
-        rows = np.zeros((round(dead_s / STEP_S), 2))
-        for step, row in enumerate(rows):
-            then_s = now_s - dead_s + (step + 0.5) * STEP_S
-            for told in self._told:
-                if told.time_s <= then_s:
-                    row[:] = told.speed_m_s, told.turn_rad_s
-        return rows
-
-    def _safe(self, wanted: NDArray[np.float64], lasts_s: float, problem: MotionProblem) -> Told:
+    def _safe(self, wanted: NDArray[np.float64], view: LocalView, problem: MotionProblem) -> ToldVelocity:
         """This command, or a slower one, or the best way to brake."""
         now_s, speed_m_s, turn_rad_s = self._time_s, float(wanted[0]), float(wanted[1])
-        problem = problem._replace(model=worst_model(problem.model))
+        before, worst = in_force(view.lately, now_s), problem._replace(model=worst_model(problem.model))
         for share in SHARES:
             # On the same arc; a rover that hardly moves keeps its turn rate.
-            told = Told(now_s, share * speed_m_s, (share if abs(speed_m_s) > 0.1 else 1.0) * turn_rad_s)
-            if all(
-                may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, problem) for gain in GAINS
-            ):
+            told = ToldVelocity(now_s, share * speed_m_s, (share if abs(speed_m_s) > 0.1 else 1.0) * turn_rad_s)
+            if _may_be_left_alone(told, view, worst):
                 self._safe_s = now_s
                 return told
         fastest_rad_s = problem.model.turn_fastest_rad_s
         for share in BRAKE_TURNS:
-            if may_be_last(0.0, share * fastest_rad_s, BRAKES_S, 1.0, 0.0, problem):
+            if may_be_last(0.0, share * fastest_rad_s, BRAKES_S, 1.0, 0.0, 0.0, worst):
                 rolls = abs(problem.start.speed_m_s) > STANDS_M_S
-                return Told(now_s, 0.0, share * fastest_rad_s if rolls else 0.0)
-        if self._told and now_s - self._safe_s < lasts_s:
-            return self._told[-1]._replace(time_s=now_s)  # with this it could be left alone
-        return Told(now_s, 0.0, 0.0)
+                return ToldVelocity(now_s, 0.0, share * fastest_rad_s if rolls else 0.0)
+        if (
+            before is not None
+            and now_s - self._safe_s < view.settings.guidance.velocity_lasts_s
+            and _stops_in_time(before, view)
+        ):
+            return before  # with this it could be left alone
+        return ToldVelocity(now_s, 0.0, 0.0)
+
+
+def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem) -> bool:
+    """Whether this may be the last command, however the rover turns, and passes the last look."""
+    lasts_s = view.settings.guidance.velocity_lasts_s
+    return all(
+        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, FASTER_S, worst) for gain in GAINS
+    ) and _stops_in_time(told, view)
+
+
+def _stops_in_time(told: ToldVelocity, view: LocalView) -> bool:
+    return velocity_stops_in_time(GuidedVelocity(told.speed_m_s, told.turn_rad_s), view, Bounds()) is None
+
+
+def _pending(view: LocalView, dead_s: float) -> NDArray[np.float64]:
+    """What was told and has not had its effect yet, one row a step."""
+    rows = np.zeros((round(dead_s / STEP_S), 2))
+    for step, row in enumerate(rows):
+        told = in_force(view.lately, view.pose.time_s - dead_s + (step + 0.5) * STEP_S)
+        if told is not None:
+            row[:] = told.speed_m_s, told.turn_rad_s
+    return rows
 
 
 def _leads_on(problem: MotionProblem) -> bool:

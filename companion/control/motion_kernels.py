@@ -64,7 +64,8 @@ class Body(NamedTuple):
 class Weights(NamedTuple):
     """What the cost of a motion is made of.
 
-    ``margin_m``: kept from obstacles, and ``margin_s`` more for each m/s. ``near_m``: risk counts below this clearance;
+    ``margin_m``: kept from obstacles, and ``margin_s`` more for each m/s; ``tight``: seconds a second at no room in it.
+    ``near_m``: risk counts below this clearance;
     ``risk``: seconds a second at none. ``unseen``: seconds a second on unseen ground. ``turn``: seconds for each radian
     that the rover does not yet point where it must go. ``change``: seconds for a first command that differs from the
     last one by 1 m/s or 1 rad/s.
@@ -72,6 +73,7 @@ class Weights(NamedTuple):
 
     margin_m: float
     margin_s: float
+    tight: float
     near_m: float
     risk: float
     unseen: float
@@ -178,8 +180,11 @@ def cost_s(knots, problem):
         state = moved(state, told_m_s, told_rad_s, model, step_s)
         x, y, heading, speed = state[0], state[1], state[2], abs(state[3])
         room = clearance_m(ground.gap_m, ground.cell_m, body, x, y, heading)
-        if room < min(weights.margin_m + weights.margin_s * speed, least):
+        if room < min(0.0, least):
             return BLOCKED_S * (2.0 - step / steps) + left_s(ground, x, y)
+        margin = weights.margin_m + weights.margin_s * speed
+        if room < margin:
+            extra += weights.tight * (1.0 - room / margin) * step_s
         if room < weights.near_m:
             short = 1.0 - max(room, 0.0) / weights.near_m
             extra += weights.risk * short * short * (0.3 + speed) * step_s
@@ -249,7 +254,7 @@ def costs_s(motions, problem):
 
 
 @njit(cache=True, nogil=True)
-def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, problem):
+def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
     """Whether a command may be the last: held so long, then braked, it leads over ground that is free and seen.
 
     ``gain``: the rover turns by this factor more than it is told.
@@ -258,7 +263,8 @@ def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, problem):
     pending, step_s = problem.pending, problem.step_s
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
     early, held = pending.shape[0], int(math.ceil(lasts_s / step_s))
-    least = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2]) - NEARER_M
+    least = clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - NEARER_M
+    least_seen = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2]) - NEARER_M
     step = 0
     while step < early + held or abs(state[3]) > 0.02:
         now_m_s, now_rad_s = 0.0, 0.0
@@ -267,7 +273,10 @@ def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, problem):
         elif step < early + held:
             now_m_s, now_rad_s = told_m_s, told_rad_s
         state = moved(state, now_m_s, gain * now_rad_s, model, step_s)
-        if clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2]) < min(margin_m, least):
+        room_m = margin_m + margin_s * abs(state[3])
+        if clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) < min(room_m, least):
+            return False
+        if clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2]) < min(margin_m, least_seen):
             return False
         step += 1
     return True

@@ -18,6 +18,7 @@ from itertools import pairwise
 from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
+from companion.control.told import ToldVelocity, in_force
 from companion.core.frames import NedPoint
 from companion.core.severity import Severity, TextSink
 from companion.mapping.map_queries import ArcQueries, Until, look_along
@@ -92,15 +93,17 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
 def _way_alone(setpoint: GuidedVelocity, view: LocalView) -> list[NedPoint]:
     """Places on the way of a rover that is told nothing more: it goes on until the velocity expires, then it brakes."""
     guidance, motion, pose = view.settings.guidance, view.settings.motion, view.pose
-    before = view.told.forward_m_s if isinstance(view.told, GuidedVelocity) else 0.0
-    speed_m_s, turn_rad_s = math.copysign(view.speed_m_s, before), view.yaw_rate_rad_s
+    before = in_force(view.lately, pose.time_s)
+    speed_m_s, turn_rad_s = math.copysign(view.speed_m_s, before.speed_m_s if before else 0.0), view.yaw_rate_rad_s
     heading_rad, point, places = pose.heading_rad, pose.point, [pose.point]
     gains_m_s = GAINS_FASTER * motion.acceleration_m_s2 * WAY_STEP_S
     gains_rad_s = motion.turn_acceleration_rad_s2 * WAY_STEP_S
     for step in range(math.ceil((motion.dead_s + guidance.velocity_lasts_s) / WAY_STEP_S)):
-        if step * WAY_STEP_S >= motion.dead_s:
-            speed_m_s += min(max(setpoint.forward_m_s - speed_m_s, -gains_m_s), gains_m_s)
-            turn_rad_s += min(max(setpoint.yaw_rate_rad_s - turn_rad_s, -gains_rad_s), gains_rad_s)
+        since_s = (step + 0.5) * WAY_STEP_S - motion.dead_s
+        told = setpoint if since_s >= 0.0 else _velocity(in_force(view.lately, pose.time_s + since_s))
+        if told is not None:
+            speed_m_s += min(max(told.forward_m_s - speed_m_s, -gains_m_s), gains_m_s)
+            turn_rad_s += min(max(told.yaw_rate_rad_s - turn_rad_s, -gains_rad_s), gains_rad_s)
         point = point.moved(heading_rad + 0.5 * turn_rad_s * WAY_STEP_S, speed_m_s * WAY_STEP_S)
         heading_rad += turn_rad_s * WAY_STEP_S
         places.append(point)
@@ -116,9 +119,15 @@ def _way_alone(setpoint: GuidedVelocity, view: LocalView) -> list[NedPoint]:
     return places
 
 
+def _velocity(told: ToldVelocity | None) -> GuidedVelocity | None:
+    return None if told is None else GuidedVelocity(told.speed_m_s, told.turn_rad_s)
+
+
 def _way_is_blocked(places: list[NedPoint], view: LocalView) -> Fault | None:
-    radius_m = view.evidence.rover_radius_m - NEARER_M
+    radius_m, base = view.evidence.rover_radius_m - NEARER_M, view.evidence.base
     for here, there in pairwise(places):
+        if not base.contains(base.cell_at(there)):
+            break  # nothing is known beyond the edge of the map
         length_m = here.distance_m(there)
         if look_along(view.evidence, here, there, radius_m).clear_m < length_m - 0.5 * SLACK_M:
             return Reason(SetpointFault.INTO_OBSTACLE)

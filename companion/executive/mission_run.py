@@ -14,6 +14,7 @@ import numpy as np
 from companion.control.controller import STANDSTILL, ControlCommand
 from companion.control.drag import DragWatch
 from companion.control.setpoint_check import SetpointCheck
+from companion.control.told import Told, after
 from companion.core.frames import Pose
 from companion.core.scan import RangeScan
 from companion.core.severity import TextSink
@@ -101,6 +102,7 @@ class MissionRun:
         self._drag = DragWatch()
         self._told: ControlCommand | None = None
         """What was sent, or still held, in the tick before."""
+        self._lately: Told = ()
         self.legs = AutoModeLegs(notifier)
         self._settings = settings
         self._make_executor = make_executor
@@ -167,7 +169,7 @@ class MissionRun:
             return None
         executor, view = self.executor, self.executor.view(self.vehicle, now_s)
         told = None if self._told is None else self._told.setpoint
-        view = replace(view, held_m_s=self._drag.held_m_s(self._told, view), told=told)
+        view = replace(view, held_m_s=self._drag.held_m_s(self._told, view), told=told, lately=self._lately)
         wanted = executor.guide(task, self.vehicle, view)
         wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
@@ -175,6 +177,7 @@ class MissionRun:
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:
         """Send it, if it is new or due again."""
         self._told = command if isinstance(command, ControlCommand) else None
+        self._lately = after(self._lately, None if self._told is None else self._told.setpoint, now_s)
         self.sender.speak(command, now_s)
 
 

@@ -14,6 +14,7 @@ from companion.control.motion_controller import MotionController, rover_model
 from companion.control.motion_kernels import clearance_m, moved
 from companion.control.motion_planners import MotionKind, motion_planner
 from companion.control.reference_path import ReferencePath, advanced
+from companion.control.told import Told, after
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
 from companion.core.rover_limits import RoverLimits
@@ -48,15 +49,18 @@ def driven(
     body = leads._body
     blocked = evidence.log_odds >= evidence.settings.occupied_at
     gap_m = distance_field(blocked) * np.float32(evidence.evidence_m) - np.float32(0.5 * evidence.evidence_m)
-    state, told = (start.east_m, start.north_m, 0.0, 0.0, 0.0), [(0.0, 0.0)] * 6
+    state, told, lately = (start.east_m, start.north_m, 0.0, 0.0, 0.0), [(0.0, 0.0)] * 6, Told()
     least_m, left_m, now_s, path = math.inf, math.inf, 0.0, PATH
     while now_s < 30.0 and left_m > 0.5:
         x, y, heading, speed, turn = state
-        at = replace(view(evidence, Pose(y, x, heading, now_s), abs(speed), settings), yaw_rate_rad_s=turn)
+        at = replace(
+            view(evidence, Pose(y, x, heading, now_s), abs(speed), settings), yaw_rate_rad_s=turn, lately=lately
+        )
         path = advanced(path, at.pose)
         setpoint = leads.follow(path, at).setpoint
         assert isinstance(setpoint, GuidedVelocity)
         told.append((setpoint.forward_m_s, setpoint.yaw_rate_rad_s))
+        lately = after(lately, setpoint, now_s)
         model = rover_model(at)
         model = model._replace(
             accel_m_s2=gain * model.accel_m_s2, decel_m_s2=gain * settings.motion.deceleration_m_s2,
@@ -116,11 +120,13 @@ def test_shut_in_it_says_that_it_is_blocked() -> None:
 
 def test_it_turns_round_where_the_path_lies_behind() -> None:
     leads, pose = controller(), Pose(10.0, 10.0, math.pi, 0.0)
-    turned, path = [], ReferencePath(PATH.points, 28)
-    for tick in range(5):
-        told = leads.follow(path, view(ground(), replace(pose, time_s=TICK_S * tick))).setpoint
+    turned, path, lately = [], ReferencePath(PATH.points, 28), Told()
+    for tick in range(10):
+        at = view(ground(), replace(pose, time_s=TICK_S * tick))
+        told = leads.follow(path, replace(at, lately=lately)).setpoint
         assert isinstance(told, GuidedVelocity)
         turned.append(abs(told.yaw_rate_rad_s))
+        lately = after(lately, told, at.pose.time_s)
     assert max(turned) > 0.5
 
 

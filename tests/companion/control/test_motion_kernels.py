@@ -33,7 +33,7 @@ SIDE = 100
 MODEL = RoverModel(0.2, 1.0, 1.0, 2.0, 2.0, 0.5, 1.5)
 BODY = Body(np.array([-0.1, 0.1]), 0.25)
 STANDING = Start(5.0, 2.0, 0.0, 0.0, 0.0)
-WEIGHTS = Weights(0.03, 0.02, 0.25, 1.0, 0.3, 0.5, 0.0)
+WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0)
 
 
 def problem(*walls: tuple[int, int, int, int], start: Start = STANDING, unseen_from: int = SIDE) -> MotionProblem:
@@ -85,17 +85,38 @@ def test_narrow_and_unseen_ground_cost_more() -> None:
 def test_a_rover_that_is_too_near_already_may_get_away_but_come_no_nearer(margin_m: float) -> None:
     ground = problem((23, 25, 0, SIDE))  # 5 cm before its front
     assert cost_s(constant(-0.3), ground) < BLOCKED_S < cost_s(constant(0.3), ground)
-    assert may_be_last(-0.3, 0.0, 0.3, 1.0, margin_m, ground) and not may_be_last(0.5, 0.0, 0.3, 1.0, margin_m, ground)
+    assert may_be_last(-0.3, 0.0, 0.3, 1.0, margin_m, 0.0, ground) and not may_be_last(
+        0.5, 0.0, 0.3, 1.0, margin_m, 0.0, ground
+    )
+
+
+def test_what_passes_nearly_touching_costs_more_the_faster_it_does() -> None:
+    beside = problem((25, 45, 54, 56))
+    dearer = [cost_s(constant(speed_m_s), beside) - cost_s(constant(speed_m_s), problem()) for speed_m_s in (0.5, 1.5)]
+    assert 0.0 < dearer[0] < dearer[1] < BLOCKED_S
+
+
+def test_a_fast_rover_that_is_left_alone_keeps_more_room() -> None:
+    beside, rolling = (25, 45, 54, 56), Start(5.0, 2.0, 0.0, 1.5, 0.0)
+    assert may_be_last(1.5, 0.0, 0.3, 1.0, 0.0, 0.0, problem(beside, start=rolling))
+    assert not may_be_last(1.5, 0.0, 0.3, 1.0, 0.0, 0.2, problem(beside, start=rolling))
+
+
+def test_ground_that_was_not_seen_beside_it_does_not_let_it_touch_what_was() -> None:
+    """A rover whose side stands over unseen ground may go on over such ground, but into nothing."""
+    started = Start(5.0, 2.0, 0.0, 0.0, 0.0)
+    unseen = problem((35, 37, 0, SIDE), start=started, unseen_from=21)
+    assert not may_be_last(1.5, 0.0, 1.0, 1.0, 0.0, 0.0, unseen)
 
 
 def test_a_command_may_be_the_last_if_the_way_it_leads_to_a_stop_is_free_and_seen() -> None:
     rolling = Start(5.0, 2.0, 0.0, 1.0, 0.0)
     # 0.2 s pending, which brakes; 0.3 s held; then 1 m/s² down: 1.1 m and the front.
     for unseen_from, may in ((36, True), (31, False)):
-        assert may_be_last(1.0, 0.0, 0.3, 1.0, 0.0, problem(start=rolling, unseen_from=unseen_from)) is may
-    assert not may_be_last(1.0, 0.0, 3.0, 1.0, 0.0, problem(start=rolling, unseen_from=36))
+        assert may_be_last(1.0, 0.0, 0.3, 1.0, 0.0, 0.0, problem(start=rolling, unseen_from=unseen_from)) is may
+    assert not may_be_last(1.0, 0.0, 3.0, 1.0, 0.0, 0.0, problem(start=rolling, unseen_from=36))
     turns = problem((20, 40, 57, 59), start=rolling)
-    assert may_be_last(1.0, 0.5, 0.5, 1.0, 0.0, turns) and not may_be_last(1.0, 0.5, 3.0, 1.0, 0.0, turns)
+    assert may_be_last(1.0, 0.5, 0.5, 1.0, 0.0, 0.0, turns) and not may_be_last(1.0, 0.5, 3.0, 1.0, 0.0, 0.0, turns)
 
 
 def test_the_model_follows_with_limited_changes() -> None:
