@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 AHEAD_M = 12.0
 """The place of the path so far ahead is where the time to go counts to."""
-AROUND_M = 2.0
+AROUND_M = 3.0
 """Ground looked at round the rover and the path up to there."""
 ROOMY_M = 0.5
 """With so much room beside it the rover drives at full speed."""
@@ -65,7 +65,8 @@ def look_round(
     pace = _pace(room_m - body_radius_m, COARSE * cell_m, fastest_m_s)
     pace[unseen.reshape(blocks).any(axis=(1, 3))] *= UNSEEN_FACTOR
     goal = np.floor((evidence.frame.xys(ahead[-1:]) - (left, low)) / COARSE).astype(np.int64)
-    ground = MotionGround(gap_m, seen_m, cell_m, cost_to_go(pace, goal), COARSE * cell_m)
+    ends = path.progress + len(ahead) >= len(path.points)
+    ground = MotionGround(gap_m, seen_m, cell_m, cost_to_go(pace, goal), COARSE * cell_m, ends)
     return Window(ground, evidence.frame.point(left, low))
 
 

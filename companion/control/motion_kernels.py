@@ -21,18 +21,23 @@ BLOCKED_S = 1e3
 NO_WAY_S = 60.0
 """The time left where no way is known to lead on."""
 FAR_M = 10.0
-"""The clearance off the edges of the ground that is looked at."""
+"""No clearance is larger. Off the edges of the ground that is looked at nothing stands, and nothing was seen."""
+BEYOND_M = 0.3
+"""The rover may stop so far beyond the end of its path."""
+HASTE = 4.0
+"""Seconds a second and m/s that the rover is too fast to stop there."""
 ARRIVED_S = 0.1
 """With so little time left, the rest of a motion does not count."""
-NEARER_M = 0.01
-"""A rover that is too near to something may come nearer by no more than this, so that it gets away."""
+NEARER_M, NEAREST_M = 0.01, -0.04
+"""A rover that is too near to something may come nearer by the first, so that it gets away, but only down to the
+second: else it would come nearer with every look."""
 
 
 class MotionGround(NamedTuple):
     """The ground round the rover: rasters of one shape, a cell's side, and a raster of coarser cells.
 
     ``gap_m``: from a cell to the nearest obstacle. ``seen_m``: to the nearest obstacle or unseen place. ``togo_s``:
-    time left from a cell of ``togo_cell_m``; inf where no way leads.
+    time left from a cell of ``togo_cell_m``; inf where no way leads. ``ends``: the rover stops where it is 0.
     """
 
     gap_m: Any
@@ -40,6 +45,7 @@ class MotionGround(NamedTuple):
     cell_m: float
     togo_s: Any
     togo_cell_m: float
+    ends: bool
 
 
 class RoverModel(NamedTuple):
@@ -122,14 +128,21 @@ def at_place(raster, cell_m, x_m, y_m, outside):
 
 
 @njit(cache=True, nogil=True)
-def clearance_m(raster, cell_m, body, x_m, y_m, heading_rad):
+def clearance_m(raster, cell_m, body, x_m, y_m, heading_rad, outside_m=FAR_M):
     """Metres between the rover's outline and what a raster of distances counts from."""
     nearest = FAR_M
     sine, cosine = math.sin(heading_rad), math.cos(heading_rad)
     for disc in range(body.ahead_m.size):
         ahead_m = body.ahead_m[disc]
-        nearest = min(nearest, at_place(raster, cell_m, x_m + ahead_m * sine, y_m + ahead_m * cosine, FAR_M))
+        nearest = min(nearest, at_place(raster, cell_m, x_m + ahead_m * sine, y_m + ahead_m * cosine, outside_m))
     return nearest - body.radius_m
+
+
+@njit(cache=True, nogil=True)
+def _least_m(raster, cell_m, body, start, outside_m=FAR_M):
+    """The clearance that a rover which is too near to something must keep."""
+    now_m = clearance_m(raster, cell_m, body, start.x_m, start.y_m, start.heading_rad, outside_m)
+    return min(max(now_m - NEARER_M, NEAREST_M), now_m)
 
 
 @njit(cache=True, nogil=True)
@@ -171,7 +184,7 @@ def cost_s(knots, problem):
     if early > 0:
         last = pending[early - 1]
         extra = weights.change * (abs(knots[0, 0] - last[0]) + abs(knots[0, 1] - last[1]))
-    least = clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - NEARER_M
+    least = _least_m(ground.gap_m, ground.cell_m, body, start)
     for step in range(steps):
         if step < early:
             told_m_s, told_rad_s = pending[step, 0], pending[step, 1]
@@ -188,9 +201,13 @@ def cost_s(knots, problem):
         if room < weights.near_m:
             short = 1.0 - max(room, 0.0) / weights.near_m
             extra += weights.risk * short * short * (0.3 + speed) * step_s
-        if weights.unseen > 0.0 and clearance_m(ground.seen_m, ground.cell_m, body, x, y, heading) < 0.0:
+        if weights.unseen > 0.0 and clearance_m(ground.seen_m, ground.cell_m, body, x, y, heading, 0.0) < 0.0:
             extra += weights.unseen * step_s
-        if left_s(ground, x, y) < ARRIVED_S:
+        left = left_s(ground, x, y)
+        if ground.ends:
+            stops_m_s = math.sqrt(2.0 * model.decel_m_s2 * (left * model.fastest_m_s + BEYOND_M))
+            extra += HASTE * max(speed - stops_m_s, 0.0) * step_s
+        if left < ARRIVED_S:
             return step * step_s + extra
     return steps * step_s + extra + _after_s(state, least, problem)
 
@@ -263,8 +280,8 @@ def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem
     pending, step_s = problem.pending, problem.step_s
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
     early, held = pending.shape[0], int(math.ceil(lasts_s / step_s))
-    least = clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - NEARER_M
-    least_seen = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2]) - NEARER_M
+    least = _least_m(ground.gap_m, ground.cell_m, body, start)
+    least_seen = _least_m(ground.seen_m, ground.cell_m, body, start, 0.0)
     step = 0
     while step < early + held or abs(state[3]) > 0.02:
         now_m_s, now_rad_s = 0.0, 0.0
@@ -276,7 +293,8 @@ def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem
         room_m = margin_m + margin_s * abs(state[3])
         if clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) < min(room_m, least):
             return False
-        if clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2]) < min(margin_m, least_seen):
+        seen_m = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2], 0.0)
+        if seen_m < min(margin_m, least_seen):
             return False
         step += 1
     return True

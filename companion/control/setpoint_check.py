@@ -21,14 +21,14 @@ from companion.control.local_view import LocalView
 from companion.control.told import ToldVelocity, in_force
 from companion.core.frames import NedPoint
 from companion.core.severity import Severity, TextSink
-from companion.mapping.map_queries import ArcQueries, Until, look_along
+from companion.mapping.map_queries import ArcQueries, Until, clearance_m, look_along
 from companion.mission.bounds import Bounds
 from companion.safety.reasons import Reason, SetpointFault
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity, Setpoint
 
 SLACK_M = 0.1
 """The controllers look in steps, and let a line end a few centimetres before an obstacle."""
-NEARER_M = 0.05
+NEARER_M, AWAY_M = 0.05, 0.01
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
 OVERSHOT_SHARE = 0.1
 """A near position is overshot by no more than this share of the distance."""
@@ -124,7 +124,9 @@ def _velocity(told: ToldVelocity | None) -> GuidedVelocity | None:
 
 
 def _way_is_blocked(places: list[NedPoint], view: LocalView) -> Fault | None:
-    radius_m, base = view.evidence.rover_radius_m - NEARER_M, view.evidence.base
+    base, radius_m = view.evidence.base, view.evidence.rover_radius_m - NEARER_M
+    # A rover that stands nearer to something must get away.
+    radius_m = min(radius_m, clearance_m(view.evidence, view.pose.point, radius_m) - AWAY_M)
     for here, there in pairwise(places):
         if not base.contains(base.cell_at(there)):
             break  # nothing is known beyond the edge of the map

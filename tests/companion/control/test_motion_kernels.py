@@ -36,7 +36,9 @@ STANDING = Start(5.0, 2.0, 0.0, 0.0, 0.0)
 WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0)
 
 
-def problem(*walls: tuple[int, int, int, int], start: Start = STANDING, unseen_from: int = SIDE) -> MotionProblem:
+def problem(
+    *walls: tuple[int, int, int, int], start: Start = STANDING, unseen_from: int = SIDE, ends: bool = False
+) -> MotionProblem:
     """10 x 10 m, north is up; ``walls``: first and last row, first and last column. The goal lies 8.5 m north."""
     blocked = np.zeros((SIDE, SIDE), dtype=np.bool_)
     for low, high, left, right in walls:
@@ -46,7 +48,7 @@ def problem(*walls: tuple[int, int, int, int], start: Start = STANDING, unseen_f
     gap_m = distance_field(blocked) * np.float32(CELL_M) - np.float32(0.5 * CELL_M)
     seen_m = distance_field(blocked | unseen) * np.float32(CELL_M) - np.float32(0.5 * CELL_M)
     pace = np.where(gap_m > BODY.radius_m, CELL_M / MODEL.fastest_m_s, np.inf)
-    ground = MotionGround(gap_m, seen_m, CELL_M, cost_to_go(pace, np.array([[50, 85]])), CELL_M)
+    ground = MotionGround(gap_m, seen_m, CELL_M, cost_to_go(pace, np.array([[50, 85]])), CELL_M, ends)
     return MotionProblem(start, np.zeros((2, 2)), ground, BODY, MODEL, WEIGHTS, 2.5, 0.1)
 
 
@@ -88,6 +90,13 @@ def test_a_rover_that_is_too_near_already_may_get_away_but_come_no_nearer(margin
     assert may_be_last(-0.3, 0.0, 0.3, 1.0, margin_m, 0.0, ground) and not may_be_last(
         0.5, 0.0, 0.3, 1.0, margin_m, 0.0, ground
     )
+
+
+def test_a_rover_too_fast_to_stop_at_the_end_of_its_path_costs_more_and_one_that_passes_through_does_not() -> None:
+    near_end = Start(5.0, 6.5, 0.0, 1.9, 0.0)
+    fast, braking = constant(1.9), constant(0.6)
+    assert cost_s(braking, problem(start=near_end, ends=True)) < cost_s(fast, problem(start=near_end, ends=True))
+    assert cost_s(fast, problem(start=near_end)) < cost_s(braking, problem(start=near_end))
 
 
 def test_what_passes_nearly_touching_costs_more_the_faster_it_does() -> None:
