@@ -92,6 +92,7 @@ class Snapshot:
     tally: SavedTally
     draws: Mapping[str, Any] | None
     sticks_us: tuple[int, int] | None
+    guarded: bool
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -230,6 +231,7 @@ class Checkpointer:
             tally=SavedTally(steps=tally.steps, return_steps=tally.return_steps, stuck=tally.stuck, epoch=driver.epoch),
             draws=self._draws,
             sticks_us=moment.vehicle.sticks.rest_us,
+            guarded=moment.vehicle.guard_at(moment.now_s) is not None,
         )
 
 
@@ -272,6 +274,7 @@ def saved_state(snapshot: Snapshot) -> SavedState:
         tally=snapshot.tally,
         draws=None if snapshot.draws is None else _saved_generator(snapshot.draws),
         sticks_us=snapshot.sticks_us,
+        guarded=snapshot.guarded,
     )
 
 

@@ -73,6 +73,7 @@ def resume_permission(state: SavedState, vehicle: VehicleState) -> ResumePermiss
     - If the program had control and the rover has left GUIDED since, a person has taken it, unless the autopilot has
       restarted.
     - A rover that was disarmed since, without a restart, is not armed again.
+    - HOLD that the guard on the autopilot put, because the program had fallen silent, is nobody's.
     - If the program had stopped the rover in HOLD, it continues only if mode, arming and boot are unchanged: otherwise
       a person may have driven it, switched it off or moved it.
     """
@@ -86,6 +87,11 @@ def resume_permission(state: SavedState, vehicle: VehicleState) -> ResumePermiss
         unchanged = heartbeat.mode == RoverMode.HOLD and heartbeat.armed == state.armed and not restarted
         control = Control.NOBODY if unchanged else Control.PERSON
         return ResumePermission(control, may_arm=unchanged and state.armed)
+    if heartbeat.mode == RoverMode.HOLD and heartbeat.armed and not restarted and state.guarded:
+        if vehicle.guard is None:
+            return None  # it speaks once a second
+        if vehicle.guard.acted:
+            return ResumePermission(Control.NOBODY, may_arm=False)
     if heartbeat.mode != RoverMode.GUIDED and (heartbeat.armed or not restarted):
         return ResumePermission(Control.PERSON, may_arm=False)
     return ResumePermission(Control.NOBODY, may_arm=restarted)

@@ -158,6 +158,7 @@ class SavedState(SavedValues):
     stopped it and set HOLD. ``boot_s``: the autopilot's time since boot. ``ahead_s``: how far the program's clock was
     ahead of it, constant while both keep running. ``trail``: the way from the start of the mission to here, without
     loops. ``sticks_us``: rest position of the pilot's sticks (steering, throttle), None if they were not seen.
+    ``guarded``: a guard on the autopilot was there.
     """
 
     mission: str
@@ -177,6 +178,7 @@ class SavedState(SavedValues):
     tally: SavedTally
     draws: SavedGenerator | None
     sticks_us: tuple[Pulse, Pulse] | None = None
+    guarded: bool = False
 
     @property
     def reached(self) -> int:

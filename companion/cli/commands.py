@@ -9,6 +9,7 @@ import typer
 from companion.cli import mission
 from companion.cli.bench import bench
 from companion.cli.doctor import doctor
+from companion.cli.guard import guard
 from companion.cli.inputs import version_option
 from companion.cli.plan import plan
 from companion.cli.replay import replay
@@ -23,6 +24,7 @@ app = typer.Typer(
 
 app.command()(run)
 app.command()(doctor)
+app.command()(guard)
 app.command()(plan)
 app.command()(replay)
 app.command()(bench)

@@ -11,6 +11,8 @@ import math
 
 from companion.settings import GuidanceSettings, Settings
 
+GUARD_SLACK_S = 0.05
+"""A guard looks every 20 ms, and then changes the mode."""
 LINK_STEP_S = 0.05
 """The link's latency counts in steps of this, rounded up."""
 
@@ -30,6 +32,15 @@ def for_link(settings: Settings, link_s: float) -> Settings:
     late_s, own = counted_s(link_s), settings.guidance
     latency_s = max(own.latency_s, loop_latency_s(settings) + late_s)
     guidance = own.model_copy(update={"latency_s": latency_s, "brake_delay_s": own.brake_delay_s + late_s})
+    return settings.model_copy(update={"guidance": guidance})
+
+
+def for_guard(settings: Settings, waits_s: float | None) -> Settings:
+    """The settings to drive with while a guard on the autopilot waits so long: what is told lasts no longer."""
+    if waits_s is None:
+        return settings
+    lasts_s = min(settings.guidance.velocity_lasts_s, waits_s + GUARD_SLACK_S)
+    guidance = settings.guidance.model_copy(update={"velocity_lasts_s": lasts_s})
     return settings.model_copy(update={"guidance": guidance})
 
 

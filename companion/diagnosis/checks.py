@@ -310,6 +310,13 @@ def guided(seen: Survey) -> Iterator[Finding]:
         yield to_set("wp-speed", Level.WARN, "Guided speed is left to CRUISE_SPEED.", "WP_SPEED", 0.0, 2.0)
 
 
+def guarded(seen: Survey) -> Iterator[Finding]:
+    """Whether a guard on the autopilot would stop a rover whose companion has fallen silent."""
+    if seen.vehicle.guard is None:
+        says = "No guard on the autopilot: what the companion told last goes on for 3 s if it dies."
+        yield Finding("guard", Level.NOTE, says, "`rover-companion guard` gives a script that ends it after 0.3 s")
+
+
 def sticks(seen: Survey) -> Iterator[Finding]:
     """Whether the pilot's sticks are on the channels that the companion reads."""
     for name, wanted in STICKS.items():
@@ -376,6 +383,7 @@ CHECKS = (
     ranges,
     avoidance,
     guided,
+    guarded,
     sticks,
     stations,
     fence,

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.control.braking import counted_s, for_link
+from companion.control.braking import counted_s, for_guard, for_link
 from companion.control.controller import ControlCommand, Controller
 from companion.control.local_view import LocalView
 from companion.core.frames import GeoPoint, NedPoint, Pose
@@ -99,9 +99,9 @@ class MissionExecutor:
         """Grows whenever what had been mapped is worth nothing any more."""
         self._mission = mission
         self._settings = settings
-        self._counted_for: tuple[int, float] | None = None
+        self._counted_for: tuple[int, float, float | None] | None = None
         self._counted = settings.current
-        """The settings with the link's latency counted in, and what they were made from."""
+        """The settings with the link's latency and the guard counted in, and what they were made from."""
         self._runner = runner
         self._log = log
         self._notifier = notifier
@@ -287,7 +287,8 @@ class MissionExecutor:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
         pose = vehicle.pose_at(now_s)
         assert pose is not None
-        settings = self._settings_for_link(vehicle.latency_s)
+        guard = vehicle.guard_at(now_s)
+        settings = self._settings_in_force(vehicle.latency_s, None if guard is None else guard.waits_s)
         rate_rad_s = 0.0 if vehicle.attitude is None else vehicle.attitude.yaw_rate_rad_s
         return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s)
 
@@ -297,11 +298,11 @@ class MissionExecutor:
         others = announced(vehicle, view.pose, self._mission.rover.radius_m, self._settings.current.traffic)
         return merged(others, self._tracker.moving(now_s, view.settings.traffic), now_s)
 
-    def _settings_for_link(self, link_s: float) -> Settings:
-        """The settings in force for a link that takes this long, there and back."""
-        made_from = (self._settings.changes, counted_s(link_s))
+    def _settings_in_force(self, link_s: float, waits_s: float | None) -> Settings:
+        """The settings for a link that takes this long, there and back, and a guard that waits so long, or none."""
+        made_from = (self._settings.changes, counted_s(link_s), waits_s)
         if made_from != self._counted_for:
-            self._counted_for, self._counted = made_from, for_link(self._settings.current, link_s)
+            self._counted_for, self._counted = made_from, for_guard(for_link(self._settings.current, link_s), waits_s)
         return self._counted
 
     def _is_refused(self, now_s: float) -> bool:

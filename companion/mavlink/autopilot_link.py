@@ -18,11 +18,14 @@ from companion.mavlink.confirmation import CommandTracker, TargetReadBack
 from companion.mavlink.download import Downloads
 from companion.mavlink.rates import RateFault, RateRequester, wanted_rates
 from companion.settings import LinkSettings
+from companion.vehicle import guard
 from companion.vehicle.commands import Command, Heartbeat, NamedValue, RequestMessage, TimeSync
-from companion.vehicle.events import AckSeen, Event, HeartbeatSeen, HomeSeen, TargetSeen
+from companion.vehicle.events import AckSeen, Event, GuardSeen, HeartbeatSeen, HomeSeen, TargetSeen
 from companion.vehicle.link_latency import TimeAnswered
 
 HEARTBEAT_S = 1.0
+GUARDED_HEARTBEAT_S = 0.1
+"""While a guard on the autopilot listens, which stops the rover soon after the last packet."""
 PLACES_S = 2.0
 """Origin and home are requested this often until known,"""
 PLACES_AGAIN_S = 30.0
@@ -76,7 +79,7 @@ class AutopilotLink:
         self._own: deque[bytes] = deque(maxlen=REMEMBERED)
         self._time_s = -math.inf
         self._asked_ns: deque[int] = deque(maxlen=64)
-        self._twin_s = self._rival_s = -math.inf
+        self._twin_s = self._rival_s = self._guard_s = -math.inf
 
     @property
     def description(self) -> str:
@@ -162,7 +165,8 @@ class AutopilotLink:
 
         The heartbeat is sent from the first tick on: the autopilot learns from packets where the companion is.
         """
-        if now_s - self._heartbeat_s >= HEARTBEAT_S - 1e-6:
+        guarded = now_s - self._guard_s < guard.FRESH_S
+        if now_s - self._heartbeat_s >= (GUARDED_HEARTBEAT_S if guarded else HEARTBEAT_S) - 1e-6:
             self._heartbeat_s = now_s
             self._write(Heartbeat(), now_s)
         self._read_back.check(now_s)
@@ -220,6 +224,8 @@ class AutopilotLink:
                 self._read_back.heard(event, self._codec.origin)
             case HomeSeen():
                 self._home_known = True
+            case GuardSeen():
+                self._guard_s = event.time_s
             case _:
                 pass
         self.downloads.heard(event)

@@ -14,6 +14,7 @@ from companion.mavlink.framing import AUTOPILOT, Packet
 from companion.mavlink.positions import point_of
 from companion.mavlink.ranges import RangeDecoder
 from companion.mavlink.statustext import TextAssembler
+from companion.vehicle import guard
 from companion.vehicle.events import (
     AckSeen,
     AttitudeSeen,
@@ -22,6 +23,7 @@ from companion.vehicle.events import (
     Event,
     FenceStatusSeen,
     GlobalPositionSeen,
+    GuardSeen,
     HeartbeatSeen,
     HomeSeen,
     ItemCurrentSeen,
@@ -49,6 +51,8 @@ NOT_TOLD = 0xFFFF
 """``total`` of MISSION_CURRENT."""
 NO_CELL_MV = 65535
 OF_SYS_STATUS = -1
+MIN_GUARD_MS, MAX_GUARD_MS = 50.0, 5000.0
+"""Another script may use the guard's name for something else."""
 
 
 class Decoder:
@@ -76,6 +80,7 @@ class Decoder:
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery_status,
             mavlink.MAVLINK_MSG_ID_FENCE_STATUS: _fence_status,
             mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
+            mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: _guard,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
@@ -299,6 +304,13 @@ def _time_answered(message: Any, time_s: float) -> Event | None:
 
 def _parameter(message: Any, time_s: float) -> Event:
     return ParameterSeen(time_s, message.param_id, message.param_value)
+
+
+def _guard(message: Any, time_s: float) -> Event | None:
+    """NAMED_VALUE_FLOAT: only the guard's counts."""
+    if message.name != guard.NAME or not MIN_GUARD_MS <= abs(message.value) <= MAX_GUARD_MS:
+        return None
+    return GuardSeen(time_s, 1e-3 * abs(message.value), message.value < 0.0)
 
 
 def _prearm(message: Any, time_s: float) -> Event:

@@ -245,7 +245,9 @@ class Arming:
         if self._owner is None and self._previous is not None:
             self._owner = resume_permission(self._previous.state, vehicle)
             self._arm = self._arm and (self._owner is None or self._owner.may_arm)
-        return self._owner.control if self._owner is not None and control is Control.NOBODY else control
+        if control is not Control.NOBODY or self._previous is None:
+            return control
+        return Control.PERSON if self._owner is None else self._owner.control
 
     # The mission on the ground -----------------------------------------------------------------------------------
 

@@ -12,6 +12,7 @@ from companion.executive.autopilot_mission import MissionChangeMonitor
 from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.battery_monitor import BatteryMonitor
+from companion.safety.guard_monitor import GuardMonitor
 from companion.safety.watchdogs import DataMonitor, Loop, LoopMonitor, Monitor, ScanMonitor, SticksMonitor, Worker
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.fence_monitor import FenceMonitor
@@ -50,6 +51,7 @@ def make_monitors(
         fences,
         BorderMonitor(run),
         batteries,
+        GuardMonitor(notifier),
         MissionChangeMonitor(run.mission.stored, autopilot.downloads, notifier),
     )
     return Monitors(by_precedence, localization, scans, rivals, fences, batteries)

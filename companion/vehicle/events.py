@@ -149,6 +149,18 @@ class TextSeen:
 
 
 @dataclass(frozen=True, slots=True)
+class GuardSeen:
+    """The guard on the autopilot speaks. ``waits_s``: for so long the companion may be silent.
+
+    ``acted``: the present HOLD is its doing.
+    """
+
+    time_s: float
+    waits_s: float
+    acted: bool
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterSeen:
     """PARAM_VALUE."""
 
@@ -358,6 +370,7 @@ Event = (
     | AckSeen
     | TargetSeen
     | TextSeen
+    | GuardSeen
     | ParameterSeen
     | PrearmSeen
     | TimeAnswered

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from companion.core.frames import Pose
+from companion.vehicle import guard
 from companion.vehicle.auto_leg import GuidedLeg, LegState, leg_after, leg_at_heartbeat
 from companion.vehicle.dead_reckoning import Drift, Reckoning, drift_after, jump_m, reckoning_after
 from companion.vehicle.events import (
@@ -17,6 +18,7 @@ from companion.vehicle.events import (
     EkfStatusSeen,
     Event,
     GlobalPositionSeen,
+    GuardSeen,
     HeartbeatSeen,
     HomeSeen,
     ItemCurrentSeen,
@@ -73,6 +75,7 @@ class VehicleState:
     """The newest range data that covers straight ahead: without it the rover would drive blind."""
     target: TargetSeen | None = None
     prearm: PrearmSeen | None = None
+    guard: GuardSeen | None = None
     jump_m: float = 0.0
     """How far the last position report was from where the velocity led."""
     frozen: bool = False
@@ -124,6 +127,10 @@ class VehicleState:
     def speed_m_s(self) -> float:
         """Ground speed; 0 until a position is known."""
         return 0.0 if self.position is None else math.hypot(self.position.north_m_s, self.position.east_m_s)
+
+    def guard_at(self, time_s: float) -> GuardSeen | None:
+        """The guard on the autopilot as last heard; None if it is not there."""
+        return self.guard if self.guard is not None and time_s - self.guard.time_s < guard.FRESH_S else None
 
     @property
     def latency_s(self) -> float:
@@ -184,6 +191,8 @@ def _fold_rare(state: VehicleState, event: Event) -> VehicleState:
             return replace(state, leg=leg_after(state.leg, event))
         case PrearmSeen():
             return replace(state, prearm=event)
+        case GuardSeen():
+            return replace(state, guard=event)
         case ParameterSeen():
             return _with_parameter(state, event)
         case _:

@@ -7,6 +7,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.core.severity import Severity
 from sitl.autopilot.channel import Channel
 from sitl.autopilot.fence import run_fence
+from sitl.autopilot.guard import guard_of
 from sitl.autopilot.links import close_channel, forward, open_channel
 from sitl.autopilot.messages import HANDLERS
 from sitl.autopilot.mission_protocol import keep_home, run_uploads
@@ -36,6 +37,7 @@ class Autopilot:
     def __init__(self, vehicle: Vehicle) -> None:
         """An autopilot that has just booted."""
         self.vehicle = vehicle
+        self._guard = guard_of(vehicle, set_mode)
         self._opened = 0
         self._next_event = 0
         self._next_second_us = 0
@@ -55,8 +57,12 @@ class Autopilot:
         """Handle bytes that arrived on a channel."""
         for message in channel.parse(data):
             handler = HANDLERS.get(message.get_type())
+            if self._guard is not None:
+                self._guard.hear(message)
             if forward(self.vehicle, channel, message) and handler is not None:
                 handler(self.vehicle, channel, message)
+        if self._guard is not None:
+            self._guard.run()
         self.vehicle.flush_texts()
 
     def next_due_us(self) -> float:
@@ -65,6 +71,8 @@ class Autopilot:
         if self._next_event < len(TIMETABLE):
             due_us = min(due_us, self._event_s() * 1e6)
         due_us = min(due_us, modes_due_us(self.vehicle))
+        if self._guard is not None:
+            due_us = min(due_us, self._guard.due_us())
         for channel in self.vehicle.channels.values():
             if channel.requested or channel.parameter_queue:
                 return 0.0
@@ -78,6 +86,8 @@ class Autopilot:
         self._report_motion()
         self._follow_timetable()
         run_modes(vehicle)
+        if self._guard is not None:
+            self._guard.run()
         if vehicle.time_us >= self._next_second_us:
             self._next_second_us += 1_000_000
             run_failsafes(vehicle)

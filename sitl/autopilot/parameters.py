@@ -113,6 +113,8 @@ DEFAULTS: dict[str, tuple[float, int]] = {
     "RTL_SPEED": (0.0, REAL32),
     "SCHED_LOOP_RATE": (50, INT16),
     **{f"SERIAL{port}_PROTOCOL": (2, INT8) for port in range(8)},
+    "SCR_ENABLE": (0, INT8),
+    "SCR_USER1": (0.0, REAL32),
     **{f"SERVO{n}_FUNCTION": ({1: 73, 3: 74}.get(n, 0), INT16) for n in range(1, OUTPUTS + 1)},
     **{f"SERVO{n}_REVERSED": (0, INT8) for n in range(1, OUTPUTS + 1)},
     "SIM_BATT_CAP_AH": (0.0, REAL32),

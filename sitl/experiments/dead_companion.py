@@ -73,9 +73,10 @@ class Told:
         return str(self.mission.sitl.sensors) if self.mission.sitl is not None else ""
 
 
-def overheard(mission: Mission, seed: int) -> Told:
-    """Drive the mission with its companion alive, and keep what it says."""
-    drive = Drive(mission, scenario_from_mission(mission), Settings(), seed, NullRecorder(), TIME_LIMIT_S)
+def overheard(mission: Mission, seed: int, settings: Settings | None = None) -> Told:
+    """Drive the mission with its companion alive, and keep what it says. ``settings``: None for the defaults."""
+    scenario = scenario_from_mission(mission)
+    drive = Drive(mission, scenario, settings or Settings(), seed, NullRecorder(), TIME_LIMIT_S)
     words: list[tuple[float, bytes]] = []
     drive.clock.overhear = lambda time_s, said: words.append((time_s, said))
     report = drive.run()

@@ -116,8 +116,11 @@ def kept_in(directory: Path, mission: Mission) -> Checkpointer:
     return Checkpointer(mission, _InlineStateWriter(StateFile(place.file, OsDisk())), previous)
 
 
-def drive_with_deaths(mission: Mission, motors: Motors, seed: int) -> KilledDrive:
-    """Drive a mission to its end while its companion is killed every few seconds."""
+def drive_with_deaths(mission: Mission, motors: Motors, seed: int, settings: Settings | None = None) -> KilledDrive:
+    """Drive a mission to its end while its companion is killed every few seconds.
+
+    ``settings``: None for the defaults.
+    """
     suite = str(mission.sitl.sensors) if mission.sitl is not None else ""
     result, rng, person = KilledDrive(mission.name, suite, motors, seed), np.random.default_rng((seed, 13)), Person()
     with TemporaryDirectory() as folder:
@@ -125,7 +128,7 @@ def drive_with_deaths(mission: Mission, motors: Motors, seed: int) -> KilledDriv
         drive = Drive(
             mission,
             scenario_from_mission(mission),
-            Settings(),
+            settings or Settings(),
             seed,
             NullRecorder(),
             TIME_LIMIT_S,

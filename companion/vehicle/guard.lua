@@ -1,0 +1,55 @@
+-- Guard for rover-companion: HOLD when the companion falls silent while it drives the rover.
+--
+-- A velocity lasts three seconds in ArduRover. Without this script a rover whose companion dies drives on for as long.
+-- It waits SCR_USER1 milliseconds (100 to 3000; 0: 300). It begins to watch with the companion's first setpoint in
+-- GUIDED, and ends when the mode is another one or the rover is disarmed: so it never acts against a pilot, nor on a
+-- companion that ended well. Once a second it tells as CMPGUARD how long it waits; negative while HOLD is its doing.
+local COMPANION = 191
+local GUIDED, HOLD = 15, 4
+local HEARTBEAT = 0
+local SETPOINTS = { [73] = true, [75] = true, [84] = true, [86] = true }
+
+local own = param:get("MAV_SYSID") or param:get("SYSID_THISMAV")
+local watches, acted = false, false
+local heard_ms, told_ms = 0, 0
+
+local function waits_ms()
+  local wanted = param:get("SCR_USER1") or 0
+  if wanted <= 0 then return 300 end
+  return math.min(math.max(wanted, 100), 3000)
+end
+
+local function listen(now_ms, guided)
+  while true do
+    local message = mavlink:receive_chan()
+    if not message then return end
+    local system, component, id = string.unpack("<BBI3", message, 8)
+    if component == COMPANION and (not own or system == own) then
+      heard_ms = now_ms
+      if guided and SETPOINTS[id] then watches = true end
+    end
+  end
+end
+
+local function update()
+  local now_ms, mode = millis():toint(), vehicle:get_mode()
+  local guided = arming:is_armed() and mode == GUIDED
+  if not guided then watches = false end
+  if mode ~= HOLD then acted = false end
+  listen(now_ms, guided)
+  if watches and now_ms - heard_ms > waits_ms() then
+    watches, acted = false, true
+    vehicle:set_mode(HOLD)
+    gcs:send_text(4, "Guard: companion silent, HOLD")
+  end
+  if now_ms - told_ms >= 1000 then
+    told_ms = now_ms
+    gcs:send_named_float("CMPGUARD", acted and -waits_ms() or waits_ms())
+  end
+  return update, 20
+end
+
+mavlink:init(20, 5)
+mavlink:register_rx_msgid(HEARTBEAT)
+for id in pairs(SETPOINTS) do mavlink:register_rx_msgid(id) end
+return update()

@@ -1,0 +1,24 @@
+"""The guard: a script on the autopilot that stops the rover when the companion falls silent.
+
+A velocity told to ArduRover lasts three seconds. With the script it lasts for a fraction of one, and the companion may
+tell higher speeds near obstacles. ``guard.lua`` is the script itself.
+
+Nouns: guard.
+"""
+
+from __future__ import annotations
+
+from importlib.resources import files
+
+NAME = "CMPGUARD"
+"""NAMED_VALUE_FLOAT of the script: how many milliseconds it waits, negative while the present HOLD is its doing."""
+FRESH_S = 2.5
+"""It speaks once a second; without a word for so long it is not there."""
+FILE = "companion_guard.lua"
+COMPONENT = 191
+
+
+def script(component_id: int = COMPONENT) -> str:
+    """The Lua script, for a companion with this component id."""
+    text = files("companion.vehicle").joinpath("guard.lua").read_text(encoding="utf-8")
+    return text.replace(f"local COMPANION = {COMPONENT}\n", f"local COMPANION = {component_id}\n")

@@ -1,0 +1,85 @@
+"""The guard script of rover-companion, as it runs on the autopilot: HOLD when the companion falls silent.
+
+In the simulator it is there when SCR_ENABLE and SCR_USER1 are set at boot. It behaves as the script
+``companion/vehicle/guard.lua`` does, which looks every 20 ms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from companion.core.severity import Severity
+from sitl.autopilot.state import Mode
+from sitl.autopilot.vehicle import Vehicle
+
+COMPANION = 191
+SETPOINTS = {
+    "MISSION_ITEM_INT",
+    "COMMAND_INT",
+    "SET_POSITION_TARGET_LOCAL_NED",
+    "SET_POSITION_TARGET_GLOBAL_INT",
+}
+LIFE = {"HEARTBEAT", *SETPOINTS}
+LOOK_US = 20_000
+TELL_US = 1_000_000
+LEAST_MS, MOST_MS = 100.0, 3000.0
+NAME = b"CMPGUARD"
+
+
+class Guard:
+    """Watches the companion's packets from its first setpoint in GUIDED until the mode or arming changes."""
+
+    def __init__(self, vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool]) -> None:
+        self._vehicle = vehicle
+        self._set_mode = set_mode
+        self._watches = self._acted = False
+        self._heard_us = self._told_us = 0
+
+    @property
+    def waits_us(self) -> float:
+        """So long the companion may be silent."""
+        return 1e3 * min(max(self._vehicle.parameters["SCR_USER1"], LEAST_MS), MOST_MS)
+
+    def hear(self, message: Any) -> None:
+        """One packet that has arrived."""
+        vehicle = self._vehicle
+        if message.get_srcSystem() != vehicle.system or message.get_srcComponent() != COMPANION:
+            return
+        if message.get_type() in LIFE:
+            self._heard_us = vehicle.time_us
+            self._watches |= self._is_guided() and message.get_type() in SETPOINTS
+
+    def due_us(self) -> float:
+        """When ``run`` is to be called next."""
+        tells_us = self._told_us + TELL_US
+        if not self._watches:
+            return tells_us
+        looks_us = (int(self._heard_us + self.waits_us) // LOOK_US + 1) * LOOK_US
+        return min(tells_us, max(looks_us, self._vehicle.time_us))
+
+    def run(self) -> None:
+        """Look, act, and tell."""
+        vehicle = self._vehicle
+        self._watches &= self._is_guided()
+        self._acted &= vehicle.mode == Mode.HOLD
+        if self._watches and vehicle.time_us - self._heard_us > self.waits_us:
+            self._watches, self._acted = False, True
+            self._set_mode(vehicle, Mode.HOLD)
+            vehicle.say(Severity.WARNING, "Guard: companion silent, HOLD")
+        if vehicle.time_us - self._told_us >= TELL_US:
+            self._told_us = vehicle.time_us
+            told_ms = (-1e-3 if self._acted else 1e-3) * self.waits_us
+            for channel in vehicle.channels.values():
+                channel.send(mavlink.MAVLink_named_value_float_message(vehicle.time_us // 1000, NAME, told_ms))
+
+    def _is_guided(self) -> bool:
+        return self._vehicle.armed and self._vehicle.mode == Mode.GUIDED
+
+
+def guard_of(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool]) -> Guard | None:
+    """The guard of an autopilot that has just booted; None if it has none."""
+    wanted = vehicle.parameters["SCR_ENABLE"] == 1 and vehicle.parameters["SCR_USER1"] > 0
+    return Guard(vehicle, set_mode) if wanted else None
