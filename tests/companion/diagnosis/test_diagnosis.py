@@ -15,6 +15,7 @@ from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Level
 from companion.vehicle.events import (
     EkfStatusSeen,
+    GuardSeen,
     HeartbeatSeen,
     HomeSeen,
     LocalPositionSeen,
@@ -46,6 +47,7 @@ WELL = Survey(
         prearm=PrearmSeen(0.0, True),
         scan=SCAN,
         scan_ahead=SCAN,
+        guard=GuardSeen(0.0, 0.3, False),
     ),
     rover_heard=True,
     autopilots=(Autopilot(1, 10, 3),),
@@ -83,6 +85,7 @@ CASES: list[tuple[str, Level, Survey]] = [
     ("wp-radius", W, with_set(WP_RADIUS=3.0)),
     ("wp-jerk", N, with_set(WP_JERK=0.0)),
     ("wp-jerk", N, with_set(WP_JERK=20.0)),
+    ("guard", N, with_state(guard=None)),
     ("wp-speed", W, with_set(WP_SPEED=0.0)),
     ("echo", N, with_set(PRX1_TYPE=2.0)),
     ("gcs-failsafe", N, with_set(FS_GCS_ENABLE=0.0)),

@@ -25,5 +25,6 @@ def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None
         "FenceMonitor",
         "BorderMonitor",
         "BatteryMonitor",
+        "GuardMonitor",
         "MissionChangeMonitor",
     ]

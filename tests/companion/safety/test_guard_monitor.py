@@ -1,0 +1,48 @@
+"""What is told of a guard on the autopilot."""
+
+from __future__ import annotations
+
+from companion.core.severity import Severity
+from companion.safety.guard_monitor import GuardMonitor
+from companion.vehicle.events import Event, GuardSeen, TextSeen
+from companion.vehicle.state import VehicleState, fold
+
+
+class Texts:
+    def __init__(self) -> None:
+        self.said: list[str] = []
+
+    def tell(self, text: str, severity: Severity) -> None:
+        self.said.append(text)
+
+
+def run(*events: tuple[float, Event | None]) -> list[str]:
+    """What is said as these come in; None for a tick without an event."""
+    texts, state = Texts(), VehicleState()
+    monitor = GuardMonitor(texts)
+    for now_s, event in events:
+        if event is not None:
+            state = fold(state, event)
+            monitor.take(event, state)
+        monitor.tick(now_s)
+        assert monitor.doubt(now_s) is None
+    return texts.said
+
+
+def test_it_tells_once_that_there_is_one_and_that_it_is_gone() -> None:
+    speaks = [(float(now_s), GuardSeen(float(now_s), 0.3, False)) for now_s in range(1, 9)]
+    silent = [(10.0, None), (11.0, None), (12.0, None)]
+    said = run((0.0, TextSeen(0.0, 6, "hello")), *speaks, *silent, (13.0, GuardSeen(13.0, 0.5, False)))
+    assert [text.split()[0] for text in said] == ["Guarded:", "The", "Guarded:"]
+    assert "0.3 s" in said[0] and "gone" in said[1] and "0.5 s" in said[2]
+
+
+def test_it_tells_once_that_hold_was_the_guards() -> None:
+    seen = [(float(now_s), GuardSeen(float(now_s), 0.3, now_s in (2, 3, 5))) for now_s in range(7)]
+    assert [text for text in run(*seen) if "HOLD:" in text] == [
+        "The guard on the autopilot has put HOLD: it heard nothing of the companion"
+    ] * 2
+
+
+def test_without_one_nothing_is_told() -> None:
+    assert run((0.0, None), (5.0, TextSeen(5.0, 6, "hello"))) == []
