@@ -17,6 +17,7 @@ from companion.vehicle.commands import (
     ChangeSpeed,
     Command,
     EndTransfer,
+    FileRequest,
     GuidedHeading,
     GuidedPosition,
     GuidedVelocity,
@@ -41,6 +42,7 @@ VELOCITY_AND_YAW_RATE = 1511
 YAW_ONLY = 2559
 """Type mask: only the yaw is used."""
 KEEP_THROTTLE = -1.0
+FILE_BYTES = 251
 
 
 LongCommand = SetMode | Arm | ChangeSpeed | RequestRate | RequestMessage | RunPrearmChecks
@@ -100,7 +102,7 @@ class Encoder:
                 return [mavlink.MAVLink_timesync_message(0, command.asked_ns)]
             case StatusText():
                 return self._text(command)
-            case RequestList() | RequestItem() | EndTransfer():
+            case RequestList() | RequestItem() | EndTransfer() | FileRequest():
                 return [self._transfer(command)]
             case AnswerGoal():
                 return [answer_message(command)]
@@ -174,13 +176,15 @@ class Encoder:
     def _read(self, command: ReadParameter) -> Any:
         return mavlink.MAVLink_param_request_read_message(self._system_id, 1, command.name.encode("ascii"), -1)
 
-    def _transfer(self, command: RequestList | RequestItem | EndTransfer) -> Any:
+    def _transfer(self, command: RequestList | RequestItem | EndTransfer | FileRequest) -> Any:
         to = (self._system_id, 1)
         match command:
             case RequestList():
                 return mavlink.MAVLink_mission_request_list_message(*to, int(command.kind))
             case RequestItem():
                 return mavlink.MAVLink_mission_request_int_message(*to, command.index, int(command.kind))
+            case FileRequest():
+                return mavlink.MAVLink_file_transfer_protocol_message(0, *to, command.payload.ljust(FILE_BYTES, b"\0"))
             case _:
                 result = mavlink.MAV_MISSION_OPERATION_CANCELLED if command.cancelled else mavlink.MAV_MISSION_ACCEPTED
                 return mavlink.MAVLink_mission_ack_message(*to, result, int(command.kind))

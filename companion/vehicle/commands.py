@@ -130,6 +130,13 @@ class ParameterValue:
 
 
 @dataclass(frozen=True, slots=True)
+class FileRequest:
+    """FILE_TRANSFER_PROTOCOL: ``payload`` is header and data."""
+
+    payload: bytes
+
+
+@dataclass(frozen=True, slots=True)
 class NamedValue:
     """NAMED_VALUE_FLOAT: a figure for ground stations; its name has at most 10 characters."""
 
@@ -171,6 +178,7 @@ Command = (
     | RequestList
     | RequestItem
     | EndTransfer
+    | FileRequest
     | StatusText
     | AnswerGoal
     | ParameterValue

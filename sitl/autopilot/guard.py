@@ -1,7 +1,7 @@
 """The guard script of rover-companion, as it runs on the autopilot: HOLD when the companion falls silent.
 
-In the simulator it is there when SCR_ENABLE and SCR_USER1 are set at boot. It behaves as the script
-``companion/vehicle/guard.lua`` does, which looks every 20 ms.
+In the simulator it is there when SCR_ENABLE is 1 at boot, and SCR_USER1 is set or the script was uploaded. It does what
+the script ``companion/vehicle/guard.lua`` does, which looks every 20 ms.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ SETPOINTS = {
 LIFE = {"HEARTBEAT", *SETPOINTS}
 LOOK_US = 20_000
 TELL_US = 1_000_000
-LEAST_MS, MOST_MS = 100.0, 3000.0
+USUAL_MS, LEAST_MS, MOST_MS = 300.0, 100.0, 3000.0
 NAME = b"CMPGUARD"
 
 
@@ -41,7 +41,8 @@ class Guard:
     @property
     def waits_us(self) -> float:
         """So long the companion may be silent."""
-        return 1e3 * min(max(self._vehicle.parameters["SCR_USER1"], LEAST_MS), MOST_MS)
+        wanted_ms = self._vehicle.parameters["SCR_USER1"] or USUAL_MS
+        return 1e3 * min(max(wanted_ms, LEAST_MS), MOST_MS)
 
     def hear(self, message: Any) -> None:
         """One packet that has arrived."""
@@ -81,5 +82,5 @@ class Guard:
 
 def guard_of(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool]) -> Guard | None:
     """The guard of an autopilot that has just booted; None if it has none."""
-    wanted = vehicle.parameters["SCR_ENABLE"] == 1 and vehicle.parameters["SCR_USER1"] > 0
-    return Guard(vehicle, set_mode) if wanted else None
+    there = vehicle.parameters["SCR_USER1"] > 0 or any(b"CMPGUARD" in file for file in vehicle.storage.files.values())
+    return Guard(vehicle, set_mode) if there and vehicle.parameters["SCR_ENABLE"] == 1 else None

@@ -71,11 +71,14 @@ class Sticks:
 
 @dataclass
 class Storage:
-    """Mission, fence and rally items; they survive a reboot."""
+    """Mission, fence and rally items, and the files of the SD card; they survive a reboot."""
 
     mission: list[Item] = field(default_factory=list)
     fence: list[Item] = field(default_factory=list)
     rally: list[Item] = field(default_factory=list)
+    files: dict[str, bytearray] = field(default_factory=dict)
+    open_file: str = ""
+    """The file that is being written; empty for none."""
 
 
 @dataclass

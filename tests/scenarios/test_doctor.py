@@ -55,7 +55,8 @@ class Case:
 
     def findings(self) -> dict[str, Level]:
         scenario = scenario_from_mission(yard(self.folder))
-        parameters = {**scenario.parameters, "FS_GCS_ENABLE": 0.0, **self.values}
+        guarded = {"SCR_ENABLE": 1.0, "SCR_USER1": 300.0}
+        parameters = {**scenario.parameters, "FS_GCS_ENABLE": 0.0, **guarded, **self.values}
         scenario = replace(scenario, parameters=parameters, sensors=self.sensors or scenario.sensors)
         simulator = scenario.simulator(0)
         simulator.advance_to_s(self.on_s)

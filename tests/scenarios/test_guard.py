@@ -7,15 +7,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from companion.cli.commands import app
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
+from companion.vehicle.guard import script
 from sitl.experiments.dead_companion import die, overheard, with_suite
 from sitl.experiments.killed_companion import Motors, drive_with_deaths
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
+from tests.sitl.network.test_server import free_port
+from tests.support.rig import yard
+from tests.support.served import mission_path, process
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 PLANNED = Settings.model_validate(
@@ -65,3 +71,24 @@ def test_it_is_told_at_the_start_and_lets_planned_motions_be_faster(guarded: Mis
         said.append([text for text in drive.companion.outcome.said if "uarded" in text])
     assert seconds[0] < seconds[1]
     assert len(said[0]) == 1 and said[1] == []
+
+
+def test_it_is_printed_written_and_uploaded_and_works_after_a_restart(tmp_path: Path) -> None:
+    with process("sitl", "serve", "--listen", url := f"tcp:127.0.0.1:{free_port()}", mission_path(yard(tmp_path))):
+        uploaded = CliRunner().invoke(app, ["guard", "--install", url])
+    assert uploaded.exit_code == 0, uploaded.output
+    assert "uploaded to scripts/companion_guard.lua" in uploaded.output and "SCR_ENABLE" in uploaded.output
+    printed = CliRunner().invoke(app, ["guard"])
+    written = CliRunner().invoke(app, ["guard", "--write", str(tmp_path)])
+    assert (printed.exit_code, written.exit_code) == (0, 0)
+    assert (tmp_path / "companion_guard.lua").read_text(encoding="utf-8") == printed.output == script()
+
+
+def test_nobody_there_and_a_place_that_cannot_be_written_are_told_in_a_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("companion.cli.guard.HEARD_S", 0.5)
+    nobody = CliRunner().invoke(app, ["guard", "--install", f"udpin:127.0.0.1:{free_port()}"])
+    assert nobody.exit_code == 4 and "no rover was heard; check link and port" in nobody.output
+    nowhere = CliRunner().invoke(app, ["guard", "--write", str(tmp_path / "file" / ".." / "..")])
+    assert nowhere.exit_code == 2 and len(nowhere.output.strip().splitlines()) == 1
