@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mission.mission import Mission
 from companion.safety.mode_latch import Control
 from companion.settings import MappingSettings
-from companion.vehicle.events import HeartbeatSeen, LocalPositionSeen, RoverMode
+from companion.vehicle.events import GuardSeen, HeartbeatSeen, LocalPositionSeen, RoverMode
 from companion.vehicle.state import VehicleState
 from tests.support.rig import yard
 from tests.support.states import a_state
@@ -64,6 +65,29 @@ def test_whose_the_rover_is(
 ) -> None:
     state = a_state(control=control, released=released, boot_s=60.0)
     assert resume_permission(state, found(mode, armed, 20.0 if restarted else 65.0)) == ResumePermission(owner, may_arm)
+
+
+@pytest.mark.parametrize(
+    ("mode", "acted", "released", "owner"),
+    [
+        (HOLD, True, False, FREE),
+        (HOLD, False, False, THEIRS),
+        (MANUAL, False, False, THEIRS),
+        (GUIDED, False, False, FREE),
+        (HOLD, True, True, FREE),
+    ],
+)
+def test_hold_that_the_guard_put_is_nobodys(mode: int, acted: bool, released: bool, owner: Control) -> None:
+    state = a_state(control=OURS, released=released, boot_s=60.0, guarded=True)
+    rover = replace(found(mode, True, 65.0), guard=GuardSeen(65.0, 0.3, acted))
+    permission = resume_permission(state, rover)
+    assert permission is not None and permission.control is owner
+
+
+def test_where_a_guard_was_it_is_waited_for_before_hold_is_taken_for_a_persons() -> None:
+    state = a_state(control=OURS, released=False, boot_s=60.0, guarded=True)
+    assert resume_permission(state, found(HOLD, True, 65.0)) is None
+    assert resume_permission(state, found(MANUAL, True, 65.0)) == ResumePermission(THEIRS, False)
 
 
 def test_nothing_is_said_of_a_rover_that_has_hardly_been_heard() -> None:
