@@ -22,7 +22,7 @@ class LocalView:
     """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
 
     ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
-    ``held_m_s``: so much slower than it was told the ground holds it.
+    ``held_m_s``: so much slower than it was told the ground holds it. ``rolls_back``: it moves tail first.
     """
 
     pose: Pose
@@ -34,6 +34,12 @@ class LocalView:
     held_m_s: float = 0.0
     told: Setpoint | None = None
     lately: Told = ()
+    rolls_back: bool = False
+
+    @property
+    def forward_m_s(self) -> float:
+        """Its speed, below 0 if it rolls tail first."""
+        return -self.speed_m_s if self.rolls_back else self.speed_m_s
 
     @property
     def further_m(self) -> float:

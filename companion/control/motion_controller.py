@@ -95,9 +95,7 @@ class MotionController:
             keeps_m = self._body.radius_m + WEIGHTS.margin_m
             self._window = look_round(view.evidence, pose.point, path, keeps_m, model.fastest_m_s)
             self._looked_s = now_s
-        before = in_force(view.lately, now_s)
-        speed_m_s = -view.speed_m_s if before is not None and before.speed_m_s < 0.0 else view.speed_m_s
-        start = Start(*self._window.place(pose.point), pose.heading_rad, speed_m_s, view.yaw_rate_rad_s)
+        start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
         pending = _pending(view, model.dead_s)
         return MotionProblem(start, pending, self._window.ground, self._body, model, WEIGHTS, HORIZON_S, STEP_S)
 

@@ -93,8 +93,7 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
 def _way_alone(setpoint: GuidedVelocity, view: LocalView) -> list[NedPoint]:
     """Places on the way of a rover that is told nothing more: it goes on until the velocity expires, then it brakes."""
     guidance, motion, pose = view.settings.guidance, view.settings.motion, view.pose
-    before = in_force(view.lately, pose.time_s)
-    speed_m_s, turn_rad_s = math.copysign(view.speed_m_s, before.speed_m_s if before else 0.0), view.yaw_rate_rad_s
+    speed_m_s, turn_rad_s = view.forward_m_s, view.yaw_rate_rad_s
     heading_rad, point, places = pose.heading_rad, pose.point, [pose.point]
     gains_m_s = GAINS_FASTER * motion.acceleration_m_s2 * WAY_STEP_S
     gains_rad_s = motion.turn_acceleration_rad_s2 * WAY_STEP_S

@@ -58,6 +58,8 @@ VERDICT_S = 15.0
 """After a jump of the position no target is given up for this long: most receivers are right again by then."""
 ROLLS_OUT_S = 10.0
 """So long at most a rover is awaited that is to stand."""
+ROLLS_BACK_M_S = 0.05
+"""Slower than this it may be the noise of the estimate."""
 ROLLS_M_S = 0.1
 """However small roll_out_m_s is: slower than this it does not roll."""
 WATCHED_SCANS = 20
@@ -290,7 +292,8 @@ class MissionExecutor:
         guard = vehicle.guard_at(now_s)
         settings = self._settings_in_force(vehicle.latency_s, None if guard is None else guard.waits_s)
         rate_rad_s = 0.0 if vehicle.attitude is None else vehicle.attitude.yaw_rate_rad_s
-        return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s)
+        back = vehicle.forward_m_s < -ROLLS_BACK_M_S
+        return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s, rolls_back=back)
 
     def _moving(self, vehicle: VehicleState, view: LocalView) -> tuple[Moving, ...]:
         """All that moves round the rover, announced or seen."""

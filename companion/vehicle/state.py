@@ -128,6 +128,14 @@ class VehicleState:
         """Ground speed; 0 until a position is known."""
         return 0.0 if self.position is None else math.hypot(self.position.north_m_s, self.position.east_m_s)
 
+    @property
+    def forward_m_s(self) -> float:
+        """Velocity over ground along the heading; 0 until both are known."""
+        if self.position is None or self.attitude is None:
+            return 0.0
+        heading_rad = self.attitude.heading_rad
+        return self.position.north_m_s * math.cos(heading_rad) + self.position.east_m_s * math.sin(heading_rad)
+
     def guard_at(self, time_s: float) -> GuardSeen | None:
         """The guard on the autopilot as last heard; None if it is not there."""
         return self.guard if self.guard is not None and time_s - self.guard.time_s < guard.FRESH_S else None
