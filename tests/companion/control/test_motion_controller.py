@@ -53,9 +53,8 @@ def driven(
     least_m, left_m, now_s, path = math.inf, math.inf, 0.0, PATH
     while now_s < 30.0 and left_m > 0.5:
         x, y, heading, speed, turn = state
-        at = replace(
-            view(evidence, Pose(y, x, heading, now_s), abs(speed), settings), yaw_rate_rad_s=turn, lately=lately
-        )
+        at = view(evidence, Pose(y, x, heading, now_s), abs(speed), settings)
+        at = replace(at, yaw_rate_rad_s=turn, lately=lately, rolls_back=speed < 0.0)
         path = advanced(path, at.pose)
         setpoint = leads.follow(path, at).setpoint
         assert isinstance(setpoint, GuidedVelocity)

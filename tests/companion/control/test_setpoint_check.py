@@ -18,6 +18,7 @@ from companion.control.controller import STOP, ControlCommand, Purpose
 from companion.control.local_view import LocalView
 from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
 from companion.control.setpoint_check import SetpointCheck, fault_of, inside_borders
+from companion.control.told import Told, ToldVelocity
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
@@ -255,6 +256,33 @@ def test_a_target_at_the_farthest_distance_passes() -> None:
         pose = Pose(0.5, MIDDLE, 0.0, 0.0)
         there = GuidedPosition(NedPoint(0.5 + farthest_m(0.0, SETTINGS.guidance) + beyond_m, MIDDLE))
         assert bool(fault(Output(there, pose, 0.0), open_ground())) is refused
+
+
+PLANNED = Settings.model_validate({"guidance": {"controller": "motion-ga", "velocity_lasts_s": 0.3}})
+
+
+def rolling(speed_m_s: float, *, back: bool = False, lately: Told = ()) -> LocalView:
+    """Towards a wall 1.5 m ahead, with planned motions."""
+    evidence = open_ground()
+    evidence.log_odds[round((MIDDLE + 1.5) / evidence.evidence_m)] = 3.0
+    at = view(evidence, Pose(MIDDLE, MIDDLE, 0.0, 0.0), speed_m_s)
+    return replace(at, settings=PLANNED, rolls_back=back, lately=lately)
+
+
+def test_a_rover_that_was_told_to_go_back_may_still_roll_into_something() -> None:
+    """Its direction is that of its velocity, not of what it was told."""
+    told = (ToldVelocity(-0.1, -0.5, 0.0),)
+    back = GuidedVelocity(-0.5, 0.0)
+    assert fault_of(back, rolling(2.0, lately=told), Bounds()) == Reason(SetpointFault.INTO_OBSTACLE)
+    assert fault_of(back, rolling(2.0, back=True, lately=told), Bounds()) is None
+    assert fault_of(back, rolling(0.5, lately=told), Bounds()) is None
+
+
+def test_what_was_told_lately_is_counted_until_a_new_velocity_shows() -> None:
+    faster, slower = (ToldVelocity(-0.3, 2.0, 0.0),), (ToldVelocity(-0.3, 0.0, 0.0),)
+    wanted = GuidedVelocity(0.6, 0.0)
+    assert fault_of(wanted, rolling(1.2, lately=slower), Bounds()) is None
+    assert fault_of(wanted, rolling(1.2, lately=faster), Bounds()) == Reason(SetpointFault.INTO_OBSTACLE)
 
 
 def test_any_velocity_but_zero_is_looked_along() -> None:
