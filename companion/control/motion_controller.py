@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import Window, look_round
-from companion.control.motion_kernels import Body, MotionProblem, RoverModel, Start, Weights, may_be_last
+from companion.control.motion_kernels import Body, MotionProblem, RoverModel, Start, Weights, may_be_last, spare_m
 from companion.control.motion_planners import MotionPlanner
 from companion.control.reference_path import ReferencePath
 from companion.control.setpoint_check import velocity_stops_in_time
@@ -37,6 +37,8 @@ BRAKE_TURNS = (0.0, -0.5, 0.5, -1.0, 1.0)
 """Turn rates to brake with, as shares of the fastest."""
 OFF_MODEL = 0.3
 """The rover may differ from its model by this share."""
+ENOUGH_M = 0.1
+"""With so much room it does not turn while it brakes."""
 BRAKES_S = 0.3
 """So long it is looked how braking goes on."""
 STANDS_M_S = 0.05
@@ -109,18 +111,23 @@ class MotionController:
             if _may_be_left_alone(told, view, worst):
                 self._safe_s = now_s
                 return told
-        fastest_rad_s = problem.model.turn_fastest_rad_s
-        for share in BRAKE_TURNS:
-            if may_be_last(0.0, share * fastest_rad_s, BRAKES_S, 1.0, 0.0, 0.0, worst):
-                rolls = abs(problem.start.speed_m_s) > STANDS_M_S
-                return ToldVelocity(now_s, 0.0, share * fastest_rad_s if rolls else 0.0)
-        if (
-            before is not None
-            and now_s - self._safe_s < view.settings.guidance.velocity_lasts_s
-            and _stops_in_time(before, view)
-        ):
+        return self._braking(before, view, worst)
+
+    def _braking(self, before: ToldVelocity | None, view: LocalView, worst: MotionProblem) -> ToldVelocity:
+        """The way to brake that keeps most room, straight on where there is enough; or to go on as told."""
+        now_s, fastest_rad_s = self._time_s, worst.model.turn_fastest_rad_s
+        spare_m = {share: _least_spare_m(share * fastest_rad_s, worst) for share in BRAKE_TURNS}
+        best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M))
+        lasted = now_s - self._safe_s < view.settings.guidance.velocity_lasts_s
+        if spare_m[best] < 0.0 and before is not None and lasted and _stops_in_time(before, view):
             return before  # with this it could be left alone
-        return ToldVelocity(now_s, 0.0, 0.0)
+        rolls = abs(worst.start.speed_m_s) > STANDS_M_S
+        return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
+
+
+def _least_spare_m(turn_rad_s: float, worst: MotionProblem) -> float:
+    """The room that is left where the rover brakes turning, however much it turns."""
+    return min(float(spare_m(0.0, turn_rad_s, BRAKES_S, gain, 0.0, 0.0, worst)) for gain in GAINS)
 
 
 def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem) -> bool:

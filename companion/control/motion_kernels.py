@@ -274,15 +274,21 @@ def costs_s(motions, problem):
 def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
     """Whether a command may be the last: held so long, then braked, it leads over ground that is free and seen.
 
-    ``gain``: the rover turns by this factor more than it is told.
+    The rover keeps ``margin_m``, and ``margin_s`` more for each m/s. ``gain``: it turns by this factor more than told.
     """
+    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem) >= 0.0
+
+
+@njit(cache=True, nogil=True)
+def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
+    """How much more room than it must keep such a rover has, at the worst place; below 0 it may not be left alone."""
     start, ground, body, model = problem.start, problem.ground, problem.body, problem.model
     pending, step_s = problem.pending, problem.step_s
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
     early, held = pending.shape[0], int(math.ceil(lasts_s / step_s))
     least = _least_m(ground.gap_m, ground.cell_m, body, start)
     least_seen = _least_m(ground.seen_m, ground.cell_m, body, start, 0.0)
-    step = 0
+    step, spare = 0, FAR_M
     while step < early + held or abs(state[3]) > 0.02:
         now_m_s, now_rad_s = 0.0, 0.0
         if step < early:
@@ -290,14 +296,12 @@ def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem
         elif step < early + held:
             now_m_s, now_rad_s = told_m_s, told_rad_s
         state = moved(state, now_m_s, gain * now_rad_s, model, step_s)
-        room_m = margin_m + margin_s * abs(state[3])
-        if clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) < min(room_m, least):
-            return False
+        room_m = min(margin_m + margin_s * abs(state[3]), least)
+        spare = min(spare, clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - room_m)
         seen_m = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2], 0.0)
-        if seen_m < min(margin_m, least_seen):
-            return False
+        spare = min(spare, seen_m - min(margin_m, least_seen))
         step += 1
-    return True
+    return spare
 
 
 @njit(cache=True, nogil=True)
