@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from companion.checkpoint.checkpointer import Checkpointer
+from companion.control.model_estimate import ModelEstimate
 from companion.core.clock import Clock
 from companion.core.frames import GeoPoint
 from companion.executive.goal_driver import GoalDriver
@@ -96,6 +97,12 @@ class Companion:
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
         return self.mission_run.statuses()
+
+    @property
+    def estimate(self) -> ModelEstimate | None:
+        """How the rover follows velocities; None where motions are not planned, or before the mission has begun."""
+        executor = self.mission_run.executor
+        return executor.estimator.estimate if executor is not None and executor.learns else None
 
     def status(self) -> Status:
         """A picture of this moment."""

@@ -14,6 +14,7 @@ from enum import StrEnum
 
 from companion.app import Companion, Status
 from companion.checkpoint.checkpointer import Checkpointer
+from companion.control.model_estimate import described
 from companion.core.clock import stopwatch_s
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
@@ -107,6 +108,8 @@ class Report:
     tick_p99_ms: float = 0.0
     track: list[TrackPoint] = field(default_factory=list)
     said: list[str] = field(default_factory=list)
+    following: str = ""
+    """How the rover followed velocities, as the companion found; empty where it plans no motions."""
 
     @property
     def exit_code(self) -> int:
@@ -209,6 +212,7 @@ class Drive:
         report.collisions = len(self.simulator.collisions)
         report.contacts = self.contacts
         report.refused = companion.mission_run.setpoint_check.refused.total()
+        report.following = "" if companion.estimate is None else described(companion.estimate)
         report.distance_m = self.simulator.driven_m
         report.sim_time_s = self.simulator.time_s
         if companion.driver is not None:

@@ -15,6 +15,8 @@ from companion.checkpoint.state_format import (
     MAX_DURATION_S,
     Raster,
     RowBand,
+    SavedEstimate,
+    SavedFollowing,
     SavedGenerator,
     SavedGrid,
     SavedNavState,
@@ -24,6 +26,7 @@ from companion.checkpoint.state_format import (
     SavedState,
     SavedTally,
 )
+from companion.control.model_estimate import ModelEstimate
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import Cell, Grid
 from companion.core.tick_marks import Mark
@@ -93,6 +96,7 @@ class Snapshot:
     draws: Mapping[str, Any] | None
     sticks_us: tuple[int, int] | None
     guarded: bool
+    estimate: ModelEstimate
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -232,6 +236,7 @@ class Checkpointer:
             draws=self._draws,
             sticks_us=moment.vehicle.sticks.rest_us,
             guarded=moment.vehicle.guard_at(moment.now_s) is not None,
+            estimate=executor.estimator.estimate,
         )
 
 
@@ -275,6 +280,17 @@ def saved_state(snapshot: Snapshot) -> SavedState:
         draws=None if snapshot.draws is None else _saved_generator(snapshot.draws),
         sticks_us=snapshot.sticks_us,
         guarded=snapshot.guarded,
+        estimate=_saved_estimate(snapshot.estimate),
+    )
+
+
+def _saved_estimate(estimate: ModelEstimate) -> SavedEstimate:
+    return SavedEstimate(
+        began=SavedFollowing(**estimate.began._asdict()),
+        figures=SavedFollowing(**estimate.figures._asdict()),
+        gathered_s=estimate.gathered_s,
+        braked_s=estimate.braked_s,
+        turned_s=estimate.turned_s,
     )
 
 

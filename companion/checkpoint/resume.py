@@ -11,7 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from companion.checkpoint.state_format import Raster, SavedGenerator, SavedNavState, SavedPlace, SavedState
+from companion.checkpoint.state_format import (
+    Raster,
+    SavedEstimate,
+    SavedGenerator,
+    SavedNavState,
+    SavedPlace,
+    SavedState,
+)
+from companion.control.following import Following
+from companion.control.model_estimate import ModelEstimate
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.executive.goal_driver import Tally
@@ -144,6 +153,8 @@ def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: Ve
     executor.driver.go_on(tally, state.tally.epoch)
     if state.draws is not None:
         executor.driver.searcher.rng.bit_generator.state = _numpy_state(state.draws)
+    if state.estimate is not None:
+        executor.estimator.go_on(resumed_estimate(state.estimate))
     shift = grid_shift(state, executor.layout)
     for x, y in state.trail:
         executor.trail.enter(Cell(x + shift.x, y + shift.y))
@@ -165,6 +176,12 @@ def grid_shift(state: SavedState, layout: MissionLayout) -> Cell:
     corner, resolution_m = from_home(layout).south_west, layout.evidence.base.resolution_m
     east, north = state.ground.east_m - corner.east_m, state.ground.north_m - corner.north_m
     return Cell(round(east / resolution_m), round(north / resolution_m))
+
+
+def resumed_estimate(saved: SavedEstimate) -> ModelEstimate:
+    """How the rover follows velocities, as the earlier run had found."""
+    began, figures = (Following(**one.model_dump()) for one in (saved.began, saved.figures))
+    return ModelEstimate(began, figures, saved.gathered_s, saved.braked_s, saved.turned_s)
 
 
 def resumed_nav_state(saved: SavedNavState, shift: Cell) -> NavState:

@@ -7,8 +7,9 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from companion.checkpoint.resume import PreviousRun
+from companion.checkpoint.resume import PreviousRun, resumed_estimate
 from companion.checkpoint.state_format import MAX_FILE_BYTES, DamagedStateError, StateError, decode_state
+from companion.control.model_estimate import ModelEstimate
 from companion.mission.identity import fingerprint
 from companion.mission.mission import Mission
 from companion.storage.files import NEW_SUFFIX, OsDisk, open_file, set_aside
@@ -28,6 +29,16 @@ def default_directory(environment: Mapping[str, str]) -> Path:
     base = environment.get("XDG_STATE_HOME", "")
     home = Path(base) if base.startswith("/") else Path(environment.get("HOME") or "/") / ".local" / "state"
     return home / "rover-companion"
+
+
+def last_estimate(directory: Path) -> ModelEstimate | None:
+    """How the rover follows velocities, as the run found whose state is kept there; None if nothing is to be had."""
+    try:
+        with open_file(directory / NAME) as file:
+            state, _ = decode_state(file.read(MAX_FILE_BYTES))
+    except (OSError, StateError):
+        return None
+    return None if state.estimate is None else resumed_estimate(state.estimate)
 
 
 class StateDirectory:

@@ -57,6 +57,7 @@ MAX_DURATION_S = 1e9
 """Also stands for "forever"."""
 Seconds = Annotated[float, Field(ge=0.0, le=MAX_DURATION_S)]
 Count = Annotated[int, Field(ge=0, lt=2**63)]
+Figure = Annotated[float, Field(gt=0.0, le=1e3)]
 FieldNumber = Annotated[int, Field(ge=-(2**31), lt=2**31)]
 GeoPair = tuple[Latitude, Longitude]
 Pulse = Annotated[int, Field(ge=PULSES_US.start, lt=PULSES_US.stop)]
@@ -142,6 +143,27 @@ class SavedTally(SavedValues):
     epoch: Count = 0
 
 
+class SavedFollowing(SavedValues):
+    """How the rover follows velocities: see ``Following``."""
+
+    dead_s: Seconds
+    acceleration_m_s2: Figure
+    deceleration_m_s2: Figure
+    turn_acceleration_rad_s2: Figure
+    turn_gain: Figure
+    off_model: Annotated[float, Field(ge=0.0, lt=1.0)]
+
+
+class SavedEstimate(SavedValues):
+    """What a run had found about that: see ``ModelEstimate``."""
+
+    began: SavedFollowing
+    figures: SavedFollowing
+    gathered_s: Seconds
+    braked_s: Seconds
+    turned_s: Seconds
+
+
 class SavedGenerator(SavedValues):
     """State of numpy's PCG64 random generator."""
 
@@ -158,7 +180,7 @@ class SavedState(SavedValues):
     stopped it and set HOLD. ``boot_s``: the autopilot's time since boot. ``ahead_s``: how far the program's clock was
     ahead of it, constant while both keep running. ``trail``: the way from the start of the mission to here, without
     loops. ``sticks_us``: rest position of the pilot's sticks (steering, throttle), None if they were not seen.
-    ``guarded``: a guard on the autopilot was there.
+    ``guarded``: a guard on the autopilot was there. ``estimate``: of how the rover follows velocities.
     """
 
     mission: str
@@ -179,6 +201,7 @@ class SavedState(SavedValues):
     draws: SavedGenerator | None
     sticks_us: tuple[Pulse, Pulse] | None = None
     guarded: bool = False
+    estimate: SavedEstimate | None = None
 
     @property
     def reached(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
@@ -11,8 +12,10 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from companion.checkpoint.state_directory import default_directory, last_estimate
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.state import StateFiles
+from companion.control.model_estimate import ModelEstimate, described
 from companion.core.clock import WallClock
 from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
@@ -21,6 +24,7 @@ from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import LinkError, open_link
 from companion.settings import SettingsError
+from companion.vehicle.motion_limits import LIMITS
 from companion.vehicle.survey import Survey
 
 STEP_S = 0.05
@@ -63,7 +67,7 @@ def doctor(
     if as_json:
         typer.echo(json.dumps({"heard": _summary(seen), "findings": [asdict(one) for one in findings]}, indent=2))
     else:
-        _show(seen, findings)
+        _show(seen, findings, last_estimate(state or default_directory(os.environ)))
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
@@ -82,11 +86,17 @@ def _summary(seen: Survey) -> dict[str, object]:
     }
 
 
-def _show(seen: Survey, findings: list[Finding]) -> None:
+def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None) -> None:
     console = Console()
     if seen.rover_heard:
         version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"
         console.print(f"rover: system {seen.system}{version}, on {seen.place}", soft_wrap=True, markup=False)
+        if known := {name: seen.parameters[name] for name in LIMITS if name in seen.parameters}:
+            limits = ", ".join(f"{name} {value:g}" for name, value in known.items())
+            console.print(f"limits: {limits}", soft_wrap=True, markup=False)
+        if estimate is not None and estimate.known > 0.0:
+            line = f"last run: the rover followed velocities {described(estimate)}"
+            console.print(line, soft_wrap=True, markup=False, highlight=False)
     elif seen.unbelieved is not None:
         line = f"rover: system {seen.unbelieved}, on {seen.place}, heard but not believed"
         console.print(line, soft_wrap=True, markup=False)

@@ -19,6 +19,7 @@ from companion.cli.live import Live, LiveConsole, Reader, levelled, reader_of
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
 from companion.cli.state import RunState, StateFiles
+from companion.control.model_estimate import described
 from companion.core.clock import WallClock
 from companion.core.severity import Severity
 from companion.executive.mission_progress import TargetStatus
@@ -197,6 +198,8 @@ def _ended(companion: Companion, rig: _Rig) -> int:
     """Print the result, and what could not be saved; returns the exit code."""
     code = _print_statuses(companion.statuses(), companion.outcome.broken_off)
     with contextlib.suppress(OSError):  # no reader: the exit code remains
+        if companion.estimate is not None:
+            typer.echo(f"the rover follows velocities {described(companion.estimate)}")
         for line in (rig.files.close(), rig.keeping.problem, str(rig.autopilot.codec.counters.refused)):
             if line:
                 typer.echo(line, err=True)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from companion.control.following import AS_SHIPPED, Following
 from companion.control.told import Told
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
@@ -23,6 +24,7 @@ class LocalView:
 
     ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
     ``held_m_s``: so much slower than it was told the ground holds it. ``rolls_back``: it moves tail first.
+    ``following``: how it follows velocities, as far as is known.
     """
 
     pose: Pose
@@ -35,6 +37,7 @@ class LocalView:
     told: Setpoint | None = None
     lately: Told = ()
     rolls_back: bool = False
+    following: Following = AS_SHIPPED
 
     @property
     def forward_m_s(self) -> float:

@@ -16,7 +16,16 @@ from numpy.typing import NDArray
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import Window, look_round
-from companion.control.motion_kernels import Body, MotionProblem, RoverModel, Start, Weights, may_be_last, spare_m
+from companion.control.motion_kernels import (
+    Body,
+    MotionProblem,
+    RoverModel,
+    Start,
+    Weights,
+    admitted_speeds,
+    may_be_last,
+    spare_m,
+)
 from companion.control.motion_planners import MotionPlanner
 from companion.control.reference_path import ReferencePath
 from companion.control.setpoint_check import velocity_stops_in_time
@@ -29,19 +38,18 @@ HORIZON_S, STEP_S = 2.5, 0.1
 LOOKS_S = 0.09
 """The ground is looked at anew after so long."""
 WEIGHTS = Weights(margin_m=0.03, margin_s=0.06, tight=4.0, near_m=0.4, risk=0.5, unseen=0.3, turn=0.5, change=0.1)
-GAINS = (1.0, 0.7, 1.3)
-"""The rover may turn so much more or less than it is told."""
 SHARES = (1.0, 0.7, 0.4, 0.15)
 """Of the speed that was planned, tried in turn until the rover may be left alone with it."""
 BRAKE_TURNS = (0.0, -0.5, 0.5, -1.0, 1.0)
 """Turn rates to brake with, as shares of the fastest."""
-OFF_MODEL = 0.3
-"""The rover may differ from its model by this share."""
 ENOUGH_M = 0.1
 """With so much room it does not turn while it brakes."""
 BRAKES_S = 0.3
 """So long it is looked how braking goes on."""
 STANDS_M_S = 0.05
+TURNS = 17
+"""Turn rates for which the fastest speed is looked for that may be told."""
+NONE_ADMITTED = np.zeros((TURNS, 2))
 FASTER_S = 0.05
 """Left alone, the rover keeps so much more room for each m/s."""
 NEAR_M = 0.3
@@ -80,10 +88,12 @@ class MotionController:
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
         problem = self._problem(path, view, model)
+        worst = problem._replace(model=worst_model(model, view.following.off_model))
+        problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
             return stop_for(Purpose.BLOCKED)
         motion, self.cost_s = self._planner.plan(problem, passed_s)
-        told = self._safe(motion[0], view, problem)
+        told = self._safe(motion[0], view, worst)
         if abs(told.speed_m_s) < 1e-6:
             if view.speed_m_s > STANDS_M_S:
                 return ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, told.turn_rad_s), 0.0)
@@ -99,24 +109,26 @@ class MotionController:
             self._looked_s = now_s
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
         pending = _pending(view, model.dead_s)
-        return MotionProblem(start, pending, self._window.ground, self._body, model, WEIGHTS, HORIZON_S, STEP_S)
+        return MotionProblem(
+            start, pending, self._window.ground, self._body, model, WEIGHTS, NONE_ADMITTED, HORIZON_S, STEP_S
+        )
 
-    def _safe(self, wanted: NDArray[np.float64], view: LocalView, problem: MotionProblem) -> ToldVelocity:
+    def _safe(self, wanted: NDArray[np.float64], view: LocalView, worst: MotionProblem) -> ToldVelocity:
         """This command, or a slower one, or the best way to brake."""
         now_s, speed_m_s, turn_rad_s = self._time_s, float(wanted[0]), float(wanted[1])
-        before, worst = in_force(view.lately, now_s), problem._replace(model=worst_model(problem.model))
         for share in SHARES:
             # On the same arc; a rover that hardly moves keeps its turn rate.
             told = ToldVelocity(now_s, share * speed_m_s, (share if abs(speed_m_s) > 0.1 else 1.0) * turn_rad_s)
             if _may_be_left_alone(told, view, worst):
                 self._safe_s = now_s
                 return told
-        return self._braking(before, view, worst)
+        return self._braking(in_force(view.lately, now_s), view, worst)
 
     def _braking(self, before: ToldVelocity | None, view: LocalView, worst: MotionProblem) -> ToldVelocity:
         """The way to brake that keeps most room, straight on where there is enough; or to go on as told."""
         now_s, fastest_rad_s = self._time_s, worst.model.turn_fastest_rad_s
-        spare_m = {share: _least_spare_m(share * fastest_rad_s, worst) for share in BRAKE_TURNS}
+        gains = _gains(view)
+        spare_m = {share: _least_spare_m(share * fastest_rad_s, gains, worst) for share in BRAKE_TURNS}
         best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M))
         lasted = now_s - self._safe_s < view.settings.guidance.velocity_lasts_s
         if spare_m[best] < 0.0 and before is not None and lasted and _stops_in_time(before, view):
@@ -125,16 +137,33 @@ class MotionController:
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
 
 
-def _least_spare_m(turn_rad_s: float, worst: MotionProblem) -> float:
+def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
+    """See ``MotionProblem.admitted_m_s``: the rover may be left alone with these."""
+    turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
+    lasts_s = view.settings.guidance.velocity_lasts_s
+    admitted: NDArray[np.float64] = admitted_speeds(
+        turns_rad_s, lasts_s, _gains(view), WEIGHTS.margin_m, FASTER_S, worst
+    )
+    return admitted
+
+
+def _gains(view: LocalView) -> tuple[float, float, float]:
+    """The rover may turn so much more or less than it is told."""
+    off = view.following.off_model
+    return 1.0, 1.0 - off, 1.0 + off
+
+
+def _least_spare_m(turn_rad_s: float, gains: tuple[float, ...], worst: MotionProblem) -> float:
     """The room that is left where the rover brakes turning, however much it turns."""
-    return min(float(spare_m(0.0, turn_rad_s, BRAKES_S, gain, 0.0, 0.0, worst)) for gain in GAINS)
+    return min(float(spare_m(0.0, turn_rad_s, BRAKES_S, gain, 0.0, 0.0, worst)) for gain in gains)
 
 
 def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem) -> bool:
     """Whether this may be the last command, however the rover turns, and passes the last look."""
     lasts_s = view.settings.guidance.velocity_lasts_s
     return all(
-        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, FASTER_S, worst) for gain in GAINS
+        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, FASTER_S, worst)
+        for gain in _gains(view)
     ) and _stops_in_time(told, view)
 
 
@@ -160,17 +189,18 @@ def _leads_on(problem: MotionProblem) -> bool:
     return bool(np.isfinite(around).any())
 
 
-def worst_model(model: RoverModel) -> RoverModel:
-    """A rover that gathers speed faster and brakes worse than it should."""
+def worst_model(model: RoverModel, off: float) -> RoverModel:
+    """A rover that gathers speed faster and brakes worse than it should, by this share."""
     return model._replace(
-        accel_m_s2=model.accel_m_s2 * (1.0 + OFF_MODEL), decel_m_s2=model.decel_m_s2 * (1.0 - OFF_MODEL) / PLANNED_SHARE
+        accel_m_s2=model.accel_m_s2 * (1.0 + off), decel_m_s2=model.decel_m_s2 * (1.0 - off) / PLANNED_SHARE
     )
 
 
 def rover_model(view: LocalView) -> RoverModel:
-    """How the rover follows commands, by the settings."""
-    own = view.settings.motion
+    """How the rover follows commands, as far as is known."""
+    own, limits = view.following, view.settings.motion
     return RoverModel(
         own.dead_s, own.acceleration_m_s2, PLANNED_SHARE * own.deceleration_m_s2, own.turn_acceleration_rad_s2,
-        view.rover.cruise_speed_m_s, min(own.backwards_m_s, view.rover.cruise_speed_m_s), own.turn_rad_s,
+        view.rover.cruise_speed_m_s, min(limits.backwards_m_s, view.rover.cruise_speed_m_s), limits.turn_rad_s,
+        own.turn_gain,
     )  # fmt: skip

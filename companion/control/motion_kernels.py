@@ -49,7 +49,10 @@ class MotionGround(NamedTuple):
 
 
 class RoverModel(NamedTuple):
-    """How the autopilot and the rover follow commands: after ``dead_s``, with limited changes, within limits."""
+    """How the autopilot and the rover follow commands: after ``dead_s``, with limited changes, within limits.
+
+    ``turn_gain``: they turn by this factor more than told.
+    """
 
     dead_s: float
     accel_m_s2: float
@@ -58,6 +61,7 @@ class RoverModel(NamedTuple):
     fastest_m_s: float
     backwards_m_s: float
     turn_fastest_rad_s: float
+    turn_gain: float
 
 
 class Body(NamedTuple):
@@ -101,6 +105,8 @@ class MotionProblem(NamedTuple):
     """What motions are judged by.
 
     ``pending``: shape (n, 2), the commands told that have not had their effect yet, one a step.
+    ``admitted_m_s``: shape (n, 2), the fastest speeds that may be told, forwards and backwards, at n turn rates evenly
+    from the fastest to the left to the fastest to the right.
     """
 
     start: Start
@@ -109,6 +115,7 @@ class MotionProblem(NamedTuple):
     body: Body
     model: RoverModel
     weights: Weights
+    admitted_m_s: Any
     horizon_s: float
     step_s: float
 
@@ -166,7 +173,7 @@ def moved(state, told_m_s, told_rad_s, model, step_s):
     most = (model.decel_m_s2 if change * speed < 0.0 else model.accel_m_s2) * step_s
     most_turn = model.turn_accel_rad_s2 * step_s
     speed += min(max(change, -most), most)
-    after = turn + min(max(told_rad_s - turn, -most_turn), most_turn)
+    after = turn + min(max(model.turn_gain * told_rad_s - turn, -most_turn), most_turn)
     middle = heading + 0.25 * (turn + after) * step_s
     heading += 0.5 * (turn + after) * step_s
     return x + speed * step_s * math.sin(middle), y + speed * step_s * math.cos(middle), heading, speed, after
@@ -316,11 +323,44 @@ def begin_later(motions, share):
 
 
 @njit(cache=True, nogil=True)
-def keep_within(motion, model):
-    """Keep a motion's commands within the rover's limits."""
+def keep_within(motion, problem):
+    """Keep a motion's commands within the rover's limits, and its first one within what may be told now."""
+    model, admitted = problem.model, problem.admitted_m_s
+    last = admitted.shape[0] - 1
     for knot in range(motion.shape[0]):
-        motion[knot, 0] = min(max(motion[knot, 0], -model.backwards_m_s), model.fastest_m_s)
+        fastest_m_s, backwards_m_s = model.fastest_m_s, model.backwards_m_s
         motion[knot, 1] = min(max(motion[knot, 1], -model.turn_fastest_rad_s), model.turn_fastest_rad_s)
+        if knot == 0:
+            at = int(round(0.5 * last * (1.0 + motion[knot, 1] / model.turn_fastest_rad_s)))
+            fastest_m_s, backwards_m_s = admitted[at, 0], admitted[at, 1]
+        motion[knot, 0] = min(max(motion[knot, 0], -backwards_m_s), fastest_m_s)
+
+
+@njit(cache=True, nogil=True)
+def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
+    """The fastest speeds at these turn rates, forwards and backwards, shape (n, 2), that may be the last command."""
+    model = problem.model
+    admitted = np.zeros((turns_rad_s.size, 2))
+    for at in range(turns_rad_s.size):
+        for side in range(2):
+            most = model.fastest_m_s if side == 0 else -model.backwards_m_s
+            for share in range(TRIED, 0, -1):
+                told_m_s, safe = most * (share / TRIED) ** 2, True
+                for gain in gains:
+                    if not may_be_last(told_m_s, turns_rad_s[at], lasts_s, gain, margin_m, margin_s, problem):
+                        safe = False
+                        break
+                if safe:
+                    admitted[at, side] = abs(told_m_s)
+                    break
+    return admitted
+
+
+@njit(cache=True, nogil=True)
+def keep_all_within(motions, problem):
+    """``keep_within`` for each."""
+    for one in range(motions.shape[0]):
+        keep_within(motions[one], problem)
 
 
 @njit(cache=True, nogil=True)
@@ -347,9 +387,11 @@ def next_generation(motions, costs, best, chances, kicks, sizes, problem):
                 motions[one, knot, part] = parent[knot, part]
                 if kicked:
                     motions[one, knot, part] += sizes[part] * (0.2 + chance[3]) * kicks[one, knot, part]
-        keep_within(motions[one], problem.model)
+        keep_within(motions[one], problem)
         costs[one] = cost_s(motions[one], problem)
 
 
+TRIED = 10
+"""So many speeds are tried, the slower the closer."""
 MUTATED = 0.4
 """So large a share of a child's knots is changed."""

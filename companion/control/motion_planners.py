@@ -19,7 +19,7 @@ from companion.control.motion_kernels import (
     RoverModel,
     begin_later,
     costs_s,
-    keep_within,
+    keep_all_within,
     next_generation,
 )
 
@@ -68,6 +68,8 @@ class MotionGa:
         motions, rng = self._motions, self._rng
         begin_later(motions, passed_s / problem.horizon_s)
         seeds = constant_motions(problem.model)
+        keep_all_within(seeds, problem)
+        keep_all_within(motions, problem)
         best = np.argsort(costs_s(seeds, problem))[: self.SEEDS]
         motions[np.argsort(self._costs)[-self.SEEDS :]] = seeds[best]
         costs = costs_s(motions, problem)
@@ -98,8 +100,8 @@ class DynamicWindow:
         speeds = np.linspace(start.speed_m_s - slower, start.speed_m_s + faster, self.SPEEDS)
         rates = np.linspace(start.turn_rad_s - turns, start.turn_rad_s + turns, self.TURNS)
         grid = np.array([(0.0, 0.0), *((speed, rate) for speed in speeds for rate in (*rates, 0.0))])
-        keep_within(grid, model)
         motions = np.repeat(grid[:, None, :], KNOTS, axis=1)
+        keep_all_within(motions, problem)
         costs = costs_s(motions, problem)
         found = int(np.argmin(costs))
         return motions[found], float(costs[found])
@@ -125,8 +127,7 @@ class Mppi:
         begin_later(self._mean, passed_s / problem.horizon_s)
         motions = self._mean + self.SIZES * self._rng.standard_normal((self.SAMPLES, KNOTS, 2))
         motions[0], motions[1] = self._mean[0], 0.0
-        for motion in motions:
-            keep_within(motion, problem.model)
+        keep_all_within(motions, problem)
         costs = costs_s(motions, problem)
         weights = np.exp(-(costs - costs.min()) / self.TEMPERATURE_S)
         self._mean = np.einsum("m,mnc->nc", weights / weights.sum(), motions)[None]

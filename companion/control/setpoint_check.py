@@ -33,8 +33,6 @@ NEARER_M, AWAY_M = 0.05, 0.01
 OVERSHOT_SHARE = 0.1
 """A near position is overshot by no more than this share of the distance."""
 WAY_STEP_S = 0.1
-GAINS_FASTER = 1.3
-"""A rover that is left alone may gain speed so much faster than its settings say."""
 ARC_PIECES = 8
 """Straight pieces that an arc is made of where borders are concerned."""
 
@@ -92,21 +90,21 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
 
 def _way_alone(setpoint: GuidedVelocity, view: LocalView) -> list[NedPoint]:
     """Places on the way of a rover that is told nothing more: it goes on until the velocity expires, then it brakes."""
-    guidance, motion, pose = view.settings.guidance, view.settings.motion, view.pose
+    guidance, follows, pose = view.settings.guidance, view.following, view.pose
     speed_m_s, turn_rad_s = view.forward_m_s, view.yaw_rate_rad_s
     heading_rad, point, places = pose.heading_rad, pose.point, [pose.point]
-    gains_m_s = GAINS_FASTER * motion.acceleration_m_s2 * WAY_STEP_S
-    gains_rad_s = motion.turn_acceleration_rad_s2 * WAY_STEP_S
-    for step in range(math.ceil((motion.dead_s + guidance.velocity_lasts_s) / WAY_STEP_S)):
-        since_s = (step + 0.5) * WAY_STEP_S - motion.dead_s
+    gains_m_s = (1.0 + follows.off_model) * follows.acceleration_m_s2 * WAY_STEP_S
+    gains_rad_s = follows.turn_acceleration_rad_s2 * WAY_STEP_S
+    for step in range(math.ceil((follows.dead_s + guidance.velocity_lasts_s) / WAY_STEP_S)):
+        since_s = (step + 0.5) * WAY_STEP_S - follows.dead_s
         told = setpoint if since_s >= 0.0 else _velocity(in_force(view.lately, pose.time_s + since_s))
         if told is not None:
             speed_m_s += min(max(told.forward_m_s - speed_m_s, -gains_m_s), gains_m_s)
-            turn_rad_s += min(max(told.yaw_rate_rad_s - turn_rad_s, -gains_rad_s), gains_rad_s)
+            turn_rad_s += min(max(follows.turn_gain * told.yaw_rate_rad_s - turn_rad_s, -gains_rad_s), gains_rad_s)
         point = point.moved(heading_rad + 0.5 * turn_rad_s * WAY_STEP_S, speed_m_s * WAY_STEP_S)
         heading_rad += turn_rad_s * WAY_STEP_S
         places.append(point)
-    stops_s = abs(speed_m_s) / motion.deceleration_m_s2
+    stops_s = abs(speed_m_s) / follows.deceleration_m_s2
     for share in (0.25, 0.5, 0.75, 1.0):
         # It turns on for as long as it takes to stop turning, while it brakes.
         part_s = 0.25 * stops_s

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.vehicle.events import RoverMode
+from companion.vehicle.motion_limits import LIMITS
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
 from companion.vehicle.survey import Survey
@@ -44,6 +45,7 @@ PARAMETERS = (
     "RNGFND1_TYPE",
     "FS_GCS_ENABLE",
     "FENCE_ENABLE",
+    *LIMITS,
     *STICKS,
     *STATIONS,
 )

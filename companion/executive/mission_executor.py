@@ -13,7 +13,9 @@ import numpy as np
 
 from companion.control.braking import counted_s, for_guard, for_link
 from companion.control.controller import ControlCommand, Controller
+from companion.control.following import following_of
 from companion.control.local_view import LocalView
+from companion.control.model_estimate import ModelEstimator
 from companion.core.frames import GeoPoint, NedPoint, Pose
 from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
@@ -114,6 +116,8 @@ class MissionExecutor:
         self._rolls_until_s: float | None = None
         rover, given = mission.rover, settings.current
         margin_m = given.guidance.narrow_margin_m if scan.is_narrow else 0.0
+        self.estimator = ModelEstimator(following_of(given.motion, {}))
+        """How the rover follows velocities."""
         self._limits = RoverLimits(
             rover.radius_m + margin_m,
             rover.cruise_speed_m_s,
@@ -285,6 +289,17 @@ class MissionExecutor:
         moving = self._moving(vehicle, view)
         return self.driver.standing(view, moving) if task is MissionTask.STAND else self.driver.guide(view, moving)
 
+    def learn(self, view: LocalView) -> None:
+        """One more moment that may tell how the rover follows velocities. ``view`` knows what was told lately."""
+        if self.learns:
+            self.estimator.note(view)
+
+    @property
+    def learns(self) -> bool:
+        """Whether it matters how the rover follows velocities, and is estimated."""
+        settings = self._settings.current
+        return settings.guidance.controller != "points" and settings.motion.learns
+
     def view(self, vehicle: VehicleState, now_s: float) -> LocalView:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
         pose = vehicle.pose_at(now_s)
@@ -293,7 +308,13 @@ class MissionExecutor:
         settings = self._settings_in_force(vehicle.latency_s, None if guard is None else guard.waits_s)
         rate_rad_s = 0.0 if vehicle.attitude is None else vehicle.attitude.yaw_rate_rad_s
         back = vehicle.forward_m_s < -ROLLS_BACK_M_S
-        return LocalView(pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s, rolls_back=back)
+        motion = settings.motion
+        self.estimator.assume(following_of(motion, vehicle.parameters))
+        follows = self.estimator.estimate.following(motion.off_model_known)
+        return LocalView(
+            pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s, rolls_back=back,
+            following=follows,
+        )  # fmt: skip
 
     def _moving(self, vehicle: VehicleState, view: LocalView) -> tuple[Moving, ...]:
         """All that moves round the rover, announced or seen."""

@@ -170,6 +170,7 @@ class MissionRun:
         executor, view = self.executor, self.executor.view(self.vehicle, now_s)
         told = None if self._told is None else self._told.setpoint
         view = replace(view, held_m_s=self._drag.held_m_s(self._told, view), told=told, lately=self._lately)
+        executor.learn(view)
         wanted = executor.guide(task, self.vehicle, view)
         wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)

@@ -12,7 +12,9 @@ from numba.core import event
 
 from companion.control.arc_controller import ArcController
 from companion.control.collision_avoidance import first_near, least_room_m
+from companion.control.following import Following
 from companion.control.local_view import LocalView
+from companion.control.model_estimate import fit_of
 from companion.control.motion_controller import MotionController
 from companion.control.motion_planners import MotionKind, motion_planner
 from companion.control.motion_prediction import steered
@@ -67,6 +69,7 @@ def _plan_motions(settings: Settings) -> None:
     evidence = new_map(empty_grid(16, 16), 0.35, settings.mapping)
     evidence.log_odds.fill(-1.0)
     path = ReferencePath(np.column_stack((np.linspace(3.0, 12.0, 37), np.full(37, 8.0))))
+    fit_of(Following(), np.zeros((2, 5)), 0.0)
     planner = motion_planner(MotionKind(settings.guidance.controller))
     controller, rover = MotionController(Footprint.rectangle(0.7, 0.5), planner), RoverLimits(0.35, 2.0, 8.0)
     for tick in range(3):

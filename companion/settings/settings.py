@@ -188,9 +188,19 @@ class MotionSettings(Section):
     """How the autopilot and the rover follow a speed and a turn rate, for controllers that plan motions."""
 
     dead_s: float = Field(0.3, ge=0.0, le=2.0, description="time until a new speed or turn rate begins to show")
-    acceleration_m_s2: float = Field(1.0, gt=0.0, le=20.0, description="ArduRover's ATC_ACCEL_MAX")
-    deceleration_m_s2: float = Field(1.0, gt=0.0, le=20.0, description="ArduRover's ATC_DECEL_MAX (0: ATC_ACCEL_MAX)")
-    turn_acceleration_rad_s2: float = Field(2.1, gt=0.0, le=50.0, description="ArduRover's ATC_STR_ACC_MAX, in radians")
+    acceleration_m_s2: float | None = Field(
+        None, gt=0.0, le=20.0, description="fastest gain of speed; unset: read from the autopilot, ATC_ACCEL_MAX"
+    )
+    deceleration_m_s2: float | None = Field(
+        None, gt=0.0, le=20.0, description="fastest loss of speed; unset: ATC_DECEL_MAX, or ATC_ACCEL_MAX if that is 0"
+    )
+    turn_acceleration_rad_s2: float | None = Field(
+        None, gt=0.0, le=50.0, description="fastest change of the turn rate; unset: ATC_STR_ACC_MAX"
+    )
+    turn_gain: float = Field(1.0, gt=0.0, le=3.0, description="the turn rate that shows, as a multiple of that told")
+    learns: bool = Field(True, description="whether all of these are estimated from what the rover does")
+    off_model: float = Field(0.3, ge=0.0, le=0.9, description="the rover may differ from these by so large a share ...")
+    off_model_known: float = Field(0.1, ge=0.0, le=0.9, description="... and by this one once they are known")
     turn_rad_s: float = Field(1.5, gt=0.0, le=10.0, description="the fastest turn that is told")
     backwards_m_s: float = Field(0.5, ge=0.0, le=10.0, description="the fastest speed backwards that is told")
 

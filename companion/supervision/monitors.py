@@ -16,6 +16,7 @@ from companion.safety.guard_monitor import GuardMonitor
 from companion.safety.watchdogs import DataMonitor, Loop, LoopMonitor, Monitor, ScanMonitor, SticksMonitor, Worker
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.fence_monitor import FenceMonitor
+from companion.supervision.limits_monitor import LimitsMonitor
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.supervision.mission_limits import BorderMonitor
 from companion.supervision.rival_monitor import RivalMonitor
@@ -52,6 +53,7 @@ def make_monitors(
         BorderMonitor(run),
         batteries,
         GuardMonitor(notifier),
+        LimitsMonitor(autopilot, live),
         MissionChangeMonitor(run.mission.stored, autopilot.downloads, notifier),
     )
     return Monitors(by_precedence, localization, scans, rivals, fences, batteries)

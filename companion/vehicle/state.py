@@ -34,6 +34,7 @@ from companion.vehicle.events import (
     TargetSeen,
 )
 from companion.vehicle.link_latency import BACK_S, Latency, TimeAnswered, latency_after_answer, latency_after_report
+from companion.vehicle.motion_limits import LIMITS
 from companion.vehicle.rc_input import Sticks, SticksSeen, sticks_after
 
 EKF_ATTITUDE, EKF_VELOCITY = 1, 2
@@ -43,7 +44,7 @@ EKF_POSITION = 8 | 16
 EKF_CONST_POSITION = 128
 """CONST_POS_MODE must not be set. No other flag counts: GPS_GLITCH alone stops neither ArduRover nor the companion."""
 PARAMETERS_KEPT = frozenset(
-    ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS", "WP_RADIUS")
+    ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS", "WP_RADIUS", *LIMITS)
 )
 """The parameters that a run needs: the autopilot sends hundreds whenever a ground station lists them."""
 OTHERS_KEPT = 64

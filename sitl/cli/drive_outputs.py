@@ -130,6 +130,8 @@ def print_summary(report: Report, console: Console) -> None:
         "compilation": f"{report.compile_time_s:.1f} s (kept for the next run)",
         "seed": f"{report.seed}",
     }
+    if report.following:
+        rows["follows"] = report.following
     for key, value in rows.items():
         table.add_row(key, value)
     console.print(table)

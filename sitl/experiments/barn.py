@@ -101,6 +101,8 @@ def settings_for(controller: str) -> Settings:
             "guidance": {"controller": controller},
             "mapping": {"evidence_m": 0.05, "hit_depth_m": 0.02, "keeps": keeps},
             "link": {"range_rate_hz": 20.0, "position_rate_hz": 20.0},
+            # Set, so that they are not read from the autopilot: the rover is to be another than it is taken for.
+            "motion": {"acceleration_m_s2": 1.0, "deceleration_m_s2": 1.0, "turn_acceleration_rad_s2": 2.1},
         }
     )
 

@@ -20,7 +20,9 @@ from companion.checkpoint.checkpointer import (
     _rows,
     saved_state,
 )
-from companion.checkpoint.resume import resumed_nav_state
+from companion.checkpoint.resume import resumed_estimate, resumed_nav_state
+from companion.control.following import AS_SHIPPED
+from companion.control.model_estimate import ModelEstimator
 from companion.core.frames import GeoPoint, LocalFrame, Pose
 from companion.core.grid import Cell, empty_grid
 from companion.core.tick_marks import Mark
@@ -86,6 +88,7 @@ class Executor:
     progress: MissionProgress
     maps_begun: int = 0
     trail: Trail = field(default_factory=Trail)
+    estimator: ModelEstimator = field(default_factory=lambda: ModelEstimator(AS_SHIPPED))
 
     @property
     def evidence(self) -> EvidenceMap:
@@ -204,6 +207,8 @@ def test_the_state_has_what_a_resumed_run_needs(bench: Bench, mission: Mission) 
     restored, driver = resumed_nav_state(state.nav_state, Cell(0, 0)), bench.executor.driver
     assert restored.past == driver.nav_state.past and restored.draws == driver.nav_state.draws
     assert (state.tally.steps, state.tally.epoch) == (5, 4)
+    assert state.estimate is not None
+    assert resumed_estimate(state.estimate) == bench.executor.estimator.estimate
     assert state.draws is not None
     assert state.draws.state == driver.searcher.rng.bit_generator.state["state"]["state"]
 

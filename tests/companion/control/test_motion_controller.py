@@ -62,7 +62,7 @@ def driven(
         lately = after(lately, setpoint, now_s)
         model = rover_model(at)
         model = model._replace(
-            accel_m_s2=gain * model.accel_m_s2, decel_m_s2=gain * settings.motion.deceleration_m_s2,
+            accel_m_s2=gain * model.accel_m_s2, decel_m_s2=gain * at.following.deceleration_m_s2,
             turn_accel_rad_s2=gain * model.turn_accel_rad_s2,
         )  # fmt: skip
         forward_m_s, turn_rad_s = told[-6]

@@ -16,10 +16,12 @@ from companion.control.motion_kernels import (
     RoverModel,
     Start,
     Weights,
+    admitted_speeds,
     at_place,
     begin_later,
     clearance_m,
     cost_s,
+    keep_within,
     may_be_last,
     moved,
     next_generation,
@@ -30,8 +32,9 @@ from companion.mapping.distance_field import distance_field
 
 CELL_M = 0.1
 SIDE = 100
-MODEL = RoverModel(0.2, 1.0, 1.0, 2.0, 2.0, 0.5, 1.5)
+MODEL = RoverModel(0.2, 1.0, 1.0, 2.0, 2.0, 0.5, 1.5, 1.0)
 BODY = Body(np.array([-0.1, 0.1]), 0.25)
+ALL_ADMITTED = np.tile((2.0, 0.5), (3, 1))
 STANDING = Start(5.0, 2.0, 0.0, 0.0, 0.0)
 WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0)
 
@@ -49,7 +52,7 @@ def problem(
     seen_m = distance_field(blocked | unseen) * np.float32(CELL_M) - np.float32(0.5 * CELL_M)
     pace = np.where(gap_m > BODY.radius_m, CELL_M / MODEL.fastest_m_s, np.inf)
     ground = MotionGround(gap_m, seen_m, CELL_M, cost_to_go(pace, np.array([[50, 85]])), CELL_M, ends)
-    return MotionProblem(start, np.zeros((2, 2)), ground, BODY, MODEL, WEIGHTS, 2.5, 0.1)
+    return MotionProblem(start, np.zeros((2, 2)), ground, BODY, MODEL, WEIGHTS, ALL_ADMITTED, 2.5, 0.1)
 
 
 def constant(speed_m_s: float, turn_rad_s: float = 0.0) -> np.ndarray:
@@ -169,3 +172,26 @@ def test_a_generation_keeps_its_best_and_stays_within_limits() -> None:
     assert all(b <= a for a, b in pairwise(bests)) and bests[-1] < bests[0] - 0.3
     assert motions[8:, :, 0].max() <= 2.0 and motions[8:, :, 0].min() >= -0.5
     assert np.abs(motions[8:, :, 1]).max() <= 1.5
+
+
+def test_no_motion_begins_faster_than_is_admitted_at_its_turn_rate() -> None:
+    admitted = np.array(((0.5, 0.1), (2.0, 0.5), (1.0, 0.2)))
+    for turn_rad_s, fastest, backwards in ((-1.5, 0.5, 0.1), (0.2, 2.0, 0.5), (1.4, 1.0, 0.2)):
+        for told_m_s, kept_m_s in ((9.0, fastest), (-9.0, -backwards), (0.05, 0.05)):
+            motion = constant(told_m_s, turn_rad_s)
+            keep_within(motion, problem()._replace(admitted_m_s=admitted))
+            assert motion[0, 0] == kept_m_s and abs(motion[1, 0]) <= 2.0
+
+
+def test_less_is_admitted_towards_a_wall_and_the_less_the_longer_it_lasts() -> None:
+    """Straight on, to the left and to the right; a wall 2 m ahead, which a turn does not meet."""
+    turns, gains = np.array((-1.5, 0.0, 1.5)), (1.0, 0.9, 1.1)
+    shorter, longer = (
+        admitted_speeds(turns, lasts_s, gains, 0.03, 0.05, problem((40, 42, 0, SIDE))) for lasts_s in (0.3, 3.0)
+    )
+    free = admitted_speeds(turns, 0.3, gains, 0.03, 0.05, problem())
+    assert free[1, 0] == MODEL.fastest_m_s and shorter[1, 0] <= free[1, 0]
+    assert 0.0 < longer[1, 0] < 0.6 < shorter[1, 0]
+    for told_m_s in (shorter[1, 0], longer[1, 0]):
+        lasts_s = 0.3 if told_m_s == shorter[1, 0] else 3.0
+        assert may_be_last(told_m_s, 0.0, lasts_s, 1.0, 0.03, 0.05, problem((40, 42, 0, SIDE)))

@@ -26,5 +26,6 @@ def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None
         "BorderMonitor",
         "BatteryMonitor",
         "GuardMonitor",
+        "LimitsMonitor",
         "MissionChangeMonitor",
     ]

@@ -1,0 +1,53 @@
+"""Following: how the autopilot and the rover follow a speed and a turn rate that they are told.
+
+Nouns: following.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from companion.settings import MotionSettings
+from companion.vehicle.motion_limits import ACCELERATION, DECELERATION, TURN_ACCELERATION
+
+MOST_M_S2, MOST_RAD_S2 = 10.0, 20.0
+"""Where the autopilot has no limit, or a larger one, the motors have."""
+
+
+class Following(NamedTuple):
+    """It begins after ``dead_s`` and changes speed and turn rate within limits.
+
+    ``turn_gain``: it turns by this factor more than told. ``off_model``: the rover may be off all this by such a share.
+    """
+
+    dead_s: float = 0.3
+    acceleration_m_s2: float = 1.0
+    deceleration_m_s2: float = 1.0
+    turn_acceleration_rad_s2: float = 2.1
+    turn_gain: float = 1.0
+    off_model: float = 0.3
+
+
+AS_SHIPPED = Following()
+"""ArduRover's parameters as shipped, and its measured dead time with some to spare."""
+
+
+def following_of(settings: MotionSettings, parameters: Mapping[str, float]) -> Following:
+    """As set; what is not set is read from the autopilot's parameters, as shipped where they are not known."""
+    usual = AS_SHIPPED
+    gains = settings.acceleration_m_s2 or _limit(parameters, ACCELERATION, usual.acceleration_m_s2, MOST_M_S2)
+    brakes = settings.deceleration_m_s2
+    if brakes is None:
+        brakes = _limit(parameters, DECELERATION, gains, MOST_M_S2) if parameters.get(DECELERATION) else gains
+    turns = settings.turn_acceleration_rad_s2
+    if turns is None:
+        usual_deg_s2 = math.degrees(usual.turn_acceleration_rad_s2)
+        turns = math.radians(_limit(parameters, TURN_ACCELERATION, usual_deg_s2, math.degrees(MOST_RAD_S2)))
+    return Following(settings.dead_s, gains, brakes, turns, settings.turn_gain, settings.off_model)
+
+
+def _limit(parameters: Mapping[str, float], name: str, usual: float, most: float) -> float:
+    value = parameters.get(name, usual)
+    return min(value, most) if value > 0.0 else most

@@ -1,0 +1,44 @@
+"""The limits monitor: reads the autopilot's limits of acceleration and turning, by which motions are planned.
+
+Nouns: limits monitor.
+"""
+
+from __future__ import annotations
+
+import math
+
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.safety.watchdogs import Monitor
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.commands import ReadParameter
+from companion.vehicle.events import Event
+from companion.vehicle.motion_limits import LIMITS
+from companion.vehicle.state import VehicleState
+
+ASK_S = 1.0
+TRIES = 10
+
+
+class LimitsMonitor(Monitor):
+    """Never a reason not to drive: what is not answered is assumed to be as shipped."""
+
+    def __init__(self, autopilot: AutopilotLink, settings: LiveSettings) -> None:
+        self._autopilot = autopilot
+        self._settings = settings
+        self._vehicle = VehicleState()
+        self._asked_s, self._tries = -math.inf, 0
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event."""
+        self._vehicle = vehicle
+
+    def tick(self, now_s: float) -> None:
+        """Ask for what is not known, each second, a few times."""
+        plans = self._settings.current.guidance.controller != "points"
+        missing = [name for name in LIMITS if name not in self._vehicle.parameters]
+        if not plans or not missing or self._vehicle.heartbeat is None or self._tries >= TRIES:
+            return
+        if now_s - self._asked_s >= ASK_S:
+            self._asked_s, self._tries = now_s, self._tries + 1
+            for name in missing:
+                self._autopilot.send(ReadParameter(name), now_s)

@@ -1,0 +1,97 @@
+"""The estimate of how a rover follows velocities, on rovers that are known."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from companion.control.following import AS_SHIPPED, Following
+from companion.control.local_view import LocalView
+from companion.control.model_estimate import KNOWN_S, ModelEstimate, ModelEstimator, described
+from companion.control.told import Told, after
+from companion.core.frames import Pose
+from companion.core.rover_limits import RoverLimits
+from companion.settings import Settings
+from companion.vehicle.commands import GuidedVelocity
+from tests.companion.control.test_motion_ground import ground
+
+TICK_S = 0.05
+EVIDENCE, SETTINGS, LIMITS = ground(), Settings(), RoverLimits(0.4, 2.0, 8.0)
+
+
+def watched(rover: Following, seconds: float, seed: int = 0, noise: float = 0.02, told: bool = True) -> ModelEstimator:
+    """What is found of a rover that is told other speeds and turn rates every half second."""
+    estimator, rng = ModelEstimator(AS_SHIPPED), np.random.default_rng(seed)
+    lately, history, speed, turn = Told(), [GuidedVelocity(0.0, 0.0)] * 40, 0.0, 0.0
+    setpoint = history[0]
+    for tick in range(round(seconds / TICK_S)):
+        now_s = tick * TICK_S
+        if tick % 10 == 0:
+            setpoint = GuidedVelocity(float(rng.uniform(-0.3, 2.0)), float(rng.uniform(-1.5, 1.5)))
+        old = history[-max(1, round(rover.dead_s / TICK_S))]
+        change, turned = old.forward_m_s - speed, rover.turn_gain * old.yaw_rate_rad_s - turn
+        most = TICK_S * (rover.deceleration_m_s2 if change * speed < 0.0 else rover.acceleration_m_s2)
+        most_turn = TICK_S * rover.turn_acceleration_rad_s2
+        speed += min(max(change, -most), most)
+        turn += min(max(turned, -most_turn), most_turn)
+        seen_m_s, seen_rad_s = speed + noise * rng.standard_normal(), turn + noise * rng.standard_normal()
+        pose = Pose(0.0, 0.0, 0.0, now_s)
+        estimator.note(
+            LocalView(
+                pose, abs(seen_m_s), EVIDENCE, LIMITS, SETTINGS, seen_rad_s, lately=lately, rolls_back=seen_m_s < 0.0
+            )
+        )
+        history.append(setpoint)
+        lately = after(lately, setpoint if told else None, now_s)
+    return estimator
+
+
+@given(
+    st.floats(0.1, 0.6), st.floats(0.7, 1.5), st.floats(0.7, 1.5), st.floats(1.4, 3.0), st.floats(0.75, 1.3),
+    st.integers(0, 1000),
+)  # fmt: skip
+def test_it_finds_what_the_rover_is_like(
+    dead_s: float, gains: float, brakes: float, turns: float, gain: float, seed: int
+) -> None:
+    rover = Following(dead_s, gains, brakes, turns, gain)
+    estimate = watched(rover, 30.0, seed).estimate
+    assert estimate.figures.dead_s == pytest.approx(dead_s, abs=0.06)
+    assert estimate.figures[1:5] == pytest.approx(rover[1:5], rel=0.2)
+    assert estimate.known == 1.0
+
+
+def test_the_more_is_known_the_less_it_may_be_off() -> None:
+    shares = [watched(AS_SHIPPED, seconds).estimate.following(0.1).off_model for seconds in (1.0, 4.0, 8.0, 30.0)]
+    assert shares == sorted(shares, reverse=True)
+    assert shares[0] == AS_SHIPPED.off_model and shares[-1] == pytest.approx(0.1)
+
+
+def test_nothing_told_nothing_learnt() -> None:
+    assert watched(Following(0.5, 0.6, 0.6, 1.2, 0.8), 20.0, told=False).estimate.figures == AS_SHIPPED
+
+
+def test_no_figure_leaves_its_bounds() -> None:
+    """A rover that hardly moves, whatever it is told."""
+    estimate = watched(Following(0.3, 0.01, 0.01, 0.01, 0.01), 30.0).estimate
+    for now, began in zip(estimate.figures[1:5], AS_SHIPPED[1:5], strict=True):
+        assert 0.5 * began <= now <= 2.0 * began
+    assert estimate.known < 0.1
+
+
+def test_what_an_earlier_run_found_counts_once_the_same_is_assumed() -> None:
+    began = AS_SHIPPED._replace(acceleration_m_s2=2.0)
+    earlier = ModelEstimate(began, began._replace(dead_s=0.15), KNOWN_S, KNOWN_S, KNOWN_S)
+    estimator = ModelEstimator(AS_SHIPPED)
+    estimator.go_on(earlier)
+    assert estimator.estimate.known == 0.0
+    estimator.assume(began)
+    assert estimator.estimate == earlier
+    estimator.assume(AS_SHIPPED)
+    assert estimator.estimate == ModelEstimate(AS_SHIPPED, AS_SHIPPED)
+
+
+def test_it_is_told_in_one_line() -> None:
+    line = described(ModelEstimate(AS_SHIPPED, AS_SHIPPED, KNOWN_S, 0.5 * KNOWN_S, KNOWN_S))
+    assert "0.30 s" in line and "50% known" in line and "\n" not in line

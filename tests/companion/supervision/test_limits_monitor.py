@@ -1,0 +1,55 @@
+"""The limits by which motions are planned are read from the autopilot."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+from companion.mavlink.autopilot_link import AutopilotLink
+from companion.settings import Settings
+from companion.settings.live_settings import LiveSettings
+from companion.supervision.limits_monitor import TRIES, LimitsMonitor
+from companion.vehicle.commands import ReadParameter
+from companion.vehicle.events import HeartbeatSeen, ParameterSeen
+from companion.vehicle.motion_limits import LIMITS
+from companion.vehicle.state import VehicleState, fold
+
+
+class Asked:
+    def __init__(self) -> None:
+        self.names: list[str] = []
+
+    def send(self, command: ReadParameter, now_s: float) -> None:
+        self.names.append(command.name)
+
+
+def asked(controller: str, answers: tuple[str, ...], seconds: int = 30) -> list[str]:
+    """What is asked for; those named are answered at once."""
+    autopilot, state = Asked(), VehicleState()
+    settings = Settings.model_validate({"guidance": {"controller": controller}})
+    monitor = LimitsMonitor(cast(AutopilotLink, cast(Any, autopilot)), LiveSettings(settings))
+    heartbeat = HeartbeatSeen(0.0, 4, True, 1)
+    state = fold(state, heartbeat)
+    monitor.take(heartbeat, state)
+    for tick in range(10 * seconds):
+        before = len(autopilot.names)
+        monitor.tick(0.1 * tick)
+        for name in autopilot.names[before:]:
+            if name in answers:
+                event = ParameterSeen(0.1 * tick, name, 1.0)
+                state = fold(state, event)
+                monitor.take(event, state)
+        assert monitor.doubt(0.1 * tick) is None
+    return autopilot.names
+
+
+def test_each_limit_is_asked_for_until_it_is_known() -> None:
+    assert asked("motion-ga", LIMITS) == list(LIMITS)
+
+
+def test_one_that_is_never_answered_is_asked_for_a_few_times() -> None:
+    names = asked("motion-ga", LIMITS[:2])
+    assert names.count(LIMITS[0]) == 1 and names.count(LIMITS[2]) == TRIES
+
+
+def test_without_planned_motions_they_are_not_needed() -> None:
+    assert asked("points", ()) == []
