@@ -50,8 +50,9 @@ STANDS_M_S = 0.05
 TURNS = 17
 """Turn rates for which the fastest speed is looked for that may be told."""
 NONE_ADMITTED = np.zeros((TURNS, 2))
-FASTER_S = 0.05
-"""Left alone, the rover keeps so much more room for each m/s."""
+FASTER_S, BLUR_S, MOST_BLUR_RAD = 0.05, 1.15, math.radians(10.0)
+"""Left alone, the rover keeps so much more room for each m/s; more where a reading speaks for a wide angle: how far to
+the side something ends that is as far away as the rover needs to stop is known only to within half of that."""
 NEAR_M = 0.3
 """A rover that stands too near to something finds its way from so far away."""
 PLANNED_SHARE = 0.8
@@ -66,7 +67,7 @@ class MotionController:
 
     def __init__(self, footprint: Footprint, planner: MotionPlanner) -> None:
         places_m, radius_m = footprint.discs()
-        self._body = Body(places_m, radius_m)
+        self._body = Body(places_m, radius_m, float(np.abs(places_m).max()) + radius_m)
         self._planner = planner
         self._window: Window | None = None
         self._looked_s = self._safe_s = self._time_s = -math.inf
@@ -142,9 +143,14 @@ def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
     turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
     admitted: NDArray[np.float64] = admitted_speeds(
-        turns_rad_s, lasts_s, _gains(view), WEIGHTS.margin_m, FASTER_S, worst
+        turns_rad_s, lasts_s, _gains(view), WEIGHTS.margin_m, _faster_s(view), worst
     )
     return admitted
+
+
+def _faster_s(view: LocalView) -> float:
+    """Room for each m/s."""
+    return max(FASTER_S, BLUR_S * min(view.rover.beam_rad, MOST_BLUR_RAD))
 
 
 def _gains(view: LocalView) -> tuple[float, float, float]:
@@ -162,7 +168,7 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem
     """Whether this may be the last command, however the rover turns, and passes the last look."""
     lasts_s = view.settings.guidance.velocity_lasts_s
     return all(
-        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, FASTER_S, worst)
+        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, _faster_s(view), worst)
         for gain in _gains(view)
     ) and _stops_in_time(told, view)
 

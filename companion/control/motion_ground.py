@@ -60,10 +60,10 @@ def look_round(
     behind_m = np.float32(max(0.5 * cell_m, evidence.settings.hit_depth_m))
     gap_m = distance_field(blocked) * np.float32(cell_m) - behind_m
     seen_m = distance_field(blocked | unseen) * np.float32(cell_m) - behind_m
-    blocks = (gap_m.shape[0] // COARSE, COARSE, gap_m.shape[1] // COARSE, COARSE)
-    room_m = gap_m.reshape(blocks).mean(axis=(1, 3)).astype(np.float64)
+    parts = [(row, column) for row in range(COARSE) for column in range(COARSE)]
+    room_m = sum(gap_m[row::COARSE, column::COARSE].astype(np.float64) for row, column in parts) / len(parts)
     pace = _pace(room_m - body_radius_m, COARSE * cell_m, fastest_m_s)
-    pace[unseen.reshape(blocks).any(axis=(1, 3))] *= UNSEEN_FACTOR
+    pace[np.logical_or.reduce([unseen[row::COARSE, column::COARSE] for row, column in parts])] *= UNSEEN_FACTOR
     goal = np.floor((evidence.frame.xys(ahead[-1:]) - (left, low)) / COARSE).astype(np.int64)
     ends = path.progress + len(ahead) >= len(path.points)
     ground = MotionGround(gap_m, seen_m, cell_m, cost_to_go(pace, goal), COARSE * cell_m, ends)
@@ -83,10 +83,11 @@ def _window(evidence: EvidenceMap, places: Floats) -> tuple[tuple[int, int], tup
 
 def _closed(evidence: EvidenceMap, first: tuple[int, int], last: tuple[int, int]) -> NDArray[np.bool_]:
     """Evidence cells of fields that the mission, a fence or experience closed."""
-    rows = np.arange(first[1], last[1]) // evidence.subdivisions
-    columns = np.arange(first[0], last[0]) // evidence.subdivisions
-    closed: NDArray[np.bool_] = (evidence.base.weights + evidence.penalty)[np.ix_(rows, columns)] >= 1.0
-    return closed
+    s = evidence.subdivisions
+    fields = np.s_[first[1] // s : -(-last[1] // s), first[0] // s : -(-last[0] // s)]
+    closed = evidence.base.weights[fields] + evidence.penalty[fields] >= 1.0
+    cells: NDArray[np.bool_] = closed.repeat(s, axis=0).repeat(s, axis=1)
+    return cells[first[1] % s :, first[0] % s :][: last[1] - first[1], : last[0] - first[0]]
 
 
 def _pace(room_m: Floats, cell_m: float, fastest_m_s: float) -> Floats:

@@ -21,7 +21,11 @@ BLOCKED_S = 1e3
 NO_WAY_S = 60.0
 """The time left where no way is known to lead on."""
 FAR_M = 10.0
-"""No clearance is larger. Off the edges of the ground that is looked at nothing stands, and nothing was seen."""
+"""No clearance is larger."""
+ROOMY_M = 0.5
+"""More room than this makes no difference."""
+AS_AT_EDGE = math.nan
+"""What stands at the edge of the ground that is looked at may go on beyond it."""
 BEYOND_M = 0.3
 """The rover may stop so far beyond the end of its path."""
 HASTE = 4.0
@@ -65,10 +69,11 @@ class RoverModel(NamedTuple):
 
 
 class Body(NamedTuple):
-    """The rover's outline: discs so far ahead of its place, all of one radius."""
+    """The rover's outline: discs so far ahead of its place, all of one radius, and the circle round them all."""
 
     ahead_m: Any
     radius_m: float
+    around_m: float
 
 
 class Weights(NamedTuple):
@@ -122,9 +127,11 @@ class MotionProblem(NamedTuple):
 
 @njit(cache=True, nogil=True)
 def at_place(raster, cell_m, x_m, y_m, outside):
-    """A raster's value between the middles of four cells; ``outside`` off its edges."""
+    """A raster's value between the middles of four cells; off its edges ``outside``, or the value at the edge."""
     height, width = raster.shape
     x, y = x_m / cell_m - 0.5, y_m / cell_m - 0.5
+    if math.isnan(outside):
+        x, y = min(max(x, 0.0), width - 1.001), min(max(y, 0.0), height - 1.001)
     left, low = int(math.floor(x)), int(math.floor(y))
     if left < 0 or low < 0 or left + 1 >= width or low + 1 >= height:
         return outside
@@ -135,8 +142,12 @@ def at_place(raster, cell_m, x_m, y_m, outside):
 
 
 @njit(cache=True, nogil=True)
-def clearance_m(raster, cell_m, body, x_m, y_m, heading_rad, outside_m=FAR_M):
-    """Metres between the rover's outline and what a raster of distances counts from."""
+def clearance_m(raster, cell_m, body, x_m, y_m, heading_rad, outside_m=AS_AT_EDGE):
+    """Metres between the rover's outline and what a raster of distances counts from; not exact above ``ROOMY_M``."""
+    # The outline lies in one circle: most places need no closer look.
+    nearest = at_place(raster, cell_m, x_m, y_m, outside_m) - body.around_m
+    if nearest > ROOMY_M:
+        return nearest
     nearest = FAR_M
     sine, cosine = math.sin(heading_rad), math.cos(heading_rad)
     for disc in range(body.ahead_m.size):
@@ -146,7 +157,7 @@ def clearance_m(raster, cell_m, body, x_m, y_m, heading_rad, outside_m=FAR_M):
 
 
 @njit(cache=True, nogil=True)
-def _least_m(raster, cell_m, body, start, outside_m=FAR_M):
+def _least_m(raster, cell_m, body, start, outside_m=AS_AT_EDGE):
     """The clearance that a rover which is too near to something must keep."""
     now_m = clearance_m(raster, cell_m, body, start.x_m, start.y_m, start.heading_rad, outside_m)
     return min(max(now_m - NEARER_M, NEAREST_M), now_m)

@@ -159,4 +159,14 @@ def backing_speed_m_s(view: LocalView) -> float:
     tail_rad, reach_m = pose.heading_rad + math.pi, blind_distance_m(fastest_m_s, settings)
     line = look_along(view.evidence, pose.point, pose.point.moved(tail_rad, reach_m), radius_m + settings.clearance_m)
     open_m = arcs.arc_clear_m(tail_rad, 0.0, arcs.kept_room_m(radius_m, 0.0), reach_m, Until.BLOCKED)
-    return min(fastest_m_s, fastest_blind_m_s(min(line.clear_m, line.seen_m, open_m), settings))
+    mapped_m = _mapped_m(view, tail_rad, reach_m + radius_m) - radius_m
+    return min(fastest_m_s, fastest_blind_m_s(min(line.clear_m, line.seen_m, open_m, mapped_m), settings))
+
+
+def _mapped_m(view: LocalView, bearing_rad: float, reach_m: float) -> float:
+    """How far the map goes in a direction, at most ``reach_m``: nothing is known beyond it."""
+    base, step_m = view.evidence.base, 0.5 * view.evidence.base.resolution_m
+    far_m = 0.0
+    while far_m < reach_m and base.contains(base.cell_at(view.pose.point.moved(bearing_rad, far_m + step_m))):
+        far_m += step_m
+    return min(far_m, reach_m)

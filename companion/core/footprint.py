@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-DISC_EXCESS = 1.08
+DISC_EXCESS = 1.03
 """The discs that cover a rectangle reach this much farther aside than the rectangle, if a few of them can."""
 MOST_DISCS = 6
 

@@ -19,6 +19,8 @@ class RoverLimits:
     """Valid range of the sensor."""
     narrow_sight: bool = False
     """Whether the sensor is single thin beams."""
+    beam_rad: float = math.radians(5.0)
+    """The width that each reading of the sensor speaks for."""
     turning_radius_m: float = 0.0
     """The tightest arc it can drive; 0: it turns on the spot."""
     fastest_m_s: float = math.inf

@@ -123,6 +123,7 @@ class MissionExecutor:
             rover.cruise_speed_m_s,
             scan.max_range_m,
             scan.is_narrow,
+            scan.beam_width_rad,
             rover.turning_radius_m,
         )
         if rover.turning_radius_m > 0.0 and scan.is_narrow:

@@ -5,6 +5,7 @@ Nouns: mission layout.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -17,6 +18,8 @@ from companion.mission.bounds import Bounds
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedMission, ResolvedTarget, resolve
 from companion.settings import MappingSettings
+
+FIELD_STEP_M = 0.05
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,7 +48,7 @@ def lay(
 ) -> MissionLayout:
     """Lay the mission out; the rover returns to ``pose`` when it has to. Raises MissionError."""
     frame = LocalFrame(origin)
-    resolved = resolve(mission, frame, frame.to_ned(home), fence)
+    resolved = resolve(mission, frame, frame.to_ned(home), fence, _fine_m(mission, settings))
     start = _start(pose.point, resolved.ground)
     evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), settings)
     return MissionLayout(origin, home, resolved.targets, start, evidence, fence, resolved.bounds, resolved.refused)
@@ -56,7 +59,7 @@ def lay_again(
 ) -> tuple[MissionLayout, MissionProgress]:
     """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
     frame = LocalFrame(origin)
-    resolved = resolve(mission, frame, frame.to_ned(layout.home), layout.fence)
+    resolved = resolve(mission, frame, frame.to_ned(layout.home), layout.fence, _fine_m(mission, settings))
     before = LocalFrame(layout.origin)
     back = _start(frame.to_ned(before.to_geo(progress.home.point)), resolved.ground)
     start = _start(frame.to_ned(before.to_geo(layout.start.point)), resolved.ground)
@@ -74,7 +77,7 @@ def lay_again(
 def fenced_again(layout: MissionLayout, mission: Mission, fence: AutopilotFence) -> MissionLayout:
     """The same ground and all that has been seen of it, with another fence of the autopilot. Raises MissionError."""
     frame = LocalFrame(layout.origin)
-    resolved = resolve(mission, frame, frame.to_ned(layout.home), fence)
+    resolved = resolve(mission, frame, frame.to_ned(layout.home), fence, layout.evidence.base.resolution_m)
     rebase(layout.evidence, _base(mission, resolved))
     return replace(layout, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
 
@@ -99,6 +102,14 @@ def _map_radius_m(mission: Mission, settings: MappingSettings) -> float:
     """What the rover's middle keeps from obstacles, by ``mapping.keeps``."""
     rover = mission.rover
     return rover.radius_m if settings.keeps == "circle" else rover.footprint.discs()[1] + settings.beside_m
+
+
+def _fine_m(mission: Mission, settings: MappingSettings) -> float | None:
+    """How large fields should be for planned motions: no obstacle fits between two places of one that are free."""
+    if settings.keeps == "circle":
+        return None
+    steps = math.floor(_map_radius_m(mission, settings) / math.sqrt(2.0) / FIELD_STEP_M + 1e-9)
+    return max(steps, 1) * FIELD_STEP_M
 
 
 def _base(mission: Mission, resolved: ResolvedMission) -> Grid:

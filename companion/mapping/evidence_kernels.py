@@ -115,6 +115,39 @@ def weigh(log_odds, base, penalty, weights, window, occupied_at, radius_cells):
 
 
 @njit(cache=True, nogil=True)
+def weigh_roomy(log_odds, base, penalty, weights, window, occupied_at, radius_cells):
+    """As ``weigh``, but a field is free if the rover keeps the radius anywhere in it, not only in its middle."""
+    height = base.shape[0]
+    x0, y0, x1, y1 = window
+    s = log_odds.shape[0] // height
+    near = _near_obstacles(log_odds, (x0 * s, y0 * s, x1 * s, y1 * s), occupied_at, radius_cells)
+    for fy in range(y0, y1):
+        for fx in range(x0, x1):
+            weights[fy, fx] = 1.0
+            if not near[(fy - y0) * s : (fy - y0 + 1) * s, (fx - x0) * s : (fx - x0 + 1) * s].all():
+                weights[fy, fx] = min(base[fy, fx] + penalty[fy, fx], 1.0)
+
+
+@njit(cache=True, nogil=True)
+def _near_obstacles(log_odds, cells, occupied_at, radius_cells):
+    """Which of the cells x0 <= x < x1, y0 <= y < y1 lie nearer than the radius to an obstacle."""
+    x0, y0, x1, y1 = cells
+    height, width = log_odds.shape
+    reach = int(math.ceil(radius_cells))
+    near = np.zeros((y1 - y0, x1 - x0), np.bool_)
+    for y in range(max(0, y0 - reach), min(height, y1 + reach)):
+        for x in range(max(0, x0 - reach), min(width, x1 + reach)):
+            if log_odds[y, x] < occupied_at:
+                continue
+            for row in range(max(y - reach, y0), min(y + reach + 1, y1)):
+                half = radius_cells * radius_cells - (row - y) * (row - y)
+                if half > 0.0:
+                    aside = int(math.ceil(math.sqrt(half))) - 1
+                    near[row - y0, max(x - aside - x0, 0) : max(min(x + aside + 1, x1) - x0, 0)] = True
+    return near
+
+
+@njit(cache=True, nogil=True)
 def soften(weights, window, soft_reach, soft_cost, max_soft):
     """Raise the weights of free fields near obstacles in a window (x0, y0, x1, y1) as in ``weigh``; reach in fields.
 

@@ -2,8 +2,9 @@
 
 The raster is finer than the fields, so that the free ground beside a thin post does not hide the post in the same
 field. A field is an obstacle when something was seen in it, or when the rover standing in its middle would touch
-something; beside obstacles the mission's own weight is raised (soft cost). What can be asked of the map is in
-``map_queries``.
+something; for planned motions (``keeps`` "outline") when there is no place in it where the rover would not, if fields
+are so small that no obstacle fits between two such places. Beside obstacles the mission's own weight is raised (soft
+cost). What can be asked of the map is in ``map_queries``.
 
 Nouns: evidence map, evidence.
 """
@@ -21,7 +22,7 @@ from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, Grid
 from companion.core.scan import RangeScan
 from companion.mapping.cell_frame import CellFrame
-from companion.mapping.evidence_kernels import InverseSensorModel, ScanInCells, cast_scan, soften, weigh
+from companion.mapping.evidence_kernels import InverseSensorModel, ScanInCells, cast_scan, soften, weigh, weigh_roomy
 from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 
@@ -214,5 +215,7 @@ def _refresh(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> None:
     weights, reach = evidence.grid.weights, base.fields(settings.soft_reach_m)
     radius = evidence.rover_radius_m / evidence.evidence_m
     window = (x0, y0, x1, y1)
-    weigh(evidence.log_odds, base.weights, evidence.penalty, weights, window, settings.occupied_at, radius)
+    roomy = settings.keeps == "outline" and evidence.subdivisions * math.sqrt(2.0) <= radius
+    weighs = weigh_roomy if roomy else weigh
+    weighs(evidence.log_odds, base.weights, evidence.penalty, weights, window, settings.occupied_at, radius)
     soften(weights, window, reach, settings.soft_cost, MAX_SOFT_WEIGHT)

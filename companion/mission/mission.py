@@ -56,13 +56,15 @@ class GridSpec:
     """The grid that the mission asks for.
 
     With ``size`` (width, height in fields) and ``home`` (the field whose middle is home) the grid is fixed. Without, it
-    encloses home, all targets and fences, with a margin of ``margin_m``.
+    encloses home, all targets and fences, with a margin of ``margin_m``. ``by_footprint``: the mission does not say how
+    large fields are; they may be smaller than ``resolution_m``, as the rover's outline needs.
     """
 
     resolution_m: float = 1.0
     size: tuple[int, int] | None = None
     home: Cell | None = None
     margin_m: float | None = None
+    by_footprint: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,7 +171,7 @@ class Mission:
 
     name: str
     targets: tuple[Target, ...]
-    grid: GridSpec = GridSpec()
+    grid: GridSpec = GridSpec(by_footprint=True)
     rover: RoverSpec = RoverSpec()
     keep_out: tuple[Area, ...] = ()
     keep_in: tuple[Area, ...] = ()

@@ -19,6 +19,8 @@ from companion.mission.mission import Mission, MissionError, OnBlocked
 from companion.mission.prior_map import stamp_prior
 
 MIN_MARGIN_M = 25.0
+ENOUGH_FIELDS = 1_000_000
+"""Fields that may be small are so large that there are no more of them: searches take time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,8 +67,12 @@ class _Shut:
     fields: Mask
 
 
-def resolve(mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence = NO_FENCE) -> ResolvedMission:
+def resolve(
+    mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence = NO_FENCE, fine_m: float | None = None
+) -> ResolvedMission:
     """Resolve the mission. ``home``: the origin of its metres, in the autopilot's local frame.
+
+    ``fine_m``: how small fields should be where the mission does not say.
 
     A grid with a size is placed with the middle of the field ``grid.home`` on home. Otherwise it encloses home,
     targets, fences and prior map, with home in the middle of a field. Weights, by precedence: fences, obstacles of
@@ -79,12 +85,14 @@ def resolve(mission: Mission, frame: LocalFrame, home: NedPoint, fence: Autopilo
     MissionError: file, place, reason.
     """
     try:
-        return _resolved(mission, frame, home, fence)
+        return _resolved(mission, frame, home, fence, fine_m)
     except (MissionError, MapError) as error:
         raise MissionError(f"{mission.source or mission.name}: {error}") from error
 
 
-def _resolved(mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence) -> ResolvedMission:
+def _resolved(
+    mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence, fine_m: float | None
+) -> ResolvedMission:
     if not mission.targets:
         raise MissionError("target: there is none to go to")
     prior = _prior_map(mission, home)
@@ -93,7 +101,7 @@ def _resolved(mission: Mission, frame: LocalFrame, home: NedPoint, fence: Autopi
     places = Places(frame, home, _no_fields if grid is None else grid.centre_of)
     points = [places.point(target.place) for target in mission.targets]
     if grid is None:
-        grid = _enclosing_grid(mission, places, points, prior)
+        grid = _enclosing_grid(mission, places, points, prior, fine_m)
     if prior is not None:
         grid = stamp_prior(grid, prior)
     weights = grid.weights.copy()
@@ -154,7 +162,9 @@ def _fixed_grid(mission: Mission, home: NedPoint) -> Grid | None:
     return empty_grid(width, height, spec.resolution_m, _south_west(home, spec.home, spec.resolution_m))
 
 
-def _enclosing_grid(mission: Mission, places: Places, points: list[NedPoint], prior: Grid | None) -> Grid:
+def _enclosing_grid(
+    mission: Mission, places: Places, points: list[NedPoint], prior: Grid | None, fine_m: float | None
+) -> Grid:
     """A grid that encloses everything in the mission, with a margin."""
     home, size_m = places.home, mission.grid.resolution_m
     corners = [(point.east_m, point.north_m) for point in (home, *points)]
@@ -170,6 +180,9 @@ def _enclosing_grid(mission: Mission, places: Places, points: list[NedPoint], pr
     margin_m = mission.grid.margin_m
     if margin_m is None:
         margin_m = max(MIN_MARGIN_M, float(np.max(high - low)) / 2.0)
+    if fine_m is not None and mission.grid.by_footprint:
+        area_m2 = float(np.prod(high - low + 2.0 * margin_m))
+        size_m = min(size_m, max(fine_m, math.sqrt(area_m2 / ENOUGH_FIELDS)))
     west, south = (
         math.ceil((at - edge + margin_m) / size_m) for at, edge in zip((home.east_m, home.north_m), low, strict=True)
     )

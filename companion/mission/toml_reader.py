@@ -270,6 +270,7 @@ def _mission(table: MissionTable, path: Path) -> Mission:
             table.grid.size,
             None if table.grid.home is None else Cell(*table.grid.home),
             table.grid.margin_m,
+            by_footprint="resolution_m" not in table.grid.model_fields_set and table.grid.size is None,
         ),
         rover=table.rover.rover,
         keep_out=keep_out + (fences.keep_out if fences else ()),

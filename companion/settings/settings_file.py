@@ -13,6 +13,12 @@ from companion.storage.validation import describe_first
 
 MAX_BYTES = 1_000_000
 
+FOR_PLANNED_MOTIONS: dict[str, dict[str, object]] = {
+    "mapping": {"evidence_m": 0.05, "hit_depth_m": 0.02, "keeps": "outline"},
+    "link": {"range_rate_hz": 20.0, "position_rate_hz": 20.0},
+}
+"""Other defaults, with any controller but ``points``."""
+
 
 def load_settings(path: Path | None) -> Settings:
     """Read a TOML settings file; None gives the defaults.
@@ -32,7 +38,19 @@ def parse_settings(data: dict[str, object], source: str) -> Settings:
         navigator = data.setdefault("navigator", {})
         if isinstance(navigator, dict):
             navigator.setdefault("planner", "bspline-ga")
+    guidance = data.get("guidance")
+    if isinstance(guidance, dict) and guidance.get("controller", "points") != "points":
+        _set_for_planned_motions(data)
     try:
         return Settings.model_validate(data)
     except ValidationError as error:
         raise SettingsError(f"{source}: {describe_first(error, Settings)}") from error
+
+
+def _set_for_planned_motions(data: dict[str, object]) -> None:
+    """Planned motions need a fine map and frequent data, where the file says nothing else."""
+    for section, values in FOR_PLANNED_MOTIONS.items():
+        table = data.setdefault(section, {})
+        if isinstance(table, dict):
+            for name, value in values.items():
+                table.setdefault(name, value)

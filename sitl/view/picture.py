@@ -5,8 +5,9 @@ Nouns: picture.
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,7 @@ def save_picture(run: Drive, path: Path) -> None:
     _draw_special(axes, run.simulator.world, run.report.sim_time_s)
     _draw_movers(axes, run)
     _draw_track(axes, north, east, [p.part for p in track])
+    _draw_rover(axes, run)
     _draw_places(axes, run)
     _draw_collisions(axes, run)
     axes.set_aspect("equal")
@@ -176,6 +178,25 @@ def _draw_collisions(axes: Axes, run: Drive) -> None:
         axes.plot(*place, "X", color="#ff0000", markeredgecolor="white", markersize=13, zorder=10, label=label)
         text = f"{collision.time_s:.1f} s, {collision.speed_m_s:.1f} m/s"
         axes.annotate(text, place, textcoords="offset points", xytext=(9, -12), color="#ff0000", fontsize=9, zorder=10)
+
+
+def _draw_rover(axes: Axes, run: Drive) -> None:
+    """Draw the rover's outline where it stands at the end."""
+    from matplotlib.patches import Circle, Polygon
+
+    truth, outline = run.simulator.truth, run.scenario.outline
+    style: dict[str, Any] = {"facecolor": "none", "edgecolor": "#202020", "linewidth": 1.2, "label": "the rover at the end"}
+    if outline.radius_m > 0.0:
+        axes.add_patch(Circle((truth.east_m, truth.north_m), outline.radius_m, **style))
+        return
+    sine, cosine = math.sin(truth.heading_rad), math.cos(truth.heading_rad)
+    front_m, rear_m, half_m = outline.front_m, outline.rear_m, outline.half_width_m
+    corners = ((front_m, half_m), (front_m, -half_m), (-rear_m, -half_m), (-rear_m, half_m))
+    places = [
+        (truth.east_m + ahead_m * sine + aside_m * cosine, truth.north_m + ahead_m * cosine - aside_m * sine)
+        for ahead_m, aside_m in corners
+    ]
+    axes.add_patch(Polygon(places, **style))
 
 
 def _draw_places(axes: Axes, run: Drive) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from companion.control.motion_kernels import (
+    AS_AT_EDGE,
     BLOCKED_S,
     Body,
     MotionGround,
@@ -33,7 +34,7 @@ from companion.mapping.distance_field import distance_field
 CELL_M = 0.1
 SIDE = 100
 MODEL = RoverModel(0.2, 1.0, 1.0, 2.0, 2.0, 0.5, 1.5, 1.0)
-BODY = Body(np.array([-0.1, 0.1]), 0.25)
+BODY = Body(np.array([-0.1, 0.1]), 0.25, 0.35)
 ALL_ADMITTED = np.tile((2.0, 0.5), (3, 1))
 STANDING = Start(5.0, 2.0, 0.0, 0.0, 0.0)
 WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0)
@@ -152,10 +153,13 @@ def test_rasters_are_read_between_cells() -> None:
     raster = np.array([[0.0, 1.0], [2.0, 3.0]])
     assert at_place(raster, 1.0, 1.0, 1.0, -1.0) == 1.5 and at_place(raster, 1.0, 0.6, 0.5, -1.0) == pytest.approx(0.1)
     assert at_place(raster, 1.0, 5.0, 0.5, -1.0) == -1.0
+    assert at_place(raster, 1.0, 5.0, 0.5, AS_AT_EDGE) == pytest.approx(1.0, abs=0.01)
     wall = problem((60, 62, 0, SIDE)).ground
     # The wall's near side lies 6 m north; the front disc reaches 0.35 m ahead.
-    assert clearance_m(wall.gap_m, CELL_M, BODY, 5.0, 5.0, 0.0) == pytest.approx(0.65, abs=0.03)
-    assert clearance_m(wall.gap_m, CELL_M, BODY, 5.0, 5.0, 0.5 * math.pi) == pytest.approx(0.75, abs=0.03)
+    assert clearance_m(wall.gap_m, CELL_M, BODY, 5.0, 5.3, 0.0) == pytest.approx(0.35, abs=0.03)
+    assert clearance_m(wall.gap_m, CELL_M, BODY, 5.0, 5.3, 0.5 * math.pi) == pytest.approx(0.45, abs=0.03)
+    # With more room than matters it is that of the circle round the outline.
+    assert clearance_m(wall.gap_m, CELL_M, BODY, 5.0, 4.0, 0.5 * math.pi) == pytest.approx(1.65, abs=0.03)
 
 
 def test_a_generation_keeps_its_best_and_stays_within_limits() -> None:

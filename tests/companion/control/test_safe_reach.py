@@ -93,6 +93,13 @@ def test_backing_off_is_as_slow_as_the_room_behind_asks_for() -> None:
     assert backing_speed_m_s(view(evidence, pose)) < BACK_LEAST_M_S
 
 
+def test_the_rover_does_not_back_off_the_map() -> None:
+    evidence = ground()
+    edge = evidence.base.south_west
+    near, far = (Pose(edge.north_m + north_m, edge.east_m + 5.0, 0.0, 0.0) for north_m in (0.4, 4.0))
+    assert backing_speed_m_s(view(evidence, near)) < BACK_LEAST_M_S < backing_speed_m_s(view(evidence, far))
+
+
 def test_looking_again_forgets_only_what_was_not_just_seen() -> None:
     evidence = ground()
     evidence.base.weights[2, 2] = 1.0

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import pytest
 
+from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.executive.mission_layout import apart_m, from_home, lay, lay_again
 from companion.executive.mission_progress import MissionPhase, on_reached, on_time, plan_progress
-from companion.mission.mission import Mission
+from companion.mission.mission import HomePoint, Mission, RoverSpec, Target
 from companion.settings import MappingSettings
 from tests.support.rig import yard
 
@@ -49,6 +51,16 @@ def test_laid_again_everything_is_where_it_was_on_earth_and_progress_is_kept(mis
     assert after.phase is MissionPhase.TRAVEL
     assert again.home == HOME and again.origin == moved
     assert not again.evidence.log_odds.any()
+
+
+def test_fields_follow_from_the_outline_where_motions_are_planned() -> None:
+    rover = RoverSpec(0.6, rectangle=Footprint.rectangle(0.9, 0.7))
+    wanted = Mission("m", (Target("goal", HomePoint(0.0, 9.0)),), rover=rover)
+    for keeps, side_m in (("circle", 1.0), ("outline", 0.25)):
+        evidence = lay(wanted, MappingSettings(keeps=keeps, evidence_m=0.05), ORIGIN, HOME, POSE).evidence
+        assert evidence.base.resolution_m == pytest.approx(side_m)
+        # No obstacle fits between two places of one field that are free.
+        assert keeps == "circle" or math.sqrt(2.0) * side_m <= evidence.rover_radius_m
 
 
 def test_distance_between_places() -> None:

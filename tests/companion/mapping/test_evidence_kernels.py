@@ -19,6 +19,7 @@ from companion.mapping.evidence_kernels import (
     nearest,
     soften,
     weigh,
+    weigh_roomy,
 )
 
 SIZE, S = 48, 8
@@ -132,6 +133,21 @@ def test_a_field_is_closed_by_evidence_in_it_or_within_the_radius_of_its_middle(
                 for x, y in occupied
             )
             assert weights[fy, fx] == (1.0 if closed else 0.5)
+
+
+@settings(deadline=None)
+@given(CELLS, st.floats(0.5, 9.0))
+def test_a_roomy_field_is_open_if_any_of_its_cells_is_as_far_from_all_evidence(
+    occupied: set[tuple[int, int]], radius: float
+) -> None:
+    base, weights = np.full((6, 6), 0.5), np.zeros((6, 6))
+    weigh_roomy(raster(occupied), base, np.zeros((6, 6), np.float32), weights, (1, 0, 6, 5), 1.0, radius)
+    for fy in range(6):
+        for fx in range(6):
+            cells = [(x, y) for y in range(fy * S, (fy + 1) * S) for x in range(fx * S, (fx + 1) * S)]
+            is_open = any(all(math.hypot(x - ox, y - oy) >= radius for ox, oy in occupied) for x, y in cells)
+            outside = fx < 1 or fy >= 5
+            assert weights[fy, fx] == (0.0 if outside else 0.5 if is_open else 1.0)
 
 
 def test_only_the_window_is_weighed_and_softened() -> None:

@@ -125,7 +125,7 @@ def test_everything(tmp_path: Path) -> None:
 
 def test_the_least_that_is_a_mission(tmp_path: Path) -> None:
     mission = load_mission(written(tmp_path, "[[target]]\nnorth_m = 10\neast_m = 0\n"))
-    assert (mission.name, mission.grid, mission.rover) == ("m", GridSpec(), RoverSpec())
+    assert (mission.name, mission.grid, mission.rover) == ("m", GridSpec(by_footprint=True), RoverSpec())
     assert mission.targets == (Target("target 1", HomePoint(10.0, 0.0)),)
     assert mission.sitl is None
 

@@ -79,6 +79,13 @@ def test_the_papers_profile_means_the_genetic_algorithm_alone_unless_said_otherw
     assert chosen.navigator.planner == "dijkstra"
 
 
+def test_planned_motions_have_a_fine_map_unless_said_otherwise() -> None:
+    own = parse_settings({"guidance": {"controller": "dwa"}, "mapping": {"evidence_m": 0.1}}, "test")
+    assert (own.mapping.evidence_m, own.mapping.keeps, own.link.range_rate_hz) == (0.1, "outline", 20.0)
+    points = parse_settings({"guidance": {"controller": "points"}}, "test")
+    assert (points.mapping, points.link) == (Settings().mapping, Settings().link)
+
+
 def test_settings_cannot_be_changed():
     with pytest.raises(ValueError, match="frozen"):
         Settings().profile = "paper"
