@@ -56,6 +56,7 @@ def look_round(
     log_odds = evidence.log_odds[low:high, left:right]
     cell_m, unseen = evidence.evidence_m, log_odds == 0.0
     blocked = (log_odds >= evidence.settings.occupied_at) | _closed(evidence, (left, low), (right, high))
+    _close_edge(blocked, (left, low), evidence)
     # To the surface: the map marks what lies a little behind it.
     behind_m = np.float32(max(0.5 * cell_m, evidence.settings.hit_depth_m))
     gap_m = distance_field(blocked) * np.float32(cell_m) - behind_m
@@ -88,6 +89,15 @@ def _closed(evidence: EvidenceMap, first: tuple[int, int], last: tuple[int, int]
     closed = evidence.base.weights[fields] + evidence.penalty[fields] >= 1.0
     cells: NDArray[np.bool_] = closed.repeat(s, axis=0).repeat(s, axis=1)
     return cells[first[1] % s :, first[0] % s :][: last[1] - first[1], : last[0] - first[0]]
+
+
+def _close_edge(blocked: NDArray[np.bool_], first: tuple[int, int], evidence: EvidenceMap) -> None:
+    """The edge of the map is no ground to drive over: nothing is known beyond it."""
+    height, width = evidence.log_odds.shape
+    blocked[0, :] |= first[1] == 0
+    blocked[:, 0] |= first[0] == 0
+    blocked[-1, :] |= first[1] + blocked.shape[0] >= height
+    blocked[:, -1] |= first[0] + blocked.shape[1] >= width
 
 
 def _pace(room_m: Floats, cell_m: float, fastest_m_s: float) -> Floats:

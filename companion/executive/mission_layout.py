@@ -50,7 +50,7 @@ def lay(
     frame = LocalFrame(origin)
     resolved = resolve(mission, frame, frame.to_ned(home), fence, _fine_m(mission, settings))
     start = _start(pose.point, resolved.ground)
-    evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), settings)
+    evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), _mapping(mission, settings))
     return MissionLayout(origin, home, resolved.targets, start, evidence, fence, resolved.bounds, resolved.refused)
 
 
@@ -67,7 +67,7 @@ def lay_again(
     if requested is not None:
         point = frame.to_ned(before.to_geo(requested.point))
         requested = replace(requested, point=point, cell=resolved.ground.cell_at(point))
-    evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), settings)
+    evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), _mapping(mission, settings))
     again = MissionLayout(
         origin, layout.home, resolved.targets, start, evidence, layout.fence, resolved.bounds, resolved.refused
     )
@@ -110,6 +110,13 @@ def _fine_m(mission: Mission, settings: MappingSettings) -> float | None:
         return None
     steps = math.floor(_map_radius_m(mission, settings) / math.sqrt(2.0) / FIELD_STEP_M + 1e-9)
     return max(steps, 1) * FIELD_STEP_M
+
+
+def _mapping(mission: Mission, settings: MappingSettings) -> MappingSettings:
+    """With small fields evidence is finer, too: it decides which gaps are wide enough."""
+    if _fine_m(mission, settings) is None or not mission.grid.by_footprint:
+        return settings
+    return settings.model_copy(update={"evidence_m": min(settings.evidence_m, FIELD_STEP_M)})
 
 
 def _base(mission: Mission, resolved: ResolvedMission) -> Grid:

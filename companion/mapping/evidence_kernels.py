@@ -116,7 +116,10 @@ def weigh(log_odds, base, penalty, weights, window, occupied_at, radius_cells):
 
 @njit(cache=True, nogil=True)
 def weigh_roomy(log_odds, base, penalty, weights, window, occupied_at, radius_cells):
-    """As ``weigh``, but a field is free if the rover keeps the radius anywhere in it, not only in its middle."""
+    """As ``weigh``, but a field is free if the rover keeps the radius anywhere in it, not only in its middle.
+
+    It keeps it from the edge of the map, too: nothing is known beyond.
+    """
     height = base.shape[0]
     x0, y0, x1, y1 = window
     s = log_odds.shape[0] // height
@@ -130,11 +133,15 @@ def weigh_roomy(log_odds, base, penalty, weights, window, occupied_at, radius_ce
 
 @njit(cache=True, nogil=True)
 def _near_obstacles(log_odds, cells, occupied_at, radius_cells):
-    """Which of the cells x0 <= x < x1, y0 <= y < y1 lie nearer than the radius to an obstacle."""
+    """Which of the cells x0 <= x < x1, y0 <= y < y1 lie nearer than the radius to an obstacle or to the map's edge."""
     x0, y0, x1, y1 = cells
     height, width = log_odds.shape
     reach = int(math.ceil(radius_cells))
     near = np.zeros((y1 - y0, x1 - x0), np.bool_)
+    near[: max(reach - y0, 0)] = True
+    near[:, : max(reach - x0, 0)] = True
+    near[max(height - reach - y0, 0) :] = True
+    near[:, max(width - reach - x0, 0) :] = True
     for y in range(max(0, y0 - reach), min(height, y1 + reach)):
         for x in range(max(0, x0 - reach), min(width, x1 + reach)):
             if log_odds[y, x] < occupied_at:

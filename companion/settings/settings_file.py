@@ -14,7 +14,7 @@ from companion.storage.validation import describe_first
 MAX_BYTES = 1_000_000
 
 FOR_PLANNED_MOTIONS: dict[str, dict[str, object]] = {
-    "mapping": {"evidence_m": 0.05, "hit_depth_m": 0.02, "keeps": "outline"},
+    "mapping": {"evidence_m": 0.1, "hit_depth_m": 0.02, "keeps": "outline"},
     "link": {"range_rate_hz": 20.0, "position_rate_hz": 20.0},
 }
 """Other defaults, with any controller but ``points``."""

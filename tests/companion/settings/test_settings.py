@@ -80,8 +80,9 @@ def test_the_papers_profile_means_the_genetic_algorithm_alone_unless_said_otherw
 
 
 def test_planned_motions_have_a_fine_map_unless_said_otherwise() -> None:
-    own = parse_settings({"guidance": {"controller": "dwa"}, "mapping": {"evidence_m": 0.1}}, "test")
-    assert (own.mapping.evidence_m, own.mapping.keeps, own.link.range_rate_hz) == (0.1, "outline", 20.0)
+    own = parse_settings({"guidance": {"controller": "dwa"}, "mapping": {"hit_depth_m": 0.03}}, "test")
+    assert (own.mapping.hit_depth_m, own.mapping.evidence_m, own.mapping.keeps) == (0.03, 0.1, "outline")
+    assert own.link.range_rate_hz == 20.0
     points = parse_settings({"guidance": {"controller": "points"}}, "test")
     assert (points.mapping, points.link) == (Settings().mapping, Settings().link)
 
