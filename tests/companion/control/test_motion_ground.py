@@ -93,3 +93,12 @@ def test_at_the_edge_of_the_map_it_is_smaller(east_m: float) -> None:
     window = look_round(ground(), NedPoint(3.0, east_m), path, 0.3, 2.0)
     assert window.ground.gap_m.shape[1] * window.ground.cell_m == pytest.approx(AROUND_M, abs=0.6)
     assert window.ground.togo_s.shape[0] * 2 == window.ground.gap_m.shape[0]
+
+
+def test_the_edge_of_the_map_is_no_ground_but_that_of_the_window_is() -> None:
+    evidence = ground()
+    inside, beside = seen(evidence), look_round(evidence, NedPoint(3.0, 1.0), PATH, 0.3, 2.0)
+    x, y = beside.place(NedPoint(3.0, 0.3))
+    row, column = int(y / beside.ground.cell_m), int(x / beside.ground.cell_m)
+    assert 0.1 < beside.ground.gap_m[row, column] < 0.3
+    assert inside.ground.gap_m[inside.ground.gap_m.shape[0] // 2, 0] > 5.0
