@@ -152,6 +152,7 @@ class SavedFollowing(SavedValues):
     turn_acceleration_rad_s2: Figure
     turn_gain: Figure
     off_model: Annotated[float, Field(ge=0.0, lt=1.0)]
+    gains_most_m_s2: Figure
 
 
 class SavedEstimate(SavedValues):

@@ -20,6 +20,7 @@ class Following(NamedTuple):
     """It begins after ``dead_s`` and changes speed and turn rate within limits.
 
     ``turn_gain``: it turns by this factor more than told. ``off_model``: the rover may be off all this by such a share.
+    ``gains_most_m_s2``: no rover gains speed faster than this.
     """
 
     dead_s: float = 0.3
@@ -28,6 +29,7 @@ class Following(NamedTuple):
     turn_acceleration_rad_s2: float = 2.1
     turn_gain: float = 1.0
     off_model: float = 0.3
+    gains_most_m_s2: float = 1.3
 
 
 AS_SHIPPED = Following()
@@ -45,7 +47,8 @@ def following_of(settings: MotionSettings, parameters: Mapping[str, float]) -> F
     if turns is None:
         usual_deg_s2 = math.degrees(usual.turn_acceleration_rad_s2)
         turns = math.radians(_limit(parameters, TURN_ACCELERATION, usual_deg_s2, math.degrees(MOST_RAD_S2)))
-    return Following(settings.dead_s, gains, brakes, turns, settings.turn_gain, settings.off_model)
+    off, most_m_s2 = settings.off_model, gains * (1.0 + settings.off_model)
+    return Following(settings.dead_s, gains, brakes, turns, settings.turn_gain, off, most_m_s2)
 
 
 def _limit(parameters: Mapping[str, float], name: str, usual: float, most: float) -> float:

@@ -73,9 +73,16 @@ class ModelEstimate:
         return min(1.0, min(self.gathered_s, self.braked_s, self.turned_s) / KNOWN_S)
 
     def following(self, off_model_known: float) -> Following:
-        """The figures, and how far the rover may be off them: the less, the more is known, down to that share."""
+        """The figures, and how far the rover may be off them: the less, the more is known, down to that share.
+
+        A rover that is told to gain speed gently is seen to gain less than it can: as much as was assumed at first
+        remains possible.
+        """
         doubted = self.began.off_model
-        return self.figures._replace(off_model=doubted - self.known * max(doubted - off_model_known, 0.0))
+        off = doubted - self.known * max(doubted - off_model_known, 0.0)
+        possible_m_s2 = self.known * self.began.acceleration_m_s2 + (1.0 - self.known) * self.began.gains_most_m_s2
+        most_m_s2 = max(self.figures.acceleration_m_s2 * (1.0 + off), possible_m_s2)
+        return self.figures._replace(off_model=off, gains_most_m_s2=most_m_s2)
 
 
 def described(estimate: ModelEstimate) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.control.controller import ControlCommand, Purpose, stop_for
+from companion.control.following import Following
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import Window, look_round
 from companion.control.motion_kernels import (
@@ -89,7 +90,7 @@ class MotionController:
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
         problem = self._problem(path, view, model)
-        worst = problem._replace(model=worst_model(model, view.following.off_model))
+        worst = problem._replace(model=worst_model(model, view.following))
         problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
             return stop_for(Purpose.BLOCKED)
@@ -195,11 +196,10 @@ def _leads_on(problem: MotionProblem) -> bool:
     return bool(np.isfinite(around).any())
 
 
-def worst_model(model: RoverModel, off: float) -> RoverModel:
-    """A rover that gathers speed faster and brakes worse than it should, by this share."""
-    return model._replace(
-        accel_m_s2=model.accel_m_s2 * (1.0 + off), decel_m_s2=model.decel_m_s2 * (1.0 - off) / PLANNED_SHARE
-    )
+def worst_model(model: RoverModel, follows: Following) -> RoverModel:
+    """A rover that gathers speed as fast as may be, and brakes worse than it should."""
+    brakes_m_s2 = model.decel_m_s2 * (1.0 - follows.off_model) / PLANNED_SHARE
+    return model._replace(accel_m_s2=follows.gains_most_m_s2, decel_m_s2=brakes_m_s2)
 
 
 def rover_model(view: LocalView) -> RoverModel:

@@ -93,7 +93,7 @@ def _way_alone(setpoint: GuidedVelocity, view: LocalView) -> list[NedPoint]:
     guidance, follows, pose = view.settings.guidance, view.following, view.pose
     speed_m_s, turn_rad_s = view.forward_m_s, view.yaw_rate_rad_s
     heading_rad, point, places = pose.heading_rad, pose.point, [pose.point]
-    gains_m_s = (1.0 + follows.off_model) * follows.acceleration_m_s2 * WAY_STEP_S
+    gains_m_s = follows.gains_most_m_s2 * WAY_STEP_S
     gains_rad_s = follows.turn_acceleration_rad_s2 * WAY_STEP_S
     for step in range(math.ceil((follows.dead_s + guidance.velocity_lasts_s) / WAY_STEP_S)):
         since_s = (step + 0.5) * WAY_STEP_S - follows.dead_s

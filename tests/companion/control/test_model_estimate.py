@@ -68,6 +68,15 @@ def test_the_more_is_known_the_less_it_may_be_off() -> None:
     assert shares[0] == AS_SHIPPED.off_model and shares[-1] == pytest.approx(0.1)
 
 
+def test_a_rover_seen_to_gain_little_speed_may_still_gain_as_much_as_its_limit() -> None:
+    begun, gentle, quick = (
+        watched(AS_SHIPPED._replace(acceleration_m_s2=gains), seconds).estimate.following(0.1).gains_most_m_s2
+        for gains, seconds in ((1.0, 1.0), (0.6, 30.0), (1.5, 30.0))
+    )
+    assert begun == AS_SHIPPED.gains_most_m_s2
+    assert gentle == AS_SHIPPED.acceleration_m_s2 and quick == pytest.approx(1.65, rel=0.15)
+
+
 def test_nothing_told_nothing_learnt() -> None:
     assert watched(Following(0.5, 0.6, 0.6, 1.2, 0.8), 20.0, told=False).estimate.figures == AS_SHIPPED
 
