@@ -185,7 +185,8 @@ def _draw_rover(axes: Axes, run: Drive) -> None:
     from matplotlib.patches import Circle, Polygon
 
     truth, outline = run.simulator.truth, run.scenario.outline
-    style: dict[str, Any] = {"facecolor": "none", "edgecolor": "#202020", "label": "the rover at the end"}
+    # Over the target's star: a small thing on most pictures.
+    style: dict[str, Any] = {"facecolor": "white", "edgecolor": "#202020", "zorder": 5, "label": "the rover at the end"}
     if outline.radius_m > 0.0:
         axes.add_patch(Circle((truth.east_m, truth.north_m), outline.radius_m, **style))
         return
