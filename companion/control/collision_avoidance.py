@@ -2,10 +2,12 @@
 
 Several options are played through: go on, go on a little and then stop, stop at once, turn and move aside, back
 off, drive off on an arc. The first that keeps its distance is taken; if none does, the one that leaves the most
-room, and if all would touch something, the one that goes well for longest. The rover stops before the way of
-others, since going on is allowed only while there still is somewhere to stop; and it waits there until going on is
-safe again. Each option says what the autopilot would be told and where the rover would then be at each moment; the
-ground there must be clear and seen.
+room. If all would touch something, those count that go well for longest: the rover goes on to move aside if it does so
+already, else it takes the one with which the two would meet at the lowest speed.
+
+The rover stops before the way of others, since going on is allowed only while there still is somewhere to stop; and it
+waits there until going on is safe again. Each option says what the autopilot would be told and where the rover would
+then be at each moment; the ground there must be clear and seen.
 
 Nouns: collision avoidance, yielding.
 """
@@ -15,6 +17,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -45,11 +48,11 @@ MARGIN_SHARES = (1.0, 0.5)
 """First with the whole margin, then with half: going on with half the margin is better than leaving the path."""
 NEAR_M = 0.15
 """If every option touches something in the end, the option is taken that comes within this distance latest."""
+AS_LATE_S = 0.5
+"""Those that come within it up to so much earlier count as well."""
 GO_ON_S = (math.inf, 3.0, 1.5, 0.4)
 """How long the rover might go on before it stops, the longest first: 0.4 s is longer than to the next tick."""
 STRAIGHT_S = 1.0
-TURNING_S = 5.0
-"""A rover that stands to look about goes on with that while nothing comes within this time."""
 ASIDE_M = (2.5, 1.5)
 ASIDE_RAD = (0.5 * math.pi, -0.5 * math.pi, 0.25 * math.pi, -0.25 * math.pi)
 """How far it may move aside, and in which directions, counted from the course of the other."""
@@ -62,7 +65,7 @@ ARC_M, ARC_M_S, ARC_SHARES = 2.5, 0.7, (0.0, -1.0, 1.0)
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Option:
-    """Something to do, and where the rover then is at each moment; what comes after ``until_s`` does not count.
+    """Something to do, and where the rover then is at each moment.
 
     ``yields``: it is not what the controller said. ``aside_rad``: the bearing to which the rover moves aside with it.
     """
@@ -70,7 +73,6 @@ class Option:
     command: ControlCommand
     places: Points
     yields: bool = True
-    until_s: float = math.inf
     aside_rad: float | None = None
 
 
@@ -115,7 +117,7 @@ def avoided(
     margins_m = view.settings.traffic.margin_m + view.settings.traffic.drift_m_s * times_s
 
     def room_m(option: Option, share: float) -> float:
-        return least_room_m(option.places, discs, times_s, share * margins_m, option.until_s)
+        return least_room_m(option.places, discs, times_s, share * margins_m)
 
     options = list(_on_the_way(outlook, command, line))
     for share in MARGIN_SHARES:
@@ -128,11 +130,13 @@ def avoided(
             return option
         options.append(option)
 
-    def worth(option: Option) -> tuple[bool, float, float]:
-        first_s, least_m = first_near(option.places, discs, times_s, NEAR_M)
-        return (True, least_m, 0.0) if least_m >= 0.0 else (False, first_s, least_m)
-
-    return max(options, key=worth)
+    ends = [(option, first_near(option.places, discs, times_s, NEAR_M)) for option in options]
+    if any(near.least_m >= 0.0 for _, near in ends):
+        return max(ends, key=lambda one: one[1].least_m)[0]
+    latest_s = max(near.first_s for _, near in ends)
+    late = [(option, near) for option, near in ends if near.first_s >= latest_s - AS_LATE_S]
+    kept = [option for option, _ in late if aside_rad is not None and option.aside_rad == aside_rad]
+    return kept[0] if kept else min(late, key=lambda one: one[1].closing_m_s)[0]
 
 
 class CollisionAvoidance:
@@ -200,7 +204,7 @@ def _on_the_way(outlook: Outlook, command: ControlCommand, line: ReferencePath |
             nearer = _nearer(command, view.pose, along_m)
             yield Option(command, places, yields=False) if nearer is None else Option(nearer, places)
     else:
-        yield Option(command, halted, yields=False, until_s=TURNING_S)
+        yield Option(command, halted, yields=False)
     yield Option(stop_for(Purpose.BRAKE), halted)
 
 
@@ -322,7 +326,7 @@ def _on_arcs(outlook: Outlook) -> Iterator[Option]:
 
 
 @njit(cache=True, nogil=True)
-def least_room_m(places: Points, discs: Points, times_s: Points, margins_m: Points, until_s: float) -> float:
+def least_room_m(places: Points, discs: Points, times_s: Points, margins_m: Points) -> float:
     """The least room beyond the margin that is left between the rover and anything that moves; negative: too little.
 
     A thing that is nearer than the margin already must not come nearer still.
@@ -333,18 +337,25 @@ def least_room_m(places: Points, discs: Points, times_s: Points, margins_m: Poin
         now_m = math.hypot(north_m - places[0, 0], east_m - places[0, 1]) - touch_m
         for i in range(times_s.size):
             time_s = times_s[i]
-            if time_s > until_s:
-                break
             to_n, to_e = north_m + north_m_s * time_s - places[i, 0], east_m + east_m_s * time_s - places[i, 1]
             room_m = math.hypot(to_n, to_e) - touch_m - min(margins_m[i], max(now_m - 0.02, 0.0))
             least_m = min(least_m, room_m)
     return least_m
 
 
+class Near(NamedTuple):
+    """How near an option comes to what moves; ``first_s`` is inf if it never comes near."""
+
+    first_s: float
+    least_m: float
+    closing_m_s: float
+    """How fast the two then move against each other."""
+
+
 @njit(cache=True, nogil=True)
-def first_near(places: Points, discs: Points, times_s: Points, near_m: float) -> tuple[float, float]:
-    """When anything that moves first comes within ``near_m`` (inf: never), and the least room at any time."""
-    first_s, least_m = math.inf, math.inf
+def first_near(places: Points, discs: Points, times_s: Points, near_m: float) -> Near:
+    """When anything that moves first comes within ``near_m``, and the least room at any time."""
+    first_s, least_m, closing_m_s = math.inf, math.inf, 0.0
     for row in range(discs.shape[0]):
         north_m, east_m, north_m_s, east_m_s, touch_m = discs[row]
         for i in range(times_s.size):
@@ -354,4 +365,9 @@ def first_near(places: Points, discs: Points, times_s: Points, near_m: float) ->
             least_m = min(least_m, room_m)
             if room_m < near_m and times_s[i] < first_s:
                 first_s = times_s[i]
-    return first_s, least_m
+                j = max(i, 1)
+                step_s = times_s[j] - times_s[j - 1]
+                apart_n = north_m_s - (places[j, 0] - places[j - 1, 0]) / step_s
+                apart_e = east_m_s - (places[j, 1] - places[j - 1, 1]) / step_s
+                closing_m_s = math.hypot(apart_n, apart_e)
+    return Near(first_s, least_m, closing_m_s)

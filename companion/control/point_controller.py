@@ -18,7 +18,7 @@ from companion.control.reference_path import STEP_M, ReferencePath
 from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, overshoot_m, unseen_flank
 from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.map_queries import clearance_m, look_along
+from companion.mapping.map_queries import ArcQueries, clearance_m, look_along
 from companion.settings import GuidanceSettings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition
 
@@ -34,6 +34,7 @@ OVERRUN_M = 0.3
 """A rover that stands so far beyond the last position may not have reached it, for the autopilot."""
 STANDS_M_S = 0.1
 CREEPS_M = 0.1
+NO_NEARER_M = 0.01
 """It does not creep less far."""
 ANEW_S = 0.15
 """Longer than the 0.1 s after which ArduRover shapes a position target from where the rover is."""
@@ -242,7 +243,10 @@ def _stops_before(distance_m: float, bearing_rad: float, view: LocalView) -> flo
     """That far, or less if the rover would otherwise overshoot into something that stands there."""
     pose, beyond_m = view.pose, overshoot_m(distance_m, view)
     there = pose.point.moved(bearing_rad, distance_m + beyond_m)
-    clear_m = look_along(view.evidence, pose.point, there, view.rover.radius_m).clear_m
+    radius_m = view.rover.radius_m
+    # No nearer to a wall than it stands: the position may be wrong by some centimetres.
+    room_m = ArcQueries(view.evidence, pose).kept_room_m(radius_m + view.settings.guidance.clearance_m, radius_m)
+    clear_m = look_along(view.evidence, pose.point, there, max(room_m - NO_NEARER_M, radius_m)).clear_m
     return min(distance_m, clear_m - beyond_m)
 
 

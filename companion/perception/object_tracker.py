@@ -1,8 +1,10 @@
 """Object tracker: which of the things that the range sensors see are moving, and where to.
 
-Ground on which something stands was never seen free. So only readings count that end on ground that had been seen
-free all round. Such readings that lie together are one thing, and a thing whose place changes evenly from scan to
-scan moves. The map does not use this: there a moving thing is evidence like any other, and is freed behind it.
+Ground on which something stands was never seen free. So readings count that end on ground that had been seen free all
+round. So do those of a narrow thing that stands alone, with nothing near on either side; but what stands seems to move,
+too, when it is seen from another side, so such a thing must be faster. Readings that lie together are one thing, and a
+thing whose place changes evenly from scan to scan moves. The map does not use this: there a moving thing is evidence
+like any other, and is freed behind it.
 
 Nouns: object tracker.
 """
@@ -33,8 +35,8 @@ TOGETHER_M = 0.8
 WIDEST_M = 3.0
 """Anything wider is not a thing that moves but ground with an error of position."""
 WINDOW_S = 1.0
-LEAST_S = 0.5
-LEAST_SIGHTINGS = 5
+LEAST_S = 0.3
+LEAST_SIGHTINGS = 4
 LOST_S = 1.0
 LEAST_RADIUS_M = 0.4
 STRAY_M = 0.15
@@ -45,6 +47,15 @@ DOUBT_M = 0.25
 """Added to the radius of a thing that is only seen: neither its place nor its size is exact."""
 LEAST_BEAMS = 8
 """A few thin beams cannot tell what moves from what the rover passes."""
+ALONE_M, ALONE_WIDEST_M = 0.8, 1.2
+"""A thing stands alone if the readings beside it lie this far behind it, and it is no wider."""
+IN_RANGE_M = 0.3
+"""... and so far inside the sensor's range: of a wall that comes into range more is seen with each scan."""
+FINE_RAD = math.radians(2.0)
+"""With wider beams what stands alone seems to jump. There this share of its readings must be on free ground."""
+PART_FREE = 0.3
+ALONE_M_S = 0.6
+"""Below this speed a thing that stands alone is not believed to move."""
 MAX_YAW_RATE_RAD_S = math.radians(45.0)
 """Faster than this, readings are too far from where they seem to be."""
 
@@ -75,6 +86,8 @@ class Sighting:
     east_m: float
     radius_m: float
     blur_m: float
+    on_free_ground: bool
+    """Else it only stands alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +113,9 @@ class Track:
         error_m_s = max(stray_m, 0.03) / math.sqrt(float(since @ since))
         north_m_s, east_m_s = (float(part) for part in velocity)
         moving = Moving(f"seen {self.number}", float(time_s[-1]), newest, north_m_s, east_m_s, radius_m)
-        return moving, stray_m <= STRAY_M + blur_m and moving.speed_m_s >= SURE * error_m_s
+        on_free_ground = 2 * sum(one.on_free_ground for one in self.sightings) >= len(self.sightings)
+        least_m_s = max(SURE * error_m_s, 0.0 if on_free_ground else ALONE_M_S)
+        return moving, stray_m <= STRAY_M + blur_m and moving.speed_m_s >= least_m_s
 
 
 class ObjectTracker:
@@ -117,9 +132,10 @@ class ObjectTracker:
         if abs(yaw_rate_rad_s) > MAX_YAW_RATE_RAD_S or len(scan.bearing_rad) < LEAST_BEAMS:
             return
         ends, range_m = _ends(pose, scan)
-        hits = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
-        if len(hits) or self._tracks:
-            self._follow(pose.time_s, _things(hits, pose, scan.beam_width_rad))
+        free = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
+        counts = free | _whole_things(scan, free)
+        if counts.any() or self._tracks:
+            self._follow(pose.time_s, _things(ends[counts], free[counts], pose, scan.beam_width_rad))
 
     def remember(self, pose: Pose, reach_m: float) -> None:
         """Note what a scan just added to the map has shown to be free."""
@@ -143,10 +159,10 @@ class ObjectTracker:
         row, column, reach = math.floor(y), math.floor(x), math.ceil(frame.cells(reach_m)) + 1
         return slice(max(row - reach, 0), max(row + reach, 0)), slice(max(column - reach, 0), max(column + reach, 0))
 
-    def _on_free_ground(self, points: Points, round_m: Points) -> Points:
-        """Those with ground round them that had all been seen free."""
+    def _on_free_ground(self, points: Points, round_m: Points) -> NDArray[np.bool_]:
+        """Which have ground round them that had all been seen free."""
         frame = self._evidence.frame
-        return points[free_all_round(self._free, frame.xys(points), round_m * frame.cells(1.0))]
+        return free_all_round(self._free, frame.xys(points), round_m * frame.cells(1.0))
 
     def _follow(self, time_s: float, things: list[Sighting]) -> None:
         """Give each thing to the track that expects it nearest; a thing that no track expects begins a new one."""
@@ -185,20 +201,63 @@ def _ends(pose: Pose, scan: RangeScan) -> tuple[Points, Points]:
     return np.column_stack((north_m, east_m)), range_m
 
 
-def _things(points: Points, pose: Pose, beam_width_rad: float) -> list[Sighting]:
+@njit(cache=True, nogil=True)
+def alone_in(beam_rad: float, range_m: Points, farthest_m: float) -> NDArray[np.int64]:
+    """For each reading the number of the narrow thing, with nothing near beside it, to which it belongs; -1: none.
+
+    ``range_m``: one for each beam, in their order, ``beam_rad`` apart; inf: free, nan: nothing is known.
+    """
+    count = len(range_m)
+    result = np.full(count, -1)
+    first = 1
+    while first < count - 1:
+        last = first
+        while last + 1 < count and abs(range_m[last + 1] - range_m[last]) <= ALONE_M:
+            last += 1
+        if math.isfinite(range_m[first]) and last < count - 1:
+            own = range_m[first : last + 1]
+            free = range_m[first - 1] > range_m[first] + ALONE_M and range_m[last + 1] > range_m[last] + ALONE_M
+            wide_m = own.min() * (last - first) * beam_rad
+            if free and wide_m <= ALONE_WIDEST_M and own.max() <= farthest_m:
+                result[first : last + 1] = first
+        first = last + 1
+    return result
+
+
+def _whole_things(scan: RangeScan, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Which of the readings that hit something are of a thing that stands alone and counts, with all of it.
+
+    "Alone" is enough for fine beams. Else a part must be on free ground (``free``, for each of those readings).
+    """
+    hit = np.isfinite(scan.range_m)
+    # In the order of bearings from straight behind on, so that what is ahead lies in one piece.
+    order = np.argsort(np.mod(scan.bearing_rad + math.pi, 2.0 * math.pi))
+    thing = np.empty(len(order), np.int64)
+    thing[order] = alone_in(scan.beam_width_rad, scan.range_m[order], scan.max_range_m - IN_RANGE_M)
+    thing = thing[hit]
+    counts = thing >= 0
+    if scan.beam_width_rad > FINE_RAD:
+        for number in np.unique(thing[counts]):
+            own = thing == number
+            counts[own] = free[own].mean() >= PART_FREE
+    return counts
+
+
+def _things(points: Points, free: NDArray[np.bool_], pose: Pose, beam_width_rad: float) -> list[Sighting]:
     """Readings that lie together, as discs: their middle lies behind what is seen of them."""
-    groups: list[list[Points]] = []
-    for point in points:
+    groups: list[list[int]] = []
+    for i, point in enumerate(points):
         for group in groups:
-            if math.dist(group[-1], point) <= TOGETHER_M or math.dist(group[0], point) <= TOGETHER_M:
-                group.append(point)
+            if min(math.dist(points[group[-1]], point), math.dist(points[group[0]], point)) <= TOGETHER_M:
+                group.append(i)
                 break
         else:
-            groups.append([point])
+            groups.append([i])
     things = []
-    for group in groups:
-        middle = np.mean(group, axis=0)
-        extent_m = 2.0 * float(max(math.dist(point, middle) for point in group))
+    for rows in groups:
+        seen = points[rows]
+        middle = np.mean(seen, axis=0)
+        extent_m = 2.0 * float(max(math.dist(point, middle) for point in seen))
         if extent_m > WIDEST_M:
             continue
         radius_m = max(extent_m / 2.0, LEAST_RADIUS_M)
@@ -207,5 +266,6 @@ def _things(points: Points, pose: Pose, beam_width_rad: float) -> list[Sighting]
         north_m = float(middle[0]) + behind_m * math.cos(away_rad)
         east_m = float(middle[1]) + behind_m * math.sin(away_rad)
         blur_m = 0.5 * beam_width_rad * math.dist(middle, (pose.north_m, pose.east_m))
-        things.append(Sighting(pose.time_s, north_m, east_m, radius_m, blur_m))
+        mostly_free = 2 * int(free[rows].sum()) >= len(rows)
+        things.append(Sighting(pose.time_s, north_m, east_m, radius_m, blur_m, mostly_free))
     return things

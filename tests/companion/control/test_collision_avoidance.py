@@ -18,7 +18,7 @@ from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
 from companion.perception.moving_obstacles import Moving
 from companion.settings import Settings
-from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 
 SETTINGS = Settings()
 ROVER = RoverLimits(0.35, 2.0, 8.0)
@@ -105,10 +105,31 @@ def test_room_is_what_is_left_at_the_nearest_moment(
     discs = np.array([[north_m, east_m, north_m_s, east_m_s, 0.8]])
     gaps = np.hypot(north_m + north_m_s * times_s - places[:, 0], east_m + east_m_s * times_s) - 0.8
     none = np.zeros_like(times_s)
-    assert least_room_m(places, discs, times_s, none, math.inf) == pytest.approx(float(gaps.min()))
-    first_s, least_m = first_near(places, discs, times_s, 0.1)
+    assert least_room_m(places, discs, times_s, none) == pytest.approx(float(gaps.min()))
+    first_s, least_m, closing_m_s = first_near(places, discs, times_s, 0.1)
     near = times_s[gaps < 0.1]
     assert (first_s, least_m) == pytest.approx((near[0] if near.size else math.inf, gaps.min()))
+    if near.size:
+        assert closing_m_s == pytest.approx(math.hypot(north_m_s - speed_m_s, east_m_s))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_where_every_way_would_touch_it_brakes_and_does_not_waver(seed: int) -> None:
+    """A walker is recognised 3 m ahead at 1.9 m/s; its velocity is not known exactly. Stopping is never given up."""
+    chance = np.random.default_rng(seed)
+    for _ in range(10):
+        pace_m_s, drift_m_s = chance.uniform(0.8, 1.1), chance.normal(0.0, 0.1)
+        walker = Moving("m", 100.0, NedPoint(22.9, 17.9), drift_m_s, pace_m_s, 0.65)
+        assert made(walker, 1.87).command.setpoint == GuidedVelocity(0.0, 0.0)
+
+
+def test_to_look_about_it_does_not_stay_where_something_comes() -> None:
+    """It may be left alone with that message: a forklift that is 7 s away counts."""
+    coming = Moving("m", 100.0, NedPoint(20.0, 26.5), 0.0, -0.8, 0.7)
+    look = ControlCommand(Purpose.LOOK, GuidedHeading(1.0), 0.5)
+    assert made(coming, 0.0, now=look).yields
+    passing = Moving("m", 100.0, NedPoint(23.0, 26.5), 0.0, -0.8, 0.7)
+    assert not made(passing, 0.0, now=look).yields
 
 
 def test_a_plan_of_meeting_by_chance_is_never_driven_into() -> None:

@@ -83,6 +83,20 @@ def test_what_stands_is_never_taken_for_something_that_moves(suite: str, speed_m
         assert sum(len(watcher.look()) for _ in range(80)) == 0
 
 
+@pytest.mark.parametrize(("suite", "least_m"), [("lidar-90", 3.0), ("lidar-360", 3.3)])
+def test_a_walker_on_ground_that_was_never_seen_is_noticed_in_time(suite: str, least_m: float) -> None:
+    """It comes into the narrow view of a rover at 1.9 m/s and walks across its way: braking takes 2.7 m."""
+    met_m = 10.0 + 1.9 * 5.0
+    track = timed_track([(met_m, 20.0 + 0.9 * 5.0), (met_m, 10.0)], 0.9, 0.0, repeats=False)
+    for seed in range(6):
+        watcher = Watcher(World(np.zeros((40, 40), np.bool_), movers=(Mover("m", 0.4, track),)), suite, seed, 1.9)
+        ahead_m = 0.0
+        while not ahead_m:
+            if any(abs(one.east_m_s + 0.9) < 0.4 and abs(one.north_m_s) < 0.4 for one in watcher.look()):
+                ahead_m = met_m - (10.0 + 1.9 * (watcher.scans - 1) * PERIOD_S)
+        assert ahead_m > least_m
+
+
 def test_the_trail_of_something_that_moves_is_soon_free_again() -> None:
     track = timed_track([(13.0, 12.0), (13.0, 40.0)], 1.0, 1.0, repeats=False)
     watcher = Watcher(World(np.zeros((40, 40), np.bool_), movers=(Mover("m", 0.5, track),)), "lidar-360", 3)
