@@ -6,7 +6,8 @@ room. If all would touch something, those count that go well for longest: the ro
 already, else it takes the one with which the two would meet at the lowest speed.
 
 The rover stops before the way of others, since going on is allowed only while there still is somewhere to stop; and it
-waits there until going on is safe again. Each option says what the autopilot would be told and where the rover would
+waits there until going on is safe again. Of positions that are as good the first is told at which nothing would meet a
+rover that is left alone with it. Each option says what the autopilot would be told and where the rover would
 then be at each moment; the ground there must be clear and seen.
 
 Nouns: collision avoidance, yielding.
@@ -52,6 +53,8 @@ AS_LATE_S = 0.5
 """Those that come within it up to so much earlier count as well."""
 GO_ON_S = (math.inf, 3.0, 1.5, 0.4)
 """How long the rover might go on before it stops, the longest first: 0.4 s is longer than to the next tick."""
+ALONE_S = 15.0
+"""A rover that is left alone with a position is not met there for so long: another companion may begin then."""
 STRAIGHT_S = 1.0
 ASIDE_M = (2.5, 1.5)
 ASIDE_RAD = (0.5 * math.pi, -0.5 * math.pi, 0.25 * math.pi, -0.25 * math.pi)
@@ -121,9 +124,10 @@ def avoided(
 
     options = list(_on_the_way(outlook, command, line))
     for share in MARGIN_SHARES:
-        for option in options:
-            if room_m(option, share) >= 0.0:
-                return option
+        good = [option for option in options if room_m(option, share) >= 0.0]
+        if good:
+            positions = (option for option in good if isinstance(option.command.setpoint, GuidedPosition))
+            return next((one for one in positions if _may_be_the_last(one.command, view, discs)), good[0])
     turns_on_the_spot = view.rover.turning_radius_m == 0.0
     for option in _out_of_the_way(outlook, moving, aside_rad) if turns_on_the_spot else _on_arcs(outlook):
         if room_m(option, MARGIN_SHARES[-1]) >= 0.0:
@@ -137,6 +141,20 @@ def avoided(
     late = [(option, near) for option, near in ends if near.first_s >= latest_s - AS_LATE_S]
     kept = [option for option, _ in late if aside_rad is not None and option.aside_rad == aside_rad]
     return kept[0] if kept else min(late, key=lambda one: one[1].closing_m_s)[0]
+
+
+def _may_be_the_last(command: ControlCommand, view: LocalView, discs: Points) -> bool:
+    """Whether nothing comes to the position that is told for a while, if the rover is left alone with it."""
+    assert isinstance(command.setpoint, GuidedPosition)
+    here, there = view.pose.point, command.setpoint.point
+    times_s = np.arange(0.0, ALONE_S, 2.0 * PERIOD_S)
+    along_m = np.minimum(Outlook(view, times_s).driven_m(command.speed_m_s, math.inf), here.distance_m(there))
+    bearing_rad = here.bearing_rad(there)
+    places = np.column_stack(
+        (here.north_m + along_m * math.cos(bearing_rad), here.east_m + along_m * math.sin(bearing_rad))
+    )
+    margins_m = np.full(len(times_s), MARGIN_SHARES[-1] * view.settings.traffic.margin_m)
+    return least_room_m(places, discs, times_s, margins_m) >= 0.0
 
 
 class CollisionAvoidance:

@@ -48,6 +48,23 @@ class InverseSensorModel(NamedTuple):
 
 
 @njit(cache=True, nogil=True)
+def _chord(scan, i, share):
+    """How far a beam is free beside its middle, where the beam next to it ends nearer: to the line between both ends.
+
+    ``share``: how far beside, in beam widths, clockwise positive. Along a wall seen at a grazing angle the ends of wide
+    beams lie far apart, and the wall between them.
+    """
+    bearing_rad, range_cells, width_rad = scan.bearing_rad, scan.range_cells, scan.beam_width_rad
+    other = (i + (1 if share > 0.0 else -1)) % bearing_rad.size
+    apart_rad = abs((bearing_rad[other] - bearing_rad[i] + math.pi) % (2.0 * math.pi) - math.pi)
+    own, its = min(range_cells[i], scan.max_cells), min(range_cells[other], scan.max_cells)
+    if math.isnan(range_cells[other]) or its >= own or abs(apart_rad - width_rad) > 0.25 * width_rad:
+        return math.inf
+    aside_rad = abs(share) * apart_rad
+    return own * its * math.sin(apart_rad) / (own * math.sin(aside_rad) + its * math.sin(apart_rad - aside_rad))
+
+
+@njit(cache=True, nogil=True)
 def cast_scan(log_odds, stamps, stamp, scan, model, protected, radius_cells):
     """Add one scan to the evidence, and free the cells within ``radius_cells`` of the sensor, where the rover stands.
 
@@ -76,11 +93,13 @@ def cast_scan(log_odds, stamps, stamp, scan, model, protected, radius_cells):
         reach = scan.max_cells if math.isinf(r) else r - 0.5 - model.kept_cells
         rays = max(1, int(math.ceil(reach * width_rad)))
         for k in range(rays):
-            angle = heading_rad + bearing_rad[i] + width_rad * ((k + 0.5) / rays - 0.5)
+            share = (k + 0.5) / rays - 0.5
+            angle = heading_rad + bearing_rad[i] + width_rad * share
             dx = math.sin(angle)
             dy = math.cos(angle)
+            free = min(reach, _chord(scan, i, share) - 0.5)
             d = 0.0
-            while d < reach:
+            while d < free:
                 x = int(math.floor(x0 + d * dx))
                 y = int(math.floor(y0 + d * dy))
                 d += 0.7

@@ -123,6 +123,17 @@ def test_where_every_way_would_touch_it_brakes_and_does_not_waver(seed: int) -> 
         assert made(walker, 1.87).command.setpoint == GuidedVelocity(0.0, 0.0)
 
 
+def test_the_place_at_which_it_may_be_left_alone_is_not_in_the_way_of_something() -> None:
+    """It may go on and will be past in time, but the position that it would be told lies in the other's way."""
+    coming = Moving("m", 100.0, NedPoint(28.0, 31.0), 0.0, -0.9, 0.7)
+    for speed_m_s in (1.0, 1.9):
+        told = made(coming, speed_m_s).command
+        assert told.purpose is Purpose.DRIVE and isinstance(told.setpoint, GuidedPosition)
+        assert told.setpoint.point.north_m < 28.0 - 0.7 - ROVER.radius_m
+    beyond = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(30.5, 20.0)), 2.0)
+    assert made(coming, 1.9, now=beyond).command == beyond
+
+
 def test_to_look_about_it_does_not_stay_where_something_comes() -> None:
     """It may be left alone with that message: a forklift that is 7 s away counts."""
     coming = Moving("m", 100.0, NedPoint(20.0, 26.5), 0.0, -0.8, 0.7)
