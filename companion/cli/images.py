@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
 from companion.cli.inputs import OutputError, written
+from companion.control.motion_controller import MotionChoice
+from companion.control.motion_kernels import BLOCKED_S, MotionGround, MotionProblem, way_of
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.planning.problem import Path as GridPath
 from companion.replay.explain import Candidate, Explanation, cost_text
@@ -158,6 +160,74 @@ def _rover(pen: ImageDraw.ImageDraw, why: Explanation, scale: int) -> None:
         [(x + r * math.sin(pose.heading_rad + turn), y - r * math.cos(pose.heading_rad + turn)) for r, turn in corners],
         START_COLOUR,
     )
+
+
+MOTIONS_M = 6.0
+"""So far round the rover the picture of motions reaches."""
+TOUCHING_COLOUR, CHEAP_COLOUR, DEAR_COLOUR = (235, 160, 155), (40, 110, 200), (190, 215, 240)
+
+
+def save_motions(file: Path, choice: MotionChoice, title: str) -> None:
+    """Write an image of the motions that were judged; the suffix decides the format. Raises OutputError."""
+    try:
+        draw_motions(choice, title).save(file)
+    except OSError as error:
+        raise OutputError(f"{file}: cannot be written: {error.strerror or error}") from error
+
+
+def draw_motions(choice: MotionChoice, title: str) -> Image.Image:
+    """The ground round the rover; the motions from dear to cheap, those that touch something below; the chosen one."""
+    problem, costs_s = choice.problem, choice.found.costs_s
+    ground, start = problem.ground, problem.start
+    scale = SIDE_PIXELS / (2.0 * MOTIONS_M)
+    picture = _round(ground, start.x_m, start.y_m)
+    pen = ImageDraw.Draw(picture)
+
+    def line(motion: Line, colour: tuple[int, int, int], width: int) -> None:
+        way = way_of(motion, problem) - (start.x_m, start.y_m)
+        pen.line([(SIDE_PIXELS / 2 + x * scale, SIDE_PIXELS / 2 - y * scale) for x, y in way.tolist()], colour, width)
+
+    order = np.argsort(costs_s)[::-1]
+    free = order[costs_s[order] < BLOCKED_S]
+    for one in order[costs_s[order] >= BLOCKED_S]:
+        line(choice.found.judged[one], TOUCHING_COLOUR, 2)
+    for share, one in zip(np.linspace(0.0, 1.0, len(free)), free, strict=True):
+        dear, cheap = np.array(DEAR_COLOUR), np.array(CHEAP_COLOUR)
+        red, green, blue = (dear + share**3 * (cheap - dear)).astype(int).tolist()
+        line(choice.found.judged[one], (red, green, blue), 3)
+    line(choice.found.motion, TAKEN_COLOUR, 7)
+    _body(pen, problem, scale)
+    entries: list[Entry] = [(f"chosen: cost {choice.found.cost_s:.2f} s", TAKEN_COLOUR), ("cheap", CHEAP_COLOUR)]
+    entries += [("dear", DEAR_COLOUR), ("touches something", TOUCHING_COLOUR), ("rover", START_COLOUR)]
+    entries += [("obstacle", OBSTACLE_COLOUR), ("not seen yet, or off the ground looked at", UNSEEN_COLOUR)]
+    return _page(picture, f"{title}: {2.0 * MOTIONS_M:g} m, {len(order)} motions of {problem.horizon_s:g} s", entries)
+
+
+def _round(ground: MotionGround, x_m: float, y_m: float) -> Image.Image:
+    """The ground round a place, north up: obstacles, unseen, free."""
+    height, width = ground.gap_m.shape
+    side = np.linspace(-MOTIONS_M, MOTIONS_M, SIDE_PIXELS, endpoint=False) + MOTIONS_M / SIDE_PIXELS
+    columns = np.floor((x_m + side) / ground.cell_m).astype(int)
+    rows = np.floor((y_m + side[::-1]) / ground.cell_m).astype(int)
+    inside = ((rows >= 0) & (rows < height))[:, None] & ((columns >= 0) & (columns < width))[None, :]
+    at = np.ix_(np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1))
+    pixels = np.full((SIDE_PIXELS, SIDE_PIXELS, 3), 250, np.uint8)
+    pixels[(ground.seen_m[at] <= 0.0) | ~inside] = UNSEEN_COLOUR
+    pixels[(ground.gap_m[at] <= 0.0) & inside] = OBSTACLE_COLOUR
+    return Image.fromarray(pixels)
+
+
+def _body(pen: ImageDraw.ImageDraw, problem: MotionProblem, scale: float) -> None:
+    """The discs that cover the rover's outline, and where it points."""
+    body, heading_rad = problem.body, problem.start.heading_rad
+    radius = body.radius_m * scale
+    for ahead_m in body.ahead_m.tolist():
+        x = SIDE_PIXELS / 2 + ahead_m * math.sin(heading_rad) * scale
+        y = SIDE_PIXELS / 2 - ahead_m * math.cos(heading_rad) * scale
+        pen.ellipse((x - radius, y - radius, x + radius, y + radius), None, START_COLOUR, 3)
+    nose = body.around_m * scale
+    tip = (SIDE_PIXELS / 2 + nose * math.sin(heading_rad), SIDE_PIXELS / 2 - nose * math.cos(heading_rad))
+    pen.line([(SIDE_PIXELS / 2, SIDE_PIXELS / 2), tip], START_COLOUR, 5)
 
 
 def _page(picture: Image.Image, title: str, entries: list[Entry]) -> Image.Image:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from companion.cli.images import save_decision
+from companion.cli.images import save_decision, save_motions
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture
 from companion.mapping.map_files import MapError
 from companion.recording.reader import Record, load_record
@@ -61,6 +61,10 @@ def _explain(explainer: DecisionExplainer, image: Path) -> None:
         typer.echo(line)
     save_decision(image, explainer.explanation)
     typer.echo(f"picture: {image}")
+    if (choice := explainer.explanation.motions) is not None:
+        beside = image.with_name(f"{image.stem}-motions{image.suffix}")
+        save_motions(beside, choice, f"after decision {explainer.explanation.number}")
+        typer.echo(f"picture of the motions: {beside}")
 
 
 def _print(record: Record, result: ReplayResult) -> None:

@@ -9,6 +9,7 @@ Nouns: motion controller.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,11 +28,12 @@ from companion.control.motion_kernels import (
     may_be_last,
     spare_m,
 )
-from companion.control.motion_planners import MotionPlanner
+from companion.control.motion_planners import Found, MotionPlanner
 from companion.control.reference_path import ReferencePath
 from companion.control.setpoint_check import velocity_stops_in_time
 from companion.control.told import ToldVelocity, in_force
 from companion.core.footprint import Footprint
+from companion.core.frames import NedPoint
 from companion.mission.bounds import Bounds
 from companion.vehicle.commands import GuidedVelocity
 
@@ -60,6 +62,17 @@ PLANNED_SHARE = 0.8
 """Motions are planned with so much of the braking there should be, so that the last look seldom says no."""
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class MotionChoice:
+    """What was judged in one tick, and what was told then. Places: metres east and north of ``corner``."""
+
+    time_s: float
+    problem: MotionProblem
+    found: Found
+    told: ToldVelocity
+    corner: NedPoint
+
+
 class MotionController:
     """Remembers the ground it looked at, and when the rover could last be left alone with what it was told."""
 
@@ -72,8 +85,8 @@ class MotionController:
         self._planner = planner
         self._window: Window | None = None
         self._looked_s = self._safe_s = self._time_s = -math.inf
-        self.cost_s = math.nan
-        """Of the motion under way."""
+        self.choice: MotionChoice | None = None
+        """The last one."""
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The path itself."""
@@ -94,8 +107,10 @@ class MotionController:
         problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
             return stop_for(Purpose.BLOCKED)
-        motion, self.cost_s = self._planner.plan(problem, passed_s)
-        told = self._safe(motion[0], view, worst)
+        found = self._planner.plan(problem, passed_s)
+        told = self._safe(found.motion[0], view, worst)
+        assert self._window is not None
+        self.choice = MotionChoice(now_s, problem, found, told, self._window.corner)
         if abs(told.speed_m_s) < 1e-6:
             if view.speed_m_s > STANDS_M_S:
                 return ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, told.turn_rad_s), 0.0)

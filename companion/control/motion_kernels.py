@@ -280,6 +280,25 @@ def _off_course_rad(ground, x_m, y_m, heading_rad):
 
 
 @njit(cache=True, nogil=True)
+def way_of(knots, problem):
+    """Where a motion leads: x and y of each step, from where the rover is now on; also through obstacles."""
+    start, pending, step_s = problem.start, problem.pending, problem.step_s
+    state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
+    early = pending.shape[0]
+    steps = early + int(round(problem.horizon_s / step_s))
+    way = np.empty((steps + 1, 2))
+    way[0, 0], way[0, 1] = start.x_m, start.y_m
+    for step in range(steps):
+        if step < early:
+            told_m_s, told_rad_s = pending[step, 0], pending[step, 1]
+        else:
+            told_m_s, told_rad_s = told_at(knots, (step - early) * step_s / problem.horizon_s)
+        state = moved(state, told_m_s, told_rad_s, problem.model, step_s)
+        way[step + 1, 0], way[step + 1, 1] = state[0], state[1]
+    return way
+
+
+@njit(cache=True, nogil=True)
 def costs_s(motions, problem):
     """The costs of motions, shape (m, n, 2)."""
     costs = np.empty(motions.shape[0])

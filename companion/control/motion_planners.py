@@ -9,7 +9,7 @@ Nouns: motion planner.
 from __future__ import annotations
 
 from enum import StrEnum
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,11 +37,20 @@ class MotionKind(StrEnum):
     MPPI = "mppi"
 
 
+class Found(NamedTuple):
+    """The motion to begin, shape (n, 2), its cost in seconds, and the motions that were judged last, with theirs."""
+
+    motion: Motions
+    cost_s: float
+    judged: Motions
+    costs_s: NDArray[np.float64]
+
+
 class MotionPlanner(Protocol):
     """Finds the motion to begin now."""
 
-    def plan(self, problem: MotionProblem, passed_s: float) -> tuple[Motions, float]:
-        """One motion, shape (n, 2), and its cost in seconds. ``passed_s``: since the last call."""
+    def plan(self, problem: MotionProblem, passed_s: float) -> Found:
+        """What is found. ``passed_s``: since the last call."""
         ...
 
     def forget(self) -> None:
@@ -63,7 +72,7 @@ class MotionGa:
         self._motions = np.zeros((self.POPULATION, KNOTS, 2))
         self._costs = np.zeros(self.POPULATION)
 
-    def plan(self, problem: MotionProblem, passed_s: float) -> tuple[Motions, float]:
+    def plan(self, problem: MotionProblem, passed_s: float) -> Found:
         """See ``MotionPlanner``."""
         motions, rng = self._motions, self._rng
         begin_later(motions, passed_s / problem.horizon_s)
@@ -79,7 +88,7 @@ class MotionGa:
             next_generation(motions, costs, self.POPULATION // 4, chance, kick, self.SIZES, problem)
         self._costs = costs
         found = int(np.argmin(costs))
-        return motions[found].copy(), float(costs[found])
+        return Found(motions[found].copy(), float(costs[found]), motions.copy(), costs.copy())
 
     def forget(self) -> None:
         """See ``MotionPlanner``."""
@@ -92,7 +101,7 @@ class DynamicWindow:
     WINDOW_S = 0.5
     SPEEDS, TURNS = 9, 21
 
-    def plan(self, problem: MotionProblem, passed_s: float) -> tuple[Motions, float]:
+    def plan(self, problem: MotionProblem, passed_s: float) -> Found:
         """See ``MotionPlanner``."""
         model, start = problem.model, problem.start
         slower, faster = model.decel_m_s2 * self.WINDOW_S, model.accel_m_s2 * self.WINDOW_S
@@ -104,7 +113,7 @@ class DynamicWindow:
         keep_all_within(motions, problem)
         costs = costs_s(motions, problem)
         found = int(np.argmin(costs))
-        return motions[found], float(costs[found])
+        return Found(motions[found], float(costs[found]), motions, costs)
 
     def forget(self) -> None:
         """See ``MotionPlanner``."""
@@ -122,7 +131,7 @@ class Mppi:
         self._rng = np.random.default_rng(seed)
         self._mean = np.zeros((1, KNOTS, 2))
 
-    def plan(self, problem: MotionProblem, passed_s: float) -> tuple[Motions, float]:
+    def plan(self, problem: MotionProblem, passed_s: float) -> Found:
         """See ``MotionPlanner``."""
         begin_later(self._mean, passed_s / problem.horizon_s)
         motions = self._mean + self.SIZES * self._rng.standard_normal((self.SAMPLES, KNOTS, 2))
@@ -131,7 +140,7 @@ class Mppi:
         costs = costs_s(motions, problem)
         weights = np.exp(-(costs - costs.min()) / self.TEMPERATURE_S)
         self._mean = np.einsum("m,mnc->nc", weights / weights.sum(), motions)[None]
-        return self._mean[0].copy(), float(costs_s(self._mean, problem)[0])
+        return Found(self._mean[0].copy(), float(costs_s(self._mean, problem)[0]), motions, costs)
 
     def forget(self) -> None:
         """See ``MotionPlanner``."""

@@ -129,6 +129,11 @@ class GoalDriver:
         self._recovery = StuckRecovery()
 
     @property
+    def controller(self) -> Controller:
+        """What leads the rover along the path."""
+        return self._controller
+
+    @property
     def nav_state(self) -> NavState | None:
         """The navigator's state on this leg; None between legs."""
         return self._state

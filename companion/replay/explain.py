@@ -1,16 +1,21 @@
-"""Explains a decision during a replay: the map as it was known, every path that was considered, and its cost."""
+"""Explains a decision during a replay: the map as it was known, every path that was considered, and its cost.
+
+Where motions are planned, also the first motions that were judged after it.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
 from companion.app import Companion
+from companion.control.motion_controller import MotionChoice, MotionController
+from companion.control.motion_kernels import BLOCKED_S, way_of
 from companion.core.frames import Pose
 from companion.core.grid import Grid
 from companion.mapping.evidence_map import known_fields
@@ -60,6 +65,8 @@ class Explanation:
     weighed: Grid
     known: NDArray[np.bool_]
     candidates: tuple[Candidate, ...]
+    motions: MotionChoice | None = None
+    """None where no motions are planned, or none were before the next decision."""
 
 
 @dataclass
@@ -87,6 +94,9 @@ class DecisionExplainer(ReplayObserver):
         self._settings = settings
         self._turning_radius_m = turning_radius_m
         self._scene: _Scene | None = None
+        self._before: MotionChoice | None = None
+        self._open = False
+        """Whether motions may still be added."""
 
     def step_begins(self, companion: Companion) -> None:
         """Note what is known, and wrap the planner to see its answers."""
@@ -99,6 +109,7 @@ class DecisionExplainer(ReplayObserver):
 
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """Keep it if it is the decision to explain."""
+        self._open = False
         if number == self._number and self.explanation is None:
             scene = self._scene or self._noted(companion)
             if scene is None:
@@ -108,7 +119,14 @@ class DecisionExplainer(ReplayObserver):
                 number, time_s, target, decision, scene.pose, scene.state, scene.ground, scene.grid, scene.weighed,
                 scene.known, (*rest, *scene.candidates),
             )  # fmt: skip
+            self._before, self._open = _choice(companion), True
         self._scene = None
+
+    def ticked(self, companion: Companion, time_s: float) -> None:
+        """Keep the first motions that are judged after the decision."""
+        if self._open and self.explanation is not None and _choice(companion) is not self._before:
+            self.explanation = replace(self.explanation, motions=_choice(companion))
+            self._open = False
 
     def _noted(self, companion: Companion) -> _Scene | None:
         driver, evidence, pose = companion.driver, companion.evidence, companion.status().pose
@@ -122,6 +140,12 @@ class DecisionExplainer(ReplayObserver):
     def _add(self, candidate: Candidate) -> None:
         if self._scene is not None:
             self._scene.candidates.append(candidate)
+
+
+def _choice(companion: Companion) -> MotionChoice | None:
+    """The last choice of a controller that plans motions."""
+    controller = None if companion.driver is None else companion.driver.controller
+    return controller.choice if isinstance(controller, MotionController) else None
 
 
 def _rest_of_path(scene: _Scene) -> Candidate:
@@ -207,7 +231,41 @@ def explanation_lines(why: Explanation) -> list[str]:
         lines.append("  nothing was searched, and there was no path to follow")
     if decision.path:
         lines.append(_shares(why, np.asarray(decision.path)))
+    return lines if why.motions is None else [*lines, *motion_lines(why.motions)]
+
+
+RANKS = (0.0, 0.25, 0.5, 0.75, 1.0)
+"""Shares of the motions, by cost, of which the last is shown."""
+
+
+def motion_lines(choice: MotionChoice) -> list[str]:
+    """Motions that were judged, from the cheapest to the dearest, and what was told."""
+    costs_s = choice.found.costs_s
+    order, free = np.argsort(costs_s), int((costs_s < BLOCKED_S).sum())
+    last = len(order) - 1
+    lines = [
+        f"motions: {len(order)} judged, {choice.problem.horizon_s:g} s long, {free} of them touch nothing; their cost: "
+        "seconds until the end of the next metres of the path, with what is added for risk"
+    ]
+    for share in RANKS:
+        rank = round(share * last)
+        lines.append(f"  {rank + 1:4d}. {_motion_text(choice, order[rank])}")
+    told = choice.told
+    lines.append(
+        f"chosen: cost {choice.found.cost_s:.2f} s; told: {told.speed_m_s:.2f} m/s, "
+        f"{math.degrees(told.turn_rad_s):.0f} deg/s"
+    )
     return lines
+
+
+def _motion_text(choice: MotionChoice, one: int) -> str:
+    """Cost, first and last command, and where a motion leads."""
+    motion, cost_s = choice.found.judged[one], float(choice.found.costs_s[one])
+    way = way_of(motion, choice.problem)
+    far_m = float(np.hypot(*(way[-1] - way[0])))
+    cost = "touches something" if cost_s >= BLOCKED_S else f"cost {cost_s:.2f} s"
+    begins, ends = (f"{speed:.2f} m/s, {math.degrees(turn):.0f} deg/s" for speed, turn in motion[[0, -1]])
+    return f"{cost}: begins with {begins}, ends with {ends}, {far_m:.1f} m away"
 
 
 def cost_text(candidate: Candidate) -> str:

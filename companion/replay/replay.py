@@ -218,6 +218,9 @@ class ReplayObserver:
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """A decision was made. ``number`` counts from 1, ``time_s`` from the beginning of the run."""
 
+    def ticked(self, companion: Companion, time_s: float) -> None:
+        """A tick is over. ``time_s``: since the beginning of the run."""
+
 
 def replay(record: Record, observer: ReplayObserver | None = None) -> ReplayResult:
     """Run the companion of a record again. Raises RecordError if the record is damaged."""
@@ -241,7 +244,7 @@ def replay(record: Record, observer: ReplayObserver | None = None) -> ReplayResu
     player.result.companion = companion
     try:
         while not companion.done and _tick(companion, player):
-            pass
+            notified.ticked(companion, player.result.seconds)
     except EndOfRecordError:
         pass
     player.end()

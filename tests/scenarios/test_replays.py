@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from companion.app import Companion
 from companion.cli.commands import app
-from companion.cli.images import FREE_COLOUR
+from companion.cli.images import CHEAP_COLOUR, FREE_COLOUR, START_COLOUR, TAKEN_COLOUR, UNSEEN_COLOUR
 from companion.core.tick_marks import Mark
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -260,6 +260,23 @@ def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
     assert {(214, 60, 50), (40, 110, 200), (150, 120, 90), FREE_COLOUR} <= colours
     late = CliRunner().invoke(app, ["replay", str(record), "--why", "100000"])
     assert late.exit_code == 2 and "the last one is" in late.output
+
+
+def test_why_shows_the_motions_that_were_judged(tmp_path: Path) -> None:
+    (tmp_path / "s.toml").write_text('[guidance]\ncontroller = "motion-ga"\n')
+    command = ["drive", str(MISSIONS / "one-obstacle.toml"), "--settings", str(tmp_path / "s.toml"), "--seed", "2"]
+    CliRunner().invoke(sitl_app, [*command, "--time-limit-s", "50", "--record", str(tmp_path / "r")])
+    number = len(load_record(tmp_path / "r").decisions) // 2
+    result = CliRunner().invoke(app, ["replay", str(tmp_path / "r"), "--why", str(number)])
+    assert result.exit_code == 0, result.output
+    judged = result.output.partition("motions: ")[2].splitlines()
+    assert judged[0].startswith("64 judged, 2.5 s long")
+    costs = [float(line.partition("cost ")[2].partition(" s")[0]) for line in judged[1:6] if "cost " in line]
+    assert costs and costs == sorted(costs)
+    assert f"chosen: cost {costs[0]:.2f} s; told: " in result.output
+    with Image.open(tmp_path / "r" / f"why-{number}-motions.png") as image:
+        colours = {colour for _, colour in image.convert("RGB").getcolors(1 << 20) or []}
+    assert {TAKEN_COLOUR, CHEAP_COLOUR, UNSEEN_COLOUR, START_COLOUR} <= colours
 
 
 def test_why_tells_the_seconds_since_the_beginning(copy: Path) -> None:

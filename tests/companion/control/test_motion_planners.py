@@ -18,7 +18,8 @@ def test_each_finds_a_way_on_and_none_into_a_wall(kind: MotionKind) -> None:
     for walls in ((), GAP):
         planner, ground = motion_planner(kind, 3), problem(*walls)
         for _ in range(10):
-            motion, found_s = planner.plan(ground, 0.0)
+            motion, found_s, judged, costs = planner.plan(ground, 0.0)
+        assert costs == pytest.approx([cost_s(one, ground) for one in judged])
         assert found_s == pytest.approx(cost_s(motion, ground))
         assert found_s < cost_s(np.zeros((6, 2)), ground) <= BLOCKED_S
 
@@ -31,7 +32,7 @@ def test_the_genetic_algorithm_is_nearest_to_the_best_through_a_gap() -> None:
         for kind, found in costs.items():
             planner = motion_planner(kind, seed)
             for _ in range(10):
-                found_s = planner.plan(ground, 0.0)[1]
+                found_s = planner.plan(ground, 0.0).cost_s
             found.append(found_s)
     ga, dwa, mppi = (np.array(costs[kind]) for kind in (MotionKind.GA, MotionKind.DWA, MotionKind.MPPI))
     assert (ga <= dwa + 1e-9).all() and ga.mean() < dwa.mean() - 0.1 and ga.mean() <= mppi.mean()
