@@ -25,6 +25,8 @@ BACK_LEAST_M_S = 0.2
 """The rover does not back out at all where there is only room to do so slower than this."""
 ROLLED_M = 0.05
 """Targets along the path are chosen in steps of this; the rover's front may lie beyond seen ground by as much."""
+UNSURE_M = 0.1
+"""An obstacle far ahead may stand, and ground that was seen may end, so much nearer: position and range are noisy."""
 FLANK_M, FLANK_NEAR_M = 0.05, 0.2
 """So far beside the rover the ground must have been seen, from so far before it on: no sensor sees nearer."""
 
@@ -118,6 +120,7 @@ class _Search:
             room=room_m,
             overshoot=self._view.settings.guidance.overshoot_m,
             held=self._view.further_m,
+            unsure=UNSURE_M,
             flank=radius_m + FLANK_M,
             near=radius_m + FLANK_NEAR_M,
             slack=ROLLED_M,

@@ -16,11 +16,12 @@ from companion.mapping.evidence_kernels import first_unseen, look
 class Stopping(NamedTuple):
     """How the rover comes to a target and stands.
 
-    ``radius``: of the rover. ``map_radius``: of the rover that the map was made for. ``room``: kept beside it on the
-    way. ``overshoot``: at most so far beyond the target it stands, and at most a tenth of the distance. ``held``: so
-    much farther, whatever the distance, because the ground holds it. ``flank``: so far beside the middle the ground
-    must have been seen, from ``near`` on. ``slack``: lengths that differ by less are equal. ``edge``: left between a
-    place and the edge of the map.
+    ``radius``: of the rover. ``map_radius``: of the rover that the map was made for. ``room``: kept beside it on
+    the way. ``overshoot``: at most so far beyond the target it stands, and at most a tenth of the distance.
+    ``held``: so much farther, whatever the distance, because the ground holds it. ``unsure``: an obstacle may
+    stand, and ground that was seen may end, so much nearer than on the map. ``flank``: so far beside the middle the
+    ground must have been seen, from ``near`` on. ``slack``: lengths that differ by less are equal. ``edge``: left
+    between a place and the edge of the map.
     """
 
     radius: float
@@ -28,6 +29,7 @@ class Stopping(NamedTuple):
     room: float
     overshoot: float
     held: float
+    unsure: float
     flank: float
     near: float
     slack: float
@@ -54,9 +56,15 @@ def may_stop_at(ground, start, target, stopping):
     # The flanks first: with thin beams they fail most often.
     if first_unseen(ground.log_odds, start, stands, stopping.flank, stopping.near)[0] < length - 1e-6:
         return False
-    if min(_look(ground, start, stands, stopping.radius, stopping)) < length - stopping.slack:
+    if _look(ground, start, stands, stopping.radius, stopping)[1] < length - stopping.slack:
         return False
-    front = moved_within_map(ground, stands, ahead, stopping.radius, stopping.edge)
+    unsure = min(stopping.unsure, 0.05 * distance)
+    # A cell counts by its middle, and what it stands for may begin half a cell before.
+    beyond = moved_within_map(ground, target, ahead, overshoot + unsure + 0.5, stopping.edge)
+    length = math.hypot(beyond[0] - start[0], beyond[1] - start[1])
+    if _look(ground, start, beyond, stopping.radius, stopping)[0] < length - 1e-6:
+        return False
+    front = moved_within_map(ground, stands, ahead, stopping.radius + unsure, stopping.edge)
     seen = _look(ground, stands, front, 0.0, stopping)[1]
     return seen >= math.hypot(front[0] - stands[0], front[1] - stands[1]) - stopping.slack
 

@@ -12,7 +12,7 @@ from companion.mapping.reach_kernels import Stopping, first_to_stop_at, may_stop
 
 HEIGHT, WIDTH = 64, 48
 STOPPING = Stopping(
-    radius=2.0, map_radius=2.0, room=0.0, overshoot=1.0, held=0.0, flank=2.2, near=3.0, slack=0.2, edge=0.04
+    radius=2.0, map_radius=2.0, room=0.0, overshoot=1.0, held=0.0, unsure=0.0, flank=2.2, near=3.0, slack=0.2, edge=0.04
 )  # fmt: skip
 START = (24.0, 10.0)
 
@@ -45,6 +45,18 @@ def test_the_front_comes_to_stand_on_seen_ground_overshoot_included() -> None:
     # Radius 2 and overshoot 1 beyond the target; 0.2 is forgiven.
     assert may_stop_at(seen(40), START, (24.0, 37.0), STOPPING)
     assert not may_stop_at(seen(40), START, (24.0, 37.5), STOPPING)
+
+
+def test_what_stands_or_ends_far_ahead_may_do_so_nearer_than_on_the_map() -> None:
+    unsure = STOPPING._replace(unsure=0.8)
+    assert may_stop_at(seen(40), START, (24.0, 36.3), unsure)
+    assert not may_stop_at(seen(40), START, (24.0, 36.5), unsure)
+    ground = seen()
+    ground.log_odds[40, 24] = 3.0  # from 40 on: radius, overshoot and half a cell are kept from it
+    assert may_stop_at(ground, START, (24.0, 36.4), STOPPING)
+    assert not may_stop_at(ground, START, (24.0, 36.7), STOPPING)
+    assert may_stop_at(ground, START, (24.0, 35.6), unsure)
+    assert not may_stop_at(ground, START, (24.0, 35.9), unsure)
 
 
 def test_an_obstacle_in_the_room_that_is_asked_for_refuses_it() -> None:
