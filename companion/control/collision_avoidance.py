@@ -6,8 +6,8 @@ room. If all would touch something, those count that go well for longest: the ro
 already, else it takes the one with which the two would meet at the lowest speed.
 
 The rover stops before the way of others, since going on is allowed only while there still is somewhere to stop; and it
-waits there until going on is safe again. Of positions that are as good the first is told at which nothing would meet a
-rover that is left alone with it. Each option says what the autopilot would be told and where the rover would
+waits there until going on is safe again. Of positions that are as good the first is told with which a rover that is
+left alone is not met, if there is one. Each option says what the autopilot would be told and where the rover would
 then be at each moment; the ground there must be clear and seen.
 
 Nouns: collision avoidance, yielding.
@@ -51,6 +51,8 @@ NEAR_M = 0.15
 """If every option touches something in the end, the option is taken that comes within this distance latest."""
 AS_LATE_S = 0.5
 """Those that come within it up to so much earlier count as well."""
+AS_SLOW_M_S = 0.15
+"""Speeds at which the two meet that differ by less are equal; then it stops or backs off."""
 GO_ON_S = (math.inf, 3.0, 1.5, 0.4)
 """How long the rover might go on before it stops, the longest first: 0.4 s is longer than to the next tick."""
 ALONE_S = 15.0
@@ -140,14 +142,23 @@ def avoided(
     latest_s = max(near.first_s for _, near in ends)
     late = [(option, near) for option, near in ends if near.first_s >= latest_s - AS_LATE_S]
     kept = [option for option, _ in late if aside_rad is not None and option.aside_rad == aside_rad]
-    return kept[0] if kept else min(late, key=lambda one: one[1].closing_m_s)[0]
+    if kept:
+        return kept[0]
+    slowest_m_s = min(near.closing_m_s for _, near in late)
+    return min((option for option, near in late if near.closing_m_s <= slowest_m_s + AS_SLOW_M_S), key=_told_m_s)
+
+
+def _told_m_s(option: Option) -> float:
+    """The speed that is told; inf for a position, which tells the rover to go on."""
+    setpoint = option.command.setpoint
+    return setpoint.forward_m_s if isinstance(setpoint, GuidedVelocity) else math.inf
 
 
 def _may_be_the_last(command: ControlCommand, view: LocalView, discs: Points) -> bool:
-    """Whether nothing comes to the position that is told for a while, if the rover is left alone with it."""
+    """Whether the rover, left alone with the position that is told, is not met on the way or there for ``ALONE_S``."""
     assert isinstance(command.setpoint, GuidedPosition)
     here, there = view.pose.point, command.setpoint.point
-    times_s = np.arange(0.0, ALONE_S, 2.0 * PERIOD_S)
+    times_s = np.arange(0.0, ALONE_S, PERIOD_S)
     along_m = np.minimum(Outlook(view, times_s).driven_m(command.speed_m_s, math.inf), here.distance_m(there))
     bearing_rad = here.bearing_rad(there)
     places = np.column_stack(

@@ -36,14 +36,17 @@ def braked_m(speed_m_s: float, times_s: Points, settings: GuidanceSettings) -> P
 def driven_m(speed_m_s: float, goal_m_s: float, goes_s: float, times_s: Points, settings: GuidanceSettings) -> Points:
     """How far it has driven at each moment when it goes on at the speed ``goal_m_s``, and stops after ``goes_s``."""
     rate = settings.deceleration_m_s2
+    slows_s = np.maximum(times_s - settings.brake_delay_s, 0.0)
     fastest = (
-        np.minimum(goal_m_s, speed_m_s + rate * times_s) if goal_m_s > speed_m_s else np.full(times_s.shape, goal_m_s)
+        np.minimum(goal_m_s, speed_m_s + rate * times_s)
+        if goal_m_s > speed_m_s
+        else np.maximum(goal_m_s, speed_m_s - rate * slows_s)
     )
     going = times_s <= goes_s
     after_s = np.maximum(times_s - goes_s - settings.brake_delay_s, 0.0)
     slowed = np.maximum(float(fastest[going][-1]) - rate * after_s, 0.0)
     speeds = np.where(going, fastest, slowed)
-    return np.concatenate(([0.0], np.cumsum((speeds[1:] + speeds[:-1]) / 2.0 * PERIOD_S)))
+    return np.concatenate(([0.0], np.cumsum((speeds[1:] + speeds[:-1]) / 2.0 * np.diff(times_s))))
 
 
 def places_ahead(pose: Pose, along_m: Points) -> Points:

@@ -34,7 +34,6 @@ OVERRUN_M = 0.3
 """A rover that stands so far beyond the last position may not have reached it, for the autopilot."""
 STANDS_M_S = 0.1
 CREEPS_M = 0.1
-NO_NEARER_M = 0.01
 """It does not creep less far."""
 ANEW_S = 0.15
 """Longer than the 0.1 s after which ArduRover shapes a position target from where the rover is."""
@@ -244,9 +243,10 @@ def _stops_before(distance_m: float, bearing_rad: float, view: LocalView) -> flo
     pose, beyond_m = view.pose, overshoot_m(distance_m, view)
     there = pose.point.moved(bearing_rad, distance_m + beyond_m)
     radius_m = view.rover.radius_m
-    # No nearer to a wall than it stands: the position may be wrong by some centimetres.
+    # No nearer to a wall than it stands, to half a cell of the map: the position may be wrong by some centimetres.
     room_m = ArcQueries(view.evidence, pose).kept_room_m(radius_m + view.settings.guidance.clearance_m, radius_m)
-    clear_m = look_along(view.evidence, pose.point, there, max(room_m - NO_NEARER_M, radius_m)).clear_m
+    half_width_m = max(room_m - 0.5 * view.evidence.evidence_m, radius_m)
+    clear_m = look_along(view.evidence, pose.point, there, half_width_m).clear_m
     return min(distance_m, clear_m - beyond_m)
 
 

@@ -55,11 +55,17 @@ def _chord(scan, i, share):
     beams lie far apart, and the wall between them.
     """
     bearing_rad, range_cells, width_rad = scan.bearing_rad, scan.range_cells, scan.beam_width_rad
-    other = (i + (1 if share > 0.0 else -1)) % bearing_rad.size
-    apart_rad = abs((bearing_rad[other] - bearing_rad[i] + math.pi) % (2.0 * math.pi) - math.pi)
+    for step in (1, -1):
+        other = (i + step) % bearing_rad.size
+        aside_rad = (bearing_rad[other] - bearing_rad[i] + math.pi) % (2.0 * math.pi) - math.pi
+        if aside_rad * share > 0.0:
+            break
+    apart_rad = abs(aside_rad)
     own, its = min(range_cells[i], scan.max_cells), min(range_cells[other], scan.max_cells)
-    if math.isnan(range_cells[other]) or its >= own or abs(apart_rad - width_rad) > 0.25 * width_rad:
+    if math.isnan(range_cells[other]) or its >= own or its <= 0.0:
         return math.inf
+    if aside_rad * share <= 0.0 or abs(apart_rad - width_rad) > 0.25 * width_rad:
+        return math.inf  # no beam next to it on this side
     aside_rad = abs(share) * apart_rad
     return own * its * math.sin(apart_rad) / (own * math.sin(aside_rad) + its * math.sin(apart_rad - aside_rad))
 

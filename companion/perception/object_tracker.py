@@ -47,8 +47,10 @@ DOUBT_M = 0.25
 """Added to the radius of a thing that is only seen: neither its place nor its size is exact."""
 LEAST_BEAMS = 8
 """A few thin beams cannot tell what moves from what the rover passes."""
-ALONE_M, ALONE_WIDEST_M = 0.8, 1.2
-"""A thing stands alone if the readings beside it lie this far behind it, and it is no wider."""
+ALONE_M, ALONE_NARROWEST_M, ALONE_WIDEST_M = 0.8, 0.25, 1.2
+"""A thing stands alone if the readings beside it lie this far behind it, and it is so wide: no post, no wall."""
+ALONE_DEPTH_M, ALONE_TOGETHER_M = 0.3, 0.3
+"""Its readings differ from one to the next by no more, and it is found again this near to where it is expected."""
 IN_RANGE_M = 0.3
 """... and so far inside the sensor's range: of a wall that comes into range more is seen with each scan."""
 FINE_RAD = math.radians(2.0)
@@ -86,8 +88,15 @@ class Sighting:
     east_m: float
     radius_m: float
     blur_m: float
+    seen_m: float
+    """How wide what is seen of it is."""
     on_free_ground: bool
     """Else it only stands alone."""
+
+    @property
+    def found_again_m(self) -> float:
+        """So near to where a thing is expected it is that one; of things that may stand the next is often not far."""
+        return TOGETHER_M if self.on_free_ground else ALONE_TOGETHER_M
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,9 +142,9 @@ class ObjectTracker:
             return
         ends, range_m = _ends(pose, scan)
         free = self._on_free_ground(ends, ROUND_M + 0.5 * scan.beam_width_rad * range_m)
-        counts = free | _whole_things(scan, free)
-        if counts.any() or self._tracks:
-            self._follow(pose.time_s, _things(ends[counts], free[counts], pose, scan.beam_width_rad))
+        things = _seen_things(ends, free, _alone(scan), pose, scan.beam_width_rad)
+        if things or self._tracks:
+            self._follow(pose.time_s, things)
 
     def remember(self, pose: Pose, reach_m: float) -> None:
         """Note what a scan just added to the map has shown to be free."""
@@ -170,7 +179,7 @@ class ObjectTracker:
         for track in self._tracks:
             expected = _expected(track, time_s)
             nearest = min(things, key=lambda one: math.dist((one.north_m, one.east_m), expected), default=None)
-            if nearest is None or math.dist((nearest.north_m, nearest.east_m), expected) > TOGETHER_M:
+            if nearest is None or math.dist((nearest.north_m, nearest.east_m), expected) > nearest.found_again_m:
                 if time_s - track.sightings[-1].time_s <= LOST_S:
                     tracks.append(track)
                 continue
@@ -212,7 +221,7 @@ def alone_in(beam_rad: float, range_m: Points, farthest_m: float) -> NDArray[np.
     first = 1
     while first < count - 1:
         last = first
-        while last + 1 < count and abs(range_m[last + 1] - range_m[last]) <= ALONE_M:
+        while last + 1 < count and abs(range_m[last + 1] - range_m[last]) <= ALONE_DEPTH_M:
             last += 1
         if math.isfinite(range_m[first]) and last < count - 1:
             own = range_m[first : last + 1]
@@ -224,27 +233,40 @@ def alone_in(beam_rad: float, range_m: Points, farthest_m: float) -> NDArray[np.
     return result
 
 
-def _whole_things(scan: RangeScan, free: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which of the readings that hit something are of a thing that stands alone and counts, with all of it.
-
-    "Alone" is enough for fine beams. Else a part must be on free ground (``free``, for each of those readings).
-    """
-    hit = np.isfinite(scan.range_m)
-    # In the order of bearings from straight behind on, so that what is ahead lies in one piece.
-    order = np.argsort(np.mod(scan.bearing_rad + math.pi, 2.0 * math.pi))
+def _alone(scan: RangeScan) -> NDArray[np.int64]:
+    """For each reading that hit something the number of the thing that stands alone to which it belongs; -1: none."""
+    bearings = np.mod(scan.bearing_rad + math.pi, 2.0 * math.pi)
+    order = np.argsort(bearings)
+    gaps = np.diff(bearings[order], prepend=bearings[order][-1] - 2.0 * math.pi)
+    if gaps.max() > 1.5 * scan.beam_width_rad:
+        order = np.roll(order, -int(np.argmax(gaps)))  # a fan begins and ends at its edges
     thing = np.empty(len(order), np.int64)
     thing[order] = alone_in(scan.beam_width_rad, scan.range_m[order], scan.max_range_m - IN_RANGE_M)
-    thing = thing[hit]
-    counts = thing >= 0
-    if scan.beam_width_rad > FINE_RAD:
-        for number in np.unique(thing[counts]):
-            own = thing == number
-            counts[own] = free[own].mean() >= PART_FREE
-    return counts
+    return thing[np.isfinite(scan.range_m)]
 
 
-def _things(points: Points, free: NDArray[np.bool_], pose: Pose, beam_width_rad: float) -> list[Sighting]:
-    """Readings that lie together, as discs: their middle lies behind what is seen of them."""
+def _seen_things(
+    ends: Points, free: NDArray[np.bool_], thing: NDArray[np.int64], pose: Pose, beam_width_rad: float
+) -> list[Sighting]:
+    """What may move: readings on free ground (``free``), things of which a part is, and with fine beams what is alone.
+
+    ``thing``: the number of the thing that stands alone to which a reading belongs; -1: none.
+    """
+    known, alone = free.copy(), []
+    for number in np.unique(thing[thing >= 0]):
+        own = thing == number
+        if free[own].mean() >= PART_FREE:
+            known[own] = True
+        elif beam_width_rad <= FINE_RAD and not free[own].any():
+            alone.append(ends[own])
+    groups = _groups(ends[known], free[known])
+    found = [_sighting(seen, pose, beam_width_rad, on_free_ground=on_free) for seen, on_free in groups]
+    found += [_sighting(seen, pose, beam_width_rad, on_free_ground=False) for seen in alone]
+    return [one for one in found if one.seen_m <= WIDEST_M and (one.on_free_ground or one.seen_m >= ALONE_NARROWEST_M)]
+
+
+def _groups(points: Points, free: NDArray[np.bool_]) -> list[tuple[Points, bool]]:
+    """Readings that lie together, and whether most of them are on free ground."""
     groups: list[list[int]] = []
     for i, point in enumerate(points):
         for group in groups:
@@ -253,19 +275,17 @@ def _things(points: Points, free: NDArray[np.bool_], pose: Pose, beam_width_rad:
                 break
         else:
             groups.append([i])
-    things = []
-    for rows in groups:
-        seen = points[rows]
-        middle = np.mean(seen, axis=0)
-        extent_m = 2.0 * float(max(math.dist(point, middle) for point in seen))
-        if extent_m > WIDEST_M:
-            continue
-        radius_m = max(extent_m / 2.0, LEAST_RADIUS_M)
-        away_rad = math.atan2(middle[1] - pose.east_m, middle[0] - pose.north_m)
-        behind_m = 0.7 * radius_m
-        north_m = float(middle[0]) + behind_m * math.cos(away_rad)
-        east_m = float(middle[1]) + behind_m * math.sin(away_rad)
-        blur_m = 0.5 * beam_width_rad * math.dist(middle, (pose.north_m, pose.east_m))
-        mostly_free = 2 * int(free[rows].sum()) >= len(rows)
-        things.append(Sighting(pose.time_s, north_m, east_m, radius_m, blur_m, mostly_free))
-    return things
+    return [(points[rows], 2 * int(free[rows].sum()) >= len(rows)) for rows in groups]
+
+
+def _sighting(seen: Points, pose: Pose, beam_width_rad: float, *, on_free_ground: bool) -> Sighting:
+    """Readings of one thing as a disc: its middle lies behind what is seen of it."""
+    middle = np.mean(seen, axis=0)
+    seen_m = 2.0 * float(max(math.dist(point, middle) for point in seen))
+    radius_m = max(seen_m / 2.0, LEAST_RADIUS_M)
+    away_rad = math.atan2(middle[1] - pose.east_m, middle[0] - pose.north_m)
+    behind_m = 0.7 * radius_m
+    north_m = float(middle[0]) + behind_m * math.cos(away_rad)
+    east_m = float(middle[1]) + behind_m * math.sin(away_rad)
+    blur_m = 0.5 * beam_width_rad * math.dist(middle, (pose.north_m, pose.east_m))
+    return Sighting(pose.time_s, north_m, east_m, radius_m, blur_m, seen_m, on_free_ground)

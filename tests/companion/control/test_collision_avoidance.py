@@ -123,6 +123,26 @@ def test_where_every_way_would_touch_it_brakes_and_does_not_waver(seed: int) -> 
         assert made(walker, 1.87).command.setpoint == GuidedVelocity(0.0, 0.0)
 
 
+@pytest.mark.parametrize("speed_m_s", [1.0, 1.5, 1.9])
+@pytest.mark.parametrize("gap_m", [0.05, 0.2, 0.6, 1.0])
+def test_told_to_go_slower_it_stops_before_what_comes_straight_at_it(speed_m_s: float, gap_m: float) -> None:
+    """Too near for anything: it must not go on to a position beyond the other only because it is told to slow down."""
+    towards = Moving("m", 100.0, NedPoint(20.0 + gap_m + 0.85, 20.0), -1.0, 0.0, 0.5)
+    slowly = ControlCommand(Purpose.DRIVE, GuidedPosition(NedPoint(24.0, 20.0)), 0.5)
+    setpoint = made(towards, speed_m_s, open_ground(0.45), slowly).command.setpoint
+    assert isinstance(setpoint, GuidedVelocity) and setpoint.forward_m_s <= 0.0
+
+
+def test_it_keeps_to_the_side_it_moves_to_where_every_way_would_touch() -> None:
+    near, standing = (
+        Moving("m", 100.0, NedPoint(21.4, 20.0), -0.8, 0.0, 0.7),
+        ControlCommand(Purpose.BLOCKED, GuidedVelocity(0.0, 0.0), 0.0),
+    )
+    for aside_rad in (0.5 * math.pi, -0.5 * math.pi):
+        option = avoided(standing, PATH, view(0.0), (near,), aside_rad=aside_rad)
+        assert option.aside_rad == aside_rad
+
+
 def test_the_place_at_which_it_may_be_left_alone_is_not_in_the_way_of_something() -> None:
     """It may go on and will be past in time, but the position that it would be told lies in the other's way."""
     coming = Moving("m", 100.0, NedPoint(28.0, 31.0), 0.0, -0.9, 0.7)

@@ -245,19 +245,27 @@ def test_noise_does_not_fill_the_free_side_of_a_wall(wide_sectors):
     assert free_side > 14.1 - HERE.north_m - 0.3
 
 
+@pytest.mark.parametrize("bearing_rad", [FULL_CIRCLE, -FULL_CIRCLE], ids=["clockwise", "counter-clockwise"])
 @pytest.mark.parametrize("phase_deg", [0.0, 1.0, 2.5, 4.0])
 @pytest.mark.parametrize("aside_m", [1.0, 2.2, 3.4])
-def test_a_wall_along_which_wide_beams_look_is_not_freed_between_their_ends(aside_m, phase_deg):
+def test_a_wall_along_which_wide_beams_look_is_not_freed_between_their_ends(aside_m, phase_deg, bearing_rad):
     """Ends of beams of 5 degrees lie up to a metre apart there, and a beam frees ground on both sides of its middle."""
     evidence, east_m = new_map(empty_grid(30, 20), RADIUS_M, SETTINGS), 10.0 + aside_m
     for step in range(40):
         pose = Pose(8.0 + 0.2 * step, 10.0, math.radians(phase_deg), 0.1 * step)
-        sine = np.sin(pose.heading_rad + FULL_CIRCLE)
+        sine = np.sin(pose.heading_rad + bearing_rad)
         range_m = np.where(sine > 1e-6, aside_m / np.maximum(sine, 1e-6), np.inf)
-        integrate(evidence, pose, scan(np.where(range_m < MAX_M, range_m, np.inf)), step + 1)
+        integrate(evidence, pose, scan(np.where(range_m < MAX_M, range_m, np.inf), bearing_rad), step + 1)
     inside = int(east_m * evidence.subdivisions) + 2
     assert (evidence.log_odds[:, inside:] >= 0.0).all()
     assert (evidence.log_odds[8 * evidence.subdivisions : 16 * evidence.subdivisions, inside - 4] < 0.0).all()
+
+
+def test_a_range_of_nothing_is_no_error():
+    evidence = new_map(empty_grid(10, 10), RADIUS_M, SETTINGS)
+    beams = np.radians([-5.0, 0.0, 5.0])
+    integrate(evidence, Pose(5.0, 5.0, 0.0, 0.0), scan(np.array([0.0, 1.0, 3.0]), beams), 1)
+    assert np.isfinite(evidence.log_odds).all()
 
 
 def test_the_field_under_the_rover_is_free():

@@ -83,6 +83,30 @@ def test_what_stands_is_never_taken_for_something_that_moves(suite: str, speed_m
         assert sum(len(watcher.look()) for _ in range(80)) == 0
 
 
+@pytest.mark.parametrize("apart_m", [0.3, 0.4, 1.0, 1.5])
+def test_posts_in_a_row_do_not_move_with_the_rover(apart_m: float) -> None:
+    posts = [(6.0 + apart_m * i, 22.0, 0.05) for i in range(40)]
+    assert movers_among(posts, 0) == 0
+
+
+def test_trunks_seldom_seem_to_move() -> None:
+    """60 of all sizes beside the way, over 8 seeds: the trunk behind must not be taken for the one before it."""
+    found = []
+    for seed in range(8):
+        chance = np.random.default_rng(seed)
+        norths, sides = chance.uniform(8.0, 30.0, 60), chance.choice((-1.0, 1.0), 60)
+        easts, sizes = 20.0 + sides * chance.uniform(1.0, 4.0, 60), chance.uniform(0.05, 0.25, 60)
+        found.append(movers_among(list(zip(norths, easts, sizes, strict=True)), seed))
+    assert np.mean(found) <= 3.0, found
+
+
+def movers_among(posts: list[tuple[float, float, float]], seed: int) -> int:
+    """In how many of 60 scans something seems to move, passing posts (north, east, radius) that stand."""
+    movers = tuple(Mover("post", radius_m, np.array([[0.0, north_m, east_m]])) for north_m, east_m, radius_m in posts)
+    watcher = Watcher(World(np.zeros((40, 40), np.bool_), movers=movers), "lidar-90", seed, 1.9)
+    return sum(bool(watcher.look()) for _ in range(60))
+
+
 @pytest.mark.parametrize(("suite", "least_m"), [("lidar-90", 3.0), ("lidar-360", 3.3)])
 def test_a_walker_on_ground_that_was_never_seen_is_noticed_in_time(suite: str, least_m: float) -> None:
     """It comes into the narrow view of a rover at 1.9 m/s and walks across its way: braking takes 2.7 m."""
