@@ -103,7 +103,7 @@ def test_creeping_between_beams_it_is_told_no_place_behind_what_stands_farther_o
     assert look_along(ground.map, pose.point, answer.setpoint.point, ROVER.radius_m).clear_m >= distance_m - 0.01
 
 
-@pytest.mark.parametrize("beside_m", [0.1, 0.15, 0.2, 0.4])
+@pytest.mark.parametrize("beside_m", [0.1, 0.3])
 def test_creeping_it_comes_no_nearer_to_a_wall_beside_it(beside_m):
     """The line to the wall's end is free, but it leads nearer to the wall; the position may be wrong by as much."""
     pose, ground = Pose(10.56, 10.56, 0.0, 0.0), Ground()
@@ -121,9 +121,9 @@ def test_creeping_it_comes_no_nearer_to_a_wall_beside_it(beside_m):
         if isinstance(answer.setpoint, GuidedPosition):
             crept += 1
             there = answer.setpoint.point
-            least_m = min(SETTINGS.clearance_m, beside_m) - 1.5 / cells
-            assert clearance_m(ground.map, there, 2.0) >= ROVER.radius_m + least_m
-    assert crept or beside_m < 0.4
+            # It stands 0.2 m or 0.3 m beside the wall; clearance_m (0.15 m), less half a cell, is kept.
+            assert clearance_m(ground.map, there, 2.0) >= ROVER.radius_m + 0.1
+    assert crept > 0
 
 
 @pytest.mark.parametrize(
