@@ -58,6 +58,15 @@ class Tally:
     stuck: int = 0
 
 
+def controller_in_force(kind: ControllerKind, rover: RoverLimits) -> ControllerKind:
+    """What really leads the rover: ``points`` where motions cannot be planned for it.
+
+    Single thin beams leave the ground between them unseen, and a planned motion does not turn to look. The motions
+    that are planned begin with turns on the spot, which a rover that turns in arcs cannot do.
+    """
+    return "points" if rover.narrow_sight or rover.turning_radius_m > 0.0 else kind
+
+
 def controller_for(rover: RoverLimits, footprint: Footprint, kind: ControllerKind, seed: int) -> Controller:
     """What leads the rover along paths. ``seed``: of a motion planner's random choices."""
     if kind != "points":

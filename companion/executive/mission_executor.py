@@ -21,7 +21,7 @@ from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
-from companion.executive.goal_driver import GoalDriver, controller_for
+from companion.executive.goal_driver import GoalDriver, controller_for, controller_in_force
 from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, from_home, lay_again
 from companion.executive.mission_progress import (
     MissionPhase,
@@ -129,6 +129,11 @@ class MissionExecutor:
         if rover.turning_radius_m > 0.0 and scan.is_narrow:
             text = "Single beams see too little for a rover that turns in arcs: give it a lidar"
             notifier.tell(text, Severity.WARNING)
+        self._kind = controller_in_force(given.guidance.controller, self._limits)
+        if self._kind != given.guidance.controller:
+            why = "single beams see too little" if scan.is_narrow else "the rover turns in arcs"
+            text = f"guidance.controller: driving with {self._kind}, not {given.guidance.controller}: {why}"
+            notifier.tell(text, Severity.WARNING)
         planner = make_planner(given.navigator.planner, given.planner)
         searcher = PathSearcher(planner, rng)
         self.driver = GoalDriver(self._controller(rng), searcher, runner)
@@ -161,9 +166,8 @@ class MissionExecutor:
 
     def _controller(self, rng: np.random.Generator) -> Controller:
         """A new one. Only those that draw random numbers take their seed from the run's."""
-        kind = self._settings.current.guidance.controller
-        seed = 0 if kind == "points" else int(rng.integers(2**63))
-        return controller_for(self._limits, self._mission.rover.footprint, kind, seed)
+        seed = 0 if self._kind == "points" else int(rng.integers(2**63))
+        return controller_for(self._limits, self._mission.rover.footprint, self._kind, seed)
 
     # The map and the ground --------------------------------------------------------------------------------------
 
@@ -298,8 +302,7 @@ class MissionExecutor:
     @property
     def learns(self) -> bool:
         """Whether it matters how the rover follows velocities, and is estimated."""
-        settings = self._settings.current
-        return settings.guidance.controller != "points" and settings.motion.learns
+        return self._kind != "points" and self._settings.current.motion.learns
 
     def view(self, vehicle: VehicleState, now_s: float) -> LocalView:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
@@ -327,7 +330,9 @@ class MissionExecutor:
         """The settings for a link that takes this long, there and back, and a guard that waits so long, or none."""
         made_from = (self._settings.changes, counted_s(link_s), waits_s)
         if made_from != self._counted_for:
-            self._counted_for, self._counted = made_from, for_guard(for_link(self._settings.current, link_s), waits_s)
+            counted = for_guard(for_link(self._settings.current, link_s), waits_s)
+            guidance = counted.guidance.model_copy(update={"controller": self._kind})
+            self._counted_for, self._counted = made_from, counted.model_copy(update={"guidance": guidance})
         return self._counted
 
     def _is_refused(self, now_s: float) -> bool:

@@ -34,6 +34,7 @@ EXPERIMENTS = (
 """Each is a module of ``sitl.experiments``, loaded when it is asked for: they load the plotting library."""
 ON_ANY_MAP = ("navigation", "driving")
 OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
+WITH_CONTROLLERS = ("barn", "killed-companion")
 EXIT_FAILED = 3
 
 
@@ -65,8 +66,13 @@ def experiment(
         Path | None, typer.Option(help="barn: a file of BARN worlds (.npz); default: worlds of our own making.")
     ] = None,
     controllers: Annotated[
-        str, typer.Option(help="barn: what leads the rover, names separated by commas; default: all.")
+        str,
+        typer.Option(
+            help="barn, killed-companion: what leads the rover, names separated by commas; "
+            "default: all, and for killed-companion points."
+        ),
     ] = "",
+    guard: Annotated[bool, typer.Option("--guard", help="killed-companion: with the guard on the autopilot.")] = False,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
         Path | None,
@@ -85,10 +91,9 @@ def experiment(
         writable(json_file)
         writable(docs and docs / "results.md")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
-        if name != "barn" and (worlds or controllers):
-            raise ExperimentError(f"--worlds, --controllers: {name} does not take them; they are for barn")
+        _refuse_unused_motion(name, worlds=worlds, controllers=controllers, guard=guard)
         leads = _names(controllers)
-        options = Options(runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, leads)
+        options = Options(runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, leads, guard)
         report = _with_progress(name, options, console)
         _put_out(report, console, json_file, docs)
         if isinstance(report, Checked) and report.failure:
@@ -112,6 +117,16 @@ def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: 
             raise ExperimentError(f"--world: {name} has its own maps; the option is for navigation and driving")
     if maps is not None and name in OWN_ENVIRONMENTS:
         raise ExperimentError(f"--maps: {name} draws the paper's own environments, it reads no maps")
+
+
+def _refuse_unused_motion(name: str, *, worlds: Path | None, controllers: str, guard: bool) -> None:
+    """The same, of the options about motion. Raises ExperimentError."""
+    if worlds and name != "barn":
+        raise ExperimentError(f"--worlds: {name} does not take it; the option is for barn")
+    if controllers and name not in WITH_CONTROLLERS:
+        raise ExperimentError(f"--controllers: {name} does not take it; the option is for barn and killed-companion")
+    if guard and name != "killed-companion":
+        raise ExperimentError(f"--guard: {name} does not take it; the option is for killed-companion")
 
 
 def _with_progress(name: str, options: Options, console: Console) -> ExperimentReport:

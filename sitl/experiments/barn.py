@@ -17,7 +17,6 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from rich.table import Table
 
-from companion.control.motion_planners import MotionKind
 from companion.core.footprint import Footprint
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
@@ -26,7 +25,16 @@ from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS
 from sitl.experiments import drawing
 from sitl.experiments.barn_worlds import GOAL_M, START_M, BarnWorld, made_world, read_worlds
-from sitl.experiments.experiment import Advance, ExperimentError, ExperimentReport, Options, each
+from sitl.experiments.experiment import (
+    CONTROLLERS,
+    GUARD,
+    POINTS,
+    Advance,
+    ExperimentReport,
+    Options,
+    chosen_controllers,
+    each,
+)
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.plant.rover import SIM_ROVER, Drivetrain
@@ -45,13 +53,9 @@ FASTEST, SLOWEST = 2.0, 8.0
 OLD_FASTEST = 4.0
 LIDAR = Lidar(3.75, -135.0 + 0.5 * 3.75, 0.06, 10.0, 20.0, 10, 72)
 """270 degrees, 10 m, 720 rays; the nearest of ten each is told, because a MAVLink message has room for 72."""
-GUARD = {"SCR_ENABLE": 1.0, "SCR_USER1": 300.0}
-"""The guard on the autopilot puts HOLD so many milliseconds after the companion's last packet."""
 OFF_MODEL = 0.3
 WARM_S = 60.0
 """So long the rover may take until it moves."""
-POINTS = "points"
-CONTROLLERS = (POINTS, *MotionKind)
 MADE = 50
 """So many worlds of our own making, if no file is given."""
 STANDARD_STEP, STANDARD_LAST = 6, 294
@@ -279,14 +283,11 @@ def standard(worlds: Sequence[BarnWorld]) -> tuple[BarnWorld, ...]:
 
 def run(options: Options, advance: Advance) -> BarnReport:
     """Every world with every controller, as many times as there are runs."""
-    for name in options.controllers:
-        if name not in CONTROLLERS:
-            raise ExperimentError(f"--controllers: {name!r:.60} is unknown; known are {', '.join(CONTROLLERS)}")
     if options.archive is None:
         worlds = tuple(made_world(number) for number in range(MADE))
     else:
         worlds = standard(read_worlds(options.archive))
-    chosen = options.controllers or CONTROLLERS
+    chosen = chosen_controllers(options, CONTROLLERS)
     tasks = [
         (world, name, seed)
         for name in chosen

@@ -10,7 +10,7 @@ from importlib.metadata import version
 from itertools import starmap
 from os import cpu_count
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar, runtime_checkable
+from typing import TYPE_CHECKING, ClassVar, Protocol, TypeVar, get_args, runtime_checkable
 
 from rich.table import Table
 
@@ -18,6 +18,7 @@ from companion.core.grid import Cell, Grid
 from companion.mapping.map_files import load_map
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings
+from companion.settings.settings import ControllerKind
 from companion.storage.files import why_no_file
 from sitl.experiments import drawing
 from sitl.experiments.results_page import write_section
@@ -25,6 +26,10 @@ from sitl.experiments.results_page import write_section
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+POINTS: ControllerKind = "points"
+CONTROLLERS: tuple[ControllerKind, ...] = get_args(ControllerKind)
+GUARD = {"SCR_ENABLE": 1.0, "SCR_USER1": 300.0}
+"""The guard on the autopilot puts HOLD so many milliseconds after the companion's last packet."""
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""
 
@@ -50,14 +55,25 @@ class Options:
     archive: Path | None = None
     """``barn``: a file of worlds; None: worlds of our own making."""
     controllers: tuple[str, ...] = ()
-    """``barn``: what leads the rover; none: all there are."""
+    """``barn``, ``killed-companion``: what leads the rover; none: the experiment's own choice."""
+    guard: bool = False
+    """``killed-companion``: the autopilot has the guard."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""
         chosen = f" --planners {','.join(self.planners)}" if self.planners else ""
         chosen += f" --controllers {','.join(self.controllers)}" if self.controllers else ""
+        chosen += " --guard" if self.guard else ""
         chosen += f" --worlds {self.archive.name}" if self.archive else ""
         return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"
+
+
+def chosen_controllers(options: Options, otherwise: tuple[ControllerKind, ...]) -> tuple[ControllerKind, ...]:
+    """The controllers that were asked for, or others. Raises ExperimentError for one that does not exist."""
+    for name in options.controllers:
+        if name not in CONTROLLERS:
+            raise ExperimentError(f"--controllers: {name!r:.60} is unknown; known are {', '.join(CONTROLLERS)}")
+    return tuple(name for name in CONTROLLERS if name in options.controllers) or otherwise
 
 
 class ExperimentReport(ABC):
@@ -66,6 +82,11 @@ class ExperimentReport(ABC):
     name: ClassVar[str]
     page: ClassVar[str] = "results.md"
     """The page of the documentation that has its section."""
+
+    @property
+    def section_name(self) -> str:
+        """Of its section there."""
+        return self.name
 
     @abstractmethod
     def tables(self) -> list[Table]:
@@ -86,7 +107,7 @@ class ExperimentReport(ABC):
     def write_docs(self, folder: Path) -> list[Path]:
         """Write pictures (under images/) and section; gives the files written."""
         files = [drawing.save(picture, folder / "images" / f"{name}.png") for name, picture in self.pictures().items()]
-        return [*files, write_section(folder, self.name, self.section(), self.page)]
+        return [*files, write_section(folder, self.section_name, self.section(), self.page)]
 
 
 @runtime_checkable

@@ -2,6 +2,7 @@
 
 Each drive is made with the firmware's own simulated rover, and with one that turns faster than it is told
 (``EAGER``). The next death comes at a random moment; for as long as a program takes to start, nobody leads the rover.
+With or without the guard on the autopilot, and with any controller.
 """
 
 from __future__ import annotations
@@ -22,9 +23,19 @@ from companion.checkpoint.state_writer import StateFile
 from companion.mission.mission import DrivetrainSpec, Mission, SitlSpec
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
+from companion.settings.settings import ControllerKind
+from companion.settings.settings_file import parse_settings
 from companion.storage.files import OsDisk
 from sitl.experiments.dead_companion import STOOD_M_S, SUITES, shipped, with_suite
-from sitl.experiments.experiment import Advance, ExperimentReport, Options, each
+from sitl.experiments.experiment import (
+    GUARD,
+    POINTS,
+    Advance,
+    ExperimentReport,
+    Options,
+    chosen_controllers,
+    each,
+)
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.experiments.soak import Person
 from sitl.lockstep import Drive
@@ -71,6 +82,7 @@ class KilledDrive:
     suite: str
     motors: Motors
     seed: int
+    controller: str = POINTS
     deaths: list[float] = field(default_factory=list)
     """Seconds since the autopilot's start."""
     contacts: list[Contact] = field(default_factory=list)
@@ -116,19 +128,24 @@ def kept_in(directory: Path, mission: Mission) -> Checkpointer:
     return Checkpointer(mission, _InlineStateWriter(StateFile(place.file, OsDisk())), previous)
 
 
-def drive_with_deaths(mission: Mission, motors: Motors, seed: int, settings: Settings | None = None) -> KilledDrive:
+def drive_with_deaths(
+    mission: Mission, motors: Motors, seed: int, settings: Settings | None = None, *, guarded: bool = False
+) -> KilledDrive:
     """Drive a mission to its end while its companion is killed every few seconds.
 
-    ``settings``: None for the defaults.
+    ``settings``: None for the defaults. ``guarded``: with the guard on the autopilot.
     """
-    suite = str(mission.sitl.sensors) if mission.sitl is not None else ""
-    result, rng, person = KilledDrive(mission.name, suite, motors, seed), np.random.default_rng((seed, 13)), Person()
+    suite, settings = str(mission.sitl.sensors) if mission.sitl is not None else "", settings or Settings()
+    result = KilledDrive(mission.name, suite, motors, seed, settings.guidance.controller)
+    rng, person, scenario = np.random.default_rng((seed, 13)), Person(), scenario_from_mission(mission)
+    if guarded:
+        scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
     with TemporaryDirectory() as folder:
         place = Path(folder)
         drive = Drive(
             mission,
-            scenario_from_mission(mission),
-            settings or Settings(),
+            scenario,
+            settings,
             seed,
             NullRecorder(),
             TIME_LIMIT_S,
@@ -154,11 +171,19 @@ def drive_with_deaths(mission: Mission, motors: Motors, seed: int, settings: Set
     return result
 
 
-def deaths_of(mission: Mission, motors: Motors, seed: int, count: int) -> list[KilledDrive]:
+def deaths_of(
+    mission: Mission,
+    motors: Motors,
+    seed: int,
+    count: int,
+    controller: ControllerKind = POINTS,
+    guarded: bool = False,
+) -> list[KilledDrive]:
     """As many drives as it takes to die so often."""
     drives: list[KilledDrive] = []
+    settings = parse_settings({"guidance": {"controller": controller}}, NAME)
     while sum(len(one.deaths) for one in drives) < count and len(drives) < count:
-        drives.append(drive_with_deaths(mission, motors, seed + len(drives)))
+        drives.append(drive_with_deaths(mission, motors, seed + len(drives), settings, guarded=guarded))
     return drives
 
 
@@ -169,6 +194,11 @@ class KilledReport(ExperimentReport):
     name: ClassVar[str] = NAME
     options: Options
     drives: tuple[KilledDrive, ...]
+
+    @property
+    def section_name(self) -> str:
+        """See ``ExperimentReport``."""
+        return f"{NAME}-guarded" if self.options.guard else NAME
 
     def tables(self) -> list[Table]:
         """One for each suite of sensors, and one of contacts."""
@@ -189,17 +219,13 @@ class KilledReport(ExperimentReport):
 
     def _rows(self, suite: str) -> list[list[str]]:
         own = [drive for drive in self.drives if drive.suite == suite]
-        kinds = dict.fromkeys((drive.mission, drive.motors) for drive in own)
-        rows = [
-            _row(f"{name}, {motors}", [drive for drive in own if (drive.mission, drive.motors) == (name, motors)])
-            for name, motors in kinds
-        ]
-        return [*rows, _row("all", own)]
+        kinds = dict.fromkeys(map(_kind, own))
+        return [*(_row(kind, [drive for drive in own if _kind(drive) == kind]) for kind in kinds), _row("all", own)]
 
     def _contacts(self) -> list[list[str]]:
         return [
             [
-                f"{drive.mission}, {drive.suite}, {drive.motors}",
+                f"{_kind(drive)}, {drive.suite}",
                 f"{drive.seed}",
                 f"{one.time_s:.1f}",
                 f"{one.speed_m_s:.2f}",
@@ -218,7 +244,8 @@ class KilledReport(ExperimentReport):
             tables += f"\n\nContacts:\n\n{markdown_table(CONTACT_HEAD, contacts)}"
         deaths = sum(len(drive.deaths) for drive in self.drives)
         touched, run_into = sum(d.touched for d in self.drives), sum(d.run_into for d in self.drives)
-        return f"""## A companion that is killed and resumed
+        guard = f"The guard on the autopilot waits {GUARD['SCR_USER1']:g} ms.\n\n" if self.options.guard else ""
+        return f"""## A companion that is killed and resumed{", with the guard" if guard else ""}
 
 `{self.options.command(NAME)}`
 
@@ -229,8 +256,13 @@ faster than it is told), until the companion had died {self.options.runs} times.
 while the rover moved: **{touched}**; *run into*: it stood, and something that moves came along: {run_into}; *ended*:
 drives whose mission ended by itself within {TIME_LIMIT_S:g} s; *person*: how often somebody had to set GUIDED or arm.
 
-{tables}
+{guard}{tables}
 """
+
+
+def _kind(drive: KilledDrive) -> str:
+    leads = "" if drive.controller == POINTS else f", {drive.controller}"
+    return f"{drive.mission}, {drive.motors}{leads}"
 
 
 def _row(name: str, drives: Iterable[KilledDrive]) -> list[str]:
@@ -249,7 +281,8 @@ def _row(name: str, drives: Iterable[KilledDrive]) -> list[str]:
 def run(options: Options, advance: Advance) -> KilledReport:
     """Each mission with each suite and both rovers, killed as many times as there are runs."""
     missions = [
-        (with_motors(with_suite(mission, suite), motors), motors)
+        (with_motors(with_suite(mission, suite), motors), motors, controller)
+        for controller in chosen_controllers(options, (POINTS,))
         for mission in shipped(options)
         for suite in SUITES
         for motors in Motors
@@ -257,7 +290,10 @@ def run(options: Options, advance: Advance) -> KilledReport:
     ]
     drives: list[KilledDrive] = []
     seeds = range(options.seed, options.seed + 100 * len(missions), 100)
-    tasks = ((mission, motors, seed, options.runs) for (mission, motors), seed in zip(missions, seeds, strict=True))
+    tasks = (
+        (mission, motors, seed, options.runs, controller, options.guard)
+        for (mission, motors, controller), seed in zip(missions, seeds, strict=True)
+    )
     for done, some in enumerate(each(options.jobs, deaths_of, tasks), start=1):
         drives += some
         advance(done, len(missions))

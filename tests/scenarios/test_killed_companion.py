@@ -34,5 +34,8 @@ def test_a_contact_is_a_failure_and_being_run_into_is_not(drives: list[KilledDri
     assert {len(table.columns) for table in report.tables()} == {7} and len(report.tables()) == len(SUITES)
     stood = replace(drives[0], contacts=[Contact(80.0, 0.0, "cart", 1.0)])
     assert replace(report, drives=(stood,)).failure == "" and stood.run_into == 1
+    guarded = KilledReport(Options(runs=5, guard=True), (replace(drives[0], controller="motion-ga"),))
+    assert guarded.section_name != report.section_name and "--guard" in guarded.section()
+    assert "eager, motion-ga" in guarded.section() and "motion-ga" not in report.section()
     moved = replace(drives[0], contacts=[Contact(80.0, 0.5, None, None)])
     assert replace(report, drives=(moved,)).failure.startswith("1 contacts")

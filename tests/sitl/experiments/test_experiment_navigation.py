@@ -104,3 +104,10 @@ def test_every_shortfall_of_navigation_is_said() -> None:
     assert "not reached: b (1.200)" in navigation.shortfalls((*ours, *other))
     assert navigation.shortfalls((ours[0], other[0])).endswith("(reached).")
     assert navigation.shortfalls(tuple(ours)) == ""
+
+
+@pytest.mark.parametrize("option", ["--guard", "--controllers=points", "--worlds=here.npz"])
+def test_an_option_of_another_experiment_is_refused_by_its_name(option: str) -> None:
+    result = CliRunner().invoke(app, ["experiment", "navigation", "--runs", "1", option])
+    assert result.exit_code == 2
+    assert result.output.startswith(f"{option.partition('=')[0]}: navigation does not take it")
