@@ -171,7 +171,7 @@ class GuidanceSettings(Section):
     controller: ControllerKind = Field(
         "points",
         description="what leads the rover along its path: `points` sends positions (arcs where it cannot turn on the "
-        "spot); the others plan motions and send velocities",
+        "spot); the others plan motions and send velocities, but not with single thin beams or a turning radius",
     )
 
     @model_validator(mode="after")
