@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import AliasChoices, Field, model_validator
+from pydantic import AliasChoices, Field, NonNegativeFloat, model_validator
 
 from companion.settings.planners import PlannerSettings
 from companion.settings.section import Section
@@ -56,7 +56,7 @@ class MappingSettings(Section):
     """From range data to field weights."""
 
     evidence_m: float = Field(
-        0.125, gt=0.0, description="side of an evidence cell; a field's side is a whole number of them"
+        0.125, ge=0.01, description="side of an evidence cell; a field's side is a whole number of them"
     )
     keeps: Literal["circle", "outline"] = Field(
         "circle",
@@ -102,8 +102,9 @@ class GuidanceSettings(Section):
     clearance_m: float = Field(
         0.15, ge=0.0, description="room beside the rover's radius that the choice of speed keeps"
     )
-    clearances: tuple[Annotated[tuple[float, float], Field(strict=False)], ...] = Field(
+    clearances: tuple[Annotated[tuple[NonNegativeFloat, NonNegativeFloat], Field(strict=False)], ...] = Field(
         ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5), (0.12, 0.3)),
+        min_length=1,
         description="room beside the rover's radius, tried in turn; the next one if the reach is less than the second "
         "figure, metres",
         strict=False,

@@ -36,6 +36,18 @@ def test_an_unknown_key_is_named_with_the_nearest_known_one(text, place, near, t
     assert f"{place}: unknown key, did you mean '{near}'?" in refused(text, tmp_path)
 
 
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[mapping]\nevidence_m = 1e-9", "mapping.evidence_m"),
+        ("[guidance]\nclearances = []", "guidance.clearances"),
+        ("[guidance]\nclearances = [[-0.1, 1.0]]", "guidance.clearances"),
+    ],
+)
+def test_what_would_hang_or_touch_something_is_refused(text, said, tmp_path):
+    assert said in refused(text, tmp_path)
+
+
 def test_a_key_like_no_other_is_not_taken_for_one_that_is_unrelated(tmp_path):
     message = refused("[navigator]\nreplan_evry = 1", tmp_path)
     assert "did you mean" not in message
