@@ -72,6 +72,13 @@ def experiment(
             "default: all, and for killed-companion points."
         ),
     ] = "",
+    setups: Annotated[
+        str,
+        typer.Option(
+            help="barn: guarded, strict (without the guard), jackal (a Jackal's limits), separated by commas; "
+            "default: guarded."
+        ),
+    ] = "",
     guard: Annotated[bool, typer.Option("--guard", help="killed-companion: with the guard on the autopilot.")] = False,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
@@ -91,9 +98,9 @@ def experiment(
         writable(json_file)
         writable(docs and docs / "results.md")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
-        _refuse_unused_motion(name, worlds=worlds, controllers=controllers, guard=guard)
-        leads = _names(controllers)
-        options = Options(runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, leads, guard)
+        _refuse_unused_motion(name, worlds=worlds, controllers=controllers, setups=setups, guard=guard)
+        leads, driven = _names(controllers), _names(setups)
+        options = Options(runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, leads, driven, guard)
         report = _with_progress(name, options, console)
         _put_out(report, console, json_file, docs)
         if isinstance(report, Checked) and report.failure:
@@ -119,10 +126,12 @@ def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: 
         raise ExperimentError(f"--maps: {name} draws the paper's own environments, it reads no maps")
 
 
-def _refuse_unused_motion(name: str, *, worlds: Path | None, controllers: str, guard: bool) -> None:
+def _refuse_unused_motion(name: str, *, worlds: Path | None, controllers: str, setups: str, guard: bool) -> None:
     """The same, of the options about motion. Raises ExperimentError."""
     if worlds and name != "barn":
         raise ExperimentError(f"--worlds: {name} does not take it; the option is for barn")
+    if setups and name != "barn":
+        raise ExperimentError(f"--setups: {name} does not take it; the option is for barn")
     if controllers and name not in WITH_CONTROLLERS:
         raise ExperimentError(f"--controllers: {name} does not take it; the option is for barn and killed-companion")
     if guard and name != "killed-companion":

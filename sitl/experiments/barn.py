@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -30,6 +30,7 @@ from sitl.experiments.experiment import (
     GUARD,
     POINTS,
     Advance,
+    ExperimentError,
     ExperimentReport,
     Options,
     chosen_controllers,
@@ -64,6 +65,41 @@ WORST = 10
 HEAD = ("controller", "runs", "reached", "contact", "timeout", "score", "old score", "t / OT")
 
 
+class Setup(StrEnum):
+    """What is driven. Planned motions have the guard on the autopilot, but for ``STRICT``."""
+
+    GUARDED = "guarded"
+    """ArduRover's limits as shipped."""
+    STRICT = "strict"
+    """The same without the guard."""
+    JACKAL = "jackal"
+    """A Jackal's limits."""
+
+
+class Limits(NamedTuple):
+    """Of the autopilot, and what the rover's speed lags behind its motors."""
+
+    acceleration_m_s2: float
+    turn_acceleration_rad_s2: float
+    turn_rate_rad_s: float
+    lag_s: float
+
+
+SHIPPED = Limits(
+    DEFAULTS["ATC_ACCEL_MAX"][0],
+    math.radians(DEFAULTS["ATC_STR_ACC_MAX"][0]),
+    math.radians(DEFAULTS["ATC_STR_RAT_MAX"][0]),
+    SIM_ROVER.speed_lag_s,
+)
+JACKAL_LIMITS = Limits(20.0, 25.0, 4.0, 0.05)
+"""As its own velocity controller is configured (jackal/jackal, jackal_control/config/control.yaml); the lag is ours."""
+
+
+def limits_of(setup: Setup) -> Limits:
+    """The limits that are driven with."""
+    return JACKAL_LIMITS if setup is Setup.JACKAL else SHIPPED
+
+
 class RunEnd(StrEnum):
     """How a run ends."""
 
@@ -80,6 +116,7 @@ class BarnRun:
     """
 
     controller: str
+    setup: Setup
     world: int
     seed: int
     end: RunEnd
@@ -97,8 +134,9 @@ def score(reached: bool, seconds: float, optimal_s: float, fastest: float) -> fl
     return reached * optimal_s / min(max(seconds, fastest * optimal_s), SLOWEST * optimal_s)
 
 
-def settings_for(controller: str) -> Settings:
+def settings_for(controller: str, setup: Setup = Setup.GUARDED) -> Settings:
     """Fine evidence, and data as often as the lidar has it."""
+    limits = limits_of(setup)
     keeps = "circle" if controller == POINTS else "outline"
     return Settings.model_validate(
         {
@@ -106,7 +144,11 @@ def settings_for(controller: str) -> Settings:
             "mapping": {"evidence_m": 0.05, "hit_depth_m": 0.02, "keeps": keeps},
             "link": {"range_rate_hz": 20.0, "position_rate_hz": 20.0},
             # Set, so that they are not read from the autopilot: the rover is to be another than it is taken for.
-            "motion": {"acceleration_m_s2": 1.0, "deceleration_m_s2": 1.0, "turn_acceleration_rad_s2": 2.1},
+            "motion": {
+                "acceleration_m_s2": limits.acceleration_m_s2,
+                "deceleration_m_s2": limits.acceleration_m_s2,
+                "turn_acceleration_rad_s2": limits.turn_acceleration_rad_s2,
+            },
         }
     )
 
@@ -120,35 +162,43 @@ def mission_of(world: BarnWorld) -> Mission:
     )  # fmt: skip
 
 
-def off_model(rng: np.random.Generator, share: float) -> tuple[Drivetrain, dict[str, float]]:
+def off_model(rng: np.random.Generator, share: float, limits: Limits = SHIPPED) -> tuple[Drivetrain, dict[str, float]]:
     """A rover that is not what the companion's settings say: each figure off by up to this share, drawn evenly.
 
     Its speed and turn rate at full output, its lag, and the autopilot's limits of acceleration, braking and turning.
     """
     top, lag, turn, gains, brakes, turns = 1.0 + share * rng.uniform(-1.0, 1.0, 6)
     own = SIM_ROVER
-    drivetrain = Drivetrain(
-        own.top_speed_m_s * top, own.speed_lag_s * lag, own.turn_rate_rad_s * turn, 0.1 * lag if share else 0.0
-    )
-    limits = {
-        "ATC_ACCEL_MAX": DEFAULTS["ATC_ACCEL_MAX"][0] * gains,
-        "ATC_DECEL_MAX": DEFAULTS["ATC_ACCEL_MAX"][0] * brakes,
-        "ATC_STR_ACC_MAX": DEFAULTS["ATC_STR_ACC_MAX"][0] * turns,
+    turn_lag_s = min(0.1, limits.lag_s) * lag if share else 0.0
+    drivetrain = Drivetrain(own.top_speed_m_s * top, limits.lag_s * lag, own.turn_rate_rad_s * turn, turn_lag_s)
+    parameters = {
+        "ATC_ACCEL_MAX": limits.acceleration_m_s2 * gains,
+        "ATC_DECEL_MAX": limits.acceleration_m_s2 * brakes,
+        "ATC_STR_ACC_MAX": math.degrees(limits.turn_acceleration_rad_s2) * turns,
+        "ATC_STR_RAT_MAX": math.degrees(limits.turn_rate_rad_s),
     }
-    return drivetrain, limits
+    if limits.acceleration_m_s2 > SHIPPED.acceleration_m_s2:
+        parameters["MOT_SLEWRATE"] = 0.0  # else the motors take a second to their full output
+    return drivetrain, parameters
 
 
 def drive(
-    world: BarnWorld, controller: str, seed: int, off: float = OFF_MODEL, settings: Settings | None = None
+    world: BarnWorld,
+    controller: str,
+    seed: int,
+    setup: Setup = Setup.GUARDED,
+    off: float = OFF_MODEL,
+    settings: Settings | None = None,
 ) -> BarnRun:
     """One run. ``off``: the rover differs by up to this share from what the companion takes it for."""
     start, mission = SimStart(START_M[1], START_M[0], 0.0, SOMEWHERE), mission_of(world)
-    drivetrain, limits = off_model(np.random.default_rng((world.number, seed, 30)), off)
-    parameters = {"WP_SPEED": SPEED_M_S, **RECOMMENDED_PARAMETERS, **limits, **({} if controller == POINTS else GUARD)}
+    drivetrain, limits = off_model(np.random.default_rng((world.number, seed, 30)), off, limits_of(setup))
+    guard = {} if controller == POINTS or setup is Setup.STRICT else GUARD
+    parameters = {"WP_SPEED": SPEED_M_S, **RECOMMENDED_PARAMETERS, **limits, **guard}
     scenario = Scenario(
         world.world(), start, SensorSuite(LIDAR), outline_of(mission.rover), parameters, drivetrain=drivetrain
     )
-    run = Drive(mission, scenario, settings or settings_for(controller), seed, NullRecorder(), WARM_S + LIMIT_S)
+    run = Drive(mission, scenario, settings or settings_for(controller, setup), seed, NullRecorder(), WARM_S + LIMIT_S)
     simulator, began_s, track, end = run.simulator, math.inf, [(start.east_m, start.north_m)], None
     seconds = 0.0
     while end is None:
@@ -166,7 +216,7 @@ def drive(
         elif seconds >= LIMIT_S or run.companion.done or now_s > WARM_S + LIMIT_S:
             end = RunEnd.TIMEOUT
     track.append((simulator.truth.east_m, simulator.truth.north_m))
-    return BarnRun(controller, world.number, seed, end, seconds, world.optimal_s, np.array(track))
+    return BarnRun(controller, setup, world.number, seed, end, seconds, world.optimal_s, np.array(track))
 
 
 @dataclass(frozen=True)
@@ -176,11 +226,13 @@ class BarnReport(ExperimentReport):
     name: ClassVar[str] = NAME
     options: Options
     worlds: tuple[BarnWorld, ...]
-    series: dict[str, tuple[BarnRun, ...]]
+    series: dict[tuple[Setup, str], tuple[BarnRun, ...]]
+    """By setup and controller."""
 
     def tables(self) -> list[Table]:
-        """One row a controller."""
-        return [terminal_table(f"{NAME}: {len(self.worlds)} worlds", HEAD, self._rows(plain=True))]
+        """One a setup, with a row a controller."""
+        worlds = f"{len(self.worlds)} worlds"
+        return [terminal_table(f"{NAME}, {one}: {worlds}", HEAD, self._rows(one, plain=True)) for one in self._setups()]
 
     def as_json(self) -> dict[str, object]:
         """Every run."""
@@ -191,40 +243,54 @@ class BarnReport(ExperimentReport):
         ]
         return {"experiment": NAME, "seed": self.options.seed, "runs": runs}
 
-    def _rows(self, *, plain: bool = False) -> list[list[str]]:
+    def _setups(self) -> list[Setup]:
+        return [setup for setup in Setup if any(setup is one for one, _ in self.series)]
+
+    def _rows(self, setup: Setup, *, plain: bool = False) -> list[list[str]]:
         """``plain``: without intervals."""
-        rows = [_row(name, runs) for name, runs in self.series.items()]
+        rows = [_row(name, runs) for (one, name), runs in self.series.items() if one is setup]
         return [[cell.partition(" (")[0] for cell in row] for row in rows] if plain else rows
 
     def pictures(self) -> dict[str, Figure]:
         """The worst runs of the best controller."""
         return {"barn-worst": _picture(self.worlds, worst(self.series[self._best()]))}
 
-    def _best(self) -> str:
-        return max(self.series, key=lambda name: float(np.mean([run.score() for run in self.series[name]])))
+    def _best(self) -> tuple[Setup, str]:
+        """Of the first setup."""
+        own = [one for one in self.series if one[0] is self._setups()[0]]
+        return max(own, key=lambda one: float(np.mean([run.score() for run in self.series[one]])))
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
         kind = f"The worlds of `{self.options.archive.name}`" if self.options.archive else "Worlds of our own making"
+        tables = "\n\n".join(f"{_told(one)}:\n\n{markdown_table(HEAD, self._rows(one))}" for one in self._setups())
         return f"""## Narrow ground (BARN)
 
 `{self.options.command(NAME)}`
 
 {kind}, {len(self.worlds)} of them, {self.options.runs} runs each: Jackal's outline (0.508 x 0.430 m), 2 m/s, a lidar
-of 270 degrees and 10 m, the limits of ArduRover as shipped (1 m/s² and 2.1 rad/s²), the protocol and score of the BARN
-challenge at ICRA. **In our simulator, not an entry.** In each run the rover's speed, lag and turn rate, and its limits
-of acceleration, braking and turning, are off by up to {100.0 * OFF_MODEL:.0f} % from what the companion takes them for.
+of 270 degrees and 10 m, the protocol and score of the BARN challenge at ICRA. **In our simulator, not an entry.** In
+each run the rover's speed, lag and turn rate, and its limits of acceleration, braking and turning, are off by up to
+{100.0 * OFF_MODEL:.0f} % from what the companion takes them for.
 Planned motions are driven with a guard on the autopilot, which stops the rover {1e-3 * GUARD["SCR_USER1"]:g} s
 after the last packet of the companion. *score*: as counted since 2026, at most 0.5; *old score*: as before, at most
 0.25; *t / OT*: mean time over the optimal time, of runs that reached the goal. In brackets: 95 % intervals, by
 resampling worlds.
 
-{markdown_table(HEAD, self._rows())}
+{tables}
 
 ![The worst runs](images/barn-worst.png)
 
-The {WORST} worst runs of `{self._best()}`, the slowest or those that ended badly: the way it drove.
+The {WORST} worst runs of `{self._best()[1]}`, the slowest or those that ended badly: the way it drove.
 """
+
+
+def _told(setup: Setup) -> str:
+    limits = limits_of(setup)
+    figures = f"{limits.acceleration_m_s2:g} m/s² and {limits.turn_acceleration_rad_s2:.1f} rad/s²"
+    whose = "a Jackal's limits" if setup is Setup.JACKAL else "the limits of ArduRover as shipped"
+    guard = ", without the guard" if setup is Setup.STRICT else ""
+    return f"`{setup}`: {whose} ({figures}){guard}"
 
 
 def _row(name: str, runs: Sequence[BarnRun]) -> list[str]:
@@ -288,9 +354,16 @@ def run(options: Options, advance: Advance) -> BarnReport:
     else:
         worlds = standard(read_worlds(options.archive))
     chosen = chosen_controllers(options, CONTROLLERS)
-    tasks = [
-        (world, name, seed)
+    # Positions need no guard, and the autopilot drives to them as it likes.
+    pairs: list[tuple[Setup, str]] = [
+        (setup, name)
+        for setup in _chosen_setups(options)
         for name in chosen
+        if name != POINTS or setup is Setup.GUARDED
+    ]
+    tasks = [
+        (world, name, seed, setup)
+        for setup, name in pairs
         for seed in range(options.seed, options.seed + options.runs)
         for world in worlds
     ]
@@ -298,4 +371,16 @@ def run(options: Options, advance: Advance) -> BarnReport:
     for done, one in enumerate(each(options.jobs, drive, tasks), start=1):
         runs.append(one)
         advance(done, len(tasks))
-    return BarnReport(options, worlds, {name: tuple(run for run in runs if run.controller == name) for name in chosen})
+    series = {
+        (setup, name): tuple(run for run in runs if (run.setup, run.controller) == (setup, name))
+        for setup, name in pairs
+    }
+    return BarnReport(options, worlds, series)
+
+
+def _chosen_setups(options: Options) -> tuple[Setup, ...]:
+    """Raises ExperimentError for one that does not exist."""
+    for name in options.setups:
+        if name not in tuple(Setup):
+            raise ExperimentError(f"--setups: {name!r:.60} is unknown; known are {', '.join(Setup)}")
+    return tuple(one for one in Setup if one in options.setups) or (Setup.GUARDED,)

@@ -56,6 +56,8 @@ class Options:
     """``barn``: a file of worlds; None: worlds of our own making."""
     controllers: tuple[str, ...] = ()
     """``barn``, ``killed-companion``: what leads the rover; none: the experiment's own choice."""
+    setups: tuple[str, ...] = ()
+    """``barn``: what is driven; none: the experiment's own choice."""
     guard: bool = False
     """``killed-companion``: the autopilot has the guard."""
 
@@ -63,6 +65,7 @@ class Options:
         """What writes this experiment's part of the results page again."""
         chosen = f" --planners {','.join(self.planners)}" if self.planners else ""
         chosen += f" --controllers {','.join(self.controllers)}" if self.controllers else ""
+        chosen += f" --setups {','.join(self.setups)}" if self.setups else ""
         chosen += " --guard" if self.guard else ""
         chosen += f" --worlds {self.archive.name}" if self.archive else ""
         return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"

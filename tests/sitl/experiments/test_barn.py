@@ -13,6 +13,7 @@ from sitl.experiments.barn import (
     BarnReport,
     BarnRun,
     RunEnd,
+    Setup,
     drive,
     off_model,
     run,
@@ -85,14 +86,14 @@ def test_planned_motions_lead_through_narrow_ground_in_a_third_of_the_time() -> 
     assert ends["motion-ga"].end is RunEnd.REACHED
     assert ends["motion-ga"].seconds < 0.5 * ends["points"].seconds
     assert ends["motion-ga"].track_m[0] == pytest.approx(START_M)
-    report = BarnReport(Options(1), (world,), {name: (one,) for name, one in ends.items()})
+    report = BarnReport(Options(1), (world,), {(Setup.GUARDED, name): (one,) for name, one in ends.items()})
     assert "not an entry" in report.section() and "motion-ga" in report.section()
     assert report.pictures()["barn-worst"].axes and len(report.as_json()["runs"]) == 2  # type: ignore[arg-type]
 
 
 def test_intervals_and_the_worst() -> None:
     def one(world: int, end: RunEnd, seconds: float) -> BarnRun:
-        return BarnRun("dwa", world, 0, end, seconds, 5.0, np.zeros((1, 2)))
+        return BarnRun("dwa", Setup.GUARDED, world, 0, end, seconds, 5.0, np.zeros((1, 2)))
 
     runs = [one(0, RunEnd.REACHED, 6.0), one(1, RunEnd.CONTACT, 2.0), one(2, RunEnd.REACHED, 50.0)]
     assert [run.world for run in worst(runs)] == [1, 2, 0]
@@ -105,5 +106,7 @@ def test_a_file_that_is_no_archive_is_refused_in_one_line(tmp_path: Path, conten
     file.write_bytes(content)
     with pytest.raises(ExperimentError, match=r"worlds\.npz: no archive of BARN worlds"):
         run(Options(1, archive=file), lambda done, total: None)
+    with pytest.raises(ExperimentError, match="--setups: 'fast' is unknown; known are guarded, strict, jackal"):
+        run(Options(1, setups=("fast",)), lambda done, total: None)
     with pytest.raises(ExperimentError, match="--controllers: 'best' is unknown"):
         run(Options(1, controllers=("best",)), lambda done, total: None)
