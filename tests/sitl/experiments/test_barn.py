@@ -15,6 +15,7 @@ from sitl.experiments.barn import (
     RunEnd,
     Setup,
     drive,
+    limits_of,
     off_model,
     run,
     score,
@@ -78,6 +79,8 @@ def test_a_rover_off_its_model_is_off_by_no_more_than_that() -> None:
     assert 0.7 <= drivetrain.top_speed_m_s / SIM_ROVER.top_speed_m_s <= 1.3
     assert 0.7 <= limits["ATC_ACCEL_MAX"] <= 1.3 and 84.0 <= limits["ATC_STR_ACC_MAX"] <= 156.0
     assert off_model(np.random.default_rng(3), 0.0)[0] == SIM_ROVER
+    quick = off_model(np.random.default_rng(3), 0.3, limits_of(Setup.JACKAL))[1]
+    assert 14.0 <= quick["ATC_ACCEL_MAX"] <= 26.0 and quick["MOT_SLEWRATE"] == 0.0
 
 
 def test_planned_motions_lead_through_narrow_ground_in_a_third_of_the_time() -> None:
@@ -86,6 +89,9 @@ def test_planned_motions_lead_through_narrow_ground_in_a_third_of_the_time() -> 
     assert ends["motion-ga"].end is RunEnd.REACHED
     assert ends["motion-ga"].seconds < 0.5 * ends["points"].seconds
     assert ends["motion-ga"].track_m[0] == pytest.approx(START_M)
+    others = {setup: drive(world, "motion-ga", 0, setup) for setup in (Setup.STRICT, Setup.JACKAL)}
+    assert {one.end for one in others.values()} == {RunEnd.REACHED}
+    assert others[Setup.JACKAL].seconds < ends["motion-ga"].seconds < others[Setup.STRICT].seconds
     report = BarnReport(Options(1), (world,), {(Setup.GUARDED, name): (one,) for name, one in ends.items()})
     assert "not an entry" in report.section() and "motion-ga" in report.section()
     assert report.pictures()["barn-worst"].axes and len(report.as_json()["runs"]) == 2  # type: ignore[arg-type]
