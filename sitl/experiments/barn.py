@@ -349,10 +349,6 @@ def standard(worlds: Sequence[BarnWorld]) -> tuple[BarnWorld, ...]:
 
 def run(options: Options, advance: Advance) -> BarnReport:
     """Every world with every controller, as many times as there are runs."""
-    if options.archive is None:
-        worlds = tuple(made_world(number) for number in range(MADE))
-    else:
-        worlds = standard(read_worlds(options.archive))
     chosen = chosen_controllers(options, CONTROLLERS)
     # Positions need no guard, and the autopilot drives to them as it likes.
     pairs: list[tuple[Setup, str]] = [
@@ -361,6 +357,10 @@ def run(options: Options, advance: Advance) -> BarnReport:
         for name in chosen
         if name != POINTS or setup is Setup.GUARDED
     ]
+    if options.archive is None:
+        worlds = tuple(made_world(number) for number in range(MADE))
+    else:
+        worlds = standard(read_worlds(options.archive))
     tasks = [
         (world, name, seed, setup)
         for setup, name in pairs
