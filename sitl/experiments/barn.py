@@ -357,6 +357,8 @@ def run(options: Options, advance: Advance) -> BarnReport:
         for name in chosen
         if name != POINTS or setup is Setup.GUARDED
     ]
+    if not pairs:
+        raise ExperimentError(f"--setups: {POINTS} is driven with {Setup.GUARDED} only; name another controller")
     if options.archive is None:
         worlds = tuple(made_world(number) for number in range(MADE))
     else:

@@ -114,5 +114,7 @@ def test_a_file_that_is_no_archive_is_refused_in_one_line(tmp_path: Path, conten
         run(Options(1, archive=file), lambda done, total: None)
     with pytest.raises(ExperimentError, match="--setups: 'fast' is unknown; known are guarded, strict, jackal"):
         run(Options(1, setups=("fast",)), lambda done, total: None)
+    with pytest.raises(ExperimentError, match="--setups: points is driven with guarded only"):
+        run(Options(1, controllers=("points",), setups=("strict",)), lambda done, total: None)
     with pytest.raises(ExperimentError, match="--controllers: 'best' is unknown"):
         run(Options(1, controllers=("best",)), lambda done, total: None)
