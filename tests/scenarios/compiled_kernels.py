@@ -1,6 +1,6 @@
 """Kernels that a drive compiles: ``python -m tests.scenarios.compiled_kernels WHAT,MISSION,MORE..`` prints JSON lines.
 
-A case is ``drive,MISSION,PLANNER`` or ``serve,MISSION,SENSORS``. Each has a process of its own, which has loaded the
+A case is ``drive,MISSION,PLANNER,CONTROLLER`` or ``serve,MISSION,SENSORS``. Each has a process of its own, which has loaded the
 program and no kernel; all are forked from one interpreter.
 """
 
@@ -42,10 +42,11 @@ def told(package: str, before: dict[str, int], said: list[str]) -> dict[str, Any
     return {"kernels": sum(before.values()), "new": new, "said": said}
 
 
-def drive(mission_file: str, planner: str) -> dict[str, Any]:
+def drive(mission_file: str, planner: str, controller: str) -> dict[str, Any]:
     """A whole drive, in lock-step; says its outcome."""
     mission = load_mission(MISSIONS / mission_file)
-    settings = parse_settings({"navigator": {"planner": planner}}, "test")
+    chosen = {"navigator": {"planner": planner}, "guidance": {"controller": controller}}
+    settings = parse_settings(chosen, "test")
     whole = Drive(mission, scenario_from_mission(mission), settings, 1, NullRecorder())
     before = compiled("companion")
     report = whole.run()

@@ -8,9 +8,11 @@ from pathlib import Path
 from typing import Any
 
 CASES = [
-    ("drive", "rooms.toml", "hybrid"),
-    ("drive", "crossing.toml", "vertex++"),
-    ("drive", "ackermann.toml", "hybrid"),
+    ("drive", "rooms.toml", "hybrid", "points"),
+    ("drive", "crossing.toml", "vertex++", "points"),
+    ("drive", "ackermann.toml", "hybrid", "points"),
+    ("drive", "ackermann.toml", "hybrid", "motion-ga"),
+    ("drive", "complex.toml", "hybrid", "motion-ga"),
     ("serve", "open.toml", "beams"),
     ("serve", "ackermann.toml", "lidar-360"),
 ]
