@@ -26,6 +26,8 @@ EXPERIMENTS = (
     "dead-companion",
     "killed-companion",
     "barn",
+    "controllers",
+    "gates",
     "wang-table4",
     "sedighi-table1",
     "achour-table1",
@@ -34,7 +36,7 @@ EXPERIMENTS = (
 """Each is a module of ``sitl.experiments``, loaded when it is asked for: they load the plotting library."""
 ON_ANY_MAP = ("navigation", "driving")
 OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
-WITH_CONTROLLERS = ("barn", "killed-companion")
+WITH_CONTROLLERS = ("barn", "controllers", "gates", "killed-companion")
 EXIT_FAILED = 3
 
 
@@ -68,8 +70,8 @@ def experiment(
     controllers: Annotated[
         str,
         typer.Option(
-            help="barn, killed-companion: what leads the rover, names separated by commas; "
-            "default: all, and for killed-companion points."
+            help=f"{', '.join(WITH_CONTROLLERS)}: what leads the rover, names separated by commas; default: all, for "
+            "gates motion-ga, for killed-companion points."
         ),
     ] = "",
     setups: Annotated[
@@ -133,7 +135,8 @@ def _refuse_unused_motion(name: str, *, worlds: Path | None, controllers: str, s
     if setups and name != "barn":
         raise ExperimentError(f"--setups: {name} does not take it; the option is for barn")
     if controllers and name not in WITH_CONTROLLERS:
-        raise ExperimentError(f"--controllers: {name} does not take it; the option is for barn and killed-companion")
+        takers = f"{', '.join(WITH_CONTROLLERS[:-1])} and {WITH_CONTROLLERS[-1]}"
+        raise ExperimentError(f"--controllers: {name} does not take it; the option is for {takers}")
     if guard and name != "killed-companion":
         raise ExperimentError(f"--guard: {name} does not take it; the option is for killed-companion")
 

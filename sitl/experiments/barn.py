@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -22,7 +22,6 @@ from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, R
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
-from sitl.autopilot.parameters import DEFAULTS
 from sitl.experiments import drawing
 from sitl.experiments.barn_worlds import GOAL_M, START_M, BarnWorld, made_world, read_worlds
 from sitl.experiments.experiment import (
@@ -36,9 +35,9 @@ from sitl.experiments.experiment import (
     chosen_controllers,
     each,
 )
+from sitl.experiments.off_model import OFF_MODEL, SHIPPED, Limits, off_model
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
-from sitl.plant.rover import SIM_ROVER, Drivetrain
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
 from sitl.sensors.range_sensors import Lidar, SensorSuite
 from sitl.world.truth import SimStart
@@ -54,7 +53,6 @@ FASTEST, SLOWEST = 2.0, 8.0
 OLD_FASTEST = 4.0
 LIDAR = Lidar(3.75, -135.0 + 0.5 * 3.75, 0.06, 10.0, 20.0, 10, 72)
 """270 degrees, 10 m, 720 rays; the nearest of ten each is told, because a MAVLink message has room for 72."""
-OFF_MODEL = 0.3
 WARM_S = 60.0
 """So long the rover may take until it moves."""
 MADE = 50
@@ -76,21 +74,6 @@ class Setup(StrEnum):
     """A Jackal's limits."""
 
 
-class Limits(NamedTuple):
-    """Of the autopilot, and what the rover's speed lags behind its motors."""
-
-    acceleration_m_s2: float
-    turn_acceleration_rad_s2: float
-    turn_rate_rad_s: float
-    lag_s: float
-
-
-SHIPPED = Limits(
-    DEFAULTS["ATC_ACCEL_MAX"][0],
-    math.radians(DEFAULTS["ATC_STR_ACC_MAX"][0]),
-    math.radians(DEFAULTS["ATC_STR_RAT_MAX"][0]),
-    SIM_ROVER.speed_lag_s,
-)
 JACKAL_LIMITS = Limits(20.0, 25.0, 4.0, 0.05)
 """As its own velocity controller is configured (jackal/jackal, jackal_control/config/control.yaml); the lag is ours."""
 
@@ -160,26 +143,6 @@ def mission_of(world: BarnWorld) -> Mission:
         f"world {world.number}", (Target("goal", goal, 0.0, OnBlocked.SKIP),), GridSpec(0.2, margin_m=2.6),
         RoverSpec(JACKAL.radius_m, SPEED_M_S, 0.0, JACKAL), sitl=SitlSpec(heading_deg=0.0),
     )  # fmt: skip
-
-
-def off_model(rng: np.random.Generator, share: float, limits: Limits = SHIPPED) -> tuple[Drivetrain, dict[str, float]]:
-    """A rover that is not what the companion's settings say: each figure off by up to this share, drawn evenly.
-
-    Its speed and turn rate at full output, its lag, and the autopilot's limits of acceleration, braking and turning.
-    """
-    top, lag, turn, gains, brakes, turns = 1.0 + share * rng.uniform(-1.0, 1.0, 6)
-    own = SIM_ROVER
-    turn_lag_s = min(0.1, limits.lag_s) * lag if share else 0.0
-    drivetrain = Drivetrain(own.top_speed_m_s * top, limits.lag_s * lag, own.turn_rate_rad_s * turn, turn_lag_s)
-    parameters = {
-        "ATC_ACCEL_MAX": limits.acceleration_m_s2 * gains,
-        "ATC_DECEL_MAX": limits.acceleration_m_s2 * brakes,
-        "ATC_STR_ACC_MAX": math.degrees(limits.turn_acceleration_rad_s2) * turns,
-        "ATC_STR_RAT_MAX": math.degrees(limits.turn_rate_rad_s),
-    }
-    if limits.acceleration_m_s2 > SHIPPED.acceleration_m_s2:
-        parameters["MOT_SLEWRATE"] = 0.0  # else the motors take a second to their full output
-    return drivetrain, parameters
 
 
 def drive(

@@ -55,7 +55,7 @@ class Options:
     archive: Path | None = None
     """``barn``: a file of worlds; None: worlds of our own making."""
     controllers: tuple[str, ...] = ()
-    """``barn``, ``killed-companion``: what leads the rover; none: the experiment's own choice."""
+    """What leads the rover, for experiments that take any; none: the experiment's own choice."""
     setups: tuple[str, ...] = ()
     """``barn``: what is driven; none: the experiment's own choice."""
     guard: bool = False

@@ -16,7 +16,6 @@ from sitl.experiments.barn import (
     Setup,
     drive,
     limits_of,
-    off_model,
     run,
     score,
     standard,
@@ -25,6 +24,7 @@ from sitl.experiments.barn import (
 )
 from sitl.experiments.barn_worlds import BODY_M, START_M, BarnWorld, made_world, read_worlds
 from sitl.experiments.experiment import ExperimentError, Options
+from sitl.experiments.off_model import off_model
 from sitl.plant.rover import SIM_ROVER
 from tests.support.shared_data import SHARED
 

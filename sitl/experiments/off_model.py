@@ -1,0 +1,50 @@
+"""Rovers that are not what the companion takes them for."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from sitl.autopilot.parameters import DEFAULTS
+from sitl.plant.rover import SIM_ROVER, Drivetrain
+
+OFF_MODEL = 0.3
+
+
+class Limits(NamedTuple):
+    """Of the autopilot, and what the rover's speed lags behind its motors."""
+
+    acceleration_m_s2: float
+    turn_acceleration_rad_s2: float
+    turn_rate_rad_s: float
+    lag_s: float
+
+
+SHIPPED = Limits(
+    DEFAULTS["ATC_ACCEL_MAX"][0],
+    math.radians(DEFAULTS["ATC_STR_ACC_MAX"][0]),
+    math.radians(DEFAULTS["ATC_STR_RAT_MAX"][0]),
+    SIM_ROVER.speed_lag_s,
+)
+
+
+def off_model(rng: np.random.Generator, share: float, limits: Limits = SHIPPED) -> tuple[Drivetrain, dict[str, float]]:
+    """A rover that is not what the companion's settings say: each figure off by up to this share, drawn evenly.
+
+    Its speed and turn rate at full output, its lag, and the autopilot's limits of acceleration, braking and turning.
+    """
+    top, lag, turn, gains, brakes, turns = 1.0 + share * rng.uniform(-1.0, 1.0, 6)
+    own = SIM_ROVER
+    turn_lag_s = min(0.1, limits.lag_s) * lag if share else 0.0
+    drivetrain = Drivetrain(own.top_speed_m_s * top, limits.lag_s * lag, own.turn_rate_rad_s * turn, turn_lag_s)
+    parameters = {
+        "ATC_ACCEL_MAX": limits.acceleration_m_s2 * gains,
+        "ATC_DECEL_MAX": limits.acceleration_m_s2 * brakes,
+        "ATC_STR_ACC_MAX": math.degrees(limits.turn_acceleration_rad_s2) * turns,
+        "ATC_STR_RAT_MAX": math.degrees(limits.turn_rate_rad_s),
+    }
+    if limits.acceleration_m_s2 > SHIPPED.acceleration_m_s2:
+        parameters["MOT_SLEWRATE"] = 0.0  # else the motors take a second to their full output
+    return drivetrain, parameters
