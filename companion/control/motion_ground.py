@@ -57,12 +57,16 @@ def look_round(
     cell_m, unseen = evidence.evidence_m, log_odds == 0.0
     blocked = (log_odds >= evidence.settings.occupied_at) | _closed(evidence, (left, low), (right, high))
     _close_edge(blocked, (left, low), evidence)
+    outside = unseen | blocked
+    for edge in (outside[0, :], outside[-1, :], outside[:, 0], outside[:, -1]):
+        edge[:] = True  # nothing is known here of what lies beyond the window
     # To the surface: the map marks what lies a little behind it.
     behind_m = np.float32(max(0.5 * cell_m, evidence.settings.hit_depth_m))
     gap_m = distance_field(blocked) * np.float32(cell_m) - behind_m
-    seen_m = distance_field(blocked | unseen) * np.float32(cell_m) - behind_m
+    seen_m = distance_field(outside) * np.float32(cell_m) - behind_m
     parts = [(row, column) for row in range(COARSE) for column in range(COARSE)]
-    room_m = sum(gap_m[row::COARSE, column::COARSE].astype(np.float64) for row, column in parts) / len(parts)
+    # The roomiest place of each counts: the mean would close gaps that are only just wide enough.
+    room_m = np.maximum.reduce([gap_m[row::COARSE, column::COARSE].astype(np.float64) for row, column in parts])
     pace = _pace(room_m - body_radius_m, COARSE * cell_m, fastest_m_s)
     pace[np.logical_or.reduce([unseen[row::COARSE, column::COARSE] for row, column in parts])] *= UNSEEN_FACTOR
     goal = np.floor((evidence.frame.xys(ahead[-1:]) - (left, low)) / COARSE).astype(np.int64)
@@ -92,12 +96,15 @@ def _closed(evidence: EvidenceMap, first: tuple[int, int], last: tuple[int, int]
 
 
 def _close_edge(blocked: NDArray[np.bool_], first: tuple[int, int], evidence: EvidenceMap) -> None:
-    """The edge of the map is no ground to drive over: nothing is known beyond it."""
+    """The edge of the map is no ground to drive over: nothing is known beyond it.
+
+    A window of whole coarse cells may end a little before it.
+    """
     height, width = evidence.log_odds.shape
     blocked[0, :] |= first[1] == 0
     blocked[:, 0] |= first[0] == 0
-    blocked[-1, :] |= first[1] + blocked.shape[0] >= height
-    blocked[:, -1] |= first[0] + blocked.shape[1] >= width
+    blocked[-1, :] |= first[1] + blocked.shape[0] > height - COARSE
+    blocked[:, -1] |= first[0] + blocked.shape[1] > width - COARSE
 
 
 def _pace(room_m: Floats, cell_m: float, fastest_m_s: float) -> Floats:

@@ -234,7 +234,8 @@ def cost_s(knots, problem):
 def _after_s(state, least, problem):
     """What comes after the horizon: the way that is left, once the rover points along it and has gathered speed.
 
-    From there it must be able to brake, too.
+    From there it must be able to brake, too. Speed counts as far as it leads on: a rover that is fast before a bend
+    must brake there. Else it would rather wait, and plan again and again to arrive at the bend fast.
     """
     ground, model, weights = problem.ground, problem.model, problem.weights
     x, y, heading, speed = state[0], state[1], state[2], state[3]
@@ -245,7 +246,11 @@ def _after_s(state, least, problem):
         if clearance_m(ground.gap_m, ground.cell_m, problem.body, to_x, to_y, heading) < min(weights.margin_m, least):
             return BLOCKED_S + left_s(ground, x, y)
     left = left_s(ground, x, y)
-    lacks = model.fastest_m_s - max(speed, 0.0)
+    leads_on = 1.0
+    if brakes_m > 0.0:
+        gained = left - left_s(ground, x + brakes_m * math.sin(heading), y + brakes_m * math.cos(heading))
+        leads_on = min(max(gained * model.fastest_m_s / brakes_m, 0.0), 1.0)
+    lacks = model.fastest_m_s - leads_on * max(speed, 0.0)
     slow = lacks * lacks / (2.0 * model.accel_m_s2 * model.fastest_m_s)
     turned = weights.turn * _off_course_rad(ground, x, y, heading)
     return left + min(slow + turned, left + 1.0)

@@ -87,6 +87,27 @@ def test_what_the_mission_or_experience_closed_is_an_obstacle() -> None:
     assert np.isinf(togo_s(seen(evidence), HERE))
 
 
+@pytest.mark.parametrize("fields", [4, 5])
+def test_the_edge_of_the_map_is_closed_on_all_sides_however_many_cells_it_has(fields: int) -> None:
+    """Five fields of five cells are 25: the window has whole cells of two."""
+    mapping = SETTINGS.mapping.model_copy(update={"evidence_m": 0.2})
+    evidence = new_map(empty_grid(fields, fields), 0.35, mapping)
+    evidence.log_odds.fill(-1.0)
+    assert evidence.log_odds.shape[0] == 5 * fields
+    middle = 0.5 * fields
+    path = ReferencePath(np.array([(middle, middle), (middle + 0.2, middle)]))
+    gap_m = look_round(evidence, NedPoint(middle, middle), path, 0.3, 2.0).ground.gap_m
+    for edge in (gap_m[0, :], gap_m[-1, :], gap_m[:, 0], gap_m[:, -1]):
+        assert edge.max() <= 0.0
+
+
+def test_beyond_the_window_nothing_is_known_to_be_free() -> None:
+    """A wall just outside would be in neither field of distances."""
+    window = seen(ground())
+    x, y = (int(v / window.ground.cell_m) for v in window.place(NedPoint(HERE.north_m, HERE.east_m + AROUND_M - 0.5)))
+    assert window.ground.gap_m[y, x] > 1.0 and window.ground.seen_m[y, x] < 0.6
+
+
 @pytest.mark.parametrize("east_m", [0.1, 19.9])
 def test_at_the_edge_of_the_map_it_is_smaller(east_m: float) -> None:
     path = replace(PATH, points=np.column_stack((PATH.points[:, 0], np.full(57, east_m))))
