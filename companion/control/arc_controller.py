@@ -77,6 +77,10 @@ class ArcController:
         """What is left of the manoeuvre under way, else the path."""
         return path if self.manoeuvre is None else self.manoeuvre.as_path()
 
+    def foreseen(self, path: ReferencePath, view: LocalView, times_s: Points) -> Points | None:
+        """It follows the line ahead."""
+        return None
+
     def follow(self, path: ReferencePath, view: LocalView) -> ControlCommand:
         """The command for this moment: on with the manoeuvre, on along the path, or stop."""
         rolling = self._rolling(view)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 
+from companion.control.following import Following
 from companion.settings import GuidanceSettings, Settings
 
 GUARD_SLACK_S = 0.05
@@ -33,6 +34,15 @@ def for_link(settings: Settings, link_s: float) -> Settings:
     latency_s = max(own.latency_s, loop_latency_s(settings) + late_s)
     guidance = own.model_copy(update={"latency_s": latency_s, "brake_delay_s": own.brake_delay_s + late_s})
     return settings.model_copy(update={"guidance": guidance})
+
+
+def late(follows: Following, dead_s: float, link_s: float) -> Following:
+    """The same where the link takes ``link_s``, there and back, beyond the first step: that is in any dead time.
+
+    ``dead_s``: as set. The estimate has the link in it, but sees a change of it only seconds later.
+    """
+    late_s = counted_s(link_s) - LINK_STEP_S
+    return follows._replace(dead_s=max(follows.dead_s, dead_s + late_s)) if late_s > 0.0 else follows
 
 
 def for_guard(settings: Settings, waits_s: float | None) -> Settings:

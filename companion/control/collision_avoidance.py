@@ -16,7 +16,7 @@ Nouns: collision avoidance, yielding.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -43,8 +43,11 @@ from companion.control.safe_reach import BACK_LEAST_M_S, backing_speed_m_s
 from companion.core.frames import NedPoint, Pose, wrap_pi_rad
 from companion.mapping.map_queries import ArcQueries, Until, look_along
 from companion.perception.moving_obstacles import Moving
+from companion.settings import GuidanceSettings
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
+Foresees = Callable[[Points], Points | None]
+"""Where the rover will be at these moments, seconds from now on."""
 MARGIN_SHARES = (1.0, 0.5)
 """First with the whole margin, then with half: going on with half the margin is better than leaving the path."""
 NEAR_M = 0.15
@@ -90,9 +93,14 @@ class Outlook:
     backwards: bool = False
 
     @property
+    def guidance(self) -> GuidanceSettings:
+        """How it brakes."""
+        return self.view.settings.guidance
+
+    @property
     def rolls_m(self) -> Points:
         """How far the rover still rolls, at each moment, if it is told to stop."""
-        return braked_m(self.view.speed_m_s, self.times_s, self.view.settings.guidance)
+        return braked_m(self.view.speed_m_s, self.times_s, self.guidance)
 
     def driven_m(self, wanted_m_s: float, goes_s: float) -> Points:
         """How far the rover drives, at each moment, if it goes on at this speed for ``goes_s`` and then stops."""
@@ -107,11 +115,13 @@ def avoided(
     *,
     aside_rad: float | None = None,
     backwards: bool = False,
+    foresees: Foresees | None = None,
 ) -> Option:
     """What to do because of what moves, when the controller says ``command``; that command if nothing comes across.
 
     ``line``: what the rover is led along. ``aside_rad``: the bearing to which it moves aside already; it keeps to that.
-    ``backwards``: it rolls tail first.
+    ``backwards``: it rolls tail first. ``foresees``: where the rover will be with that command, if it is known better
+    than that it follows the line.
     """
     times_s = np.arange(0.0, view.settings.traffic.look_s + 1e-9, PERIOD_S)
     outlook = Outlook(view, times_s, backwards)
@@ -124,7 +134,11 @@ def avoided(
     def room_m(option: Option, share: float) -> float:
         return least_room_m(option.places, discs, times_s, share * margins_m)
 
-    options = list(_on_the_way(outlook, command, line))
+    places = foresees(times_s) if foresees is not None and command.purpose is Purpose.DRIVE else None
+    if places is None:
+        options = list(_on_the_way(outlook, command, line))
+    else:
+        options = list(_on_as_foreseen(outlook, command, places))
     for share in MARGIN_SHARES:
         good = [option for option in options if room_m(option, share) >= 0.0]
         if good:
@@ -183,9 +197,10 @@ class CollisionAvoidance:
         moving: tuple[Moving, ...],
         *,
         backwards: bool,
+        foresees: Foresees | None = None,
     ) -> Option:
         """What to do, as ``avoided`` says."""
-        option = avoided(command, line, view, moving, aside_rad=self._aside_rad, backwards=backwards)
+        option = avoided(command, line, view, moving, aside_rad=self._aside_rad, backwards=backwards, foresees=foresees)
         self._aside_rad = option.aside_rad
         return option
 
@@ -235,6 +250,19 @@ def _on_the_way(outlook: Outlook, command: ControlCommand, line: ReferencePath |
     else:
         yield Option(command, halted, yields=False)
     yield Option(stop_for(Purpose.BRAKE), halted)
+
+
+def _on_as_foreseen(outlook: Outlook, command: ControlCommand, places: Points) -> Iterator[Option]:
+    """Going on as foreseen, going on a little, stopping."""
+    reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(places, axis=0).T))))
+    for goes_s in GO_ON_S:
+        last = int(np.searchsorted(outlook.times_s, goes_s, side="right")) - 1
+        speed_m_s = (reached_m[last] - reached_m[max(last - 1, 0)]) / PERIOD_S
+        rolls_m = braked_m(speed_m_s, np.maximum(outlook.times_s - outlook.times_s[last], 0.0), outlook.guidance)
+        along_m = np.minimum(reached_m, reached_m[last]) + rolls_m
+        stopping = np.column_stack([np.interp(along_m, reached_m, places[:, axis]) for axis in range(2)])
+        yield Option(command, stopping if math.isfinite(goes_s) else places, yields=False)
+    yield Option(stop_for(Purpose.BRAKE), _halted(outlook))
 
 
 def _nearer(command: ControlCommand, pose: Pose, along_m: Points) -> ControlCommand | None:

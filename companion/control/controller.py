@@ -10,7 +10,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from companion.control.local_view import LocalView
-from companion.control.reference_path import ReferencePath
+from companion.control.reference_path import Points, ReferencePath
 from companion.vehicle.commands import GuidedVelocity, Setpoint
 
 STOP = GuidedVelocity(0.0, 0.0)
@@ -62,6 +62,13 @@ class Controller(Protocol):
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The line that the rover is really led along: the path, or a manoeuvre back to it."""
+        ...
+
+    def foreseen(self, path: ReferencePath, view: LocalView, times_s: Points) -> Points | None:
+        """Where the rover will be at these moments from now on, if nothing comes across; one row each, north and east.
+
+        None: it follows the line ahead as it is told.
+        """
         ...
 
     def reset(self) -> None:

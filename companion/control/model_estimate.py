@@ -31,6 +31,7 @@ GAP_S = 0.5
 """Moments farther apart do not belong together."""
 DEADS_S = tuple(0.025 * step for step in range(2, 33))
 """Dead times that are tried: another one far away may fit best."""
+MOST_DEAD_S = DEADS_S[-1]
 CHANGES = (0.03, -0.03, 0.1, -0.1)
 """The other figures are tried with so much more or less."""
 FIGURES = ("acceleration_m_s2", "deceleration_m_s2", "turn_acceleration_rad_s2", "turn_gain")
@@ -176,15 +177,17 @@ def fit_of(figures, rows, since_s):
     ``rows``: shape (n, 5), time, speed and turn rate told since the row before, speed and turn rate seen;
     ``since_s``: the three kinds of motion are counted from then on.
     """
-    speed, turn, at = rows[0, 3], rows[0, 4], 0
+    speed, turn, at, counted = rows[0, 3], rows[0, 4], 0, 0
     error = gathers_s = brakes_s = turns_s = 0.0
     for row in range(1, rows.shape[0]):
         now_s, step_s = rows[row, 0], rows[row, 0] - rows[row - 1, 0]
         while at + 1 < row and rows[at + 1, 0] <= now_s - figures.dead_s:
             at += 1
-        if rows[at, 0] > now_s - figures.dead_s:
+        if now_s - rows[0, 0] < MOST_DEAD_S:
+            # The same moments for every dead time, or the noise of the first ones would choose it.
             speed, turn = rows[row, 3], rows[row, 4]
             continue
+        counted += 1
         change, turned = rows[at + 1, 1] - speed, figures.turn_gain * rows[at + 1, 2] - turn
         slows = change * speed < 0.0
         most = (figures.deceleration_m_s2 if slows else figures.acceleration_m_s2) * step_s
@@ -199,4 +202,4 @@ def fit_of(figures, rows, since_s):
         turn += min(max(turned, -most_turn), most_turn)
         off, off_turn = (rows[row, 3] - speed) / ERROR_M_S, (rows[row, 4] - turn) / ERROR_RAD_S
         error += min(off * off, MOST_ERROR * MOST_ERROR) + min(off_turn * off_turn, MOST_ERROR * MOST_ERROR)
-    return error / rows.shape[0], gathers_s, brakes_s, turns_s
+    return error / max(counted, 1), gathers_s, brakes_s, turns_s

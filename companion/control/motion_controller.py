@@ -27,15 +27,16 @@ from companion.control.motion_kernels import (
     admitted_speeds,
     may_be_last,
     spare_m,
+    way_of,
 )
 from companion.control.motion_planners import Found, MotionPlanner
-from companion.control.reference_path import ReferencePath
+from companion.control.reference_path import Points, ReferencePath
 from companion.control.setpoint_check import velocity_stops_in_time
 from companion.control.told import ToldVelocity, in_force
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
 from companion.mission.bounds import Bounds
-from companion.vehicle.commands import GuidedVelocity
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 HORIZON_S, STEP_S = 2.5, 0.1
 LOOKS_S = 0.09
@@ -76,9 +77,6 @@ class MotionChoice:
 class MotionController:
     """Remembers the ground it looked at, and when the rover could last be left alone with what it was told."""
 
-    backwards = False
-    """It drives backwards for a moment at a time, never along a path."""
-
     def __init__(self, footprint: Footprint, planner: MotionPlanner) -> None:
         places_m, radius_m = footprint.discs()
         self._body = Body(places_m, radius_m, float(np.abs(places_m).max()) + radius_m)
@@ -87,10 +85,30 @@ class MotionController:
         self._looked_s = self._safe_s = self._time_s = -math.inf
         self.choice: MotionChoice | None = None
         """The last one."""
+        self.backwards = False
+        """Whether the rover rolled tail first when it was last led."""
 
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The path itself."""
         return path
+
+    def foreseen(self, path: ReferencePath, view: LocalView, times_s: Points) -> Points | None:
+        """The motion that was chosen, as told, and then on along the path."""
+        if self.choice is None or self.choice.time_s != view.pose.time_s:
+            return None
+        motion, problem, corner = self.choice.found.motion.copy(), self.choice.problem, self.choice.corner
+        motion[0] = self.choice.told.speed_m_s, self.choice.told.turn_rad_s
+        way = way_of(motion, problem)[:, ::-1] + (corner.north_m, corner.east_m)
+        last_s = STEP_S * (len(way) - 1)
+        moves_s = np.minimum(times_s, last_s)
+        at_s = np.arange(len(way)) * STEP_S
+        places = np.column_stack([np.interp(moves_s, at_s, way[:, axis]) for axis in range(2)])
+        ahead = path.points[path.progress :]
+        on = np.vstack((way[-1], ahead[int(np.argmin(((ahead - way[-1]) ** 2).sum(axis=1))) + 1 :]))
+        reached_m = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(on, axis=0).T))))
+        along_m = (times_s - last_s) * view.rover.cruise_speed_m_s
+        further = np.column_stack([np.interp(along_m, reached_m, on[:, axis]) for axis in range(2)])
+        return np.where((times_s > last_s)[:, None], further, places)
 
     def reset(self) -> None:
         """The path is void, and what was planned along it."""
@@ -100,6 +118,7 @@ class MotionController:
     def follow(self, path: ReferencePath, view: LocalView) -> ControlCommand:
         """The beginning of the best motion, or of a slower one, or to brake."""
         now_s, model = view.pose.time_s, rover_model(view)
+        self.backwards = view.rolls_back
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
         problem = self._problem(path, view, model)
@@ -194,12 +213,15 @@ def _stops_in_time(told: ToldVelocity, view: LocalView) -> bool:
 
 
 def _pending(view: LocalView, dead_s: float) -> NDArray[np.float64]:
-    """What was told and has not had its effect yet, one row a step."""
+    """What was told and has not had its effect yet, one row a step.
+
+    Where that was no velocity, the rover goes on as it does; a position tells it to drive on.
+    """
     rows = np.zeros((round(dead_s / STEP_S), 2))
+    on_m_s = view.rover.cruise_speed_m_s if isinstance(view.told, GuidedPosition) else view.forward_m_s
     for step, row in enumerate(rows):
         told = in_force(view.lately, view.pose.time_s - dead_s + (step + 0.5) * STEP_S)
-        if told is not None:
-            row[:] = told.speed_m_s, told.turn_rad_s
+        row[:] = (on_m_s, view.yaw_rate_rad_s) if told is None else (told.speed_m_s, told.turn_rad_s)
     return rows
 
 

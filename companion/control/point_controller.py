@@ -14,7 +14,7 @@ import math
 from companion.control.braking import braking_distance_m, fastest_within_m, stopping_distance_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
-from companion.control.reference_path import STEP_M, ReferencePath
+from companion.control.reference_path import STEP_M, Points, ReferencePath
 from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, overshoot_m, unseen_flank
 from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
@@ -88,6 +88,10 @@ class PointController:
     def line_ahead(self, path: ReferencePath | None) -> ReferencePath | None:
         """The path itself."""
         return path
+
+    def foreseen(self, path: ReferencePath, view: LocalView, times_s: Points) -> Points | None:
+        """It follows the line ahead."""
+        return None
 
     def reset(self) -> None:
         """It knows no manoeuvres; a look outlasts a change of path."""

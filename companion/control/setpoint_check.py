@@ -30,6 +30,8 @@ SLACK_M = 0.1
 """The controllers look in steps, and let a line end a few centimetres before an obstacle."""
 NEARER_M, AWAY_M = 0.05, 0.01
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
+TOUCHES_M = 1e-6
+"""A piece of a way that is clear for less than its length leads into something."""
 OVERSHOT_SHARE = 0.1
 """A near position is overshot by no more than this share of the distance."""
 WAY_STEP_S = 0.1
@@ -124,12 +126,15 @@ def _way_is_blocked(places: list[NedPoint], view: LocalView) -> Fault | None:
     base, radius_m = view.evidence.base, view.evidence.rover_radius_m - NEARER_M
     # A rover that stands nearer to something must get away.
     radius_m = min(radius_m, clearance_m(view.evidence, view.pose.point, radius_m) - AWAY_M)
+    left_m = math.fsum(here.distance_m(there) for here, there in pairwise(places))
     for here, there in pairwise(places):
         if not base.contains(base.cell_at(there)):
             break  # nothing is known beyond the edge of the map
         length_m = here.distance_m(there)
-        if look_along(view.evidence, here, there, radius_m).clear_m < length_m - 0.5 * SLACK_M:
+        clear_m = look_along(view.evidence, here, there, radius_m).clear_m
+        if clear_m < length_m - TOUCHES_M and left_m - clear_m > 0.5 * SLACK_M:
             return Reason(SetpointFault.INTO_OBSTACLE)
+        left_m -= length_m
     return None
 
 

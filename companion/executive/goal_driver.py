@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import partial
 
 from companion.control.arc_controller import ArcController
 from companion.control.collision_avoidance import CollisionAvoidance
@@ -56,15 +57,6 @@ class Tally:
     steps: int = 0
     return_steps: int = 0
     stuck: int = 0
-
-
-def controller_in_force(kind: ControllerKind, rover: RoverLimits) -> ControllerKind:
-    """What really leads the rover: ``points`` where motions cannot be planned for it.
-
-    Single thin beams leave the ground between them unseen, and a planned motion does not turn to look. The motions
-    that are planned begin with turns on the spot, which a rover that turns in arcs cannot do.
-    """
-    return "points" if rover.narrow_sight or rover.turning_radius_m > 0.0 else kind
 
 
 def controller_for(rover: RoverLimits, footprint: Footprint, kind: ControllerKind, seed: int) -> Controller:
@@ -211,8 +203,9 @@ class GoalDriver:
     ) -> tuple[ControlCommand, bool]:
         """What to do because of what moves, and whether that is something else than the command."""
         controller = self._controller
-        line = controller.line_ahead(self.path)
-        option = self._avoidance.avoid(command, line, view, moving, backwards=controller.backwards)
+        line, path = controller.line_ahead(self.path), self.path
+        foresees = None if path is None else partial(controller.foreseen, path, view)
+        option = self._avoidance.avoid(command, line, view, moving, backwards=controller.backwards, foresees=foresees)
         return option.command, option.yields
 
     def _follow(self, view: LocalView) -> ControlCommand:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from companion.control.braking import counted_s, for_guard, for_link
+from companion.control.braking import counted_s, for_guard, for_link, late
 from companion.control.controller import ControlCommand, Controller
 from companion.control.following import following_of
 from companion.control.local_view import LocalView
@@ -21,7 +21,8 @@ from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
-from companion.executive.goal_driver import GoalDriver, controller_for, controller_in_force
+from companion.executive.controller_choice import settings_in_force
+from companion.executive.goal_driver import GoalDriver, controller_for
 from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, from_home, lay_again
 from companion.executive.mission_progress import (
     MissionPhase,
@@ -50,7 +51,7 @@ from companion.perception.object_tracker import ObjectTracker
 from companion.planning.registry import make_planner
 from companion.recording.recorder import RunLog
 from companion.safety.reasons import RunPhase
-from companion.settings import Settings
+from companion.settings import ControllerKind, Settings
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.state import VehicleState
 
@@ -114,7 +115,9 @@ class MissionExecutor:
         """The way back to where the mission began."""
         self._refuges: list[Refuge] = []
         self._rolls_until_s: float | None = None
-        rover, given = mission.rover, settings.current
+        rover, asked = mission.rover, settings.current.guidance.controller
+        self._scan = scan
+        given = self._given
         margin_m = given.guidance.narrow_margin_m if scan.is_narrow else 0.0
         self.estimator = ModelEstimator(following_of(given.motion, {}))
         """How the rover follows velocities."""
@@ -129,10 +132,11 @@ class MissionExecutor:
         if rover.turning_radius_m > 0.0 and scan.is_narrow:
             text = "Single beams see too little for a rover that turns in arcs: give it a lidar"
             notifier.tell(text, Severity.WARNING)
-        self._kind = controller_in_force(given.guidance.controller, self._limits)
-        if self._kind != given.guidance.controller:
+        self.controller: ControllerKind = given.guidance.controller
+        """The one in force."""
+        if self.controller != asked:
             why = "single beams see too little" if scan.is_narrow else "the rover turns in arcs"
-            text = f"guidance.controller: driving with {self._kind}, not {given.guidance.controller}: {why}"
+            text = f"guidance.controller: driving with {self.controller}, not {asked}: {why}"
             notifier.tell(text, Severity.WARNING)
         planner = make_planner(given.navigator.planner, given.planner)
         searcher = PathSearcher(planner, rng)
@@ -166,8 +170,8 @@ class MissionExecutor:
 
     def _controller(self, rng: np.random.Generator) -> Controller:
         """A new one. Only those that draw random numbers take their seed from the run's."""
-        seed = 0 if self._kind == "points" else int(rng.integers(2**63))
-        return controller_for(self._limits, self._mission.rover.footprint, self._kind, seed)
+        seed = 0 if self.controller == "points" else int(rng.integers(2**63))
+        return controller_for(self._limits, self._mission.rover.footprint, self.controller, seed)
 
     # The map and the ground --------------------------------------------------------------------------------------
 
@@ -186,7 +190,7 @@ class MissionExecutor:
             return False
         self._notifier.tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", Severity.WARNING)
         self.maps_begun += 1
-        mapping = self._settings.current.mapping
+        mapping = self._given.mapping
         self.layout, self.progress = lay_again(self.layout, self.progress, self._mission, mapping, origin)
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
@@ -302,7 +306,7 @@ class MissionExecutor:
     @property
     def learns(self) -> bool:
         """Whether it matters how the rover follows velocities, and is estimated."""
-        return self._kind != "points" and self._settings.current.motion.learns
+        return self.controller != "points" and self._settings.current.motion.learns
 
     def view(self, vehicle: VehicleState, now_s: float) -> LocalView:
         """This moment. Settings that were changed count from here on; those of the map itself and the planner stay."""
@@ -315,6 +319,7 @@ class MissionExecutor:
         motion = settings.motion
         self.estimator.assume(following_of(motion, vehicle.parameters))
         follows = self.estimator.estimate.following(motion.off_model_known)
+        follows = late(follows, motion.dead_s, vehicle.latency_s)
         return LocalView(
             pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s, rolls_back=back,
             following=follows,
@@ -326,13 +331,16 @@ class MissionExecutor:
         others = announced(vehicle, view.pose, self._mission.rover.radius_m, self._settings.current.traffic)
         return merged(others, self._tracker.moving(now_s, view.settings.traffic), now_s)
 
+    @property
+    def _given(self) -> Settings:
+        """The settings as they are now, of the controller in force."""
+        return settings_in_force(self._settings.current, self._scan, self._mission.rover.turning_radius_m)
+
     def _settings_in_force(self, link_s: float, waits_s: float | None) -> Settings:
         """The settings for a link that takes this long, there and back, and a guard that waits so long, or none."""
         made_from = (self._settings.changes, counted_s(link_s), waits_s)
         if made_from != self._counted_for:
-            counted = for_guard(for_link(self._settings.current, link_s), waits_s)
-            guidance = counted.guidance.model_copy(update={"controller": self._kind})
-            self._counted_for, self._counted = made_from, counted.model_copy(update={"guidance": guidance})
+            self._counted_for, self._counted = made_from, for_guard(for_link(self._given, link_s), waits_s)
         return self._counted
 
     def _is_refused(self, now_s: float) -> bool:

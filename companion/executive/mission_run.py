@@ -17,7 +17,7 @@ from companion.control.setpoint_check import SetpointCheck
 from companion.control.told import Told, after
 from companion.core.frames import Pose
 from companion.core.scan import RangeScan
-from companion.core.severity import TextSink
+from companion.core.severity import Severity, TextSink
 from companion.executive.auto_mode_legs import AutoModeLegs
 from companion.executive.mission_executor import MissionExecutor, MissionTask
 from companion.executive.mission_layout import MissionLayout
@@ -90,6 +90,7 @@ class MissionRun:
         self.vehicle = vehicle
         self.sender = sender
         self.latch = LatchState()
+        self._notifier = notifier
         self.executor: MissionExecutor | None = None
         """None until the mission has begun."""
         self.awaited: Reason[WaitReason] | None = None
@@ -136,11 +137,15 @@ class MissionRun:
             return [(target.name, TargetStatus.PENDING) for target in self.mission.targets]
         return self.executor.statuses()
 
-    def begin(self, layout: MissionLayout, progress: MissionProgress) -> MissionExecutor:
+    def begin(self, layout: MissionLayout, progress: MissionProgress, now_s: float) -> MissionExecutor:
         """The rover may be driven for the first time."""
         seen = self.vehicle.scan_ahead or self.vehicle.scan
         assert seen is not None
         self.executor = self._make_executor(layout, progress, seen.scan)
+        if self.executor.controller != "points" and self.vehicle.guard_at(now_s) is None:
+            lasts_s = self._settings.current.guidance.velocity_lasts_s
+            text = f"No guard on the autopilot: each command must be safe for {lasts_s:g} s, so the rover is slower"
+            self._notifier.tell(text, Severity.INFO)
         return self.executor
 
     def start_afresh(self) -> None:

@@ -32,6 +32,7 @@ from companion.mission.bounds import Bounds
 from companion.perception.object_tracker import ObjectTracker
 from companion.planning import registry
 from companion.settings import Settings
+from companion.settings.settings_file import by_points
 from companion.vehicle.commands import GuidedVelocity
 
 COMPILING = "compiling, once on this machine: about a minute, several on a Raspberry Pi"
@@ -39,7 +40,10 @@ COMPILING = "compiling, once on this machine: about a minute, several on a Raspb
 
 
 def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
-    """Run every compiled kernel that a drive of such a rover with these settings uses once, with the types it uses."""
+    """Run every compiled kernel that a drive of such a rover with these settings uses once, with the types it uses.
+
+    Those for points, too: whether motions can be planned is known only once the sensors are.
+    """
     registry.warm_up((settings.navigator.planner,), settings.planner)
     evidence = new_map(empty_grid(8, 8), 0.35, settings.mapping)
     bearings = np.array([0.0, 0.5])
@@ -55,19 +59,13 @@ def warm_up(settings: Settings, turning_radius_m: float = 0.0) -> None:
     least_room_m(places, np.ones((1, 5)), np.array([0.0, 0.2]), np.array([0.3, 0.3]))
     steered(0.0, 0.0, 0.0, places, np.zeros(2), np.zeros(1))
     first_near(places, np.ones((1, 5)), np.array([0.0, 0.2]), 0.1)
-    at = LocalView(Pose(4.0, 4.0, 0.0, 0.0), 0.2, evidence, RoverLimits(0.35, 2.0, 4.0), _by_points(settings))
+    at = LocalView(Pose(4.0, 4.0, 0.0, 0.0), 0.2, evidence, RoverLimits(0.35, 2.0, 4.0), by_points(settings))
     farthest_clear(ReferencePath(np.column_stack((np.linspace(4.0, 7.0, 13), np.full(13, 4.0)))), at)
     velocity_stops_in_time(GuidedVelocity(0.2, 0.1), at, Bounds())
     if turning_radius_m > 0.0:
-        _steer(_by_points(settings))
+        _steer(by_points(settings))
     if settings.guidance.controller != "points":
         _plan_motions(settings)
-
-
-def _by_points(settings: Settings) -> Settings:
-    """What a rover drives with for which no motions can be planned: that is known only once its sensors are."""
-    guidance = settings.guidance.model_copy(update={"controller": "points"})
-    return settings.model_copy(update={"guidance": guidance})
 
 
 def _plan_motions(settings: Settings) -> None:

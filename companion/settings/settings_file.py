@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from companion.settings.section import SettingsError
-from companion.settings.settings import Settings
+from companion.settings.settings import MappingSettings, Settings
 from companion.storage.toml_file import read_toml
 from companion.storage.validation import describe_first
 
@@ -45,6 +45,18 @@ def parse_settings(data: dict[str, object], source: str) -> Settings:
         return Settings.model_validate(data)
     except ValidationError as error:
         raise SettingsError(f"{source}: {describe_first(error, Settings)}") from error
+
+
+def by_points(settings: Settings) -> Settings:
+    """The same as if ``guidance.controller`` were ``points``: what planned motions have other defaults for, too."""
+    usual, given = MappingSettings(), settings.mapping
+    back = {
+        name: getattr(usual, name)
+        for name, value in FOR_PLANNED_MOTIONS["mapping"].items()
+        if getattr(given, name) == value
+    }
+    guidance = settings.guidance.model_copy(update={"controller": "points"})
+    return settings.model_copy(update={"guidance": guidance, "mapping": given.model_copy(update=back)})
 
 
 def _set_for_planned_motions(data: dict[str, object]) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from companion.checkpoint.resume import PreviousRun, ResumePermission, resume_permission, resumed_layout, same_boot
 from companion.control.controller import STANDSTILL
 from companion.core.severity import Severity
+from companion.executive.controller_choice import settings_in_force
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import MissionProgress, plan_progress
 from companion.executive.mission_run import MissionRun
@@ -279,7 +280,10 @@ class Arming:
         pose, mission, fence = vehicle.pose_at(now_s), self._run.mission, self._limits.fence
         if vehicle.origin is None or vehicle.home is None or pose is None:
             return None
-        origin, mapping = vehicle.origin.point, self._settings.current.mapping
+        seen, settings = vehicle.scan_ahead or vehicle.scan, self._settings.current
+        scan = None if seen is None else seen.scan
+        mapping = settings_in_force(settings, scan, mission.rover.turning_radius_m).mapping
+        origin = vehicle.origin.point
         if self._previous is None or vehicle.position is None:
             layout = lay(mission, mapping, origin, vehicle.home.point, pose, fence)
             return Cleared(layout, plan_progress(layout.targets, layout.start))

@@ -116,7 +116,7 @@ class Supervisor:
             return
         text = f"Companion: {self._run.mission.name}, {len(cleared.progress.targets)} targets"
         self._notifier.tell(text, Severity.INFO)
-        executor = self._run.begin(cleared.layout, cleared.progress)
+        executor = self._run.begin(cleared.layout, cleared.progress, now_s)
         if self._saver.resume(executor, now_s):
             text = f"Resumed {cleared.found}, {executor.reached} targets reached before"
             self._notifier.tell(text, Severity.INFO)

@@ -1,7 +1,7 @@
 -- Guard for rover-companion: HOLD when the companion falls silent while it drives the rover.
 --
 -- A velocity lasts three seconds in ArduRover. Without this script a rover whose companion dies drives on for as long.
--- It waits SCR_USER1 milliseconds (100 to 3000; 0: 300). It begins to watch with the companion's first setpoint in
+-- It waits SCR_USER1 milliseconds (200 to 3000; 0: 300). It begins to watch with the companion's first setpoint in
 -- GUIDED, and ends when the mode is another one or the rover is disarmed: so it never acts against a pilot, nor on a
 -- companion that ended well. Once a second it tells as CMPGUARD how long it waits; negative while HOLD is its doing.
 local COMPANION = 191
@@ -16,7 +16,7 @@ local heard_ms, told_ms = 0, 0
 local function waits_ms()
   local wanted = param:get("SCR_USER1") or 0
   if wanted <= 0 then return 300 end
-  return math.min(math.max(wanted, 100), 3000)
+  return math.min(math.max(wanted, 200), 3000)
 end
 
 local function listen(now_ms, guided)
@@ -35,7 +35,7 @@ local function update()
   local now_ms, mode = millis():toint(), vehicle:get_mode()
   local guided = arming:is_armed() and mode == GUIDED
   if not guided then watches = false end
-  if mode ~= HOLD then acted = false end
+  if mode ~= HOLD or not arming:is_armed() then acted = false end
   listen(now_ms, guided)
   if watches and now_ms - heard_ms > waits_ms() then
     watches, acted = false, true

@@ -49,6 +49,8 @@ PARAMETERS_KEPT = frozenset(
 """The parameters that a run needs: the autopilot sends hundreds whenever a ground station lists them."""
 OTHERS_KEPT = 64
 OTHERS_FORGOTTEN_S = 30.0
+WIDER_S = 1.0
+"""So long a wide scan stands before those of single beams that look the same way."""
 """Other vehicles are kept for this long after their last message, and no more than OTHERS_KEPT of them."""
 
 
@@ -176,7 +178,7 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
         case EkfStatusSeen():
             return replace(state, ekf=event)
         case RangeSeen():
-            return replace(state, scan=event, scan_ahead=event if event.scan.looks_ahead else state.scan_ahead)
+            return replace(state, scan=event, scan_ahead=_seen_ahead(state.scan_ahead, event))
         case TargetSeen():
             return replace(state, target=event)
         case SticksSeen():
@@ -206,6 +208,14 @@ def _fold_rare(state: VehicleState, event: Event) -> VehicleState:
             return _with_parameter(state, event)
         case _:
             return state
+
+
+def _seen_ahead(before: RangeSeen | None, event: RangeSeen) -> RangeSeen | None:
+    """The newest scan ahead. A single beam does not take the place of a wider scan that is as good as new."""
+    if not event.scan.looks_ahead:
+        return before
+    wider = before is not None and not before.scan.is_narrow and event.time_s - before.time_s < WIDER_S
+    return before if event.scan.is_narrow and wider else event
 
 
 def _with_parameter(state: VehicleState, event: ParameterSeen) -> VehicleState:

@@ -25,7 +25,7 @@ SETPOINTS = {
 LIFE = {"HEARTBEAT", *SETPOINTS}
 LOOK_US = 20_000
 TELL_US = 1_000_000
-USUAL_MS, LEAST_MS, MOST_MS = 300.0, 100.0, 3000.0
+USUAL_MS, LEAST_MS, MOST_MS = 300.0, 200.0, 3000.0
 NAME = b"CMPGUARD"
 
 
@@ -65,7 +65,7 @@ class Guard:
         """Look, act, and tell."""
         vehicle = self._vehicle
         self._watches &= self._is_guided()
-        self._acted &= vehicle.mode == Mode.HOLD
+        self._acted &= vehicle.armed and vehicle.mode == Mode.HOLD
         if self._watches and vehicle.time_us - self._heard_us > self.waits_us:
             self._watches, self._acted = False, True
             self._set_mode(vehicle, Mode.HOLD)

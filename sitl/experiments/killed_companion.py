@@ -83,6 +83,7 @@ class KilledDrive:
     motors: Motors
     seed: int
     controller: str = POINTS
+    """What really led the rover: motions are not planned for every one."""
     deaths: list[float] = field(default_factory=list)
     """Seconds since the autopilot's start."""
     contacts: list[Contact] = field(default_factory=list)
@@ -136,7 +137,7 @@ def drive_with_deaths(
     ``settings``: None for the defaults. ``guarded``: with the guard on the autopilot.
     """
     suite, settings = str(mission.sitl.sensors) if mission.sitl is not None else "", settings or Settings()
-    result = KilledDrive(mission.name, suite, motors, seed, settings.guidance.controller)
+    result = KilledDrive(mission.name, suite, motors, seed)
     rng, person, scenario = np.random.default_rng((seed, 13)), Person(), scenario_from_mission(mission)
     if guarded:
         scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
@@ -164,6 +165,8 @@ def drive_with_deaths(
                 drive.kill_companion(float(rng.uniform(*ABSENT_S)), kept_in(place, mission))
                 dies_s = None
         result.ended, result.person = drive.companion.done, person.helped
+        executor = drive.companion.mission_run.executor
+        result.controller = POINTS if executor is None else executor.controller
     for hit in simulator.collisions:
         before = [death_s for death_s in result.deaths if death_s <= hit.time_s]
         since_s = hit.time_s - before[-1] if before else None
@@ -245,6 +248,12 @@ class KilledReport(ExperimentReport):
         deaths = sum(len(drive.deaths) for drive in self.drives)
         touched, run_into = sum(d.touched for d in self.drives), sum(d.run_into for d in self.drives)
         guard = f"The guard on the autopilot waits {GUARD['SCR_USER1']:g} ms.\n\n" if self.options.guard else ""
+        planned = sum(len(drive.deaths) for drive in self.drives if drive.controller != POINTS)
+        if planned:
+            guard += f"""Motions were planned in the drives with {planned} of these deaths; with thin beams and on arcs
+`{POINTS}` leads the rover whatever is asked for.
+
+"""
         return f"""## A companion that is killed and resumed{", with the guard" if guard else ""}
 
 `{self.options.command(NAME)}`

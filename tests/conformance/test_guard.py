@@ -179,8 +179,20 @@ def test_it_tells_once_a_second_how_long_it_waits_and_whether_hold_is_its_doing(
     assert guard.told_ms == 300.0
 
 
+def test_a_hold_in_which_a_person_disarmed_the_rover_is_not_its_doing_any_more(guard: Guards) -> None:
+    """Else a companion that is resumed would take the rover from whoever armed it again."""
+    looks(guard, 1.1, 0.1, packed(SETPOINT))
+    looks(guard, 2.0)
+    assert guard.mode == Mode.HOLD and guard.told_ms == -300.0
+    guard.put(Mode.HOLD, False)
+    looks(guard, 1.1)
+    guard.put(Mode.HOLD, True)
+    looks(guard, 1.1)
+    assert guard.told_ms == 300.0
+
+
 def test_the_script_waits_within_bounds_and_for_the_component_it_was_made_for() -> None:
-    for wanted, waits_ms in ((0.0, 300.0), (20.0, 100.0), (9000.0, 3000.0), (500.0, 500.0)):
+    for wanted, waits_ms in ((0.0, 300.0), (20.0, 200.0), (9000.0, 3000.0), (500.0, 500.0)):
         one = Script(wanted)
         looks(one, 1.1)
         assert one.told_ms == waits_ms

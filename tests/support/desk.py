@@ -51,7 +51,7 @@ class Desk:
         pose = self.run.vehicle.pose_at(self.now_s)
         assert pose is not None
         layout = lay(self.mission, self.settings.current.mapping, PLACE, PLACE, pose)
-        return self.run.begin(layout, plan_progress(layout.targets, layout.start))
+        return self.run.begin(layout, plan_progress(layout.targets, layout.start), self.now_s)
 
     def stand(self, north_m: float, east_m: float, *, mode: int = GUIDED, armed: bool = True) -> VehicleState:
         """The vehicle as it is heard now, standing there; what it sees all round is free."""

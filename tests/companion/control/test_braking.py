@@ -13,9 +13,11 @@ from companion.control.braking import (
     fastest_blind_m_s,
     fastest_within_m,
     for_link,
+    late,
     loop_latency_s,
     stopping_distance_m,
 )
+from companion.control.following import Following
 from companion.settings import Settings, parse_settings
 
 SETTINGS = Settings()
@@ -30,6 +32,13 @@ def test_a_velocity_that_is_the_last_word_ends_within_the_distance(distance_m: f
 
 def test_the_default_latency_is_what_the_loop_needs() -> None:
     assert SETTINGS.guidance.latency_s == pytest.approx(loop_latency_s(SETTINGS))
+
+
+@pytest.mark.parametrize(("link_s", "dead_s"), [(0.0, 0.25), (0.05, 0.25), (0.1, 0.35), (0.6, 0.85), (1.0, 1.25)])
+def test_a_late_link_makes_the_dead_time_longer(link_s: float, dead_s: float) -> None:
+    """What the link takes up to one step is in the dead time that is set, 0.3 s, and in the 0.25 s that were found."""
+    assert late(Following(dead_s=0.25), 0.3, link_s).dead_s == pytest.approx(dead_s)
+    assert late(Following(dead_s=2.0), 0.3, link_s).dead_s == 2.0
 
 
 @given(st.floats(0.0, 3.0), st.floats(0.1, 20.0))

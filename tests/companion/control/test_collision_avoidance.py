@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from companion.control.collision_avoidance import CollisionAvoidance, Option, avoided, first_near, least_room_m
 from companion.control.controller import ControlCommand, Purpose
 from companion.control.local_view import LocalView
+from companion.control.motion_prediction import Points
 from companion.control.reference_path import ReferencePath
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
@@ -54,6 +55,20 @@ def made(
     moving: Moving, speed_m_s: float = 1.5, ground: EvidenceMap | None = None, now: ControlCommand = DRIVE
 ) -> Option:
     return avoided(now, PATH, view(speed_m_s, ground), (moving,))
+
+
+def test_what_is_foreseen_counts_and_not_the_line() -> None:
+    """A rover that is told to back off meets what comes from behind, and not what crosses its line ahead."""
+    back = ControlCommand(Purpose.DRIVE, GuidedVelocity(-0.5, 0.0), 0.5)
+    behind = Moving("m", 100.0, NedPoint(17.6, 20.0), 0.5, 0.0, 0.5)
+
+    def backs(times_s: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> Points:
+        return np.column_stack((HERE.north_m - 0.5 * times_s, np.full(len(times_s), HERE.east_m)))
+
+    for moving, yields in ((behind, True), (crossing(-3.0, 1.0, 22.5), False)):
+        option = avoided(back, PATH, view(0.0), (moving,), foresees=backs)
+        assert (option.command != back) == yields
+    assert avoided(back, PATH, view(0.0), (behind,)).command == back, "along the line it would get away"
 
 
 def test_it_stops_before_the_way_of_what_crosses() -> None:

@@ -15,8 +15,8 @@ def test_without_settings_and_parameters_it_is_as_shipped() -> None:
 
 
 def test_the_limits_are_the_autopilots() -> None:
-    follows = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 2.0, "ATC_DECEL_MAX": 3.0, "ATC_STR_ACC_MAX": 90.0})
-    assert follows[1:3] == (2.0, 3.0)
+    follows = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 1.5, "ATC_DECEL_MAX": 1.8, "ATC_STR_ACC_MAX": 90.0})
+    assert follows[1:3] == (1.5, 1.8) and follows.gains_most_m_s2 == pytest.approx(1.5 * 1.3)
     assert follows.turn_acceleration_rad_s2 == pytest.approx(math.pi / 2.0)
 
 
@@ -24,9 +24,13 @@ def test_braking_without_a_limit_of_its_own_has_that_of_gaining_speed() -> None:
     assert following_of(MotionSettings(), {"ATC_ACCEL_MAX": 2.0, "ATC_DECEL_MAX": 0.0}).deceleration_m_s2 == 2.0
 
 
-def test_no_limit_is_a_large_one() -> None:
-    follows = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 0.0, "ATC_STR_ACC_MAX": 0.0})
-    assert follows.acceleration_m_s2 == 10.0 and follows.turn_acceleration_rad_s2 == pytest.approx(20.0)
+def test_an_autopilot_without_limits_makes_no_rover_brake_better() -> None:
+    """It may gather speed as fast as motors can, but it is counted on to brake as one with the limits as shipped."""
+    follows = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 0.0, "ATC_DECEL_MAX": 0.0, "ATC_STR_ACC_MAX": 0.0})
+    assert follows[1:3] == (1.0, 1.0) and follows.gains_most_m_s2 == pytest.approx(13.0)
+    assert follows.turn_acceleration_rad_s2 == pytest.approx(20.0)
+    large = following_of(MotionSettings(), {"ATC_ACCEL_MAX": 20.0, "ATC_DECEL_MAX": 5.0})
+    assert large[1:3] == (2.0, 2.0) and large.gains_most_m_s2 == pytest.approx(13.0)
 
 
 def test_what_is_set_counts_before_what_the_autopilot_says() -> None:

@@ -77,6 +77,20 @@ def test_a_rover_seen_to_gain_little_speed_may_still_gain_as_much_as_its_limit()
     assert gentle == AS_SHIPPED.acceleration_m_s2 and quick == pytest.approx(1.65, rel=0.15)
 
 
+@pytest.mark.parametrize("noise", [0.02, 0.2])
+def test_a_rover_that_is_told_to_stand_tells_nothing_of_its_dead_time(noise: float) -> None:
+    """A longer dead time leaves fewer moments to compare: that must not make it fit better."""
+    rng = np.random.default_rng(7)
+    estimator = ModelEstimator(AS_SHIPPED)
+    lately = Told()
+    for tick in range(200):
+        lately = after(lately, GuidedVelocity(0.0, 0.0), tick * TICK_S)
+        seen_m_s, seen_rad_s = noise * rng.standard_normal(2)
+        pose = Pose(0.0, 0.0, 0.0, tick * TICK_S)
+        estimator.note(LocalView(pose, abs(seen_m_s), EVIDENCE, LIMITS, SETTINGS, seen_rad_s, lately=lately))
+    assert estimator.estimate.figures.dead_s == AS_SHIPPED.dead_s
+
+
 def test_nothing_told_nothing_learnt() -> None:
     assert watched(Following(0.5, 0.6, 0.6, 1.2, 0.8), 20.0, told=False).estimate.figures == AS_SHIPPED
 

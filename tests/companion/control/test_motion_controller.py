@@ -14,14 +14,14 @@ from companion.control.motion_controller import MotionController, rover_model
 from companion.control.motion_kernels import clearance_m, moved
 from companion.control.motion_planners import MotionKind, motion_planner
 from companion.control.reference_path import ReferencePath, advanced
-from companion.control.told import Told, after
+from companion.control.told import Told, ToldVelocity, after
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.distance_field import distance_field
 from companion.mapping.evidence_map import EvidenceMap
 from companion.settings import Settings
-from companion.vehicle.commands import GuidedVelocity
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 from tests.companion.control.test_motion_ground import PATH, ground, wall
 
 FOOTPRINT = Footprint.rectangle(0.6, 0.4)
@@ -127,6 +127,49 @@ def test_it_turns_round_where_the_path_lies_behind() -> None:
         turned.append(abs(told.yaw_rate_rad_s))
         lately = after(lately, told, at.pose.time_s)
     assert max(turned) > 0.5
+
+
+def test_after_another_kind_of_setpoint_the_rover_counts_as_going_on() -> None:
+    """No velocity was told in the dead time: that is no command to stop. A position tells the rover to drive on."""
+    pose, slow = Pose(3.0, 10.0, 0.0, 0.0), ToldVelocity(-1.0, 0.5, 0.2)
+    at = replace(view(ground(), pose, 1.0), yaw_rate_rad_s=0.3)
+    cases = (
+        (replace(at, lately=(slow,)), (0.5, 0.2)),
+        (at, (1.0, 0.3)),
+        (replace(at, rolls_back=True), (-1.0, 0.3)),
+        (replace(at, told=GuidedPosition(PATH.end)), (2.0, 0.3)),
+    )
+    for seen, expected in cases:
+        leads = controller()
+        leads.follow(PATH, seen)
+        assert leads.choice is not None
+        pending = leads.choice.problem.pending
+        assert len(pending) == 3 and np.all(pending == expected)
+
+
+def test_it_foresees_what_it_told_and_then_the_path() -> None:
+    leads, times_s = controller(), np.arange(0.0, 6.0, 0.2)
+    at = view(ground(), Pose(3.0, 10.0, 0.0, 0.0), 1.0)
+    assert leads.foreseen(PATH, at, times_s) is None
+    leads.follow(PATH, at)
+    places = leads.foreseen(PATH, at, times_s)
+    assert places is not None and places.shape == (30, 2)
+    steps_m = np.hypot(*np.diff(places, axis=0).T)
+    assert np.hypot(*(places[0] - (3.0, 10.0))) < 0.01 and steps_m.max() < 0.45
+    assert abs(places[-1, 1] - 10.0) < 0.3 and 11.0 < places[-1, 0] < 14.5
+    assert leads.foreseen(PATH, replace(at, pose=replace(at.pose, time_s=1.0)), times_s) is None
+
+
+def test_it_foresees_that_it_backs_off() -> None:
+    """Before a wall, with the path behind it, it begins tail first or turns: not on towards the wall."""
+    evidence = ground()
+    wall(evidence, 3.6, 8.0, 12.0)
+    path, leads = ReferencePath(PATH.points[::-1].copy(), 50), controller()
+    at = view(evidence, Pose(3.2, 10.0, 0.0, 0.0))
+    command = leads.follow(path, at)
+    places = leads.foreseen(path, at, np.arange(0.0, 2.0, 0.2))
+    assert command.purpose is Purpose.DRIVE and places is not None
+    assert places[:, 0].max() < 3.35
 
 
 def test_a_seed_gives_the_same_commands() -> None:

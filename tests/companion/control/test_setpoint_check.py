@@ -293,6 +293,22 @@ def test_any_velocity_but_zero_is_looked_along() -> None:
         assert fault(Output(GuidedVelocity(forward_m_s, 0.0), pose, 0.0), evidence)
 
 
+@pytest.mark.parametrize("forward_m_s", [0.2, 0.3, 0.45, 0.8, -0.1, -0.3, -0.5])
+@pytest.mark.parametrize("controller", ["points", "motion-ga"])
+def test_a_velocity_that_ends_in_a_wall_is_refused_however_slow_it_is(controller: str, forward_m_s: float) -> None:
+    """A planned motion's way is looked along in pieces; each is shorter than the slack where the rover is slow."""
+    evidence, pose = open_ground(), Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    settings = Settings.model_validate({"guidance": {"controller": controller}})
+    at = replace(view(evidence, pose), settings=settings)
+    wall_m = MIDDLE + math.copysign(RADIUS_M + 0.7 * abs(forward_m_s), forward_m_s)
+    told = GuidedVelocity(forward_m_s, 0.0)
+    assert fault_of(told, at, Bounds()) is None
+    row = round(wall_m / evidence.evidence_m)
+    evidence.log_odds[row - 1 : row + 1] = 2.0
+    found = fault_of(told, at, Bounds())
+    assert found is not None and found.kind is SetpointFault.INTO_OBSTACLE
+
+
 @pytest.mark.parametrize("beyond_m", [-0.05, 0.05])
 def test_what_stands_before_the_edge_of_the_map_counts_for_a_target_beyond_it(beyond_m: float) -> None:
     evidence = open_ground()

@@ -74,6 +74,18 @@ def test_range_data_ahead_is_told_from_the_rest(bearing_deg: float, range_m: flo
     assert (state.scan_ahead is not None) == counts
 
 
+def test_a_single_beam_ahead_does_not_take_the_place_of_a_lidar() -> None:
+    """Which of them came last would decide how the rover is driven."""
+    wide = RangeScan(1.0, np.radians(np.arange(-45.0, 45.0, 5.0)), np.full(18, 3.0), 0.2, 8.0, 0.1, "lidar")
+    beam = RangeScan(1.05, np.array([0.0]), np.array([3.0]), 0.2, 8.0, 0.1, "beam")
+    assert beam.is_narrow and not wide.is_narrow
+    both = fold(fold(VehicleState(), RangeSeen(1.0, wide)), RangeSeen(1.05, beam))
+    assert both.scan_ahead is not None and both.scan_ahead.scan is wide
+    later = fold(both, RangeSeen(3.0, beam))
+    assert later.scan_ahead is not None and later.scan_ahead.scan is beam
+    assert fold(later, RangeSeen(3.1, wide)).scan_ahead == RangeSeen(3.1, wide)
+
+
 @pytest.mark.parametrize("event", [AckSeen(1.0, 176, 0), TextSeen(1.0, 6, "hello")])
 def test_answers_and_texts_are_no_state(event: Event) -> None:
     state = VehicleState()

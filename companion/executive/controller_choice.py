@@ -1,0 +1,27 @@
+"""Which controller leads the rover, and with which settings: motions cannot be planned for every rover.
+
+Nouns: controller in force.
+"""
+
+from __future__ import annotations
+
+from companion.core.scan import RangeScan
+from companion.settings import ControllerKind, Settings
+from companion.settings.settings_file import by_points
+
+
+def controller_in_force(kind: ControllerKind, *, narrow_sight: bool, turning_radius_m: float) -> ControllerKind:
+    """What really leads the rover: ``points`` where motions cannot be planned for it.
+
+    Single thin beams leave the ground between them unseen, and a planned motion does not turn to look. The motions
+    that are planned begin with turns on the spot, which a rover that turns in arcs cannot do.
+    """
+    return "points" if narrow_sight or turning_radius_m > 0.0 else kind
+
+
+def settings_in_force(settings: Settings, scan: RangeScan | None, turning_radius_m: float) -> Settings:
+    """The settings of the controller in force. ``scan``: any one of the rover's sensor; None: not heard yet."""
+    narrow = scan is not None and scan.is_narrow
+    chosen = settings.guidance.controller
+    kind = controller_in_force(chosen, narrow_sight=narrow, turning_radius_m=turning_radius_m)
+    return settings if kind == chosen else by_points(settings)
