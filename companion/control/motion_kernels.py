@@ -177,6 +177,15 @@ def told_at(knots, share):
 
 
 @njit(cache=True, nogil=True)
+def _told_in(step, knots, problem):
+    """The command that has its effect in a step: first those that were told before, then the motion's."""
+    early = problem.pending.shape[0]
+    if step < early:
+        return problem.pending[step, 0], problem.pending[step, 1]
+    return told_at(knots, (step - early) * problem.step_s / problem.horizon_s)
+
+
+@njit(cache=True, nogil=True)
 def moved(state, told_m_s, told_rad_s, model, step_s):
     """The rover a step later: place, heading, speed, turn rate."""
     x, y, heading, speed, turn = state
@@ -204,10 +213,7 @@ def cost_s(knots, problem):
         extra = weights.change * (abs(knots[0, 0] - last[0]) + abs(knots[0, 1] - last[1]))
     least = _least_m(ground.gap_m, ground.cell_m, body, start)
     for step in range(steps):
-        if step < early:
-            told_m_s, told_rad_s = pending[step, 0], pending[step, 1]
-        else:
-            told_m_s, told_rad_s = told_at(knots, (step - early) * step_s / problem.horizon_s)
+        told_m_s, told_rad_s = _told_in(step, knots, problem)
         state = moved(state, told_m_s, told_rad_s, model, step_s)
         x, y, heading, speed = state[0], state[1], state[2], abs(state[3])
         room = clearance_m(ground.gap_m, ground.cell_m, body, x, y, heading)
@@ -287,17 +293,13 @@ def _off_course_rad(ground, x_m, y_m, heading_rad):
 @njit(cache=True, nogil=True)
 def way_of(knots, problem):
     """Where a motion leads: x and y of each step, from where the rover is now on; also through obstacles."""
-    start, pending, step_s = problem.start, problem.pending, problem.step_s
+    start, step_s = problem.start, problem.step_s
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
-    early = pending.shape[0]
-    steps = early + int(round(problem.horizon_s / step_s))
+    steps = problem.pending.shape[0] + int(round(problem.horizon_s / step_s))
     way = np.empty((steps + 1, 2))
     way[0, 0], way[0, 1] = start.x_m, start.y_m
     for step in range(steps):
-        if step < early:
-            told_m_s, told_rad_s = pending[step, 0], pending[step, 1]
-        else:
-            told_m_s, told_rad_s = told_at(knots, (step - early) * step_s / problem.horizon_s)
+        told_m_s, told_rad_s = _told_in(step, knots, problem)
         state = moved(state, told_m_s, told_rad_s, problem.model, step_s)
         way[step + 1, 0], way[step + 1, 1] = state[0], state[1]
     return way
