@@ -25,6 +25,7 @@ EXPERIMENTS = (
     "driving",
     "dead-companion",
     "killed-companion",
+    "missions",
     "barn",
     "controllers",
     "gates",
@@ -36,7 +37,8 @@ EXPERIMENTS = (
 """Each is a module of ``sitl.experiments``, loaded when it is asked for: they load the plotting library."""
 ON_ANY_MAP = ("navigation", "driving")
 OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
-WITH_CONTROLLERS = ("barn", "controllers", "gates", "killed-companion")
+WITH_CONTROLLERS = ("barn", "controllers", "gates", "killed-companion", "missions")
+WITH_GUARD = ("killed-companion", "missions")
 EXIT_FAILED = 3
 
 
@@ -71,7 +73,7 @@ def experiment(
         str,
         typer.Option(
             help=f"{', '.join(WITH_CONTROLLERS)}: what leads the rover, names separated by commas; default: all, for "
-            "gates motion-ga, for killed-companion points."
+            "gates motion-ga, for killed-companion and missions points."
         ),
     ] = "",
     setups: Annotated[
@@ -81,7 +83,9 @@ def experiment(
             "default: guarded."
         ),
     ] = "",
-    guard: Annotated[bool, typer.Option("--guard", help="killed-companion: with the guard on the autopilot.")] = False,
+    guard: Annotated[
+        bool, typer.Option("--guard", help="killed-companion, missions: with the guard on the autopilot.")
+    ] = False,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
         Path | None,
@@ -137,8 +141,8 @@ def _refuse_unused_motion(name: str, *, worlds: Path | None, controllers: str, s
     if controllers and name not in WITH_CONTROLLERS:
         takers = f"{', '.join(WITH_CONTROLLERS[:-1])} and {WITH_CONTROLLERS[-1]}"
         raise ExperimentError(f"--controllers: {name} does not take it; the option is for {takers}")
-    if guard and name != "killed-companion":
-        raise ExperimentError(f"--guard: {name} does not take it; the option is for killed-companion")
+    if guard and name not in WITH_GUARD:
+        raise ExperimentError(f"--guard: {name} does not take it; the option is for {' and '.join(WITH_GUARD)}")
 
 
 def _with_progress(name: str, options: Options, console: Console) -> ExperimentReport:

@@ -59,7 +59,7 @@ class Options:
     setups: tuple[str, ...] = ()
     """``barn``: what is driven; none: the experiment's own choice."""
     guard: bool = False
-    """``killed-companion``: the autopilot has the guard."""
+    """The autopilot has the guard, for experiments in which that is to be chosen."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""

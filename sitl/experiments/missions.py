@@ -1,0 +1,132 @@
+"""Every shipped mission with every suite of sensors, by what leads the rover: contacts, refused setpoints, times."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
+from typing import ClassVar
+
+import numpy as np
+from rich.table import Table
+
+from companion.executive.mission_progress import TargetStatus
+from companion.mission.mission import Mission
+from companion.recording.recorder import NullRecorder
+from companion.settings.settings import ControllerKind
+from companion.settings.settings_file import parse_settings
+from sitl.experiments.dead_companion import STOOD_M_S, SUITES, shipped, with_suite
+from sitl.experiments.experiment import GUARD, POINTS, Advance, ExperimentReport, Options, chosen_controllers, each
+from sitl.experiments.results_page import markdown_table, terminal_table
+from sitl.lockstep import Drive
+from sitl.scenario import scenario_from_mission
+
+NAME = "missions"
+NO_WAY = ("Sealed",)
+"""Missions with a target that cannot be reached: the only ones in which a target may be called unreachable."""
+TIME_LIMIT_S = 1800.0
+HEAD = ("mission", "led by", "runs", "touched", "run into", "refused", "missed", "mean s", "95 % of the mean")
+
+
+@dataclass(frozen=True, slots=True)
+class MissionDrive:
+    """One drive."""
+
+    mission: str
+    suite: str
+    controller: str
+    """What really led the rover."""
+    seed: int
+    touched: int
+    run_into: int
+    """It stood, and something that moves came along."""
+    refused: int
+    """Setpoints that the last look replaced."""
+    missed: int
+    """Targets not reached though there is a way."""
+    seconds: float
+    """From the first movement to the last."""
+
+
+def drive(mission: Mission, controller: ControllerKind, seed: int, guarded: bool) -> MissionDrive:
+    """One drive. ``guarded``: with the guard on the autopilot."""
+    suite = str(mission.sitl.sensors) if mission.sitl is not None else ""
+    scenario = scenario_from_mission(mission)
+    if guarded:
+        scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
+    settings = parse_settings({"guidance": {"controller": controller}}, NAME)
+    run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S)
+    report, executor = run.run(), run.companion.mission_run.executor
+    hits = run.simulator.collisions
+    run_into = sum(hit.mover is not None and abs(hit.speed_m_s) < STOOD_M_S for hit in hits)
+    unreached = sum(status is not TargetStatus.REACHED for _, status in report.targets)
+    led_by = POINTS if executor is None else executor.controller
+    return MissionDrive(
+        mission.name, suite, led_by, seed, len(hits) - run_into, run_into, report.refused,
+        0 if mission.name in NO_WAY else unreached, report.driving_time_s,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MissionsReport(ExperimentReport):
+    """See ``ExperimentReport``."""
+
+    name: ClassVar[str] = NAME
+    options: Options
+    drives: tuple[MissionDrive, ...]
+
+    def tables(self) -> list[Table]:
+        """One for each suite of sensors."""
+        return [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in SUITES]
+
+    def as_json(self) -> dict[str, object]:
+        """Every drive."""
+        drives = [asdict(one) for one in self.drives]
+        return {"experiment": NAME, "seed": self.options.seed, "runs": self.options.runs, "drives": drives}
+
+    def _rows(self, suite: str) -> list[list[str]]:
+        own = [one for one in self.drives if one.suite == suite]
+        kinds = dict.fromkeys((one.mission, one.controller) for one in own)
+        rows = [_row(*kind, [one for one in own if (one.mission, one.controller) == kind]) for kind in kinds]
+        return [*rows, _row("all", "", own)] if rows else rows
+
+    def section(self) -> str:
+        """See ``ExperimentReport``."""
+        tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in SUITES)
+        guard = ", with the guard on the autopilot" if self.options.guard else ""
+        return f"""## Every shipped mission
+
+`{self.options.command(NAME)}`
+
+Each mission with each suite of sensors, {self.options.runs} seeds each{guard}. *touched*: contacts while the rover
+moved; *run into*: it stood, and something that moves came along; *refused*: setpoints that the last look replaced by a
+stop; *missed*: targets not reached though there is a way; *mean s*: driving time, with its 95 % interval by resampling
+seeds. With thin beams, and on arcs, points lead the rover whatever is asked for.
+
+{tables}
+"""
+
+
+def _row(mission: str, controller: str, drives: Iterable[MissionDrive]) -> list[str]:
+    own = list(drives)
+    times_s = np.array([one.seconds for one in own])
+    picks = np.random.default_rng(0).integers(len(own), size=(2000, len(own)))
+    low_s, high_s = np.percentile(times_s[picks].mean(axis=1), (2.5, 97.5))
+    counts = [sum(getattr(one, name) for one in own) for name in ("touched", "run_into", "refused", "missed")]
+    spread = f"{low_s:.0f} to {high_s:.0f}" if controller else ""
+    return [mission, controller, f"{len(own)}", *map(str, counts), f"{times_s.mean():.1f}", spread]
+
+
+def run(options: Options, advance: Advance) -> MissionsReport:
+    """Every mission, suite, controller and seed."""
+    tasks = [
+        (with_suite(mission, suite), controller, seed, options.guard)
+        for controller in chosen_controllers(options, (POINTS,))
+        for mission in shipped(options)
+        for suite in SUITES
+        for seed in range(options.seed, options.seed + options.runs)
+    ]
+    drives: list[MissionDrive] = []
+    for done, one in enumerate(each(options.jobs, drive, tasks), start=1):
+        drives.append(one)
+        advance(done, len(tasks))
+    return MissionsReport(options, tuple(drives))
