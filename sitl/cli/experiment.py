@@ -40,6 +40,8 @@ OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
 WITH_CONTROLLERS = ("barn", "controllers", "gates", "killed-companion", "missions")
 WITH_GUARD = ("killed-companion", "missions")
 EXIT_FAILED = 3
+LINES = 10
+"""Of progress, where there is no terminal for a bar."""
 
 
 def experiment(
@@ -152,8 +154,14 @@ def _with_progress(name: str, options: Options, console: Console) -> ExperimentR
         # The bar appears with the first progress, so that a bad folder of maps gives one line only.
         task = progress.add_task(name, total=None, visible=False)
 
+        told = 0
+
         def advance(done: int, total: int) -> None:
+            nonlocal told
             progress.update(task, completed=done, total=total, visible=True)
+            if not console.is_terminal and LINES * done // total > told:
+                told = LINES * done // total
+                typer.echo(f"{name}: {done} of {total}", err=True)
 
         return run(options, advance)
 

@@ -6,8 +6,11 @@ import math
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
-from sitl.experiments.experiment import Options
+from sitl.cli.commands import app
+from sitl.experiments import gates
+from sitl.experiments.experiment import Advance, Options
 from sitl.experiments.gates import FINE_M, SIDE_M, WIDTHS_M, GateDrive, GatesReport, drive, world_of
 
 
@@ -34,3 +37,16 @@ def test_the_table_counts_by_width_and_angle() -> None:
     assert [row[1] for row in rows] == ["0.8", "0.9", "1", "1.2", "1.5"]
     assert [row[3] for row in rows] == ["0", "0", "1", "1", "1"] and rows[0][-1] == "-"
     assert np.all([row[2] == row[4] == "0" for row in rows])
+
+
+def test_without_a_terminal_progress_is_told_in_a_few_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    def quick(options: Options, advance: Advance) -> GatesReport:
+        for done in range(1, 36):
+            advance(done, 35)
+        return GatesReport(options, ())
+
+    monkeypatch.setattr(gates, "run", quick)
+    result = CliRunner().invoke(app, ["experiment", "gates", "--runs", "1"])
+    assert result.exit_code == 0
+    lines = result.stderr.splitlines()
+    assert len(lines) == 10 and lines[0] == "gates: 4 of 35" and lines[-1] == "gates: 35 of 35"
