@@ -44,6 +44,7 @@ REFERENCE_PLANNER = "theta-star"
 TIME_LIMIT_S = 600.0
 DRAWS = 2000
 ALL = "all"
+SHORT = ("controller", "runs", "there", "touched", "refused", "pairs", "s", "points s", "ratio")
 HEAD = ("controller", "runs", "reached", "contacts", "refused", "pairs", "mean s", "points s", "ratio")
 
 
@@ -107,7 +108,7 @@ class ControllersReport(ExperimentReport):
 
     def tables(self) -> list[Table]:
         """One for each kind of ground, and one for all."""
-        return [terminal_table(f"{NAME}: {kind}", HEAD, self._rows(kind)) for kind in self._kinds()]
+        return [terminal_table(f"{NAME}: {kind}", SHORT, self._plain(kind)) for kind in self._kinds()]
 
     def as_json(self) -> dict[str, object]:
         """Every drive."""
@@ -122,6 +123,10 @@ class ControllersReport(ExperimentReport):
         reference = {(one.kind, one.seed): one for one in own if one.controller == POINTS}
         names = dict.fromkeys(one.controller for one in own)
         return [_row(name, [one for one in own if one.controller == name], reference) for name in names]
+
+    def _plain(self, kind: str) -> list[list[str]]:
+        """Without intervals: a terminal is narrow."""
+        return [[cell.partition(" (")[0] for cell in row] for row in self._rows(kind)]
 
     def section(self) -> str:
         """See ``ExperimentReport``."""
