@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.following import Following
 from companion.control.local_view import LocalView
-from companion.control.motion_ground import Window, look_round
+from companion.control.motion_ground import NEAR_M, Window, look_round
 from companion.control.motion_kernels import (
     Body,
     MotionProblem,
@@ -57,8 +57,6 @@ NONE_ADMITTED = np.zeros((TURNS, 2))
 FASTER_S, BLUR_S, MOST_BLUR_RAD = 0.05, 1.15, math.radians(10.0)
 """Left alone, the rover keeps so much more room for each m/s; more where a reading speaks for a wide angle: how far to
 the side something ends that is as far away as the rover needs to stop is known only to within half of that."""
-NEAR_M = 0.3
-"""A rover that stands too near to something finds its way from so far away."""
 PLANNED_SHARE = 0.8
 """Motions are planned with so much of the braking there should be, so that the last look seldom says no."""
 

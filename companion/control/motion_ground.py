@@ -31,6 +31,10 @@ SLOWEST_SHARE = 0.25
 """Of full speed, where there is no room at all."""
 UNSEEN_FACTOR = 1.3
 """Unseen ground takes so much longer."""
+NEAR_M = 0.3
+"""A rover that stands too near to something finds its way from so far away."""
+NEARER_M = 1.0
+"""A path that is closed farther ahead is followed at least so far, or it counts as closed here."""
 COARSE = 2
 """Evidence cells along the side of a cell that has a time to go."""
 
@@ -69,10 +73,34 @@ def look_round(
     room_m = np.maximum.reduce([gap_m[row::COARSE, column::COARSE].astype(np.float64) for row, column in parts])
     pace = _pace(room_m - body_radius_m, COARSE * cell_m, fastest_m_s)
     pace[np.logical_or.reduce([unseen[row::COARSE, column::COARSE] for row, column in parts])] *= UNSEEN_FACTOR
-    goal = np.floor((evidence.frame.xys(ahead[-1:]) - (left, low)) / COARSE).astype(np.int64)
+    cells = np.floor((evidence.frame.xys(ahead) - (left, low)) / COARSE).astype(np.int64)
     ends = path.progress + len(ahead) >= len(path.points)
-    ground = MotionGround(gap_m, seen_m, cell_m, cost_to_go(pace, goal), COARSE * cell_m, ends)
+    around = _around(evidence, here, (left, low), pace)
+    togo_s = cost_to_go(pace, cells[-1:])
+    if len(around) and not np.isfinite(togo_s[around[:, 1], around[:, 0]]).any():
+        # The path leads on farther ahead only for a coarser look. Go as near to that place as possible, and see.
+        last = _farthest(cells, cost_to_go(pace, around))
+        if last * STEP_M >= NEARER_M:
+            togo_s, ends = cost_to_go(pace, cells[last : last + 1]), False
+    ground = MotionGround(gap_m, seen_m, cell_m, togo_s, COARSE * cell_m, ends)
     return Window(ground, evidence.frame.point(left, low))
+
+
+def _around(evidence: EvidenceMap, here: NedPoint, first: tuple[int, int], pace: Floats) -> NDArray[np.int64]:
+    """Coarse cells, x and y, beside the rover where its middle can be."""
+    middle = np.floor((evidence.frame.xy(here) - np.array(first)) / COARSE).astype(np.int64)
+    reach = round(NEAR_M / (COARSE * evidence.evidence_m))
+    lows = np.maximum(middle - reach, 0)
+    near = pace[lows[1] : middle[1] + reach + 1, lows[0] : middle[0] + reach + 1]
+    return np.argwhere(np.isfinite(near))[:, ::-1] + lows
+
+
+def _farthest(cells: NDArray[np.int64], times_s: Floats) -> int:
+    """The number of the last of these cells that can be come to; 0 if there is none."""
+    height, width = times_s.shape
+    x, y = np.clip(cells[:, 0], 0, width - 1), np.clip(cells[:, 1], 0, height - 1)
+    reached = np.flatnonzero(np.isfinite(times_s[y, x]))
+    return int(reached[-1]) if len(reached) else 0
 
 
 def _window(evidence: EvidenceMap, places: Floats) -> tuple[tuple[int, int], tuple[int, int]]:

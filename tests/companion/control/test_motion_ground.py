@@ -15,7 +15,7 @@ from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.settings import Settings
 
 SETTINGS = Settings()
-HERE = NedPoint(3.0, 10.0)
+HERE, BEYOND = NedPoint(3.0, 10.0), NedPoint(11.0, 10.0)
 PATH = ReferencePath(np.column_stack((np.arange(3.0, 17.1, STEP_M), np.full(57, 10.0))))
 
 
@@ -66,7 +66,18 @@ def test_a_wall_is_gone_round_and_a_narrow_gap_in_it_is_no_way() -> None:
     assert np.isfinite(round_s) and round_s > free_s + 0.1
     wall(evidence, 8.0, 0.0, 20.0)
     wall(evidence, 8.0, 9.75, 10.25, -1.0)
-    assert np.isinf(togo_s(seen(evidence), HERE))
+    assert np.isinf(togo_s(seen(evidence), BEYOND))
+
+
+def test_where_the_path_is_closed_farther_ahead_it_counts_up_to_there() -> None:
+    """The planner's fields are coarser: its path may lead through a gap that is too narrow for a closer look."""
+    evidence = ground()
+    wall(evidence, 12.0, 0.0, 20.0)
+    window = seen(evidence)
+    assert togo_s(window, HERE) == pytest.approx((12.0 - 0.4 - HERE.north_m) / 2.0, abs=0.6)
+    assert togo_s(window, NedPoint(11.4, HERE.east_m)) < 0.2 and not window.ground.ends
+    wall(evidence, HERE.north_m + 0.8, 0.0, 20.0)
+    assert np.isinf(togo_s(seen(evidence), HERE)), "closed here"
 
 
 def test_unseen_ground_takes_longer_and_counts_as_near() -> None:
@@ -80,11 +91,12 @@ def test_unseen_ground_takes_longer_and_counts_as_near() -> None:
 
 def test_what_the_mission_or_experience_closed_is_an_obstacle() -> None:
     evidence = ground()
+    assert np.isfinite(togo_s(seen(evidence), BEYOND))
     evidence.base.weights[8, :] = 1.0
-    assert np.isinf(togo_s(seen(evidence), HERE))
+    assert np.isinf(togo_s(seen(evidence), BEYOND))
     evidence = ground()
     evidence.penalty[8, :] = 0.6
-    assert np.isinf(togo_s(seen(evidence), HERE))
+    assert np.isinf(togo_s(seen(evidence), BEYOND))
 
 
 @pytest.mark.parametrize("fields", [4, 5])
