@@ -10,9 +10,8 @@ from typing import Any
 CASES = [
     ("drive", "rooms.toml", "hybrid", "points"),
     ("drive", "crossing.toml", "vertex++", "points"),
-    ("drive", "ackermann.toml", "hybrid", "points"),
-    ("drive", "ackermann.toml", "hybrid", "motion-ga"),
-    ("drive", "complex.toml", "hybrid", "motion-ga"),
+    ("drive", "ackermann.toml", "hybrid", "motion-ga"),  # led by points
+    ("drive", "one-obstacle.toml", "hybrid", "motion-ga"),
     ("serve", "open.toml", "beams"),
     ("serve", "ackermann.toml", "lidar-360"),
 ]

@@ -13,9 +13,9 @@ MISSIONS = Path(__file__).resolve().parents[3] / "missions"
 
 
 def test_a_drive_says_who_led_it() -> None:
-    mission = with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "beams")
+    mission = with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "lidar-90")
     one = drive(mission, "motion-ga", 0, guarded=True)
-    assert (one.mission, one.suite, one.controller) == (mission.name, "beams", "points")
+    assert (one.mission, one.suite, one.controller) == (mission.name, "lidar-90", "motion-ga")
     assert (one.touched, one.run_into, one.refused, one.missed) == (0, 0, 0, 0) and 10.0 < one.seconds < 200.0
 
 
