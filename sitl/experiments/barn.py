@@ -36,7 +36,7 @@ from sitl.experiments.experiment import (
     each,
 )
 from sitl.experiments.off_model import OFF_MODEL, SHIPPED, Limits, off_model
-from sitl.experiments.results_page import markdown_table, terminal_table
+from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.lockstep import Drive
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
 from sitl.sensors.range_sensors import Lidar, SensorSuite
@@ -212,7 +212,7 @@ class BarnReport(ExperimentReport):
     def _rows(self, setup: Setup, *, plain: bool = False) -> list[list[str]]:
         """``plain``: without intervals."""
         rows = [_row(name, runs) for (one, name), runs in self.series.items() if one is setup]
-        return [[cell.partition(" (")[0] for cell in row] for row in rows] if plain else rows
+        return without_intervals(rows) if plain else rows
 
     def pictures(self) -> dict[str, Figure]:
         """The worst runs of the best controller."""

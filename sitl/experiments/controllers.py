@@ -16,10 +16,8 @@ from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, R
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
-from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.experiments.experiment import (
     CONTROLLERS,
-    GUARD,
     POINTS,
     Advance,
     ExperimentReport,
@@ -28,8 +26,8 @@ from sitl.experiments.experiment import (
     each,
 )
 from sitl.experiments.narrow_grounds import GroundKind, NarrowGround, drawn
-from sitl.experiments.off_model import OFF_MODEL, off_model
-from sitl.experiments.results_page import markdown_table, terminal_table
+from sitl.experiments.off_model import OFF_MODEL, off_model, parameters_for
+from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
 from sitl.world.truth import SimStart
@@ -88,8 +86,7 @@ def drive(kind: GroundKind, controller: str, seed: int, off: float = OFF_MODEL) 
     ground = drawn(kind, seed)
     mission = mission_on(ground, controller, seed)
     drivetrain, limits = off_model(np.random.default_rng((seed, 52)), off)
-    guard = {} if controller == POINTS else GUARD
-    parameters = {"WP_SPEED": SPEED_M_S, **RECOMMENDED_PARAMETERS, **limits, **guard}
+    parameters = {**parameters_for(ROVER, controller), **limits}
     start = SimStart(*ground.start_m, np.pi / 2.0, SOMEWHERE)
     scenario = Scenario(ground.world, start, SENSORS, outline_of(ROVER), parameters, drivetrain=drivetrain)
     run = Drive(mission, scenario, settings_for(controller), seed, NullRecorder(), TIME_LIMIT_S)
@@ -108,7 +105,7 @@ class ControllersReport(ExperimentReport):
 
     def tables(self) -> list[Table]:
         """One for each kind of ground, and one for all."""
-        return [terminal_table(f"{NAME}: {kind}", SHORT, self._plain(kind)) for kind in self._kinds()]
+        return [terminal_table(f"{NAME}: {one}", SHORT, without_intervals(self._rows(one))) for one in self._kinds()]
 
     def as_json(self) -> dict[str, object]:
         """Every drive."""
@@ -123,10 +120,6 @@ class ControllersReport(ExperimentReport):
         reference = {(one.kind, one.seed): one for one in own if one.controller == POINTS}
         names = dict.fromkeys(one.controller for one in own)
         return [_row(name, [one for one in own if one.controller == name], reference) for name in names]
-
-    def _plain(self, kind: str) -> list[list[str]]:
-        """Without intervals: a terminal is narrow."""
-        return [[cell.partition(" (")[0] for cell in row] for row in self._rows(kind)]
 
     def section(self) -> str:
         """See ``ExperimentReport``."""

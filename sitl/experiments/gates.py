@@ -13,9 +13,8 @@ from companion.core.footprint import Footprint
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
 from companion.settings.settings_file import parse_settings
-from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
-from sitl.experiments.experiment import GUARD, Advance, ExperimentReport, Options, chosen_controllers, each
-from sitl.experiments.off_model import OFF_MODEL, off_model
+from sitl.experiments.experiment import Advance, ExperimentReport, Options, chosen_controllers, each
+from sitl.experiments.off_model import OFF_MODEL, off_model, parameters_for
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
@@ -73,8 +72,7 @@ def drive(controller: str, width_m: float, angle_deg: float, seed: int, off: flo
     grid = GridSpec(margin_m=9.0, by_footprint=True)
     mission = Mission(f"gate {width_m:g} m", (goal,), grid, ROVER, sitl=sitl)
     start = SimStart(0.5 * SIDE_M, 3.0, math.radians(90.0), SOMEWHERE)
-    guard = {} if controller == "points" else GUARD
-    parameters = {"WP_SPEED": 2.0, **RECOMMENDED_PARAMETERS, **limits, **guard}
+    parameters = {**parameters_for(ROVER, controller), **limits}
     scenario = Scenario(world, start, SENSORS, outline_of(ROVER), parameters, drivetrain=drivetrain)
     settings = parse_settings({"guidance": {"controller": controller}}, NAME)
     run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S)

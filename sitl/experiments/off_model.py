@@ -7,7 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from companion.mission.mission import RoverSpec
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS
+from sitl.experiments.experiment import GUARD, POINTS
 from sitl.plant.rover import SIM_ROVER, Drivetrain
 
 OFF_MODEL = 0.3
@@ -28,6 +31,12 @@ SHIPPED = Limits(
     math.radians(DEFAULTS["ATC_STR_RAT_MAX"][0]),
     SIM_ROVER.speed_lag_s,
 )
+
+
+def parameters_for(rover: RoverSpec, controller: str) -> dict[str, float]:
+    """Of the autopilot, as recommended; with the guard where motions are planned."""
+    guard = {} if controller == POINTS else GUARD
+    return {"WP_SPEED": rover.cruise_speed_m_s, **RECOMMENDED_PARAMETERS, **guard}
 
 
 def off_model(rng: np.random.Generator, share: float, limits: Limits = SHIPPED) -> tuple[Drivetrain, dict[str, float]]:

@@ -50,6 +50,11 @@ def terminal_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]
     return table
 
 
+def without_intervals(rows: Sequence[Sequence[str]]) -> list[list[str]]:
+    """The same figures without what stands in brackets: a terminal is narrow."""
+    return [[cell.partition(" (")[0] for cell in row] for row in rows]
+
+
 def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table; the first column is text, the others are figures and stand right."""
     lines = [head, [":--", *["--:"] * (len(head) - 1)], *rows]
