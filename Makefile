@@ -16,7 +16,7 @@ SECONDS := 600
 # Container images often set this. Without compiled bytecode each start of a program takes three times as long.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: demo test test-all lint pytest bench results soak fuzz clean
+.PHONY: demo test test-all lint collect pytest bench results soak fuzz clean
 
 demo: $(KERNELS)
 	@echo "driving missions/rooms.toml ..."
@@ -25,7 +25,11 @@ demo: $(KERNELS)
 # The linters and the compiler side by side, then the tests.
 test: $(TOOLS)
 	@$(MAKE) --no-print-directory --jobs=2 lint $(ALL_KERNELS)
-	@$(MAKE) --no-print-directory pytest
+	@$(MAKE) --no-print-directory collect pytest
+
+# Compiles the tests to bytecode once; each of the workers that begin with none would do it for itself.
+collect: $(ALL_KERNELS)
+	@$(BIN)/python -m pytest --collect-only -q > /dev/null
 
 # More workers than processors: many tests wait for real time.
 pytest: $(ALL_KERNELS)

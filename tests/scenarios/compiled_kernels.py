@@ -1,6 +1,6 @@
 """Kernels that a drive compiles: ``python -m tests.scenarios.compiled_kernels WHAT,MISSION,MORE..`` prints JSON lines.
 
-A case is ``drive,MISSION,PLANNER,CONTROLLER`` or ``serve,MISSION,SENSORS``. Each has a process of its own, which has
+A case is ``drive,MISSION,PLANNER,CONTROLLER,SECONDS`` or ``serve,MISSION,SENSORS``. Each has a process of its own, which has
 loaded the program and no kernel; all are forked from one interpreter.
 """
 
@@ -42,15 +42,15 @@ def told(package: str, before: dict[str, int], said: list[str]) -> dict[str, Any
     return {"kernels": sum(before.values()), "new": new, "said": said}
 
 
-def drive(mission_file: str, planner: str, controller: str) -> dict[str, Any]:
-    """A whole drive, in lock-step; says its outcome."""
+def drive(mission_file: str, planner: str, controller: str, limit_s: str) -> dict[str, Any]:
+    """A drive in lock-step, no longer than so many seconds; says for how many it drove."""
     mission = load_mission(MISSIONS / mission_file)
     chosen = {"navigator": {"planner": planner}, "guidance": {"controller": controller}}
     settings = parse_settings(chosen, "test")
-    whole = Drive(mission, scenario_from_mission(mission), settings, 1, NullRecorder())
+    whole = Drive(mission, scenario_from_mission(mission), settings, 1, NullRecorder(), float(limit_s))
     before = compiled("companion")
     report = whole.run()
-    return told("companion", before, [report.outcome])
+    return told("companion", before, [f"{report.driving_time_s:.1f}"])
 
 
 def serve(mission_file: str, sensors: str) -> dict[str, Any]:

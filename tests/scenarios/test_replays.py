@@ -91,9 +91,9 @@ def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) 
     ("name", "faults", "limit_s"),
     [
         ("crossing.toml", "radio", 60.0),
-        ("ackermann.toml", "interrupted", 90.0),
-        ("field.plan", "gps", 80.0),
-        ("clutter.toml", "vehicle", 75.0),
+        ("ackermann.toml", "interrupted", 75.0),
+        ("field.plan", "gps", 65.0),
+        ("clutter.toml", "vehicle", 60.0),
     ],
 )
 def test_nothing_differs_under_faults(tmp_path: Path, name: str, faults: str, limit_s: float) -> None:
