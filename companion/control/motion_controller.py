@@ -41,7 +41,9 @@ from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 HORIZON_S, STEP_S = 2.5, 0.1
 LOOKS_S = 0.09
 """The ground is looked at anew after so long."""
-WEIGHTS = Weights(margin_m=0.03, margin_s=0.06, tight=4.0, near_m=0.4, risk=0.5, unseen=0.3, turn=0.5, change=0.1)
+WEIGHTS = Weights(
+    margin_m=0.03, margin_s=0.06, tight=4.0, near_m=0.4, risk=0.5, unseen=0.3, turn=0.5, change=0.1, late=0.4
+)
 SHARES = (1.0, 0.7, 0.4, 0.15)
 """Of the speed that was planned, tried in turn until the rover may be left alone with it."""
 BRAKE_TURNS = (0.0, -0.5, 0.5, -1.0, 1.0)
@@ -138,8 +140,7 @@ class MotionController:
     def _problem(self, path: ReferencePath, view: LocalView, model: RoverModel) -> MotionProblem:
         now_s, pose = view.pose.time_s, view.pose
         if self._window is None or now_s - self._looked_s >= LOOKS_S:
-            keeps_m = self._body.radius_m + WEIGHTS.margin_m
-            self._window = look_round(view.evidence, pose.point, path, keeps_m, model.fastest_m_s)
+            self._window = look_round(view.evidence, pose.point, path, self._body.radius_m, model.fastest_m_s)
             self._looked_s = now_s
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
         pending = _pending(view, model.dead_s)

@@ -29,6 +29,9 @@ ROOMY_M = 0.5
 """With so much room beside it the rover drives at full speed."""
 SLOWEST_SHARE = 0.25
 """Of full speed, where there is no room at all."""
+TIGHT_M, TIGHT = 0.1, 4.0
+"""With less room than the first it takes longer, up to by the second as a factor more. There motions cost so much that
+else no way through a gap would seem worth it, and the rover would wait before it."""
 UNSEEN_FACTOR = 1.3
 """Unseen ground takes so much longer."""
 NEAR_M = 0.3
@@ -138,4 +141,5 @@ def _close_edge(blocked: NDArray[np.bool_], first: tuple[int, int], evidence: Ev
 def _pace(room_m: Floats, cell_m: float, fastest_m_s: float) -> Floats:
     """Seconds to cross a cell: slower where it is narrow; inf where the rover's middle cannot be."""
     share = SLOWEST_SHARE + (1.0 - SLOWEST_SHARE) * np.clip(room_m / ROOMY_M, 0.0, 1.0)
-    return np.where(room_m > 0.0, cell_m / (fastest_m_s * share), np.inf)
+    longer = 1.0 + TIGHT * np.clip(1.0 - room_m / TIGHT_M, 0.0, 1.0)
+    return np.where(room_m > 0.0, cell_m * longer / (fastest_m_s * share), np.inf)

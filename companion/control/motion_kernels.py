@@ -83,7 +83,9 @@ class Weights(NamedTuple):
     ``near_m``: risk counts below this clearance;
     ``risk``: seconds a second at none. ``unseen``: seconds a second on unseen ground. ``turn``: seconds for each radian
     that the rover does not yet point where it must go. ``change``: seconds for a first command that differs from the
-    last one by 1 m/s or 1 rad/s.
+    last one by 1 m/s or 1 rad/s. ``late``: seconds for each second on the way and each second that is left from there:
+    of two motions with the same end the one that is near it sooner costs less. Else the rover would put off what it
+    could do now, and again the next time.
     """
 
     margin_m: float
@@ -94,6 +96,7 @@ class Weights(NamedTuple):
     unseen: float
     turn: float
     change: float
+    late: float
 
 
 class Start(NamedTuple):
@@ -212,6 +215,7 @@ def cost_s(knots, problem):
         last = pending[early - 1]
         extra = weights.change * (abs(knots[0, 0] - last[0]) + abs(knots[0, 1] - last[1]))
     least = _least_m(ground.gap_m, ground.cell_m, body, start)
+    first_s = left_s(ground, start.x_m, start.y_m)
     for step in range(steps):
         told_m_s, told_rad_s = _told_in(step, knots, problem)
         state = moved(state, told_m_s, told_rad_s, model, step_s)
@@ -228,6 +232,7 @@ def cost_s(knots, problem):
         if weights.unseen > 0.0 and clearance_m(ground.seen_m, ground.cell_m, body, x, y, heading, 0.0) < 0.0:
             extra += weights.unseen * step_s
         left = left_s(ground, x, y)
+        extra += weights.late * min(left, first_s + 1.0) * step_s
         if ground.ends:
             stops_m_s = math.sqrt(2.0 * model.decel_m_s2 * (left * model.fastest_m_s + BEYOND_M))
             extra += HASTE * max(speed - stops_m_s, 0.0) * step_s

@@ -69,6 +69,20 @@ def test_a_wall_is_gone_round_and_a_narrow_gap_in_it_is_no_way() -> None:
     assert np.isinf(togo_s(seen(evidence), BEYOND))
 
 
+def test_where_there_is_hardly_room_each_metre_takes_much_longer() -> None:
+    """Longer than a motion costs there, so that it seems worth it."""
+
+    def metre_s(gap_m: float) -> float:
+        evidence = ground()
+        for row in np.arange(5.0, 7.0, evidence.evidence_m):
+            wall(evidence, float(row), 5.0, 10.0 - 0.5 * gap_m)
+            wall(evidence, float(row), 10.0 + 0.5 * gap_m, 15.0)
+        window = seen(evidence)
+        return togo_s(window, NedPoint(5.5, 10.0)) - togo_s(window, NedPoint(6.5, 10.0))
+
+    assert metre_s(0.8) > 4.0 * metre_s(1.4) > 4.0 * 0.5
+
+
 def test_where_the_path_is_closed_farther_ahead_it_counts_up_to_there() -> None:
     """The planner's fields are coarser: its path may lead through a gap that is too narrow for a closer look."""
     evidence = ground()

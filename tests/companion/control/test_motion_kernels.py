@@ -37,7 +37,7 @@ MODEL = RoverModel(0.2, 1.0, 1.0, 2.0, 2.0, 0.5, 1.5, 1.0)
 BODY = Body(np.array([-0.1, 0.1]), 0.25, 0.35)
 ALL_ADMITTED = np.tile((2.0, 0.5), (3, 1))
 STANDING = Start(5.0, 2.0, 0.0, 0.0, 0.0)
-WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0)
+WEIGHTS = Weights(0.03, 0.02, 4.0, 0.25, 1.0, 0.3, 0.5, 0.0, 0.0)
 
 
 def problem(
@@ -79,6 +79,15 @@ def test_a_motion_that_could_not_brake_at_its_end_is_blocked() -> None:
     fast[-1, 0] = 2.0
     ground = problem((51, 53, 0, SIDE))
     assert cost_s(slow, ground) < BLOCKED_S <= cost_s(fast, ground)
+
+
+def test_what_can_be_done_now_is_not_put_off() -> None:
+    """To go a little and wait there, or to wait and then go: both end at nearly the same place."""
+    now, later = constant(0.0), constant(0.0)
+    now[:3, 0], later[3:5, 0] = 0.3, 0.3
+    as_near, sooner = problem(), problem()._replace(weights=WEIGHTS._replace(late=0.4))
+    assert cost_s(later, as_near) == pytest.approx(cost_s(now, as_near), abs=0.1)
+    assert cost_s(now, sooner) < cost_s(later, sooner)
 
 
 def test_narrow_and_unseen_ground_cost_more() -> None:
