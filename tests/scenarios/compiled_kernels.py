@@ -1,7 +1,7 @@
 """Kernels that a drive compiles: ``python -m tests.scenarios.compiled_kernels WHAT,MISSION,MORE..`` prints JSON lines.
 
-A case is ``drive,MISSION,PLANNER,CONTROLLER,SECONDS`` or ``serve,MISSION,SENSORS``. Each has a process of its own, which
-has loaded the program and no kernel; all are forked from one interpreter.
+A case is ``drive,MISSION,PLANNER,CONTROLLER,SECONDS`` or ``serve,MISSION,SENSORS``. Each has a process of its own,
+which has loaded the program and no kernel; all are forked from one interpreter.
 """
 
 from __future__ import annotations
