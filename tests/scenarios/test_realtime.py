@@ -19,7 +19,11 @@ from tests.support.served import finished, interpreter, mission_path, process
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("start", "kind", "speedup"), [(process, "udp", 1.0), (interpreter, "tcp", 2.0)], ids=["udp", "tcp"]
+    ("start", "kind", "speedup"),
+    [
+        pytest.param(process, "udp", 1.0, id="udp"),
+        pytest.param(interpreter, "tcp", 2.0, id="tcp", marks=pytest.mark.thorough),
+    ],
 )
 def test_companion_and_simulator_as_two_processes(
     tmp_path: Path, start: Callable[..., Any], kind: str, speedup: float

@@ -458,7 +458,7 @@ def test_what_cannot_be_said_stops_the_rover_and_not_the_companion(tmp_path: Pat
 @pytest.mark.parametrize(
     ("form", "kind"),
     [
-        ("local", "SET_POSITION_TARGET_LOCAL_NED"),
+        pytest.param("local", "SET_POSITION_TARGET_LOCAL_NED", marks=pytest.mark.thorough),  # all other drives
         ("global", "SET_POSITION_TARGET_GLOBAL_INT"),
         ("mission-item", "MISSION_ITEM_INT"),
         ("reposition", "COMMAND_INT"),
