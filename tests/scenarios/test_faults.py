@@ -99,7 +99,7 @@ OVERCOME: dict[str, tuple[Fault, ...]] = {
 }
 
 
-OFTEN_SHOWN = ("out of order and twice", "outages", "lost and damaged")
+OFTEN_SHOWN = ("out of order and twice", "outages", "lost and damaged", "late")
 """Like what the plan of a poor radio below does; make test-all drives them too."""
 
 

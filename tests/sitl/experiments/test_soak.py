@@ -84,6 +84,7 @@ def test_the_person_helps_when_asked_for_long_enough(monkeypatch: pytest.MonkeyP
     assert (person.helped, modes, armed) == (1, [Mode.GUIDED], ["the vehicle"])
 
 
+@pytest.mark.thorough
 def test_a_run_is_driven() -> None:
     first = soaked(0)
     assert (first.ended, first.collisions, first.error) == (Ended.REACHED, 0, "")
