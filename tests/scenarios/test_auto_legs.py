@@ -138,6 +138,7 @@ def test_the_limits_of_a_leg_are_the_autopilots(tmp_path: Path, limits: tuple[fl
     assert [status for _, status in rig.companion.statuses()] == [TargetStatus.SKIPPED]
 
 
+@pytest.mark.thorough
 def test_a_place_that_cannot_be_reached_is_stood_before_until_the_limit(tmp_path: Path) -> None:
     rows: list[Row] = [(LIMITS, (150.0, 0, 0, 0), None), (GUIDED_ENABLE, ON, (15, 7)), (WAYPOINT, NONE, (3, 7))]
     rig = in_auto(tmp_path, rows, sealed=True)

@@ -99,8 +99,8 @@ OVERCOME: dict[str, tuple[Fault, ...]] = {
 }
 
 
-OFTEN_SHOWN = ("out of order and twice", "outages", "lost and damaged", "late")
-"""Like what the plan of a poor radio below does; make test-all drives them too."""
+OFTEN_SHOWN = ("out of order and twice", "outages", "lost and damaged", "late", "pilot")
+"""Like what the plan of a poor radio below does, and tests of a pilot; make test-all drives them too."""
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,14 @@ def test_the_plan_of_a_poor_radio_is_driven_from_the_command_line() -> None:
     assert "outcome: reached" in result.output
 
 
-@pytest.mark.parametrize(("name", "reached"), [("gps", True), ("vehicle", False), ("interrupted", False)])
+@pytest.mark.parametrize(
+    ("name", "reached"),
+    [
+        ("gps", True),
+        pytest.param("vehicle", False, marks=pytest.mark.thorough),  # replays below it drive that one too
+        ("interrupted", False),
+    ],
+)
 def test_the_shipped_plans_do_no_harm(name: str, reached: bool) -> None:
     run = Run(load_faults(MISSIONS / "faults" / f"{name}.toml"), limit_s=100.0 if name == "interrupted" else 170.0)
     assert run.report.collisions == 0

@@ -473,7 +473,8 @@ def test_every_form_of_setpoint_drives(form: str, kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["one-obstacle.toml", "clutter.toml", pytest.param("rooms.toml", marks=pytest.mark.thorough)]
+    "name",
+    ["clutter.toml", *(pytest.param(f"{name}.toml", marks=pytest.mark.thorough) for name in ("one-obstacle", "rooms"))],
 )
 def test_no_guided_position_lies_beyond_what_was_seen_free(name: str) -> None:
     """At most by the way the rover needs to stop at cruise speed, and half a metre."""

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 CASES = [
-    ("drive", "rooms.toml", "hybrid", "points", "75"),
     ("drive", "crossing.toml", "vertex++", "points", "75"),
     ("drive", "ackermann.toml", "hybrid", "motion-ga", "85"),  # led by points
     ("drive", "one-obstacle.toml", "hybrid", "motion-ga", "70"),

@@ -83,23 +83,27 @@ def test_a_rover_off_its_model_is_off_by_no_more_than_that() -> None:
     assert 14.0 <= quick["ATC_ACCEL_MAX"] <= 26.0 and quick["MOT_SLEWRATE"] == 0.0
 
 
-def test_planned_motions_lead_through_narrow_ground_in_a_third_of_the_time() -> None:
+def test_planned_motions_lead_through_narrow_ground() -> None:
     world = made_world(3)
-    ends = {name: drive(world, name, 0) for name in ("motion-ga", "points")}
-    assert ends["motion-ga"].end is RunEnd.REACHED
-    assert ends["motion-ga"].seconds < 0.5 * ends["points"].seconds
-    assert ends["motion-ga"].track_m[0] == pytest.approx(START_M)
-    quick = drive(world, "motion-ga", 0, Setup.JACKAL)
-    assert quick.end is RunEnd.REACHED and quick.seconds < ends["motion-ga"].seconds
-    report = BarnReport(Options(1), (world,), {(Setup.GUARDED, name): (one,) for name, one in ends.items()})
+    one = drive(world, "motion-ga", 0)
+    assert one.end is RunEnd.REACHED and one.seconds < 2.0 * world.optimal_s
+    assert one.track_m[0] == pytest.approx(START_M)
+    report = BarnReport(Options(1), (world,), {(Setup.GUARDED, "motion-ga"): (one,)})
     assert "not an entry" in report.section() and "motion-ga" in report.section()
-    assert report.pictures()["barn-worst"].axes and len(report.as_json()["runs"]) == 2  # type: ignore[arg-type]
+    assert report.pictures()["barn-worst"].axes and len(report.as_json()["runs"]) == 1  # type: ignore[arg-type]
 
 
 @pytest.mark.thorough
-def test_without_a_guard_it_gets_through_too_and_takes_longer() -> None:
-    guarded, strict = (drive(made_world(3), "motion-ga", 0, setup) for setup in (Setup.GUARDED, Setup.STRICT))
-    assert strict.end is RunEnd.REACHED and guarded.seconds < strict.seconds
+def test_points_take_more_than_twice_the_time_there() -> None:
+    motions, points = (drive(made_world(3), name, 0) for name in ("motion-ga", "points"))
+    assert motions.seconds < 0.5 * points.seconds
+
+
+@pytest.mark.thorough
+def test_without_a_guard_it_takes_longer_and_with_a_jackals_limits_less() -> None:
+    setups = (Setup.JACKAL, Setup.GUARDED, Setup.STRICT)
+    quick, guarded, strict = (drive(made_world(3), "motion-ga", 0, setup) for setup in setups)
+    assert strict.end is RunEnd.REACHED and quick.seconds < guarded.seconds < strict.seconds
 
 
 def test_intervals_and_the_worst() -> None:

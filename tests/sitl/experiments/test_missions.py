@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 from companion.mission.load import load_mission
 from sitl.experiments.dead_companion import with_suite
 from sitl.experiments.experiment import Options
@@ -12,6 +14,7 @@ from sitl.experiments.missions import NO_WAY, MissionDrive, MissionsReport, driv
 MISSIONS = Path(__file__).resolve().parents[3] / "missions"
 
 
+@pytest.mark.thorough
 def test_a_drive_says_who_led_it() -> None:
     mission = with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "lidar-90")
     one = drive(mission, "motion-ga", 0, guarded=True)
