@@ -75,14 +75,14 @@ class MotionChoice:
 
 
 class MotionController:
-    """Remembers the ground it looked at, and when the rover could last be left alone with what it was told."""
+    """Remembers the ground it looked at."""
 
     def __init__(self, footprint: Footprint, planner: MotionPlanner) -> None:
         places_m, radius_m = footprint.discs()
         self._body = Body(places_m, radius_m, float(np.abs(places_m).max()) + radius_m)
         self._planner = planner
         self._window: Window | None = None
-        self._looked_s = self._safe_s = self._time_s = -math.inf
+        self._looked_s = self._time_s = -math.inf
         self.choice: MotionChoice | None = None
         """The last one."""
         self.backwards = False
@@ -122,7 +122,7 @@ class MotionController:
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
         problem = self._problem(path, view, model)
-        worst = problem._replace(model=worst_model(model, view.following))
+        worst = problem._replace(model=worst_model(model, view.following), pending=_pending(view, _latest(view)))
         problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
             return stop_for(Purpose.BLOCKED)
@@ -140,10 +140,10 @@ class MotionController:
     def _problem(self, path: ReferencePath, view: LocalView, model: RoverModel) -> MotionProblem:
         now_s, pose = view.pose.time_s, view.pose
         if self._window is None or now_s - self._looked_s >= LOOKS_S:
-            self._window = look_round(view.evidence, pose.point, path, self._body.radius_m, model.fastest_m_s)
+            self._window = look_round(view.evidence, pose.point, path, self._body, model.fastest_m_s)
             self._looked_s = now_s
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
-        pending = _pending(view, model.dead_s)
+        pending = _pending(view, round(model.dead_s / STEP_S))
         return MotionProblem(
             start, pending, self._window.ground, self._body, model, WEIGHTS, NONE_ADMITTED, HORIZON_S, STEP_S
         )
@@ -155,19 +155,15 @@ class MotionController:
             # On the same arc; a rover that hardly moves keeps its turn rate.
             told = ToldVelocity(now_s, share * speed_m_s, (share if abs(speed_m_s) > 0.1 else 1.0) * turn_rad_s)
             if _may_be_left_alone(told, view, worst):
-                self._safe_s = now_s
                 return told
-        return self._braking(in_force(view.lately, now_s), view, worst)
+        return self._braking(view, worst)
 
-    def _braking(self, before: ToldVelocity | None, view: LocalView, worst: MotionProblem) -> ToldVelocity:
-        """The way to brake that keeps most room, straight on where there is enough; or to go on as told."""
+    def _braking(self, view: LocalView, worst: MotionProblem) -> ToldVelocity:
+        """The way to brake that keeps most room, straight on where there is enough."""
         now_s, fastest_rad_s = self._time_s, worst.model.turn_fastest_rad_s
         gains = _gains(view)
         spare_m = {share: _least_spare_m(share * fastest_rad_s, gains, worst) for share in BRAKE_TURNS}
         best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M))
-        lasted = now_s - self._safe_s < view.settings.guidance.velocity_lasts_s
-        if spare_m[best] < 0.0 and before is not None and lasted and _stops_in_time(before, view):
-            return before  # with this it could be left alone
         rolls = abs(worst.start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
 
@@ -211,15 +207,20 @@ def _stops_in_time(told: ToldVelocity, view: LocalView) -> bool:
     return velocity_stops_in_time(GuidedVelocity(told.speed_m_s, told.turn_rad_s), view, Bounds()) is None
 
 
-def _pending(view: LocalView, dead_s: float) -> NDArray[np.float64]:
+def _latest(view: LocalView) -> int:
+    """After how many steps a command has its effect at the latest."""
+    return math.ceil(view.following.dead_s * (1.0 + view.following.off_model) / STEP_S - 1e-6)
+
+
+def _pending(view: LocalView, steps: int) -> NDArray[np.float64]:
     """What was told and has not had its effect yet, one row a step.
 
     Where that was no velocity, the rover goes on as it does; a position tells it to drive on.
     """
-    rows = np.zeros((round(dead_s / STEP_S), 2))
+    rows = np.zeros((steps, 2))
     on_m_s = view.rover.cruise_speed_m_s if isinstance(view.told, GuidedPosition) else view.forward_m_s
     for step, row in enumerate(rows):
-        told = in_force(view.lately, view.pose.time_s - dead_s + (step + 0.5) * STEP_S)
+        told = in_force(view.lately, view.pose.time_s + (step + 0.5 - steps) * STEP_S)
         row[:] = (on_m_s, view.yaw_rate_rad_s) if told is None else (told.speed_m_s, told.turn_rad_s)
     return rows
 

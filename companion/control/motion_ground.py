@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.control.motion_kernels import MotionGround
+from companion.control.motion_kernels import Body, MotionGround
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import NedPoint
 from companion.mapping.cost_to_go import cost_to_go
@@ -38,6 +38,9 @@ NEAR_M = 0.3
 """A rover that stands too near to something finds its way from so far away."""
 NEARER_M = 1.0
 """A path that is closed farther ahead is followed at least so far, or it counts as closed here."""
+UNDER_M, BESIDE = 0.1, 1.5
+"""Round the rover ground counts as seen: so much beyond what it can turn on, and to so many times its half width. A
+lidar of 90 degrees sees the ground beside the rover's way only from there on."""
 COARSE = 2
 """Evidence cells along the side of a cell that has a time to go."""
 
@@ -54,27 +57,30 @@ class Window:
         return point.east_m - self.corner.east_m, point.north_m - self.corner.north_m
 
 
-def look_round(
-    evidence: EvidenceMap, here: NedPoint, path: ReferencePath, body_radius_m: float, fastest_m_s: float
-) -> Window:
-    """The window as the map is now. ``body_radius_m``: what the rover's middle keeps from obstacles where it passes."""
+def look_round(evidence: EvidenceMap, here: NedPoint, path: ReferencePath, body: Body, fastest_m_s: float) -> Window:
+    """The window as the map is now.
+
+    The ground that the rover can turn on where it stands counts as seen: no sensor sees it.
+    """
     ahead = path.points[path.progress : path.progress + round(AHEAD_M / STEP_M) + 1]
     (left, low), (right, high) = _window(evidence, np.vstack((ahead, (here.north_m, here.east_m))))
     log_odds = evidence.log_odds[low:high, left:right]
     cell_m, unseen = evidence.evidence_m, log_odds == 0.0
-    blocked = (log_odds >= evidence.settings.occupied_at) | _closed(evidence, (left, low), (right, high))
+    blocked = (log_odds >= evidence.settings.occupied_at) | _closed(evidence, (left, low), (right, high), body.radius_m)
     _close_edge(blocked, (left, low), evidence)
-    outside = unseen | blocked
-    for edge in (outside[0, :], outside[-1, :], outside[:, 0], outside[:, -1]):
-        edge[:] = True  # nothing is known here of what lies beyond the window
     # To the surface: the map marks what lies a little behind it.
     behind_m = np.float32(max(0.5 * cell_m, evidence.settings.hit_depth_m))
+    outside = (
+        unseen & ~_under(evidence, here, (left, low), unseen.shape, _unseen_to_m(body) + float(behind_m))
+    ) | blocked
+    for edge in (outside[0, :], outside[-1, :], outside[:, 0], outside[:, -1]):
+        edge[:] = True  # nothing is known here of what lies beyond the window
     gap_m = distance_field(blocked) * np.float32(cell_m) - behind_m
     seen_m = distance_field(outside) * np.float32(cell_m) - behind_m
     parts = [(row, column) for row in range(COARSE) for column in range(COARSE)]
     # The roomiest place of each counts: the mean would close gaps that are only just wide enough.
     room_m = np.maximum.reduce([gap_m[row::COARSE, column::COARSE].astype(np.float64) for row, column in parts])
-    pace = _pace(room_m - body_radius_m, COARSE * cell_m, fastest_m_s)
+    pace = _pace(room_m - body.radius_m, COARSE * cell_m, fastest_m_s)
     pace[np.logical_or.reduce([unseen[row::COARSE, column::COARSE] for row, column in parts])] *= UNSEEN_FACTOR
     cells = np.floor((evidence.frame.xys(ahead) - (left, low)) / COARSE).astype(np.int64)
     ends = path.progress + len(ahead) >= len(path.points)
@@ -117,13 +123,43 @@ def _window(evidence: EvidenceMap, places: Floats) -> tuple[tuple[int, int], tup
     return (int(low[0]), int(low[1])), (int(high[0]), int(high[1]))
 
 
-def _closed(evidence: EvidenceMap, first: tuple[int, int], last: tuple[int, int]) -> NDArray[np.bool_]:
-    """Evidence cells of fields that the mission, a fence or experience closed."""
+def _closed(
+    evidence: EvidenceMap, first: tuple[int, int], last: tuple[int, int], body_radius_m: float
+) -> NDArray[np.bool_]:
+    """Evidence cells of fields that the mission, a fence or experience closed to the rover's outline.
+
+    What the mission closes has grown by the rover's radius, for its middle. Here its outline keeps the distance, so a
+    strip as wide as that is taken off again: else the rover would keep it twice.
+    """
     s = evidence.subdivisions
     fields = np.s_[first[1] // s : -(-last[1] // s), first[0] // s : -(-last[0] // s)]
-    closed = evidence.base.weights[fields] + evidence.penalty[fields] >= 1.0
-    cells: NDArray[np.bool_] = closed.repeat(s, axis=0).repeat(s, axis=1)
-    return cells[first[1] % s :, first[0] % s :][: last[1] - first[1], : last[0] - first[0]]
+    base, penalty = evidence.base.weights[fields], evidence.penalty[fields]
+    here = np.s_[first[1] % s : first[1] % s + last[1] - first[1], first[0] % s : first[0] % s + last[0] - first[0]]
+
+    def cells(closed: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        fine: NDArray[np.bool_] = closed.repeat(s, axis=0).repeat(s, axis=1)[here]
+        return fine
+
+    closed = cells(base >= 1.0)
+    if closed.any():
+        deep_m = distance_field(~closed) * evidence.evidence_m
+        closed = deep_m > body_radius_m
+    return closed | cells(base + penalty >= 1.0) & ~cells(base >= 1.0)
+
+
+def _unseen_to_m(body: Body) -> float:
+    """So far from the rover's place no sensor sees the ground."""
+    return max(body.around_m, BESIDE * body.radius_m) + UNDER_M
+
+
+def _under(
+    evidence: EvidenceMap, here: NedPoint, first: tuple[int, int], shape: tuple[int, ...], reach_m: float
+) -> NDArray[np.bool_]:
+    """The evidence cells within reach of the rover's place."""
+    (x, y), reach = np.array(evidence.frame.xy(here)) - first, evidence.frame.cells(reach_m)
+    beside, along = np.arange(shape[1]) + 0.5 - x, np.arange(shape[0]) + 0.5 - y
+    under: NDArray[np.bool_] = along[:, None] ** 2 + beside**2 <= reach**2
+    return under
 
 
 def _close_edge(blocked: NDArray[np.bool_], first: tuple[int, int], evidence: EvidenceMap) -> None:

@@ -32,6 +32,10 @@ HASTE = 4.0
 """Seconds a second and m/s that the rover is too fast to stop there."""
 ARRIVED_S = 0.1
 """With so little time left, the rest of a motion does not count."""
+MOST_PIECES = 40
+"""Of a braking distance that is looked at."""
+ENDLESS = 300
+"""Steps: a rover that takes longer to stop may not be left alone with anything."""
 NEARER_M, NEAREST_M = 0.01, -0.04
 """A rover that is too near to something may come nearer by the first, so that it gets away, but only down to the
 second: else it would come nearer with every look."""
@@ -251,9 +255,11 @@ def _after_s(state, least, problem):
     ground, model, weights = problem.ground, problem.model, problem.weights
     x, y, heading, speed = state[0], state[1], state[2], state[3]
     brakes_m = speed * abs(speed) / (2.0 * model.decel_m_s2)
-    for piece in range(1, 4):
-        to_x = x + brakes_m * piece / 3.0 * math.sin(heading)
-        to_y = y + brakes_m * piece / 3.0 * math.cos(heading)
+    # In pieces that nothing fits between.
+    pieces = min(max(int(math.ceil(abs(brakes_m) / problem.body.radius_m)), 3), MOST_PIECES)
+    for piece in range(1, pieces + 1):
+        to_x = x + brakes_m * piece / pieces * math.sin(heading)
+        to_y = y + brakes_m * piece / pieces * math.cos(heading)
         if clearance_m(ground.gap_m, ground.cell_m, problem.body, to_x, to_y, heading) < min(weights.margin_m, least):
             return BLOCKED_S + left_s(ground, x, y)
     left = left_s(ground, x, y)
@@ -339,6 +345,8 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
     least_seen = _least_m(ground.seen_m, ground.cell_m, body, start, 0.0)
     step, spare = 0, FAR_M
     while step < early + held or abs(state[3]) > 0.02:
+        if step > early + held + ENDLESS:
+            return -FAR_M
         now_m_s, now_rad_s = 0.0, 0.0
         if step < early:
             now_m_s, now_rad_s = pending[step, 0], pending[step, 1]

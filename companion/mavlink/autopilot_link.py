@@ -18,7 +18,6 @@ from companion.mavlink.confirmation import CommandTracker, TargetReadBack
 from companion.mavlink.download import Downloads
 from companion.mavlink.rates import RateFault, RateRequester, wanted_rates
 from companion.settings import LinkSettings
-from companion.vehicle import guard
 from companion.vehicle.commands import Command, Heartbeat, NamedValue, RequestMessage, TimeSync
 from companion.vehicle.events import AckSeen, Event, GuardSeen, HeartbeatSeen, HomeSeen, TargetSeen
 from companion.vehicle.link_latency import TimeAnswered
@@ -79,7 +78,9 @@ class AutopilotLink:
         self._own: deque[bytes] = deque(maxlen=REMEMBERED)
         self._time_s = -math.inf
         self._asked_ns: deque[int] = deque(maxlen=64)
-        self._twin_s = self._rival_s = self._guard_s = -math.inf
+        self._twin_s = self._rival_s = -math.inf
+        self._guarded = False
+        """A guard was heard. It may still watch though its words are lost, so heartbeats stay frequent from then on."""
 
     @property
     def description(self) -> str:
@@ -165,8 +166,7 @@ class AutopilotLink:
 
         The heartbeat is sent from the first tick on: the autopilot learns from packets where the companion is.
         """
-        guarded = now_s - self._guard_s < guard.FRESH_S
-        if now_s - self._heartbeat_s >= (GUARDED_HEARTBEAT_S if guarded else HEARTBEAT_S) - 1e-6:
+        if now_s - self._heartbeat_s >= (GUARDED_HEARTBEAT_S if self._guarded else HEARTBEAT_S) - 1e-6:
             self._heartbeat_s = now_s
             self._write(Heartbeat(), now_s)
         self._read_back.check(now_s)
@@ -225,7 +225,7 @@ class AutopilotLink:
             case HomeSeen():
                 self._home_known = True
             case GuardSeen():
-                self._guard_s = event.time_s
+                self._guarded = True
             case _:
                 pass
         self.downloads.heard(event)

@@ -80,7 +80,7 @@ class Decoder:
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery_status,
             mavlink.MAVLINK_MSG_ID_FENCE_STATUS: _fence_status,
             mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
-            mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: _guard,
+            mavlink.MAVLINK_MSG_ID_NAMED_VALUE_FLOAT: self._guard,
             mavlink.MAVLINK_MSG_ID_ATTITUDE: self._attitude,
             mavlink.MAVLINK_MSG_ID_LOCAL_POSITION_NED: self._local_position,
             mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT: self._global_position,
@@ -221,6 +221,13 @@ class Decoder:
             return None
         return LocalPositionSeen(time_s, message.time_boot_ms / 1000.0, *values)
 
+    def _guard(self, message: Any, time_s: float) -> Event | None:
+        """NAMED_VALUE_FLOAT: only that of a guard which watches this very component counts."""
+        ours = message.name == guard.name_of(self.component_id)
+        if not ours or not MIN_GUARD_MS <= abs(message.value) <= MAX_GUARD_MS:
+            return None
+        return GuardSeen(time_s, 1e-3 * abs(message.value), message.value < 0.0)
+
     def _attitude(self, message: Any, time_s: float) -> Event | None:
         if self._is_late(message) or not (math.isfinite(message.yaw) and math.isfinite(message.yawspeed)):
             return None
@@ -304,13 +311,6 @@ def _time_answered(message: Any, time_s: float) -> Event | None:
 
 def _parameter(message: Any, time_s: float) -> Event:
     return ParameterSeen(time_s, message.param_id, message.param_value)
-
-
-def _guard(message: Any, time_s: float) -> Event | None:
-    """NAMED_VALUE_FLOAT: only the guard's counts."""
-    if message.name != guard.NAME or not MIN_GUARD_MS <= abs(message.value) <= MAX_GUARD_MS:
-        return None
-    return GuardSeen(time_s, 1e-3 * abs(message.value), message.value < 0.0)
 
 
 def _prearm(message: Any, time_s: float) -> Event:

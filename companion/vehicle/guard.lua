@@ -3,7 +3,8 @@
 -- A velocity lasts three seconds in ArduRover. Without this script a rover whose companion dies drives on for as long.
 -- It waits SCR_USER1 milliseconds (200 to 3000; 0: 300). It begins to watch with the companion's first setpoint in
 -- GUIDED, and ends when the mode is another one or the rover is disarmed: so it never acts against a pilot, nor on a
--- companion that ended well. Once a second it tells as CMPGUARD how long it waits; negative while HOLD is its doing.
+-- companion that ended well. Twice a second it tells as CMPGRD191, the number being the component it watches, how long it waits;
+-- negative while HOLD is its doing.
 local COMPANION = 191
 local GUIDED, HOLD = 15, 4
 local HEARTBEAT = 0
@@ -24,7 +25,7 @@ local function listen(now_ms, guided)
     local message = mavlink:receive_chan()
     if not message then return end
     local system, component, id = string.unpack("<BBI3", message, 8)
-    if component == COMPANION and (not own or system == own) then
+    if component == COMPANION and system == own then
       heard_ms = now_ms
       if guided and SETPOINTS[id] then watches = true end
     end
@@ -42,9 +43,9 @@ local function update()
     vehicle:set_mode(HOLD)
     gcs:send_text(4, "Guard: companion silent, HOLD")
   end
-  if now_ms - told_ms >= 1000 then
+  if own and now_ms - told_ms >= 500 then
     told_ms = now_ms
-    gcs:send_named_float("CMPGUARD", acted and -waits_ms() or waits_ms())
+    gcs:send_named_float("CMPGRD" .. COMPANION, acted and -waits_ms() or waits_ms())
   end
   return update, 20
 end

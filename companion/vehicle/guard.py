@@ -10,12 +10,18 @@ from __future__ import annotations
 
 from importlib.resources import files
 
-NAME = "CMPGUARD"
-"""NAMED_VALUE_FLOAT of the script: how many milliseconds it waits, negative while the present HOLD is its doing."""
-FRESH_S = 2.5
-"""It speaks once a second; without a word for so long it is not there."""
+NAME = "CMPGRD"
+"""NAMED_VALUE_FLOAT of the script, with the id of the component that it watches behind it: how many milliseconds it
+waits, negative while the present HOLD is its doing."""
+FRESH_S = 1.3
+"""It speaks twice a second; without a word for so long it is not there."""
 FILE = "companion_guard.lua"
 COMPONENT = 191
+
+
+def name_of(component_id: int) -> str:
+    """The name under which a guard that watches this component speaks."""
+    return f"{NAME}{component_id}"
 
 
 def script(component_id: int = COMPONENT) -> str:

@@ -140,8 +140,10 @@ class VehicleState:
         return self.position.north_m_s * math.cos(heading_rad) + self.position.east_m_s * math.sin(heading_rad)
 
     def guard_at(self, time_s: float) -> GuardSeen | None:
-        """The guard on the autopilot as last heard; None if it is not there."""
-        return self.guard if self.guard is not None and time_s - self.guard.time_s < guard.FRESH_S else None
+        """The guard on the autopilot as last heard; None if it is not there, or does not watch: in legs of AUTO."""
+        if self.in_auto or self.guard is None or time_s - self.guard.time_s >= guard.FRESH_S:
+            return None
+        return self.guard
 
     @property
     def latency_s(self) -> float:

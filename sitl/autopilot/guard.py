@@ -6,6 +6,7 @@ the script ``companion/vehicle/guard.lua`` does, which looks every 20 ms.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -24,16 +25,20 @@ SETPOINTS = {
 }
 LIFE = {"HEARTBEAT", *SETPOINTS}
 LOOK_US = 20_000
-TELL_US = 1_000_000
+TELL_US = 500_000
 USUAL_MS, LEAST_MS, MOST_MS = 300.0, 200.0, 3000.0
-NAME = b"CMPGUARD"
+WATCHES = re.compile(rb"^local COMPANION = (\d+)$", re.MULTILINE)
+"""In the script: the component that it watches."""
 
 
 class Guard:
     """Watches the companion's packets from its first setpoint in GUIDED until the mode or arming changes."""
 
-    def __init__(self, vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool]) -> None:
+    def __init__(
+        self, vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool], component_id: int = COMPANION
+    ) -> None:
         self._vehicle = vehicle
+        self._component_id = component_id
         self._set_mode = set_mode
         self._watches = self._acted = False
         self._heard_us = self._told_us = 0
@@ -47,7 +52,7 @@ class Guard:
     def hear(self, message: Any) -> None:
         """One packet that has arrived."""
         vehicle = self._vehicle
-        if message.get_srcSystem() != vehicle.system or message.get_srcComponent() != COMPANION:
+        if message.get_srcSystem() != vehicle.system or message.get_srcComponent() != self._component_id:
             return
         if message.get_type() in LIFE:
             self._heard_us = vehicle.time_us
@@ -73,8 +78,9 @@ class Guard:
         if vehicle.time_us - self._told_us >= TELL_US:
             self._told_us = vehicle.time_us
             told_ms = (-1e-3 if self._acted else 1e-3) * self.waits_us
+            name = b"CMPGRD%d" % self._component_id
             for channel in vehicle.channels.values():
-                channel.send(mavlink.MAVLink_named_value_float_message(vehicle.time_us // 1000, NAME, told_ms))
+                channel.send(mavlink.MAVLink_named_value_float_message(vehicle.time_us // 1000, name, told_ms))
 
     def _is_guided(self) -> bool:
         return self._vehicle.armed and self._vehicle.mode == Mode.GUIDED
@@ -82,5 +88,8 @@ class Guard:
 
 def guard_of(vehicle: Vehicle, set_mode: Callable[[Vehicle, int], bool]) -> Guard | None:
     """The guard of an autopilot that has just booted; None if it has none."""
-    there = vehicle.parameters["SCR_USER1"] > 0 or any(b"CMPGUARD" in file for file in vehicle.storage.files.values())
-    return Guard(vehicle, set_mode) if there and vehicle.parameters["SCR_ENABLE"] == 1 else None
+    found = next((found for file in vehicle.storage.files.values() if (found := WATCHES.search(file))), None)
+    there = vehicle.parameters["SCR_USER1"] > 0 or found is not None
+    if not there or vehicle.parameters["SCR_ENABLE"] != 1:
+        return None
+    return Guard(vehicle, set_mode, COMPANION if found is None else int(found[1]))

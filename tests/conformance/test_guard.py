@@ -12,19 +12,19 @@ from hypothesis import strategies as st
 from lupa import LuaRuntime
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from companion.vehicle.guard import script
-from sitl.autopilot.guard import LOOK_US, Guard
+from companion.vehicle.guard import name_of, script
+from sitl.autopilot.guard import LOOK_US, Guard, guard_of
 from sitl.autopilot.state import Mode
 
 AUTOPILOT_OF_THE_SCRIPT = b"""
-now_ms, mode, armed, queue, wanted, told, texts, parameters = 0, 0, false, {}, {}, {}, {}, {}
+now_ms, mode, armed, queue, wanted, told, names, texts, parameters = 0, 0, false, {}, {}, {}, {}, {}, {}
 function millis() return { toint = function() return now_ms end } end
 vehicle = { get_mode = function() return mode end, set_mode = function(_, new) mode = new return true end }
 arming = { is_armed = function() return armed end }
 param = { get = function(_, name) return parameters[name] end }
 gcs = {
   send_text = function(_, severity, text) texts[#texts + 1] = text end,
-  send_named_float = function(_, name, value) told[#told + 1] = value end,
+  send_named_float = function(_, name, value) told[#told + 1] = value names[#names + 1] = name end,
 }
 mavlink = {
   init = function() end,
@@ -75,6 +75,12 @@ class Script:
         told = list(self.values[b"told"].values())
         return told[-1] if told else None
 
+    @property
+    def name(self) -> bytes:
+        """Under which it spoke last."""
+        name: bytes = list(self.values[b"names"].values())[-1]
+        return name
+
 
 @dataclass
 class Simulated:
@@ -83,6 +89,7 @@ class Simulated:
     waits_ms: float = 300.0
     vehicle: Any = field(init=False)
     told_ms: float | None = None
+    name: bytes = b""
 
     def __post_init__(self) -> None:
         parameters = {"SCR_USER1": self.waits_ms}
@@ -94,7 +101,7 @@ class Simulated:
         self._parser = mavlink.MAVLink(None)
 
     def _tell(self, message: Any) -> None:
-        self.told_ms = message.value
+        self.told_ms, self.name = message.value, message.name.encode()
 
     def _set_mode(self, vehicle: Any, mode: int) -> bool:
         vehicle.mode = int(mode)
@@ -169,13 +176,13 @@ def test_it_never_acts_in_another_mode_nor_while_disarmed_nor_after_it(guard: Gu
     assert guard.mode == Mode.GUIDED, "somebody else drives in GUIDED now"
 
 
-def test_it_tells_once_a_second_how_long_it_waits_and_whether_hold_is_its_doing(guard: Guards) -> None:
-    looks(guard, 1.1, 0.1, packed(SETPOINT))
-    assert guard.told_ms == 300.0
+def test_it_tells_twice_a_second_how_long_it_waits_and_whether_hold_is_its_doing(guard: Guards) -> None:
+    looks(guard, 0.6, 0.1, packed(SETPOINT))
+    assert guard.told_ms == 300.0 and guard.name == name_of(191).encode()
     looks(guard, 2.0)
     assert guard.told_ms == -300.0
     guard.put(Mode.MANUAL, True)
-    looks(guard, 1.1)
+    looks(guard, 0.6)
     assert guard.told_ms == 300.0
 
 
@@ -203,7 +210,24 @@ def test_the_script_waits_within_bounds_and_for_the_component_it_was_made_for() 
     assert other.mode == Mode.GUIDED
     other.hear(packed(SETPOINT, component=195))
     looks(other, 1.0)
-    assert other.mode == Mode.HOLD
+    assert other.mode == Mode.HOLD and other.name == name_of(195).encode()
+
+
+def test_an_autopilot_whose_system_id_cannot_be_read_is_not_guarded_and_not_told_to_be() -> None:
+    one = Script()
+    one.values[b"parameters"][b"MAV_SYSID"] = None
+    one._update = one.lua.execute(script().encode())[0]
+    one.put(Mode.GUIDED, True)
+    looks(one, 2.0, 0.1, packed(SETPOINT))
+    looks(one, 2.0)
+    assert one.told_ms is None and one.mode == Mode.GUIDED
+
+
+def test_the_simulators_guard_watches_the_component_of_the_script_that_was_uploaded() -> None:
+    storage = SimpleNamespace(files={"scripts/companion_guard.lua": script(195).encode()})
+    vehicle: Any = SimpleNamespace(parameters={"SCR_USER1": 0.0, "SCR_ENABLE": 1.0}, storage=storage)
+    made = guard_of(vehicle, lambda *_: True)
+    assert made is not None and made._component_id == 195
 
 
 STEPS = st.one_of(

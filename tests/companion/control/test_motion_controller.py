@@ -10,7 +10,7 @@ import pytest
 
 from companion.control.controller import Purpose
 from companion.control.local_view import LocalView
-from companion.control.motion_controller import MotionController, rover_model
+from companion.control.motion_controller import MotionController, _latest, rover_model
 from companion.control.motion_kernels import clearance_m, moved
 from companion.control.motion_planners import MotionKind, motion_planner
 from companion.control.reference_path import ReferencePath, advanced
@@ -102,6 +102,60 @@ def test_it_stops_before_ground_that_was_not_seen() -> None:
     leads, pose = controller(), Pose(6.5, 10.0, 0.0, 0.0)
     told = leads.follow(PATH, view(evidence, pose, 1.5)).setpoint
     assert isinstance(told, GuidedVelocity) and told.forward_m_s <= 0.2
+
+
+@pytest.mark.parametrize("settings", [GUARDED, STRICT])
+def test_ground_that_has_become_unknown_before_it_is_not_driven_onto(settings: Settings) -> None:
+    """As where a map is looked at again. It brakes at once, and creeps no farther than it can see beside itself."""
+    leads, evidence, lately, path = controller(), ground(), Told(), PATH
+    north_m, speed_m_s, told_m_s, ended_m = 3.0, 1.5, [1.5] * 6, math.nan
+    for tick in range(90):
+        if tick == 4:
+            evidence.log_odds[round((north_m + 0.9) / evidence.evidence_m) :] = 0.0
+            ended_m = north_m + speed_m_s * 0.3 + speed_m_s**2 / 2.0
+        at = replace(view(evidence, Pose(north_m, 10.0, 0.0, TICK_S * tick), speed_m_s, settings), lately=lately)
+        path = advanced(path, at.pose)
+        setpoint = leads.follow(path, at).setpoint
+        assert isinstance(setpoint, GuidedVelocity)
+        told_m_s.append(setpoint.forward_m_s)
+        lately = after(lately, setpoint, at.pose.time_s)
+        speed_m_s += min(max(told_m_s[-6] - speed_m_s, -TICK_S), TICK_S)
+        north_m += speed_m_s * TICK_S
+        assert tick < 5 or setpoint.forward_m_s < 0.3
+    assert north_m < ended_m + 0.8
+
+
+def test_a_rover_that_saw_nothing_behind_it_does_not_reverse_there() -> None:
+    evidence = ground()
+    evidence.log_odds[: round(9.5 / evidence.evidence_m)] = 0.0
+    leads, back, state = controller(), ReferencePath(PATH.points[::-1].copy(), 28), (10.0, 10.0, 0.0, 0.0, 0.0)
+    for tick in range(60):
+        at = view(evidence, Pose(state[1], state[0], state[2], TICK_S * tick), abs(state[3]))
+        at = replace(at, yaw_rate_rad_s=state[4], rolls_back=state[3] < 0.0)
+        told = leads.follow(back, at).setpoint
+        assert isinstance(told, GuidedVelocity)
+        state = moved(state, told.forward_m_s, told.yaw_rate_rad_s, rover_model(at), TICK_S)
+        assert math.hypot(state[0] - 10.0, state[1] - 10.0) < 0.6, "what it can turn on, and a little more"
+
+
+def test_what_is_told_allows_for_a_command_that_comes_later_than_the_model_says() -> None:
+    """With the dead time off by as much as all else, it may be left alone only at a lower speed."""
+    evidence = ground()
+    wall(evidence, 6.0, 8.0, 12.0)
+    fastest_m_s, lately = [], (ToldVelocity(-1.0, 1.5, 0.0),)
+    for off_model in (0.0, 0.6):
+        at = view(evidence, Pose(3.0, 10.0, 0.0, 0.0), 1.5)
+        # It brakes as well as it should in both cases: only what comes late is compared.
+        brakes_m_s2 = 1.0 / (1.0 - off_model)
+        follows = at.following._replace(off_model=off_model, gains_most_m_s2=1.0, deceleration_m_s2=brakes_m_s2)
+        at = replace(at, lately=lately, following=follows)
+        leads = controller()
+        leads.follow(PATH, at)
+        assert leads.choice is not None
+        fastest_m_s.append(leads.choice.problem.admitted_m_s[8, 0])
+    assert fastest_m_s[1] < 0.9 * fastest_m_s[0]
+    late = replace(at, following=at.following._replace(dead_s=0.25, off_model=0.3))
+    assert _latest(late) == 4, "0.325 s"
 
 
 def test_shut_in_it_says_that_it_is_blocked() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from companion.control.motion_ground import AHEAD_M, AROUND_M, Window, look_round
+from companion.control.motion_kernels import Body
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import NedPoint
 from companion.core.grid import empty_grid
@@ -15,6 +16,7 @@ from companion.mapping.evidence_map import EvidenceMap, new_map
 from companion.settings import Settings
 
 SETTINGS = Settings()
+BODY = Body(np.zeros(1), 0.3, 0.3)
 HERE, BEYOND = NedPoint(3.0, 10.0), NedPoint(11.0, 10.0)
 PATH = ReferencePath(np.column_stack((np.arange(3.0, 17.1, STEP_M), np.full(57, 10.0))))
 
@@ -32,7 +34,7 @@ def wall(evidence: EvidenceMap, north_m: float, west_m: float, east_m: float, va
 
 
 def seen(evidence: EvidenceMap) -> Window:
-    return look_round(evidence, HERE, PATH, 0.3, 2.0)
+    return look_round(evidence, HERE, PATH, BODY, 2.0)
 
 
 def togo_s(window: Window, point: NedPoint) -> float:
@@ -57,6 +59,29 @@ def test_gaps_are_told_from_the_surface() -> None:
     x, y = (int(v / window.ground.cell_m) for v in window.place(NedPoint(5.0, 10.0)))
     assert window.ground.gap_m[y, x] == pytest.approx(1.0 - 0.0625, abs=0.13)
     assert window.ground.seen_m[y, x] == window.ground.gap_m[y, x]
+
+
+def test_the_ground_that_the_rover_stands_on_counts_as_seen_and_none_beyond() -> None:
+    evidence = ground()
+    evidence.log_odds.fill(0.0)
+    window = seen(evidence)
+
+    def seen_m(point: NedPoint) -> float:
+        x, y = (int(v / window.ground.cell_m) for v in window.place(point))
+        return float(window.ground.seen_m[y, x])
+
+    assert seen_m(HERE) > BODY.radius_m
+    assert seen_m(NedPoint(HERE.north_m - 1.0, HERE.east_m)) < 0.0
+
+
+def test_what_the_mission_closes_keeps_the_rovers_middle_away_and_not_its_sides_once_more() -> None:
+    """Two fences whose fields, grown by the rover's radius, leave 1 m between them."""
+    evidence = new_map(empty_grid(80, 80, 0.25), 0.3, SETTINGS.mapping)
+    evidence.log_odds.fill(-1.0)
+    evidence.base.weights[32:36, :38] = evidence.base.weights[32:36, 42:] = 1.0
+    assert togo_s(seen(evidence), HERE) < 1.5 * togo_s(seen(ground()), HERE)
+    evidence.base.weights[32:36] = 1.0
+    assert np.isinf(togo_s(seen(evidence), BEYOND)) or np.isinf(togo_s(seen(evidence), HERE))
 
 
 def test_a_wall_is_gone_round_and_a_narrow_gap_in_it_is_no_way() -> None:
@@ -122,7 +147,7 @@ def test_the_edge_of_the_map_is_closed_on_all_sides_however_many_cells_it_has(fi
     assert evidence.log_odds.shape[0] == 5 * fields
     middle = 0.5 * fields
     path = ReferencePath(np.array([(middle, middle), (middle + 0.2, middle)]))
-    gap_m = look_round(evidence, NedPoint(middle, middle), path, 0.3, 2.0).ground.gap_m
+    gap_m = look_round(evidence, NedPoint(middle, middle), path, BODY, 2.0).ground.gap_m
     for edge in (gap_m[0, :], gap_m[-1, :], gap_m[:, 0], gap_m[:, -1]):
         assert edge.max() <= 0.0
 
@@ -137,14 +162,14 @@ def test_beyond_the_window_nothing_is_known_to_be_free() -> None:
 @pytest.mark.parametrize("east_m", [0.1, 19.9])
 def test_at_the_edge_of_the_map_it_is_smaller(east_m: float) -> None:
     path = replace(PATH, points=np.column_stack((PATH.points[:, 0], np.full(57, east_m))))
-    window = look_round(ground(), NedPoint(3.0, east_m), path, 0.3, 2.0)
+    window = look_round(ground(), NedPoint(3.0, east_m), path, BODY, 2.0)
     assert window.ground.gap_m.shape[1] * window.ground.cell_m == pytest.approx(AROUND_M, abs=0.6)
     assert window.ground.togo_s.shape[0] * 2 == window.ground.gap_m.shape[0]
 
 
 def test_the_edge_of_the_map_is_no_ground_but_that_of_the_window_is() -> None:
     evidence = ground()
-    inside, beside = seen(evidence), look_round(evidence, NedPoint(3.0, 1.0), PATH, 0.3, 2.0)
+    inside, beside = seen(evidence), look_round(evidence, NedPoint(3.0, 1.0), PATH, BODY, 2.0)
     x, y = beside.place(NedPoint(3.0, 0.3))
     row, column = int(y / beside.ground.cell_m), int(x / beside.ground.cell_m)
     assert 0.1 < beside.ground.gap_m[row, column] < 0.3

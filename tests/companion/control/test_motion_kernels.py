@@ -79,6 +79,12 @@ def test_a_motion_that_could_not_brake_at_its_end_is_blocked() -> None:
     fast[-1, 0] = 2.0
     ground = problem((51, 53, 0, SIDE))
     assert cost_s(slow, ground) < BLOCKED_S <= cost_s(fast, ground)
+    # From 2 m/s it needs 2 m: a thin post anywhere on that way is in it.
+    rolling = Start(5.0, 1.0, 0.0, 2.0, 0.0)
+    for row in range(69, 80, 2):
+        post = problem((row, row + 1, 50, 51), start=rolling)
+        body = BODY._replace(ahead_m=np.array([0.0]), radius_m=0.2, around_m=0.2)
+        assert cost_s(constant(2.0), post._replace(body=body, pending=np.full((2, 2), (2.0, 0.0)))) >= BLOCKED_S, row
 
 
 def test_what_can_be_done_now_is_not_put_off() -> None:
@@ -139,6 +145,12 @@ def test_a_command_may_be_the_last_if_the_way_it_leads_to_a_stop_is_free_and_see
     assert not may_be_last(1.0, 0.0, 3.0, 1.0, 0.0, 0.0, problem(start=rolling, unseen_from=36))
     turns = problem((20, 40, 57, 59), start=rolling)
     assert may_be_last(1.0, 0.5, 0.5, 1.0, 0.0, 0.0, turns) and not may_be_last(1.0, 0.5, 3.0, 1.0, 0.0, 0.0, turns)
+
+
+def test_a_rover_that_hardly_brakes_may_not_be_left_alone_and_that_is_found_soon() -> None:
+    rolling = problem(start=Start(5.0, 5.0, 0.0, 1.0, 0.0))
+    assert may_be_last(1.0, 3.0, 0.3, 1.0, 0.0, 0.0, rolling)
+    assert not may_be_last(1.0, 3.0, 0.3, 1.0, 0.0, 0.0, rolling._replace(model=MODEL._replace(decel_m_s2=1e-9)))
 
 
 def test_the_model_follows_with_limited_changes() -> None:

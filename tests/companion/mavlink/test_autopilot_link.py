@@ -79,6 +79,23 @@ def test_it_speaks_first_and_once_a_second() -> None:
     assert bench.tick(10.0) and bench.tick(10.1) == [], "nothing but heartbeats while nobody is there"
 
 
+def heartbeats(bench: Bench, begin_s: float, end_s: float) -> int:
+    before = len(bench.log)
+    for tick in range(round((end_s - begin_s) / 0.05)):
+        bench.link.service(begin_s + 0.05 * tick)
+    said = [raw for _, raw in bench.log[before:]]
+    return sum(message.get_type() == "HEARTBEAT" for message in messages(b"".join(said)))
+
+
+def test_it_speaks_often_once_a_guard_was_heard_which_may_watch_though_its_words_are_lost() -> None:
+    bench = Bench()
+    assert heartbeats(bench, 1.0, 5.0) == 4
+    bench.hear(5.0, bench.rover.pack(mavlink.MAVLink_named_value_float_message(0, b"CMPGRD195", 300.0)))
+    assert heartbeats(bench, 5.0, 9.0) == 4, "that one watches another component"
+    bench.hear(9.0, bench.rover.pack(mavlink.MAVLink_named_value_float_message(0, b"CMPGRD191", 300.0)))
+    assert heartbeats(bench, 9.0, 29.0) >= 195
+
+
 def test_rates_and_places_are_asked_for_when_the_vehicle_is_heard() -> None:
     bench = Bench(known=False)
     (event,) = bench.hear(1.0, bench.rover.heartbeat())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from companion.core.severity import Severity
 from companion.safety.guard_monitor import GuardMonitor
 from companion.vehicle.events import Event, GuardSeen, TextSeen
@@ -42,6 +44,11 @@ def test_it_tells_once_that_hold_was_the_guards() -> None:
     assert [text for text in run(*seen) if "HOLD:" in text] == [
         "The guard on the autopilot has put HOLD: it heard nothing of the companion"
     ] * 2
+
+
+def test_in_legs_of_auto_it_does_not_watch_and_counts_as_absent() -> None:
+    state = replace(fold(VehicleState(), GuardSeen(1.0, 0.3, False)), in_auto=True)
+    assert state.guard_at(1.1) is None and replace(state, in_auto=False).guard_at(1.1) is not None
 
 
 def test_without_one_nothing_is_told() -> None:
