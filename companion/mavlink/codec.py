@@ -45,10 +45,16 @@ class Codec:
     """
 
     def __init__(
-        self, settings: LinkSettings, system_id: int = 1, signer: Signer | None = None, recorded: Recorded | None = None
+        self,
+        settings: LinkSettings,
+        system_id: int = 1,
+        signer: Signer | None = None,
+        recorded: Recorded | None = None,
+        companion: int | None = None,
     ) -> None:
+        """``companion``: the component whose guard is listened for; None: this one itself."""
         self._framer = Framer()
-        self._decoder = Decoder(system_id, settings.component_id)
+        self._decoder = Decoder(system_id, settings.component_id, companion)
         self._encoder = Encoder(settings.setpoint, settings.component_id, signer)
         self._signer = signer
         self._recorded = recorded

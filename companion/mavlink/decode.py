@@ -58,7 +58,8 @@ MIN_GUARD_MS, MAX_GUARD_MS = 50.0, 5000.0
 class Decoder:
     """Turns packets into events; keeps the vehicle's id, its clock and the last packets."""
 
-    def __init__(self, system_id: int, component_id: int) -> None:
+    def __init__(self, system_id: int, component_id: int, companion: int | None = None) -> None:
+        """``companion``: the component whose guard counts; None: this one itself."""
         self.system_id = system_id
         self.component_id = component_id
         self.vehicle_known = False
@@ -76,6 +77,7 @@ class Decoder:
         self._newest_ms: dict[int, int] = {}
         self._texts = TextAssembler()
         self._ranges = RangeDecoder()
+        self._guards_name = guard.name_of(component_id if companion is None else companion)
         self._readers: dict[int, Callable[[Any, float], Event | None]] = {
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery_status,
             mavlink.MAVLINK_MSG_ID_FENCE_STATUS: _fence_status,
@@ -222,8 +224,8 @@ class Decoder:
         return LocalPositionSeen(time_s, message.time_boot_ms / 1000.0, *values)
 
     def _guard(self, message: Any, time_s: float) -> Event | None:
-        """NAMED_VALUE_FLOAT: only that of a guard which watches this very component counts."""
-        ours = message.name == guard.name_of(self.component_id)
+        """NAMED_VALUE_FLOAT: only that of a guard which watches the companion counts."""
+        ours = message.name == self._guards_name
         if not ours or not MIN_GUARD_MS <= abs(message.value) <= MAX_GUARD_MS:
             return None
         return GuardSeen(time_s, 1e-3 * abs(message.value), message.value < 0.0)

@@ -50,7 +50,9 @@ class Surveyor:
         self._link = link
         self._companion = settings.component_id
         other = OTHER_COMPONENT + (self._companion == OTHER_COMPONENT)
-        self._codec = Codec(settings.model_copy(update={"component_id": other}), signer=signer)
+        self._codec = Codec(
+            settings.model_copy(update={"component_id": other}), signer=signer, companion=self._companion
+        )
         self._rates = RateRequester(wanted_rates(settings))
         self._mav: Any = mavlink.MAVLink(None)
         self._names = tuple(names)
