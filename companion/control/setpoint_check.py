@@ -73,11 +73,13 @@ def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fa
 
 def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault | None:
     """A guided velocity, if nothing more is told, ends on its arc before the rover touches anything that is known."""
-    if not isinstance(setpoint, GuidedVelocity) or setpoint.forward_m_s == 0.0:
+    if not isinstance(setpoint, GuidedVelocity):
         return None
     forward_m_s, yaw_rate_rad_s = setpoint.forward_m_s, setpoint.yaw_rate_rad_s
     if not math.isfinite(forward_m_s) or not math.isfinite(yaw_rate_rad_s):
         return Reason(SetpointFault.NOT_A_NUMBER)
+    if forward_m_s == 0.0:
+        return None
     if view.settings.guidance.controller != "points":
         return _way_is_blocked(_way_alone(setpoint, view), view)
     base_m_s = max(view.speed_m_s, view.settings.steering.scale_base_m_s)
@@ -91,22 +93,28 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
 
 
 def _way_alone(setpoint: GuidedVelocity, view: LocalView) -> list[NedPoint]:
-    """Places on the way of a rover that is told nothing more: it goes on until the velocity expires, then it brakes."""
+    """Places on the way of a rover that is told nothing more: it goes on until the velocity expires, then it brakes.
+
+    It brakes as badly as it may.
+    """
     guidance, follows, pose = view.settings.guidance, view.following, view.pose
     speed_m_s, turn_rad_s = view.forward_m_s, view.yaw_rate_rad_s
     heading_rad, point, places = pose.heading_rad, pose.point, [pose.point]
-    gains_m_s = follows.gains_most_m_s2 * WAY_STEP_S
+    brakes_m_s2 = follows.deceleration_m_s2 * (1.0 - follows.off_model)
+    gains_m_s, loses_m_s = follows.gains_most_m_s2 * WAY_STEP_S, brakes_m_s2 * WAY_STEP_S
     gains_rad_s = follows.turn_acceleration_rad_s2 * WAY_STEP_S
     for step in range(math.ceil((follows.dead_s + guidance.velocity_lasts_s) / WAY_STEP_S)):
         since_s = (step + 0.5) * WAY_STEP_S - follows.dead_s
         told = setpoint if since_s >= 0.0 else _velocity(in_force(view.lately, pose.time_s + since_s))
         if told is not None:
-            speed_m_s += min(max(told.forward_m_s - speed_m_s, -gains_m_s), gains_m_s)
+            change_m_s = told.forward_m_s - speed_m_s
+            most_m_s = loses_m_s if change_m_s * speed_m_s < 0.0 else gains_m_s
+            speed_m_s += min(max(change_m_s, -most_m_s), most_m_s)
             turn_rad_s += min(max(follows.turn_gain * told.yaw_rate_rad_s - turn_rad_s, -gains_rad_s), gains_rad_s)
         point = point.moved(heading_rad + 0.5 * turn_rad_s * WAY_STEP_S, speed_m_s * WAY_STEP_S)
         heading_rad += turn_rad_s * WAY_STEP_S
         places.append(point)
-    stops_s = abs(speed_m_s) / follows.deceleration_m_s2
+    stops_s = abs(speed_m_s) / brakes_m_s2
     for share in (0.25, 0.5, 0.75, 1.0):
         # It turns on for as long as it takes to stop turning, while it brakes.
         part_s = 0.25 * stops_s

@@ -198,6 +198,7 @@ def test_what_is_not_a_number_does_not_pass(value: float) -> None:
         (GuidedPosition(NedPoint(value, 1.0)), SetpointFault.BEYOND_HORIZON),
         (GuidedVelocity(value, 0.0), SetpointFault.NOT_A_NUMBER),
         (GuidedVelocity(1.0, value), SetpointFault.NOT_A_NUMBER),
+        (GuidedVelocity(0.0, value), SetpointFault.NOT_A_NUMBER),
     ):
         assert fault(Output(setpoint, pose, 0.0), open_ground()) is kind
 
@@ -283,6 +284,13 @@ def test_what_was_told_lately_is_counted_until_a_new_velocity_shows() -> None:
     wanted = GuidedVelocity(0.6, 0.0)
     assert fault_of(wanted, rolling(1.2, lately=slower), Bounds()) is None
     assert fault_of(wanted, rolling(1.2, lately=faster), Bounds()) == Reason(SetpointFault.INTO_OBSTACLE)
+
+
+def test_a_rover_that_may_brake_badly_is_told_to_earlier() -> None:
+    at = rolling(1.2, lately=(ToldVelocity(-0.3, 1.2, 0.0),))
+    good, bad = (replace(at, following=at.following._replace(off_model=off)) for off in (0.0, 0.5))
+    assert fault_of(GuidedVelocity(0.05, 0.0), good, Bounds()) is None
+    assert fault_of(GuidedVelocity(0.05, 0.0), bad, Bounds()) == Reason(SetpointFault.INTO_OBSTACLE)
 
 
 def test_any_velocity_but_zero_is_looked_along() -> None:
