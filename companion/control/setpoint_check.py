@@ -133,7 +133,7 @@ def _velocity(told: ToldVelocity | None) -> GuidedVelocity | None:
 def _way_is_blocked(places: list[NedPoint], view: LocalView) -> Fault | None:
     base, radius_m = view.evidence.base, view.evidence.rover_radius_m - NEARER_M
     # A rover that stands nearer to something must get away.
-    radius_m = min(radius_m, clearance_m(view.evidence, view.pose.point, radius_m) - AWAY_M)
+    radius_m = max(min(radius_m, clearance_m(view.evidence, view.pose.point, radius_m) - AWAY_M), 0.0)
     left_m = math.fsum(here.distance_m(there) for here, there in pairwise(places))
     for here, there in pairwise(places):
         if not base.contains(base.cell_at(there)):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 
+from companion.core.severity import Severity, TextSink
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.watchdogs import Monitor
 from companion.settings.live_settings import LiveSettings
@@ -20,25 +21,32 @@ TRIES = 10
 
 
 class LimitsMonitor(Monitor):
-    """Never a reason not to drive: what is not answered is assumed to be as shipped."""
+    """Never a reason not to drive: what is not answered is assumed to be as shipped, and that is told."""
 
-    def __init__(self, autopilot: AutopilotLink, settings: LiveSettings) -> None:
+    def __init__(self, autopilot: AutopilotLink, settings: LiveSettings, notifier: TextSink) -> None:
+        self._notifier = notifier
         self._autopilot = autopilot
         self._settings = settings
         self._vehicle = VehicleState()
-        self._asked_s, self._tries = -math.inf, 0
+        self._asked_s, self._tries, self._told = -math.inf, 0, False
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event."""
         self._vehicle = vehicle
 
     def tick(self, now_s: float) -> None:
-        """Ask for what is not known, each second, a few times."""
+        """Ask for what is not known, each second, a few times; then tell that it is assumed."""
         plans = self._settings.current.guidance.controller != "points"
         missing = [name for name in LIMITS if name not in self._vehicle.parameters]
-        if not plans or not missing or self._vehicle.heartbeat is None or self._tries >= TRIES:
+        if not plans or not missing or self._vehicle.heartbeat is None or self._told:
             return
-        if now_s - self._asked_s >= ASK_S:
+        if now_s - self._asked_s < ASK_S:
+            return
+        if self._tries >= TRIES:
+            self._told = True
+            text = f"The autopilot does not tell {', '.join(missing)}: taken to be as shipped"
+            self._notifier.tell(text, Severity.WARNING)
+        else:
             self._asked_s, self._tries = now_s, self._tries + 1
             for name in missing:
                 self._autopilot.send(ReadParameter(name), now_s)

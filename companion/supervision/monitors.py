@@ -53,7 +53,7 @@ def make_monitors(
         BorderMonitor(run),
         batteries,
         GuardMonitor(notifier),
-        LimitsMonitor(autopilot, live),
+        LimitsMonitor(autopilot, live, notifier),
         MissionChangeMonitor(run.mission.stored, autopilot.downloads, notifier),
     )
     return Monitors(by_precedence, localization, scans, rivals, fences, batteries)

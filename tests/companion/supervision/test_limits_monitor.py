@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, cast
 
+from companion.core.severity import Severity
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.settings import Settings
 from companion.settings.live_settings import LiveSettings
@@ -17,16 +18,20 @@ from companion.vehicle.state import VehicleState, fold
 class Asked:
     def __init__(self) -> None:
         self.names: list[str] = []
+        self.said: list[str] = []
+
+    def tell(self, text: str, severity: Severity) -> None:
+        self.said.append(text)
 
     def send(self, command: ReadParameter, now_s: float) -> None:
         self.names.append(command.name)
 
 
-def asked(controller: str, answers: tuple[str, ...], seconds: int = 30) -> list[str]:
-    """What is asked for; those named are answered at once."""
+def asked(controller: str, answers: tuple[str, ...], seconds: int = 30) -> Asked:
+    """What is asked for and told; those named are answered at once."""
     autopilot, state = Asked(), VehicleState()
     settings = Settings.model_validate({"guidance": {"controller": controller}})
-    monitor = LimitsMonitor(cast(AutopilotLink, cast(Any, autopilot)), LiveSettings(settings))
+    monitor = LimitsMonitor(cast(AutopilotLink, cast(Any, autopilot)), LiveSettings(settings), autopilot)
     heartbeat = HeartbeatSeen(0.0, 4, True, 1)
     state = fold(state, heartbeat)
     monitor.take(heartbeat, state)
@@ -39,17 +44,18 @@ def asked(controller: str, answers: tuple[str, ...], seconds: int = 30) -> list[
                 state = fold(state, event)
                 monitor.take(event, state)
         assert monitor.doubt(0.1 * tick) is None
-    return autopilot.names
+    return autopilot
 
 
 def test_each_limit_is_asked_for_until_it_is_known() -> None:
-    assert asked("motion-ga", LIMITS) == list(LIMITS)
+    assert asked("motion-ga", LIMITS).names == list(LIMITS)
 
 
-def test_one_that_is_never_answered_is_asked_for_a_few_times() -> None:
-    names = asked("motion-ga", LIMITS[:2])
-    assert names.count(LIMITS[0]) == 1 and names.count(LIMITS[2]) == TRIES
+def test_one_that_is_never_answered_is_asked_for_a_few_times_and_then_told() -> None:
+    found = asked("motion-ga", LIMITS[:2])
+    assert found.names.count(LIMITS[0]) == 1 and found.names.count(LIMITS[2]) == TRIES
+    assert found.said == [f"The autopilot does not tell {LIMITS[2]}: taken to be as shipped"]
 
 
 def test_without_planned_motions_they_are_not_needed() -> None:
-    assert asked("points", ()) == []
+    assert asked("points", ()).names == []
