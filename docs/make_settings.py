@@ -16,6 +16,8 @@ from companion.settings import Settings
 PAGE = Path(__file__).with_name("settings.md")
 
 UNITS = {
+    "rad_s2": "rad/s²",
+    "rad_s": "rad/s",
     "m_s2": "m/s²",
     "m_s": "m/s",
     "deg_s": "deg/s",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -15,9 +16,12 @@ from companion.recording.record_format import RecordError
 from companion.replay.explain import DecisionExplainer, explanation_lines
 from companion.replay.replay import ReplayResult
 from companion.replay.replay import replay as run_again
+from companion.storage.files import read_at_most
 
 EXIT_SAME, EXIT_DIFFERENT = 0, 1
 SHOWN = 20
+COLLISIONS, MOST_BYTES = "collisions.json", 1_000_000
+"""What a simulated drive leaves in its record if the rover touched something; it knows no more of that by itself."""
 
 
 def replay(
@@ -51,6 +55,8 @@ def replay(
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     _print(record, result)
+    for line in _collisions(directory):
+        typer.echo(line)
     raise typer.Exit(EXIT_DIFFERENT if result.differences else EXIT_SAME)
 
 
@@ -65,6 +71,24 @@ def _explain(explainer: DecisionExplainer, image: Path) -> None:
         beside = image.with_name(f"{image.stem}-motions{image.suffix}")
         save_motions(beside, choice, f"after decision {explainer.explanation.number}")
         typer.echo(f"picture of the motions: {beside}")
+
+
+def _collisions(directory: Path) -> list[str]:
+    """The contacts of a simulated drive, a line each; times are the simulator's."""
+    file = directory / COLLISIONS
+    if not file.exists():
+        return []
+    try:
+        contacts = json.loads(read_at_most(file, MOST_BYTES))
+        lines = [
+            f"collision at {one['time_s']} s of the simulation: {one['with']}, {one['speed_m_s']} m/s, "
+            f"north {one['north_m']} m, east {one['east_m']} m of the start"
+            for one in contacts
+        ]
+    except (OSError, ValueError, TypeError, KeyError):
+        return [f"{file}: cannot be read; delete it, or drive again with --record"]
+    more = len(lines) - SHOWN
+    return [*lines[:SHOWN], *([f"... and {more} more collisions"] if more > 0 else [])]
 
 
 def _print(record: Record, result: ReplayResult) -> None:

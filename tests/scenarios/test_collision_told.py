@@ -10,6 +10,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from companion.cli.commands import app as companion
 from sitl.cli.commands import app
 
 WORLD = """
@@ -53,6 +54,11 @@ def test_in_lines_table_figures_record_and_picture(tmp_path: Path, monkeypatch: 
     assert contact["east_m"] == pytest.approx(14.0 - 5.5 - 0.15 - 0.35, abs=0.1)
     assert contact["north_m"] == pytest.approx(0.0, abs=0.3)
     assert json.loads(Path("run/collisions.json").read_text()) == [contact]
+    replayed = CliRunner().invoke(companion, ["replay", "run"])
+    told = f"collision at {contact['time_s']} s of the simulation: an obstacle, {contact['speed_m_s']} m/s"
+    assert replayed.exit_code == 0 and told in replayed.output
+    Path("run/collisions.json").write_text("[1]")
+    assert "collisions.json: cannot be read" in CliRunner().invoke(companion, ["replay", "run"]).output
     line = (
         f"collision 1: the rover touched an obstacle with {contact['speed_m_s']:.1f} m/s at {contact['time_s']:.1f} s"
     )
