@@ -128,8 +128,8 @@ def _closed(
 ) -> NDArray[np.bool_]:
     """Evidence cells of fields that the mission, a fence or experience closed to the rover's outline.
 
-    What the mission closes has grown by the rover's radius, for its middle. Here its outline keeps the distance, so a
-    strip as wide as that is taken off again: else the rover would keep it twice.
+    What the mission closes has grown by the rover's radius, for its middle, at worst by half a field less. Here its
+    outline keeps the distance, so a strip as wide as that is taken off again: else the rover would keep it twice.
     """
     s = evidence.subdivisions
     fields = np.s_[first[1] // s : -(-last[1] // s), first[0] // s : -(-last[0] // s)]
@@ -143,7 +143,7 @@ def _closed(
     closed = cells(base >= 1.0)
     if closed.any():
         deep_m = distance_field(~closed) * evidence.evidence_m
-        closed = deep_m > body_radius_m
+        closed = deep_m > max(body_radius_m - 0.5 * evidence.base.resolution_m, 0.0)
     return closed | cells(base + penalty >= 1.0) & ~cells(base >= 1.0)
 
 

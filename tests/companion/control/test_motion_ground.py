@@ -75,11 +75,15 @@ def test_the_ground_that_the_rover_stands_on_counts_as_seen_and_none_beyond() ->
 
 
 def test_what_the_mission_closes_keeps_the_rovers_middle_away_and_not_its_sides_once_more() -> None:
-    """Two fences whose fields, grown by the rover's radius, leave 1 m between them."""
+    """Two fences whose fields, grown by the rover's radius, leave 0.5 m between them."""
     evidence = new_map(empty_grid(80, 80, 0.25), 0.3, SETTINGS.mapping)
     evidence.log_odds.fill(-1.0)
-    evidence.base.weights[32:36, :38] = evidence.base.weights[32:36, 42:] = 1.0
-    assert togo_s(seen(evidence), HERE) < 1.5 * togo_s(seen(ground()), HERE)
+    evidence.base.weights[32:36, :39] = evidence.base.weights[32:36, 41:] = 1.0
+    assert np.isfinite(togo_s(seen(evidence), HERE)), "it is 0.6 m wide"
+    coarse = ground()  # in fields so large that they did not grow, nothing is taken off
+    coarse.base.weights[8] = 1.0
+    x, y = (int(v / coarse.evidence_m) for v in (10.5 - seen(coarse).corner.east_m, 8.05 - seen(coarse).corner.north_m))
+    assert seen(coarse).ground.gap_m[y, x] <= 0.0
     evidence.base.weights[32:36] = 1.0
     assert np.isinf(togo_s(seen(evidence), BEYOND)) or np.isinf(togo_s(seen(evidence), HERE))
 
