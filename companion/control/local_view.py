@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from companion.control.following import AS_SHIPPED, Following
 from companion.control.told import Told
+from companion.core.footprint import Footprint
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.evidence_map import EvidenceMap
@@ -24,7 +25,7 @@ class LocalView:
 
     ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
     ``held_m_s``: so much slower than it was told the ground holds it. ``rolls_back``: it moves tail first.
-    ``following``: how it follows velocities, as far as is known.
+    ``following``: how it follows velocities, as far as is known. ``body``: its outline, if it is no circle.
     """
 
     pose: Pose
@@ -38,6 +39,12 @@ class LocalView:
     lately: Told = ()
     rolls_back: bool = False
     following: Following = AS_SHIPPED
+    body: Footprint | None = None
+
+    @property
+    def footprint(self) -> Footprint:
+        """The rover's outline."""
+        return self.body or Footprint.circle(self.rover.radius_m)
 
     @property
     def forward_m_s(self) -> float:

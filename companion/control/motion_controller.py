@@ -31,11 +31,9 @@ from companion.control.motion_kernels import (
 )
 from companion.control.motion_planners import Found, MotionPlanner
 from companion.control.reference_path import Points, ReferencePath
-from companion.control.setpoint_check import velocity_stops_in_time
 from companion.control.told import ToldVelocity, in_force
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
-from companion.mission.bounds import Bounds
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 HORIZON_S, STEP_S = 2.5, 0.1
@@ -195,16 +193,12 @@ def _least_spare_m(turn_rad_s: float, gains: tuple[float, ...], worst: MotionPro
 
 
 def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem) -> bool:
-    """Whether this may be the last command, however the rover turns, and passes the last look."""
+    """Whether this may be the last command, however the rover turns."""
     lasts_s = view.settings.guidance.velocity_lasts_s
     return all(
         may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, _faster_s(view), worst)
         for gain in _gains(view)
-    ) and _stops_in_time(told, view)
-
-
-def _stops_in_time(told: ToldVelocity, view: LocalView) -> bool:
-    return velocity_stops_in_time(GuidedVelocity(told.speed_m_s, told.turn_rad_s), view, Bounds()) is None
+    )
 
 
 def _latest(view: LocalView) -> int:

@@ -2,8 +2,8 @@
 
 A setpoint may be the last one that the autopilot receives, and it is followed to its end. So each one is asked
 whether the rover may be left alone with it. One that may not is replaced by velocity zero, reported and counted.
-That this never happens is the task of the controllers. This file asks the map and the braking formulas as they do, but
-uses none of their decisions.
+That this never happens is the task of the controllers. For points this file asks the map and the braking formulas as
+they do, but uses none of their decisions; for planned motions it reckons anew, in ``left_alone``.
 
 Nouns: setpoint check.
 """
@@ -13,28 +13,25 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable
-from itertools import pairwise
 
 from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
+from companion.control.left_alone import Met, first_met, ways_left_alone
 from companion.control.local_view import LocalView
-from companion.control.told import ToldVelocity, in_force
 from companion.core.frames import NedPoint
 from companion.core.severity import Severity, TextSink
-from companion.mapping.map_queries import ArcQueries, Until, clearance_m, look_along
+from companion.mapping.map_queries import ArcQueries, Until, look_along
 from companion.mission.bounds import Bounds
 from companion.safety.reasons import Reason, SetpointFault
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity, Setpoint
 
 SLACK_M = 0.1
 """The controllers look in steps, and let a line end a few centimetres before an obstacle."""
-NEARER_M, AWAY_M = 0.05, 0.01
+NEARER_M = 0.05
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
-TOUCHES_M = 1e-6
-"""A piece of a way that is clear for less than its length leads into something."""
 OVERSHOT_SHARE = 0.1
 """A near position is overshot by no more than this share of the distance."""
-WAY_STEP_S = 0.1
+STANDS_M_S = 0.05
 ARC_PIECES = 8
 """Straight pieces that an arc is made of where borders are concerned."""
 
@@ -72,16 +69,19 @@ def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fa
 
 
 def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault | None:
-    """A guided velocity, if nothing more is told, ends on its arc before the rover touches anything that is known."""
+    """A guided velocity, if nothing more is told, ends before the rover touches anything that is known.
+
+    Where motions are planned the whole outline is looked at, and it stays on seen ground: see ``left_alone``.
+    """
     if not isinstance(setpoint, GuidedVelocity):
         return None
     forward_m_s, yaw_rate_rad_s = setpoint.forward_m_s, setpoint.yaw_rate_rad_s
     if not math.isfinite(forward_m_s) or not math.isfinite(yaw_rate_rad_s):
         return Reason(SetpointFault.NOT_A_NUMBER)
+    if view.settings.guidance.controller != "points":
+        return None if _only_stops(setpoint, view) else _left_alone(setpoint, view)
     if forward_m_s == 0.0:
         return None
-    if view.settings.guidance.controller != "points":
-        return _way_is_blocked(_way_alone(setpoint, view), view)
     base_m_s = max(view.speed_m_s, view.settings.steering.scale_base_m_s)
     reach_m = blind_distance_m(abs(forward_m_s), view.settings.guidance)
     arcs = ArcQueries(view.evidence, view.pose)
@@ -92,57 +92,19 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
     return None
 
 
-def _way_alone(setpoint: GuidedVelocity, view: LocalView) -> list[NedPoint]:
-    """Places on the way of a rover that is told nothing more: it goes on until the velocity expires, then it brakes.
-
-    It brakes as badly as it may.
-    """
-    guidance, follows, pose = view.settings.guidance, view.following, view.pose
-    speed_m_s, turn_rad_s = view.forward_m_s, view.yaw_rate_rad_s
-    heading_rad, point, places = pose.heading_rad, pose.point, [pose.point]
-    brakes_m_s2 = follows.deceleration_m_s2 * (1.0 - follows.off_model)
-    gains_m_s, loses_m_s = follows.gains_most_m_s2 * WAY_STEP_S, brakes_m_s2 * WAY_STEP_S
-    gains_rad_s = follows.turn_acceleration_rad_s2 * WAY_STEP_S
-    for step in range(math.ceil((follows.dead_s + guidance.velocity_lasts_s) / WAY_STEP_S)):
-        since_s = (step + 0.5) * WAY_STEP_S - follows.dead_s
-        told = setpoint if since_s >= 0.0 else _velocity(in_force(view.lately, pose.time_s + since_s))
-        if told is not None:
-            change_m_s = told.forward_m_s - speed_m_s
-            most_m_s = loses_m_s if change_m_s * speed_m_s < 0.0 else gains_m_s
-            speed_m_s += min(max(change_m_s, -most_m_s), most_m_s)
-            turn_rad_s += min(max(follows.turn_gain * told.yaw_rate_rad_s - turn_rad_s, -gains_rad_s), gains_rad_s)
-        point = point.moved(heading_rad + 0.5 * turn_rad_s * WAY_STEP_S, speed_m_s * WAY_STEP_S)
-        heading_rad += turn_rad_s * WAY_STEP_S
-        places.append(point)
-    stops_s = abs(speed_m_s) / brakes_m_s2
-    for share in (0.25, 0.5, 0.75, 1.0):
-        # It turns on for as long as it takes to stop turning, while it brakes.
-        part_s = 0.25 * stops_s
-        mean_m_s = speed_m_s * (1.125 - share)
-        turn_rad_s -= math.copysign(min(gains_rad_s * part_s / WAY_STEP_S, abs(turn_rad_s)), turn_rad_s)
-        point = point.moved(heading_rad + 0.5 * turn_rad_s * part_s, mean_m_s * part_s)
-        heading_rad += turn_rad_s * part_s
-        places.append(point)
-    return places
+def _only_stops(setpoint: GuidedVelocity, view: LocalView) -> bool:
+    """To stand, or to brake: that may be told anywhere. A rover that stands may not turn everywhere."""
+    return setpoint.forward_m_s == 0.0 and (setpoint.yaw_rate_rad_s == 0.0 or view.speed_m_s > STANDS_M_S)
 
 
-def _velocity(told: ToldVelocity | None) -> GuidedVelocity | None:
-    return None if told is None else GuidedVelocity(told.speed_m_s, told.turn_rad_s)
-
-
-def _way_is_blocked(places: list[NedPoint], view: LocalView) -> Fault | None:
-    base, radius_m = view.evidence.base, view.evidence.rover_radius_m - NEARER_M
-    # A rover that stands nearer to something must get away.
-    radius_m = max(min(radius_m, clearance_m(view.evidence, view.pose.point, radius_m) - AWAY_M), 0.0)
-    left_m = math.fsum(here.distance_m(there) for here, there in pairwise(places))
-    for here, there in pairwise(places):
-        if not base.contains(base.cell_at(there)):
-            break  # nothing is known beyond the edge of the map
-        length_m = here.distance_m(there)
-        clear_m = look_along(view.evidence, here, there, radius_m).clear_m
-        if clear_m < length_m - TOUCHES_M and left_m - clear_m > 0.5 * SLACK_M:
-            return Reason(SetpointFault.INTO_OBSTACLE)
-        left_m -= length_m
+def _left_alone(setpoint: GuidedVelocity, view: LocalView) -> Fault | None:
+    """A planned velocity: nothing that the outline meets, however much the rover turns."""
+    ways = ways_left_alone(setpoint, view)
+    if ways is None:
+        return Reason(SetpointFault.INTO_OBSTACLE)
+    for way in ways:
+        if (met := first_met(way, view)) is not Met.NOTHING:
+            return Reason(SetpointFault.ONTO_UNSEEN if met is Met.UNSEEN else SetpointFault.INTO_OBSTACLE)
     return None
 
 
@@ -153,10 +115,21 @@ def inside_borders(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fault
     if isinstance(setpoint, GuidedPosition):
         name = bounds.fault((view.pose.point, setpoint.point))
     elif isinstance(setpoint, GuidedVelocity) and setpoint.forward_m_s != 0.0:
-        name = bounds.fault(_stopping_way(setpoint, view))
+        name = next((name for way in _ways(setpoint, view) if (name := bounds.fault(way))), "")
     else:
         return None
     return Reason(SetpointFault.OVER_BORDER, (name,)) if name else None
+
+
+def _ways(velocity: GuidedVelocity, view: LocalView) -> list[list[NedPoint]]:
+    """The ways on which it may end."""
+    if view.settings.guidance.controller == "points":
+        return [_stopping_way(velocity, view)]
+    corner = view.evidence.base.south_west
+    return [
+        [NedPoint(corner.north_m + float(north_m), corner.east_m + float(east_m)) for north_m, east_m, _ in way]
+        for way in ways_left_alone(velocity, view) or []
+    ]
 
 
 def _course_rad(velocity: GuidedVelocity, view: LocalView) -> float:

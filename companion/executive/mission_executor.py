@@ -322,7 +322,7 @@ class MissionExecutor:
         follows = late(follows, motion.dead_s, vehicle.latency_s)
         return LocalView(
             pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s, rolls_back=back,
-            following=follows,
+            following=follows, body=self._mission.rover.footprint,
         )  # fmt: skip
 
     def _moving(self, vehicle: VehicleState, view: LocalView) -> tuple[Moving, ...]:

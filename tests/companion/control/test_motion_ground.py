@@ -33,8 +33,8 @@ def wall(evidence: EvidenceMap, north_m: float, west_m: float, east_m: float, va
     evidence.log_odds[y, left:right] = value
 
 
-def seen(evidence: EvidenceMap) -> Window:
-    return look_round(evidence, HERE, PATH, BODY, 2.0)
+def seen(evidence: EvidenceMap, body: Body = BODY) -> Window:
+    return look_round(evidence, HERE, PATH, body, 2.0)
 
 
 def togo_s(window: Window, point: NedPoint) -> float:
@@ -75,11 +75,11 @@ def test_the_ground_that_the_rover_stands_on_counts_as_seen_and_none_beyond() ->
 
 
 def test_what_the_mission_closes_keeps_the_rovers_middle_away_and_not_its_sides_once_more() -> None:
-    """Two fences whose fields, grown by the rover's radius, leave 0.5 m between them."""
-    evidence = new_map(empty_grid(80, 80, 0.25), 0.3, SETTINGS.mapping)
+    """Two fences whose fields, grown by the rover's radius, leave 0.5 m between them. The rover is 0.8 m wide."""
+    evidence, wide = new_map(empty_grid(80, 80, 0.25), 0.4, SETTINGS.mapping), Body(np.zeros(1), 0.4, 0.4)
     evidence.log_odds.fill(-1.0)
     evidence.base.weights[32:36, :39] = evidence.base.weights[32:36, 41:] = 1.0
-    assert np.isfinite(togo_s(seen(evidence), HERE)), "it is 0.6 m wide"
+    assert np.isfinite([togo_s(seen(evidence, wide), place) for place in (HERE, BEYOND)]).all(), "its middle has room"
     coarse = ground()  # in fields so large that they did not grow, nothing is taken off
     coarse.base.weights[8] = 1.0
     x, y = (int(v / coarse.evidence_m) for v in (10.5 - seen(coarse).corner.east_m, 8.05 - seen(coarse).corner.north_m))

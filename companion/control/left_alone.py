@@ -1,0 +1,228 @@
+"""Left alone: where a rover goes that is told one velocity and then nothing more, and what its outline meets there.
+
+This is the last look's own reckoning. It shares no code with the planning of motions: it asks each cell of the evidence
+map under the outline, not a field of distances, and follows the rover in steps of its own. So an error there is not
+repeated here. It is a little milder than the planning, so that it speaks only where something is wrong.
+
+Nouns: left alone.
+"""
+
+# mypy: disable-error-code="no-untyped-def"
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from companion.control.following import Following
+from companion.control.local_view import LocalView
+from companion.control.told import in_force
+from companion.mapping.evidence_map import EvidenceMap
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+
+STEP_S = 0.05
+ANY_S = 0.1
+"""The outline is looked at so often."""
+MOST_STEPS = 1200
+"""A rover that does not stand by then never does."""
+STANDS_M_S = 0.02
+AWAY_M = 0.02
+"""A rover whose outline lies over something that was seen may overlap it by so much more, so that it gets away."""
+UNDER_M, BESIDE = 0.3, 1.5
+"""No sensor sees the ground on which the rover can turn and so much round it, nor what lies that many times its half
+width beside it."""
+
+Places = NDArray[np.float64]
+"""Shape (n, 3): metres north and east of the map's corner, heading."""
+
+
+class Met(IntEnum):
+    """What comes first on a way."""
+
+    NOTHING = 0
+    OBSTACLE = 1
+    UNSEEN = 2
+    CLOSED = 3
+    ENDLESS = 4
+
+
+class Rover(NamedTuple):
+    """The worst that may be: it gains speed fast and brakes badly."""
+
+    gains_m_s2: float
+    brakes_m_s2: float
+    turns_rad_s2: float
+
+
+class Outline(NamedTuple):
+    """How far it reaches ahead, back and to either side; a circle reaches as far everywhere."""
+
+    front_m: float
+    rear_m: float
+    half_width_m: float
+    is_circle: bool
+
+
+class Rasters(NamedTuple):
+    """The map's rasters."""
+
+    log_odds: Any
+    base: Any
+    penalty: Any
+    cell_m: float
+    occupied_at: float
+
+
+def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] | None:
+    """The ways on which it may end, as it turns as told, less or more; None if it would never stand."""
+    follows, off = view.following, view.following.off_model
+    latest_s = follows.dead_s * (1.0 + off)
+    tells = _tells(setpoint, view, latest_s)
+    corner, pose = view.evidence.base.south_west, view.pose
+    start = np.array(
+        (pose.north_m - corner.north_m, pose.east_m - corner.east_m, pose.heading_rad, view.forward_m_s,
+         view.yaw_rate_rad_s)
+    )  # fmt: skip
+    ends_s = latest_s + view.settings.guidance.velocity_lasts_s
+    ways = []
+    for gain in (1.0, 1.0 - off, 1.0 + off):
+        places, stands = way_of(start, tells, ends_s, follows.turn_gain * gain, _worst(follows))
+        if not stands:
+            return None
+        ways.append(places)
+    return ways
+
+
+def first_met(places: Places, view: LocalView) -> Met:
+    """What the outline meets first on a way, of all that is known."""
+    footprint = view.footprint
+    outline = Outline(footprint.front_m, footprint.rear_m, footprint.half_width_m, footprint.is_circle)
+    under_m = max(footprint.radius_m, BESIDE * footprint.half_width_m) + UNDER_M
+    return Met(meets(places, outline, under_m, _rasters(view.evidence)))
+
+
+def _rasters(evidence: EvidenceMap) -> Rasters:
+    return Rasters(
+        evidence.log_odds, evidence.base.weights, evidence.penalty, evidence.evidence_m, evidence.settings.occupied_at
+    )
+
+
+def _worst(follows: Following) -> Rover:
+    brakes_m_s2 = follows.deceleration_m_s2 * (1.0 - follows.off_model)
+    return Rover(follows.gains_most_m_s2, brakes_m_s2, follows.turn_acceleration_rad_s2)
+
+
+def _tells(setpoint: GuidedVelocity, view: LocalView, latest_s: float) -> NDArray[np.float64]:
+    """From when on which speed and turn rate have their effect, one a row; the last one is the setpoint's.
+
+    Where no velocity was told, the rover goes on as it does; a position tells it to drive on.
+    """
+    now_s, on_m_s = view.pose.time_s, view.forward_m_s
+    if isinstance(view.told, GuidedPosition):
+        on_m_s = view.rover.cruise_speed_m_s
+    first = in_force(view.lately, now_s - latest_s)
+    rows = [(-math.inf, on_m_s, view.yaw_rate_rad_s) if first is None else (-math.inf, *first[1:])]
+    later = (one for one in view.lately if one.time_s > now_s - latest_s)
+    rows += [(one.time_s - now_s + latest_s, one.speed_m_s, one.turn_rad_s) for one in later]
+    return np.array([*rows, (latest_s, setpoint.forward_m_s, setpoint.yaw_rate_rad_s)])
+
+
+@njit(cache=True, nogil=True)
+def way_of(start, tells, ends_s, gain, rover):
+    """The way of a rover that does what ``tells`` and then brakes, and whether it comes to stand.
+
+    ``start``: north, east, heading, forward speed, turn rate. ``gain``: it turns by this factor more than told.
+    """
+    north, east, heading, speed, turn = start
+    every = int(round(ANY_S / STEP_S))
+    places = np.empty((MOST_STEPS // every + 2, 3))
+    places[0, 0], places[0, 1], places[0, 2] = north, east, heading
+    at, count = 0, 1
+    for step in range(MOST_STEPS):
+        middle_s = (step + 0.5) * STEP_S
+        while at + 1 < tells.shape[0] and tells[at + 1, 0] <= middle_s:
+            at += 1
+        goes_m_s, turns_rad_s = 0.0, 0.0
+        if middle_s < ends_s:
+            goes_m_s, turns_rad_s = tells[at, 1], gain * tells[at, 2]
+        slows = speed * (goes_m_s - speed) < 0.0
+        most = (rover.brakes_m_s2 if slows else rover.gains_m_s2) * STEP_S
+        most_turn = rover.turns_rad_s2 * STEP_S
+        speed = min(max(goes_m_s, speed - most), speed + most)
+        turn = min(max(turns_rad_s, turn - most_turn), turn + most_turn)
+        heading += 0.5 * turn * STEP_S
+        north += speed * STEP_S * math.cos(heading)
+        east += speed * STEP_S * math.sin(heading)
+        heading += 0.5 * turn * STEP_S
+        stands = middle_s >= ends_s and abs(speed) < STANDS_M_S
+        if stands or (step + 1) % every == 0:
+            places[count, 0], places[count, 1], places[count, 2] = north, east, heading
+            count += 1
+        if stands:
+            return places[:count], True
+    return places[:count], False
+
+
+@njit(cache=True, nogil=True)
+def _inside_m(outline, forward_m, right_m):
+    """How deep a place lies in the outline; below 0 outside."""
+    if outline.is_circle:
+        return outline.front_m - math.hypot(forward_m, right_m)
+    return min(outline.front_m - forward_m, outline.rear_m + forward_m, outline.half_width_m - abs(right_m))
+
+
+@njit(cache=True, nogil=True)
+def _deepest(place, outline, under, under_m, evidence):
+    """How deep the outline lies over obstacles, and over ground that is unseen or off the map; below 0: not at all."""
+    height, width = evidence.log_odds.shape
+    cell_m, north, east = evidence.cell_m, place[0], place[1]
+    sine, cosine = math.sin(place[2]), math.cos(place[2])
+    reach_m = math.hypot(max(outline.front_m, outline.rear_m), outline.half_width_m)
+    obstacle_m = unseen_m = -1.0
+    for y in range(int(math.floor((north - reach_m) / cell_m)), int(math.ceil((north + reach_m) / cell_m))):
+        for x in range(int(math.floor((east - reach_m) / cell_m)), int(math.ceil((east + reach_m) / cell_m))):
+            found = 0.0
+            if 0 <= y < height and 0 <= x < width:
+                found = evidence.log_odds[y, x]
+            if found != 0.0 and found < evidence.occupied_at:
+                continue
+            to_north, to_east = (y + 0.5) * cell_m - north, (x + 0.5) * cell_m - east
+            deep_m = _inside_m(outline, to_north * cosine + to_east * sine, to_east * cosine - to_north * sine)
+            if found != 0.0:
+                obstacle_m = max(obstacle_m, deep_m)
+            elif math.hypot((y + 0.5) * cell_m - under[0], (x + 0.5) * cell_m - under[1]) > under_m:
+                unseen_m = max(unseen_m, deep_m)
+    return obstacle_m, unseen_m
+
+
+@njit(cache=True, nogil=True)
+def _is_closed(place, evidence):
+    """Whether the rover's middle is in a field that mission, fence or experience closes."""
+    rows, columns = evidence.base.shape
+    field_m = evidence.cell_m * (evidence.log_odds.shape[0] // rows)
+    y, x = int(math.floor(place[0] / field_m)), int(math.floor(place[1] / field_m))
+    return 0 <= y < rows and 0 <= x < columns and evidence.base[y, x] + evidence.penalty[y, x] >= 1.0
+
+
+@njit(cache=True, nogil=True)
+def meets(places, outline, under_m, evidence):
+    """The number of a ``Met``."""
+    begins_m, _ = _deepest(places[0], outline, places[0], under_m, evidence)
+    allowed_m = begins_m + AWAY_M if begins_m > 0.0 else 0.0
+    was_closed = _is_closed(places[0], evidence)
+    for at in range(1, places.shape[0]):
+        obstacle_m, unseen_m = _deepest(places[at], outline, places[0], under_m, evidence)
+        if obstacle_m > allowed_m:
+            return 1
+        if unseen_m > 0.0:
+            return 2
+        closed = _is_closed(places[at], evidence)
+        if closed and not was_closed:
+            return 3
+        was_closed = closed
+    return 0

@@ -1,0 +1,213 @@
+"""What becomes of a rover that is left alone with a velocity, against a slow reading of the same map with shapes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given
+from hypothesis import settings as runs
+from hypothesis import strategies as st
+from shapely import affinity
+
+from companion.control.left_alone import Met, first_met, ways_left_alone
+from companion.control.local_view import LocalView
+from companion.control.setpoint_check import fault_of
+from companion.control.told import ToldVelocity
+from companion.core.footprint import Footprint
+from companion.core.frames import NedPoint, Pose
+from companion.core.grid import empty_grid
+from companion.core.rover_limits import RoverLimits
+from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mission.bounds import Bound, Bounds
+from companion.safety.reasons import SetpointFault
+from companion.settings import Settings
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+
+SIDE = 20
+MIDDLE = 0.5 * SIDE
+GUIDANCE = {"controller": "motion-ga", "velocity_lasts_s": 0.35}
+SETTINGS = Settings.model_validate({"guidance": GUIDANCE, "mapping": {"evidence_m": 0.1}})
+LONG = Footprint.rectangle(1.6, 0.5)
+CELL_M = 0.1
+
+
+def open_ground() -> EvidenceMap:
+    evidence = new_map(empty_grid(SIDE, SIDE), 0.35, SETTINGS.mapping)
+    evidence.log_odds.fill(-1.0)
+    assert evidence.evidence_m == pytest.approx(CELL_M)
+    return evidence
+
+
+def put(evidence: EvidenceMap, north_m: float, east_m: float, value: float = 3.0) -> None:
+    """One cell, so far north and east of the rover's place in the middle."""
+    y, x = (math.floor((MIDDLE + v) / CELL_M) for v in (north_m, east_m))
+    evidence.log_odds[y, x] = value
+
+
+def view(evidence: EvidenceMap, speed_m_s: float = 0.0, body: Footprint | None = LONG) -> LocalView:
+    pose = Pose(MIDDLE, MIDDLE, 0.0, 0.0)
+    return LocalView(pose, speed_m_s, evidence, RoverLimits(0.35, 2.0, 8.0), SETTINGS, body=body)
+
+
+def fault(told: GuidedVelocity, at: LocalView, *bounds: Bound) -> SetpointFault | None:
+    found = fault_of(told, at, Bounds(bounds))
+    return None if found is None else found.kind
+
+
+@pytest.mark.parametrize(
+    ("north_m", "east_m", "refused"), [(0.95, 0.02, True), (0.95, 0.15, True), (0.55, 0.35, False), (1.25, 0.02, False)]
+)
+def test_the_whole_outline_counts_not_a_circle(north_m: float, east_m: float, refused: bool) -> None:
+    """Its nose is 0.8 m ahead; told 0.5 m/s it goes on by 0.2 m. A circle round it would reach 0.84 m aside."""
+    evidence = open_ground()
+    put(evidence, north_m, east_m)
+    wanted = SetpointFault.INTO_OBSTACLE if refused else None
+    assert fault(GuidedVelocity(0.5, 0.0), view(evidence)) is wanted
+
+
+def test_a_long_rover_that_stands_may_not_turn_against_a_post_and_a_round_one_may() -> None:
+    evidence = open_ground()
+    put(evidence, 0.65, 0.35)
+    turn = GuidedVelocity(0.0, 0.6)
+    assert fault(turn, view(evidence)) is SetpointFault.INTO_OBSTACLE
+    assert fault(turn, view(evidence, body=Footprint.circle(0.5))) is None
+    assert fault(GuidedVelocity(0.0, -0.6), view(evidence)) is None
+
+
+def test_braking_is_told_anywhere() -> None:
+    evidence = open_ground()
+    for north_m in np.arange(0.9, 3.0, 0.1):
+        put(evidence, north_m, 0.0)
+    for told in (GuidedVelocity(0.0, 0.0), GuidedVelocity(0.0, 0.8)):
+        assert fault(told, view(evidence, 1.5)) is None
+    assert fault(GuidedVelocity(0.1, 0.0), view(evidence, 1.5)) is SetpointFault.INTO_OBSTACLE
+
+
+def test_ground_that_was_not_seen_counts_but_not_where_no_sensor_sees_it() -> None:
+    evidence = open_ground()
+    evidence.log_odds[round((MIDDLE + 1.4) / CELL_M) :] = 0.0
+    assert fault(GuidedVelocity(0.5, 0.0), view(evidence)) is None
+    assert fault(GuidedVelocity(1.2, 0.0), view(evidence, 1.0)) is SetpointFault.ONTO_UNSEEN
+    put(evidence, 0.0, 0.5, 0.0)
+    assert fault(GuidedVelocity(0.3, 0.4), view(evidence)) is None
+
+
+def test_a_turn_that_comes_out_larger_than_told_is_counted_on() -> None:
+    """At 1.5 m/s, 0.5 rad/s: the post lies beside the way as told, and on that of a rover that turns 1.3 times more."""
+    at = view(open_ground(), 1.5)
+    as_told, more = (first_met_with(replace(at, following=at.following._replace(off_model=off))) for off in (0.0, 0.3))
+    assert as_told is None and more is SetpointFault.INTO_OBSTACLE
+
+
+def first_met_with(at: LocalView) -> SetpointFault | None:
+    """With settings that let a velocity last 3 s."""
+    guidance = SETTINGS.guidance.model_copy(update={"velocity_lasts_s": 3.0})
+    put(at.evidence, 3.0, 3.6)
+    return fault(GuidedVelocity(1.5, 0.5), replace(at, settings=SETTINGS.model_copy(update={"guidance": guidance})))
+
+
+@pytest.mark.parametrize(("speed_m_s", "refused"), [(0.5, False), (2.0, True)])
+def test_the_edge_of_the_map_is_ground_that_nobody_saw(speed_m_s: float, refused: bool) -> None:
+    at = replace(view(open_ground(), speed_m_s), pose=Pose(SIDE - 3.0, MIDDLE, 0.0, 0.0))
+    assert fault(GuidedVelocity(speed_m_s, 0.0), at) is (SetpointFault.ONTO_UNSEEN if refused else None)
+
+
+def test_a_rover_over_something_gets_away_but_not_farther_over_it() -> None:
+    evidence = open_ground()
+    for east_m in np.arange(-0.3, 0.3, 0.1):
+        put(evidence, 0.72, east_m)
+    assert fault(GuidedVelocity(-0.4, 0.0), view(evidence)) is None
+    assert fault(GuidedVelocity(0.4, 0.0), view(evidence)) is SetpointFault.INTO_OBSTACLE
+
+
+def test_a_field_that_is_closed_may_be_left_and_not_entered() -> None:
+    evidence = open_ground()
+    evidence.base.weights[int(MIDDLE) + 1, :] = 1.0
+    assert fault(GuidedVelocity(1.0, 0.0), view(evidence, 1.0)) is SetpointFault.INTO_OBSTACLE
+    inside = replace(view(evidence), pose=Pose(MIDDLE + 1.5, MIDDLE, 0.0, 0.0))
+    assert fault(GuidedVelocity(0.5, 0.0), inside) is None
+
+
+@pytest.mark.parametrize(("lasts_s", "refused"), [(0.35, False), (3.2, True)])
+def test_borders_count_for_as_long_as_the_velocity_lasts(lasts_s: float, refused: bool) -> None:
+    """1 m/s, 4 m before a border: without a guard the rover goes on for 3.2 s."""
+    square = shapely.box(0.0, 0.0, SIDE, MIDDLE + 4.0)
+    guidance = SETTINGS.guidance.model_copy(update={"velocity_lasts_s": lasts_s})
+    at = replace(view(open_ground(), 1.0), settings=SETTINGS.model_copy(update={"guidance": guidance}))
+    found = fault(GuidedVelocity(1.0, 0.0), at, Bound("the yard", square, True, 0.35, 0.35))
+    assert found is (SetpointFault.OVER_BORDER if refused else None)
+
+
+def test_what_was_told_before_has_its_effect_first_and_after_a_position_the_rover_drives_on() -> None:
+    evidence = open_ground()
+    for east_m in np.arange(-0.3, 0.3, 0.1):
+        put(evidence, 1.05, east_m)
+    slow = GuidedVelocity(0.1, 0.0)
+    assert fault(slow, replace(view(evidence, 0.2), lately=(ToldVelocity(-1.0, 0.2, 0.0),))) is None
+    for before in (
+        replace(view(evidence, 0.2), lately=(ToldVelocity(-0.35, 2.0, 0.0),)),
+        replace(view(evidence, 0.2), told=GuidedPosition(NedPoint(MIDDLE + 5.0, MIDDLE))),
+    ):
+        assert fault(slow, before) is SetpointFault.INTO_OBSTACLE
+
+
+@st.composite
+def grounds(draw) -> EvidenceMap:
+    """Some cells that stand, and patches that nobody has seen."""
+    evidence, place = open_ground(), st.floats(-4.0, 4.0)
+    for _ in range(draw(st.integers(0, 12))):
+        put(evidence, draw(place), draw(place))
+    for _ in range(draw(st.integers(0, 3))):
+        y, x = (round((MIDDLE + draw(place)) / CELL_M) for _ in range(2))
+        evidence.log_odds[y : y + draw(st.integers(1, 12)), x : x + 6] = 0.0
+    return evidence
+
+
+BODIES = st.sampled_from((LONG, Footprint.rectangle(0.9, 0.7, 0.2), Footprint.circle(0.4)))
+
+
+@runs(max_examples=150, deadline=None)
+@given(grounds(), BODIES, st.floats(-2.0, 2.0), st.floats(-1.0, 1.0), st.floats(0.0, 2.0))
+def test_what_passes_is_free_under_the_outline_in_shapes(
+    evidence: EvidenceMap, body: Footprint, forward_m_s: float, turn_rad_s: float, speed_m_s: float
+) -> None:
+    at = view(evidence, speed_m_s, body)
+    told = GuidedVelocity(forward_m_s, turn_rad_s)
+    standing = shapely.points((np.argwhere(evidence.log_odds >= 1.0)[:, ::-1] + 0.5) * CELL_M)
+    if shape(body, MIDDLE, MIDDLE, 0.0).buffer(0.01).intersects(shapely.multipoints(standing)):
+        return
+    if forward_m_s == 0.0 or fault(told, at) is not None:
+        return
+    ways = ways_left_alone(told, at)
+    assert ways is not None and len(ways) == 3
+    unseen = shapely.points((np.argwhere(evidence.log_odds == 0.0)[:, ::-1] + 0.5) * CELL_M)
+    far = unseen[shapely.distance(unseen, shapely.Point(MIDDLE, MIDDLE)) > body.radius_m + 0.8]
+    for way in ways:
+        assert first_met(way, at) is Met.NOTHING
+        for north_m, east_m, heading_rad in way:
+            inner = shape(body, north_m, east_m, heading_rad).buffer(-0.005)
+            assert not shapely.intersects(inner, standing).any() and not shapely.intersects(inner, far).any()
+
+
+def shape(body: Footprint, north_m: float, east_m: float, heading_rad: float) -> shapely.Polygon:
+    """The outline at a place: x east, y north."""
+    if body.is_circle:
+        return shapely.Point(east_m, north_m).buffer(body.front_m)
+    still = shapely.box(-body.half_width_m, -body.rear_m, body.half_width_m, body.front_m)
+    return affinity.translate(affinity.rotate(still, -math.degrees(heading_rad), origin=(0, 0)), east_m, north_m)
+
+
+@pytest.mark.parametrize("lasts_s", [0.35, 3.2])
+def test_its_way_is_as_long_as_physics_makes_it(lasts_s: float) -> None:
+    """At 1 m/s: dead time and what the command lasts, and then braking by 30 % worse than it should."""
+    guidance = SETTINGS.guidance.model_copy(update={"velocity_lasts_s": lasts_s})
+    at = replace(view(open_ground(), 1.0), settings=SETTINGS.model_copy(update={"guidance": guidance}))
+    ways = ways_left_alone(GuidedVelocity(1.0, 0.0), at)
+    assert ways is not None
+    follows = at.following
+    wanted_m = 1.3 * follows.dead_s + lasts_s + 0.5 / (0.7 * follows.deceleration_m_s2)
+    assert ways[0][-1, 0] - MIDDLE == pytest.approx(wanted_m, abs=0.06)
