@@ -30,15 +30,17 @@ ANY_S = 0.1
 """The outline is looked at so often."""
 MOST_STEPS = 1200
 """A rover that does not stand by then never does."""
-STANDS_M_S = 0.02
+STANDS_M_S, STANDS_RAD_S = 0.02, 0.02
+NEARER_M, NEARER_UNSEEN_M = 0.05, 0.1
+"""So deep the outline may lie over the middle of a cell: steps in time and cells make ways differ by as much."""
 AWAY_M = 0.02
-"""A rover whose outline lies over something that was seen may overlap it by so much more, so that it gets away."""
-UNDER_M, BESIDE = 0.3, 1.5
+"""A rover whose outline lies deeper over something may get so much deeper, so that it gets away."""
+UNDER_M, BESIDE = 0.3, 2.0
 """No sensor sees the ground on which the rover can turn and so much round it, nor what lies that many times its half
 width beside it."""
 
 Places = NDArray[np.float64]
-"""Shape (n, 3): metres north and east of the map's corner, heading."""
+"""Shape (n, 4): metres north and east of the map's corner, heading, forward speed."""
 
 
 class Met(IntEnum):
@@ -94,6 +96,10 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
         places, stands = way_of(start, tells, ends_s, follows.turn_gain * gain, _worst(follows))
         if not stands:
             return None
+        if setpoint.forward_m_s * view.forward_m_s < 0.0:
+            # Until it rolls the other way it brakes, as it does when it is told to stop: no reason to refuse.
+            turned = np.flatnonzero(places[:, 3] * setpoint.forward_m_s > 0.0)
+            places = places[min(turned[0] if len(turned) else len(places), len(places) - 2) :]
         ways.append(places)
     return ways
 
@@ -140,8 +146,8 @@ def way_of(start, tells, ends_s, gain, rover):
     """
     north, east, heading, speed, turn = start
     every = int(round(ANY_S / STEP_S))
-    places = np.empty((MOST_STEPS // every + 2, 3))
-    places[0, 0], places[0, 1], places[0, 2] = north, east, heading
+    places = np.empty((MOST_STEPS // every + 2, 4))
+    places[0] = north, east, heading, speed
     at, count = 0, 1
     for step in range(MOST_STEPS):
         middle_s = (step + 0.5) * STEP_S
@@ -159,9 +165,9 @@ def way_of(start, tells, ends_s, gain, rover):
         north += speed * STEP_S * math.cos(heading)
         east += speed * STEP_S * math.sin(heading)
         heading += 0.5 * turn * STEP_S
-        stands = middle_s >= ends_s and abs(speed) < STANDS_M_S
+        stands = middle_s >= ends_s and abs(speed) < STANDS_M_S and abs(turn) < STANDS_RAD_S
         if stands or (step + 1) % every == 0:
-            places[count, 0], places[count, 1], places[count, 2] = north, east, heading
+            places[count] = north, east, heading, speed
             count += 1
         if stands:
             return places[:count], True
@@ -213,13 +219,13 @@ def _is_closed(place, evidence):
 def meets(places, outline, under_m, evidence):
     """The number of a ``Met``."""
     begins_m, _ = _deepest(places[0], outline, places[0], under_m, evidence)
-    allowed_m = begins_m + AWAY_M if begins_m > 0.0 else 0.0
+    allowed_m = max(begins_m + AWAY_M, NEARER_M)
     was_closed = _is_closed(places[0], evidence)
     for at in range(1, places.shape[0]):
         obstacle_m, unseen_m = _deepest(places[at], outline, places[0], under_m, evidence)
         if obstacle_m > allowed_m:
             return 1
-        if unseen_m > 0.0:
+        if unseen_m > NEARER_UNSEEN_M:
             return 2
         closed = _is_closed(places[at], evidence)
         if closed and not was_closed:

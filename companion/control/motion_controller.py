@@ -37,6 +37,8 @@ from companion.core.frames import NedPoint
 from companion.vehicle.commands import GuidedPosition, GuidedVelocity
 
 HORIZON_S, STEP_S = 2.5, 0.1
+ALONE_STEP_S = 0.05
+"""Of the way of a rover that is left alone: a turn that begins so much earlier ends decimetres away."""
 LOOKS_S = 0.09
 """The ground is looked at anew after so long."""
 WEIGHTS = Weights(
@@ -120,7 +122,11 @@ class MotionController:
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
         problem = self._problem(path, view, model)
-        worst = problem._replace(model=worst_model(model, view.following), pending=_pending(view, _latest(view)))
+        worst = problem._replace(
+            model=worst_model(model, view.following),
+            pending=_pending(view, _latest(view), ALONE_STEP_S),
+            step_s=ALONE_STEP_S,
+        )
         problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
             return stop_for(Purpose.BLOCKED)
@@ -141,7 +147,7 @@ class MotionController:
             self._window = look_round(view.evidence, pose.point, path, self._body, model.fastest_m_s)
             self._looked_s = now_s
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
-        pending = _pending(view, round(model.dead_s / STEP_S))
+        pending = _pending(view, round(model.dead_s / STEP_S), STEP_S)
         return MotionProblem(
             start, pending, self._window.ground, self._body, model, WEIGHTS, NONE_ADMITTED, HORIZON_S, STEP_S
         )
@@ -203,10 +209,10 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem
 
 def _latest(view: LocalView) -> int:
     """After how many steps a command has its effect at the latest."""
-    return math.ceil(view.following.dead_s * (1.0 + view.following.off_model) / STEP_S - 1e-6)
+    return math.ceil(view.following.dead_s * (1.0 + view.following.off_model) / ALONE_STEP_S - 1e-6)
 
 
-def _pending(view: LocalView, steps: int) -> NDArray[np.float64]:
+def _pending(view: LocalView, steps: int, step_s: float) -> NDArray[np.float64]:
     """What was told and has not had its effect yet, one row a step.
 
     Where that was no velocity, the rover goes on as it does; a position tells it to drive on.
@@ -214,7 +220,7 @@ def _pending(view: LocalView, steps: int) -> NDArray[np.float64]:
     rows = np.zeros((steps, 2))
     on_m_s = view.rover.cruise_speed_m_s if isinstance(view.told, GuidedPosition) else view.forward_m_s
     for step, row in enumerate(rows):
-        told = in_force(view.lately, view.pose.time_s + (step + 0.5 - steps) * STEP_S)
+        told = in_force(view.lately, view.pose.time_s + (step + 0.5 - steps) * step_s)
         row[:] = (on_m_s, view.yaw_rate_rad_s) if told is None else (told.speed_m_s, told.turn_rad_s)
     return rows
 

@@ -38,7 +38,7 @@ NEAR_M = 0.3
 """A rover that stands too near to something finds its way from so far away."""
 NEARER_M = 1.0
 """A path that is closed farther ahead is followed at least so far, or it counts as closed here."""
-UNDER_M, BESIDE = 0.1, 1.5
+UNDER_M, BESIDE = 0.1, 2.0
 """Round the rover ground counts as seen: so much beyond what it can turn on, and to so many times its half width. A
 lidar of 90 degrees sees the ground beside the rover's way only from there on."""
 COARSE = 2

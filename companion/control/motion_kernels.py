@@ -34,7 +34,7 @@ ARRIVED_S = 0.1
 """With so little time left, the rest of a motion does not count."""
 MOST_PIECES = 40
 """Of a braking distance that is looked at."""
-ENDLESS = 300
+ENDLESS = 600
 """Steps: a rover that takes longer to stop may not be left alone with anything."""
 NEARER_M, NEAREST_M = 0.01, -0.04
 """A rover that is too near to something may come nearer by the first, so that it gets away, but only down to the
@@ -344,7 +344,7 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
     least = _least_m(ground.gap_m, ground.cell_m, body, start)
     least_seen = _least_m(ground.seen_m, ground.cell_m, body, start, 0.0)
     step, spare = 0, FAR_M
-    while step < early + held or abs(state[3]) > 0.02:
+    while step < early + held or abs(state[3]) > 0.02 or abs(state[4]) > 0.02:
         if step > early + held + ENDLESS:
             return -FAR_M
         now_m_s, now_rad_s = 0.0, 0.0

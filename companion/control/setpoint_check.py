@@ -127,7 +127,7 @@ def _ways(velocity: GuidedVelocity, view: LocalView) -> list[list[NedPoint]]:
         return [_stopping_way(velocity, view)]
     corner = view.evidence.base.south_west
     return [
-        [NedPoint(corner.north_m + float(north_m), corner.east_m + float(east_m)) for north_m, east_m, _ in way]
+        [NedPoint(corner.north_m + float(north_m), corner.east_m + float(east_m)) for north_m, east_m in way[:, :2]]
         for way in ways_left_alone(velocity, view) or []
     ]
 

@@ -72,10 +72,10 @@ def test_the_whole_outline_counts_not_a_circle(north_m: float, east_m: float, re
 def test_a_long_rover_that_stands_may_not_turn_against_a_post_and_a_round_one_may() -> None:
     evidence = open_ground()
     put(evidence, 0.65, 0.35)
-    turn = GuidedVelocity(0.0, 0.6)
+    turn = GuidedVelocity(0.0, 1.0)
     assert fault(turn, view(evidence)) is SetpointFault.INTO_OBSTACLE
     assert fault(turn, view(evidence, body=Footprint.circle(0.5))) is None
-    assert fault(GuidedVelocity(0.0, -0.6), view(evidence)) is None
+    assert fault(GuidedVelocity(0.0, -1.0), view(evidence)) is None
 
 
 def test_braking_is_told_anywhere() -> None:
@@ -106,7 +106,7 @@ def test_a_turn_that_comes_out_larger_than_told_is_counted_on() -> None:
 def first_met_with(at: LocalView) -> SetpointFault | None:
     """With settings that let a velocity last 3 s."""
     guidance = SETTINGS.guidance.model_copy(update={"velocity_lasts_s": 3.0})
-    put(at.evidence, 3.0, 3.6)
+    put(at.evidence, 3.0, 2.9)
     return fault(GuidedVelocity(1.5, 0.5), replace(at, settings=SETTINGS.model_copy(update={"guidance": guidance})))
 
 
@@ -140,6 +140,15 @@ def test_borders_count_for_as_long_as_the_velocity_lasts(lasts_s: float, refused
     at = replace(view(open_ground(), 1.0), settings=SETTINGS.model_copy(update={"guidance": guidance}))
     found = fault(GuidedVelocity(1.0, 0.0), at, Bound("the yard", square, True, 0.35, 0.35))
     assert found is (SetpointFault.OVER_BORDER if refused else None)
+
+
+def test_a_rover_that_rolls_too_fast_to_go_back_soon_is_told_to_all_the_same() -> None:
+    """It only brakes for as long as the velocity lasts. Beyond a border it would be no better off if it was refused."""
+    square = Bound("the yard", shapely.box(0.0, 0.0, SIDE, MIDDLE + 1.0), True, 0.35, 0.35)
+    at = view(open_ground(), 2.0)
+    assert fault(GuidedVelocity(-0.4, 0.0), at) is None
+    assert fault(GuidedVelocity(-0.4, 0.0), at, square) is SetpointFault.OVER_BORDER, "it stands beyond it"
+    assert fault(GuidedVelocity(-0.4, 0.0), view(open_ground(), 0.3), square) is None
 
 
 def test_what_was_told_before_has_its_effect_first_and_after_a_position_the_rover_drives_on() -> None:
@@ -188,9 +197,10 @@ def test_what_passes_is_free_under_the_outline_in_shapes(
     far = unseen[shapely.distance(unseen, shapely.Point(MIDDLE, MIDDLE)) > body.radius_m + 0.8]
     for way in ways:
         assert first_met(way, at) is Met.NOTHING
-        for north_m, east_m, heading_rad in way:
-            inner = shape(body, north_m, east_m, heading_rad).buffer(-0.005)
-            assert not shapely.intersects(inner, standing).any() and not shapely.intersects(inner, far).any()
+        for north_m, east_m, heading_rad, _ in way:
+            outline = shape(body, north_m, east_m, heading_rad)
+            assert not shapely.intersects(outline.buffer(-0.055), standing).any()
+            assert not shapely.intersects(outline.buffer(-0.105), far).any()
 
 
 def shape(body: Footprint, north_m: float, east_m: float, heading_rad: float) -> shapely.Polygon:

@@ -270,13 +270,18 @@ def rolling(speed_m_s: float, *, back: bool = False, lately: Told = ()) -> Local
     return replace(at, settings=PLANNED, rolls_back=back, lately=lately)
 
 
-def test_a_rover_that_was_told_to_go_back_may_still_roll_into_something() -> None:
+def test_to_go_back_is_to_brake_first_and_is_looked_at_from_where_the_rover_stands() -> None:
     """Its direction is that of its velocity, not of what it was told."""
     told = (ToldVelocity(-0.1, -0.5, 0.0),)
-    back = GuidedVelocity(-0.5, 0.0)
-    assert fault_of(back, rolling(2.0, lately=told), Bounds()) == Reason(SetpointFault.INTO_OBSTACLE)
-    assert fault_of(back, rolling(2.0, back=True, lately=told), Bounds()) is None
-    assert fault_of(back, rolling(0.5, lately=told), Bounds()) is None
+    for back_m_s, refused in ((-0.1, False), (-1.0, True)):
+        at = rolling(2.0, lately=told)
+        at.evidence.log_odds[round((MIDDLE - 0.6) / at.evidence.evidence_m)] = 3.0
+        at.evidence.log_odds[round((MIDDLE + 1.5) / at.evidence.evidence_m)] = -1.0
+        found = fault_of(GuidedVelocity(back_m_s, 0.0), replace(at, rolls_back=True, speed_m_s=0.1), Bounds())
+        assert bool(found) is refused
+        assert fault_of(GuidedVelocity(back_m_s, 0.0), at, Bounds()) is None, "it stands 3 m farther ahead"
+    assert fault_of(GuidedVelocity(-0.5, 0.0), rolling(2.0, lately=told), Bounds()) is None
+    assert fault_of(GuidedVelocity(0.5, 0.0), rolling(2.0, lately=told), Bounds()) is not None
 
 
 def test_what_was_told_lately_is_counted_until_a_new_velocity_shows() -> None:
