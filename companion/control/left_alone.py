@@ -85,11 +85,7 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
     follows, off = view.following, view.following.off_model
     latest_s = follows.dead_s * (1.0 + off)
     tells = _tells(setpoint, view, latest_s)
-    corner, pose = view.evidence.base.south_west, view.pose
-    start = np.array(
-        (pose.north_m - corner.north_m, pose.east_m - corner.east_m, pose.heading_rad, view.forward_m_s,
-         view.yaw_rate_rad_s)
-    )  # fmt: skip
+    start = np.array((*_from_corner(view), view.pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s))
     ends_s = latest_s + view.settings.guidance.velocity_lasts_s
     ways = []
     for gain in (1.0, 1.0 - off, 1.0 + off):
@@ -105,11 +101,18 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
 
 
 def first_met(places: Places, view: LocalView) -> Met:
-    """What the outline meets first on a way, of all that is known."""
+    """What the outline meets first on a way, of all that is known; unseen ground does not count round the rover."""
     footprint = view.footprint
     outline = Outline(footprint.front_m, footprint.rear_m, footprint.half_width_m, footprint.is_circle)
     under_m = max(footprint.radius_m, BESIDE * footprint.half_width_m) + UNDER_M
-    return Met(meets(places, outline, under_m, _rasters(view.evidence)))
+    here = _from_corner(view)
+    return Met(meets(places, outline, here, under_m, _rasters(view.evidence)))
+
+
+def _from_corner(view: LocalView) -> tuple[float, float]:
+    """The rover's place, metres north and east of the map's corner."""
+    corner, pose = view.evidence.base.south_west, view.pose
+    return pose.north_m - corner.north_m, pose.east_m - corner.east_m
 
 
 def _rasters(evidence: EvidenceMap) -> Rasters:
@@ -216,13 +219,13 @@ def _is_closed(place, evidence):
 
 
 @njit(cache=True, nogil=True)
-def meets(places, outline, under_m, evidence):
-    """The number of a ``Met``."""
-    begins_m, _ = _deepest(places[0], outline, places[0], under_m, evidence)
+def meets(places, outline, under, under_m, evidence):
+    """The number of a ``Met``. Ground counts as seen within ``under_m`` of the place ``under``."""
+    begins_m, _ = _deepest(places[0], outline, under, under_m, evidence)
     allowed_m = max(begins_m + AWAY_M, NEARER_M)
     was_closed = _is_closed(places[0], evidence)
     for at in range(1, places.shape[0]):
-        obstacle_m, unseen_m = _deepest(places[at], outline, places[0], under_m, evidence)
+        obstacle_m, unseen_m = _deepest(places[at], outline, under, under_m, evidence)
         if obstacle_m > allowed_m:
             return 1
         if unseen_m > NEARER_UNSEEN_M:
