@@ -25,6 +25,7 @@ from sitl.network import ListenError
 from sitl.network.client_log import LoggedLink
 from sitl.network.mavlink_client import FORMS, ClientLink, open_link
 from sitl.scenario import Scenario, ScenarioError, equipped, scenario_from_mission
+from sitl.world.geodesy import ALTITUDE_M
 
 
 def physics(
@@ -93,7 +94,7 @@ def _greeting(behind: Physics, host: str, port: int, mavlink: str | None, parame
     """How to start the firmware, and which sensors it does not get."""
     start = behind.start
     heading_deg = math.degrees(start.heading_rad) % 360.0
-    home = f"{start.home.lat_deg:.7f},{start.home.lon_deg:.7f},0,{heading_deg:.0f}"
+    home = f"{start.home.lat_deg:.7f},{start.home.lon_deg:.7f},{ALTITUDE_M:g},{heading_deg:.0f}"
     defaults = f" --defaults {parameters}" if parameters else ""
     lines = [
         f"listening on udp {host}:{port}",
