@@ -7,10 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple
 
+from companion.core.rover_limits import RoverLimits
 from companion.settings import MotionSettings
-from companion.vehicle.motion_limits import ACCELERATION, DECELERATION, TURN_ACCELERATION
+from companion.vehicle.motion_limits import ACCELERATION, DECELERATION, FASTEST, TURN_ACCELERATION, TURN_RATE
 
 MOST_M_S2, MOST_RAD_S2 = 10.0, 20.0
 """Where the autopilot has no limit, or a larger one, the motors have."""
@@ -56,6 +58,19 @@ def following_of(settings: MotionSettings, parameters: Mapping[str, float]) -> F
         turns = math.radians(_limit(parameters, TURN_ACCELERATION, usual_deg_s2, math.degrees(MOST_RAD_S2)))
     off = settings.off_model
     return Following(settings.dead_s, gains, brakes, turns, settings.turn_gain, off, most_m_s2 * (1.0 + off))
+
+
+def within_limits(rover: RoverLimits, parameters: Mapping[str, float]) -> RoverLimits:
+    """The same rover, no faster than the autopilot lets it drive and turn where it is told velocities.
+
+    What is not known, and a limit of 0, changes nothing.
+    """
+    fastest_m_s, turns_deg_s = (parameters.get(name, 0.0) for name in (FASTEST, TURN_RATE))
+    return replace(
+        rover,
+        cruise_speed_m_s=min(rover.cruise_speed_m_s, fastest_m_s) if fastest_m_s > 0.0 else rover.cruise_speed_m_s,
+        turns_most_rad_s=math.radians(turns_deg_s) if turns_deg_s > 0.0 else math.inf,
+    )
 
 
 def _believed(parameters: Mapping[str, float], name: str, usual: float) -> float:

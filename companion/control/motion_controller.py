@@ -244,6 +244,6 @@ def rover_model(view: LocalView) -> RoverModel:
     own, limits = view.following, view.settings.motion
     return RoverModel(
         own.dead_s, own.acceleration_m_s2, PLANNED_SHARE * own.deceleration_m_s2, own.turn_acceleration_rad_s2,
-        view.rover.cruise_speed_m_s, min(limits.backwards_m_s, view.rover.cruise_speed_m_s), limits.turn_rad_s,
-        own.turn_gain,
+        view.rover.cruise_speed_m_s, min(limits.backwards_m_s, view.rover.cruise_speed_m_s),
+        min(limits.turn_rad_s, view.rover.turns_most_rad_s), own.turn_gain,
     )  # fmt: skip

@@ -25,3 +25,5 @@ class RoverLimits:
     """The tightest arc it can drive; 0: it turns on the spot."""
     fastest_m_s: float = math.inf
     """The highest speed on its present way; the way may be planned with lower speeds in places."""
+    turns_most_rad_s: float = math.inf
+    """The autopilot lets it turn no faster."""

@@ -40,7 +40,6 @@ PARAMETERS = (
     "GUID_TIMEOUT",
     "WP_RADIUS",
     "WP_JERK",
-    "WP_SPEED",
     "PRX1_TYPE",
     "RNGFND1_TYPE",
     "FS_GCS_ENABLE",

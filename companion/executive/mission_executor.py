@@ -13,7 +13,7 @@ import numpy as np
 
 from companion.control.braking import counted_s, for_guard, for_link, late
 from companion.control.controller import ControlCommand, Controller
-from companion.control.following import following_of
+from companion.control.following import following_of, within_limits
 from companion.control.local_view import LocalView
 from companion.control.model_estimate import ModelEstimator
 from companion.core.frames import GeoPoint, NedPoint, Pose
@@ -320,8 +320,9 @@ class MissionExecutor:
         self.estimator.assume(following_of(motion, vehicle.parameters))
         follows = self.estimator.estimate.following(motion.off_model_known)
         follows = late(follows, motion.dead_s, vehicle.latency_s)
+        rover = self._limits if self.controller == "points" else within_limits(self._limits, vehicle.parameters)
         return LocalView(
-            pose, vehicle.speed_m_s, self.evidence, self._limits, settings, rate_rad_s, rolls_back=back,
+            pose, vehicle.speed_m_s, self.evidence, rover, settings, rate_rad_s, rolls_back=back,
             following=follows, body=self._mission.rover.footprint,
         )  # fmt: skip
 

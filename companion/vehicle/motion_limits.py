@@ -1,7 +1,9 @@
-"""ArduRover's parameters that limit how fast speed and turn rate change."""
+"""ArduRover's parameters that limit speed and turn rate where a velocity is told, and how fast they change."""
 
 from __future__ import annotations
 
 ACCELERATION, DECELERATION, TURN_ACCELERATION = "ATC_ACCEL_MAX", "ATC_DECEL_MAX", "ATC_STR_ACC_MAX"
 """m/s², m/s² (0: the one before) and degrees/s²; 0: without a limit."""
-LIMITS = (ACCELERATION, DECELERATION, TURN_ACCELERATION)
+FASTEST, TURN_RATE = "WP_SPEED", "ATC_STR_RAT_MAX"
+"""m/s (0: CRUISE_SPEED) and degrees/s (0: without a limit)."""
+LIMITS = (ACCELERATION, DECELERATION, TURN_ACCELERATION, FASTEST, TURN_RATE)

@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from companion.control.following import AS_SHIPPED, following_of
+from companion.control.following import AS_SHIPPED, following_of, within_limits
+from companion.core.rover_limits import RoverLimits
 from companion.settings import MotionSettings
 
 
@@ -37,3 +38,15 @@ def test_what_is_set_counts_before_what_the_autopilot_says() -> None:
     own = MotionSettings(acceleration_m_s2=0.5, deceleration_m_s2=0.6, turn_acceleration_rad_s2=0.7)
     follows = following_of(own, {"ATC_ACCEL_MAX": 2.0, "ATC_DECEL_MAX": 3.0, "ATC_STR_ACC_MAX": 90.0})
     assert follows[1:4] == (0.5, 0.6, 0.7)
+
+
+def test_no_motion_is_planned_that_the_autopilot_would_cut_short() -> None:
+    rover = RoverLimits(0.4, 2.0, 8.0)
+    limited = within_limits(rover, {"WP_SPEED": 1.2, "ATC_STR_RAT_MAX": 45.0})
+    assert limited.cruise_speed_m_s == 1.2 and limited.turns_most_rad_s == pytest.approx(0.25 * math.pi)
+    assert within_limits(rover, {"WP_SPEED": 5.0}) == rover, "the mission's speed is the lower one"
+
+
+def test_limits_that_are_not_known_or_zero_change_nothing() -> None:
+    rover = RoverLimits(0.4, 2.0, 8.0)
+    assert within_limits(rover, {}) == within_limits(rover, {"WP_SPEED": 0.0, "ATC_STR_RAT_MAX": 0.0}) == rover
