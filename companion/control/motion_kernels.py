@@ -331,12 +331,15 @@ def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem
 
     The rover keeps ``margin_m``, and ``margin_s`` more for each m/s. ``gain``: it turns by this factor more than told.
     """
-    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem) >= 0.0
+    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, 0.0) >= 0.0
 
 
 @njit(cache=True, nogil=True)
-def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
-    """How much more room than it must keep such a rover has, at the worst place; below 0 it may not be left alone."""
+def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, enough_m=-math.inf):
+    """How much more room than it must keep such a rover has, at the worst place; below 0 it may not be left alone.
+
+    Once it is sure to be below ``enough_m``, it is not looked at to its end.
+    """
     start, ground, body, model = problem.start, problem.ground, problem.body, problem.model
     pending, step_s = problem.pending, problem.step_s
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
@@ -357,6 +360,8 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
         spare = min(spare, clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - room_m)
         seen_m = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2], 0.0)
         spare = min(spare, seen_m - min(margin_m, least_seen))
+        if spare < enough_m:
+            break
         step += 1
     return spare
 
