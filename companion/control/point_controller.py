@@ -35,6 +35,8 @@ OVERRUN_M = 0.3
 STANDS_M_S = 0.1
 CREEPS_M = 0.1
 """It does not creep less far."""
+CREEPS_NARROW_M = 0.4
+"""Near walls of which thin beams have seen only points it creeps no farther at a time: the map may be off by as much."""
 ANEW_S = 0.15
 """Longer than the 0.1 s after which ArduRover shapes a position target from where the rover is."""
 
@@ -235,20 +237,31 @@ def _look_or_blocked(path: ReferencePath, view: LocalView) -> ControlCommand:
         # It has looked, and nothing is there but ground between the beams: creep, up to the next obstacle.
         bearing = pose.point.bearing_rad(ahead)
         creep_m = min(line.seen_m, distance_m) + braking_distance_m(settings.min_speed_m_s, settings)
-        creep_m = _stops_before(creep_m, bearing, view)
+        creep_m = _creeps_m(creep_m, bearing, view)
         if creep_m >= CREEPS_M:
             target = pose.point.moved(bearing, creep_m)
             return ControlCommand(Purpose.DRIVE, GuidedPosition(target), settings.min_speed_m_s)
     return stop_for(Purpose.BLOCKED)
 
 
-def _stops_before(distance_m: float, bearing_rad: float, view: LocalView) -> float:
+def _creeps_m(distance_m: float, bearing_rad: float, view: LocalView) -> float:
+    """How far to creep, at most ``distance_m``. Single thin beams: with wide room, or else a little at a time."""
+    settings = view.settings.guidance
+    if not view.rover.narrow_sight:
+        return _stops_before(distance_m, bearing_rad, settings.clearance_m, view)
+    wide_m = _stops_before(distance_m, bearing_rad, settings.narrow_clearance_m, view)
+    if wide_m >= CREEPS_M:
+        return wide_m
+    return _stops_before(min(distance_m, CREEPS_NARROW_M), bearing_rad, settings.clearance_m, view)
+
+
+def _stops_before(distance_m: float, bearing_rad: float, clearance_m: float, view: LocalView) -> float:
     """That far, or less if the rover would otherwise overshoot into something that stands there."""
     pose, beyond_m = view.pose, overshoot_m(distance_m, view)
     there = pose.point.moved(bearing_rad, distance_m + beyond_m)
     radius_m = view.rover.radius_m
     # No nearer to a wall than it stands, to half a cell of the map: the position may be wrong by some centimetres.
-    room_m = ArcQueries(view.evidence, pose).kept_room_m(radius_m + view.settings.guidance.clearance_m, radius_m)
+    room_m = ArcQueries(view.evidence, pose).kept_room_m(radius_m + clearance_m, radius_m)
     half_width_m = max(room_m - 0.5 * view.evidence.evidence_m, radius_m)
     clear_m = look_along(view.evidence, pose.point, there, half_width_m).clear_m
     return min(distance_m, clear_m - beyond_m)
