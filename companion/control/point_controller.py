@@ -36,7 +36,7 @@ STANDS_M_S = 0.1
 CREEPS_M = 0.1
 """It does not creep less far."""
 CREEPS_NARROW_M = 0.4
-"""Near walls of which thin beams have seen only points it creeps no farther at a time: the map may be off by as much."""
+"""Near walls of which thin beams saw only points it creeps no farther at a time: the map may be off by as much."""
 ANEW_S = 0.15
 """Longer than the 0.1 s after which ArduRover shapes a position target from where the rover is."""
 
