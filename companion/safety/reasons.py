@@ -80,7 +80,7 @@ class WaitReason(Enum):
     ARMING = "arming"
     PERSON_STARTS_AUTO = "a person to arm and to set AUTO (the autopilot drives this mission)"
     PERSON_SETS_GUIDED = "a person to set GUIDED (somebody is driving)"
-    PERSON_SETS_GUIDED_AGAIN = "a person to set GUIDED (a person has had the rover)"
+    PERSON_SETS_GUIDED_AGAIN = "a person to set GUIDED (the rover was taken over, or stopped in doubt)"
     PERSON_ARMS = "a person to arm (or run with --arm)"
     AUTOPILOT_HEARD = "the autopilot to be heard again"
     PERSON_SETS_MODE = "a person to set {}"

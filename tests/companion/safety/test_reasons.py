@@ -75,7 +75,7 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (WaitReason.ARMING, (), "arming"),
     (WaitReason.PERSON_STARTS_AUTO, (), "a person to arm and to set AUTO (the autopilot drives this mission)"),
     (WaitReason.PERSON_SETS_GUIDED, (), "a person to set GUIDED (somebody is driving)"),
-    (WaitReason.PERSON_SETS_GUIDED_AGAIN, (), "a person to set GUIDED (a person has had the rover)"),
+    (WaitReason.PERSON_SETS_GUIDED_AGAIN, (), "a person to set GUIDED (the rover was taken over, or stopped in doubt)"),
     (WaitReason.PERSON_ARMS, (), "a person to arm (or run with --arm)"),
     (WaitReason.AUTOPILOT_HEARD, (), "the autopilot to be heard again"),
     (WaitReason.PERSON_SETS_MODE, ("AUTO",), "a person to set AUTO"),
