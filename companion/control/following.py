@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from companion.core.rover_limits import RoverLimits
 from companion.settings import MotionSettings
-from companion.vehicle.motion_limits import ACCELERATION, DECELERATION, FASTEST, TURN_ACCELERATION, TURN_RATE
+from companion.vehicle.motion_limits import ACCELERATION, CRUISE, DECELERATION, FASTEST, TURN_ACCELERATION, TURN_RATE
 
 MOST_M_S2, MOST_RAD_S2 = 10.0, 20.0
 """Where the autopilot has no limit, or a larger one, the motors have."""
@@ -63,12 +63,13 @@ def following_of(settings: MotionSettings, parameters: Mapping[str, float]) -> F
 def within_limits(rover: RoverLimits, parameters: Mapping[str, float]) -> RoverLimits:
     """The same rover, no faster than the autopilot lets it drive and turn where it is told velocities.
 
-    What is not known, and a limit of 0, changes nothing.
+    What is not known, and a limit of 0, changes nothing; ``WP_SPEED`` 0 leaves it to ``CRUISE_SPEED``.
     """
-    fastest_m_s, turns_deg_s = (parameters.get(name, 0.0) for name in (FASTEST, TURN_RATE))
+    fastest_m_s = parameters.get(FASTEST, 0.0) or parameters.get(CRUISE, 0.0)
+    turns_deg_s = parameters.get(TURN_RATE, 0.0)
     return replace(
         rover,
-        cruise_speed_m_s=min(rover.cruise_speed_m_s, fastest_m_s) if fastest_m_s > 0.0 else rover.cruise_speed_m_s,
+        told_most_m_s=fastest_m_s if fastest_m_s > 0.0 else math.inf,
         turns_most_rad_s=math.radians(turns_deg_s) if turns_deg_s > 0.0 else math.inf,
     )
 

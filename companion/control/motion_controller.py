@@ -241,9 +241,10 @@ def worst_model(model: RoverModel, follows: Following) -> RoverModel:
 
 def rover_model(view: LocalView) -> RoverModel:
     """How the rover follows commands, as far as is known."""
-    own, limits = view.following, view.settings.motion
+    own, limits, rover = view.following, view.settings.motion, view.rover
+    fastest_m_s = min(rover.cruise_speed_m_s, rover.told_most_m_s)
     return RoverModel(
         own.dead_s, own.acceleration_m_s2, PLANNED_SHARE * own.deceleration_m_s2, own.turn_acceleration_rad_s2,
-        view.rover.cruise_speed_m_s, min(limits.backwards_m_s, view.rover.cruise_speed_m_s),
-        min(limits.turn_rad_s, view.rover.turns_most_rad_s), own.turn_gain,
+        fastest_m_s, min(limits.backwards_m_s, fastest_m_s), min(limits.turn_rad_s, rover.turns_most_rad_s),
+        own.turn_gain,
     )  # fmt: skip

@@ -93,6 +93,7 @@ class MotionGa:
     def forget(self) -> None:
         """See ``MotionPlanner``."""
         self._motions[:] = 0.0
+        self._costs[:] = 0.0
 
 
 class DynamicWindow:

@@ -11,11 +11,11 @@ from __future__ import annotations
 
 import math
 
-from companion.control.braking import braking_distance_m, fastest_within_m, stopping_distance_m
+from companion.control.braking import braking_distance_m, fastest_within_m, overshoot_m, stopping_distance_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, Points, ReferencePath
-from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, overshoot_m, unseen_flank
+from companion.control.safe_reach import Reach, arc_is_free, farthest_clear, unseen_flank
 from companion.core.frames import Pose, wrap_pi_rad
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.map_queries import ArcQueries, clearance_m, look_along
@@ -257,7 +257,8 @@ def _creeps_m(distance_m: float, bearing_rad: float, view: LocalView) -> float:
 
 def _stops_before(distance_m: float, bearing_rad: float, clearance_m: float, view: LocalView) -> float:
     """That far, or less if the rover would otherwise overshoot into something that stands there."""
-    pose, beyond_m = view.pose, overshoot_m(distance_m, view)
+    pose = view.pose
+    beyond_m = overshoot_m(distance_m, view.speed_m_s, view.settings.guidance) + view.further_m
     there = pose.point.moved(bearing_rad, distance_m + beyond_m)
     radius_m = view.rover.radius_m
     # No nearer to a wall than it stands, to half a cell of the map: the position may be wrong by some centimetres.

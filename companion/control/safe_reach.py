@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.control.braking import blind_distance_m, farthest_m, fastest_blind_m_s
+from companion.control.braking import blind_distance_m, farthest_m, fastest_blind_m_s, overshoot_m
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import NedPoint, wrap_pi_rad
@@ -38,11 +38,6 @@ class Reach:
     target: NedPoint
     distance_m: float
     room_m: float
-
-
-def overshoot_m(distance_m: float, view: LocalView) -> float:
-    """How far beyond a position at that distance the rover may come to stand."""
-    return min(view.settings.guidance.overshoot_m, 0.1 * distance_m) + view.further_m
 
 
 def farthest_clear(path: ReferencePath, view: LocalView) -> Reach:
@@ -119,6 +114,7 @@ class _Search:
             map_radius=evidence.rover_radius_m,
             room=room_m,
             overshoot=self._view.settings.guidance.overshoot_m,
+            rolling=overshoot_m(0.0, self._view.speed_m_s, self._view.settings.guidance),
             held=self._view.further_m,
             unsure=UNSURE_M,
             flank=radius_m + FLANK_M,

@@ -14,7 +14,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 
-from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m
+from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m, overshoot_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.left_alone import Met, first_met, ways_left_alone
 from companion.control.local_view import LocalView
@@ -29,8 +29,6 @@ SLACK_M = 0.1
 """The controllers look in steps, and let a line end a few centimetres before an obstacle."""
 NEARER_M = 0.05
 """The rover's disc may overlap evidence by this much: evidence has an error, and a rover at a wall must get away."""
-OVERSHOT_SHARE = 0.1
-"""A near position is overshot by no more than this share of the distance."""
 STANDS_M_S = 0.05
 ARC_PIECES = 8
 """Straight pieces that an arc is made of where borders are concerned."""
@@ -55,7 +53,7 @@ def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fa
     distance_m = here.distance_m(there)
     if not distance_m <= farthest_m(view.speed_m_s, settings) + SLACK_M:
         return Reason(SetpointFault.BEYOND_HORIZON)
-    overshoots_m = min(settings.overshoot_m, OVERSHOT_SHARE * distance_m) + view.further_m
+    overshoots_m = overshoot_m(distance_m, view.speed_m_s, settings) + view.further_m
     stands = here.moved(here.bearing_rad(there), distance_m + overshoots_m)
     if not evidence.base.contains(evidence.base.cell_at(stands)):
         stands, overshoots_m = there, 0.0  # nothing is known beyond the edge of the map

@@ -25,5 +25,6 @@ class RoverLimits:
     """The tightest arc it can drive; 0: it turns on the spot."""
     fastest_m_s: float = math.inf
     """The highest speed on its present way; the way may be planned with lower speeds in places."""
+    told_most_m_s: float = math.inf
     turns_most_rad_s: float = math.inf
-    """The autopilot lets it turn no faster."""
+    """Told a velocity, the autopilot lets it drive and turn no faster."""

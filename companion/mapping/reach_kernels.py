@@ -17,7 +17,8 @@ class Stopping(NamedTuple):
     """How the rover comes to a target and stands.
 
     ``radius``: of the rover. ``map_radius``: of the rover that the map was made for. ``room``: kept beside it on
-    the way. ``overshoot``: at most so far beyond the target it stands, and at most a tenth of the distance.
+    the way. ``overshoot``: at most so far beyond the target it stands, and at most a tenth of the distance, or
+    ``rolling``, which counts on the speed that it has.
     ``held``: so much farther, whatever the distance, because the ground holds it. ``unsure``: an obstacle may
     stand, and ground that was seen may end, so much nearer than on the map. ``flank``: so far beside the middle the
     ground must have been seen, from ``near`` on. ``slack``: lengths that differ by less are equal. ``edge``: left
@@ -28,6 +29,7 @@ class Stopping(NamedTuple):
     map_radius: float
     room: float
     overshoot: float
+    rolling: float
     held: float
     unsure: float
     flank: float
@@ -50,7 +52,7 @@ def may_stop_at(ground, start, target, stopping):
     clear, seen = _look(ground, start, target, stopping.radius + stopping.room, stopping)
     if min(clear, seen) < distance - stopping.slack:
         return False
-    overshoot = min(stopping.overshoot, 0.1 * distance) + stopping.held
+    overshoot = min(stopping.overshoot, max(0.1 * distance, stopping.rolling)) + stopping.held
     stands = moved_within_map(ground, target, ahead, overshoot, stopping.edge)
     length = math.hypot(stands[0] - start[0], stands[1] - start[1])
     # The flanks first: with thin beams they fail most often.

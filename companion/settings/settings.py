@@ -153,7 +153,9 @@ class GuidanceSettings(Section):
     )
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
     change_after_s: float = Field(0.1, ge=0.0, description="minimum time between targets that differ")
-    narrow_clearance_m: float = Field(0.4, ge=0.0, description="minimum clearance with single thin beams")
+    narrow_clearance_m: float = Field(
+        0.4, ge=0.0, description="clearance with single thin beams; with less the rover creeps a little at a time"
+    )
     narrow_margin_m: float = Field(
         0.05,
         ge=0.0,

@@ -13,7 +13,7 @@ from companion.safety.watchdogs import Monitor
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events import Event
-from companion.vehicle.motion_limits import LIMITS
+from companion.vehicle.motion_limits import CHANGES, LIMITS
 from companion.vehicle.state import VehicleState
 
 ASK_S = 1.0
@@ -44,9 +44,17 @@ class LimitsMonitor(Monitor):
             return
         if self._tries >= TRIES:
             self._told = True
-            text = f"The autopilot does not tell {', '.join(missing)}: taken to be as shipped"
-            self._notifier.tell(text, Severity.WARNING)
+            self._notifier.tell(_not_told(missing), Severity.WARNING)
         else:
             self._asked_s, self._tries = now_s, self._tries + 1
             for name in missing:
                 self._autopilot.send(ReadParameter(name), now_s)
+
+
+def _not_told(missing: list[str]) -> str:
+    """What is assumed instead."""
+    shipped = [name for name in missing if name in CHANGES]
+    others = [name for name in missing if name not in CHANGES]
+    parts = [f"{', '.join(shipped)}: taken to be as shipped"] if shipped else []
+    parts += [f"{', '.join(others)}: taken to be no limit"] if others else []
+    return f"The autopilot does not tell {'; '.join(parts)}"

@@ -6,6 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from companion.control.braking import braking_distance_m, overshoot_m
+from companion.settings import Settings
+from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from tests.support.sitl_client import open_ground, ready
 
 
@@ -102,3 +105,24 @@ def test_velocity_targets_time_out_after_three_seconds() -> None:
     assert "target not received last 3secs, stopping" in client.texts()
     client.run_to(last_s + 5.7)
     assert client.simulator.truth.speed_m_s < 0.02
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("share", [1.0, 1.5])
+def test_it_stands_no_farther_beyond_a_near_place_than_the_companion_counts_on(speed_m_s: float, share: float) -> None:
+    """Standing, places 0.4 and 0.6 m ahead; rolling, as near as it can brake, which is as near as it is told."""
+    guidance = Settings().guidance
+    client = ready(open_ground(parameters={**RECOMMENDED_PARAMETERS, "WP_SPEED": 2.0}))
+    if speed_m_s > 0.0:
+        client.drive_to(60.0, 0.0)
+        client.run_for(0.2)
+        client.command(178, 1, speed_m_s, -1)
+        client.run_for(8.0)
+    began = client.simulator.truth
+    assert began.speed_m_s == pytest.approx(speed_m_s, abs=0.02)
+    ahead_m = share * (braking_distance_m(speed_m_s, guidance) if speed_m_s > 0.0 else 0.4)
+    client.drive_to(began.north_m + ahead_m, 0.0)
+    client.run_for(10.0)
+    beyond_m = client.simulator.truth.north_m - began.north_m - ahead_m
+    assert client.simulator.truth.speed_m_s < 0.01
+    assert 0.0 < beyond_m <= overshoot_m(ahead_m, speed_m_s, guidance)

@@ -30,9 +30,11 @@ from tests.support.rig import GATE, yard
 class Desk:
     """The mission begins at the origin, which is home; ``now_s`` goes on by a tick with every ``step``."""
 
-    def __init__(self, folder: Path, targets: str = GATE, **yard_options: bool) -> None:
+    def __init__(
+        self, folder: Path, targets: str = GATE, settings: Settings | None = None, **yard_options: bool
+    ) -> None:
         self.mission = yard(folder, targets, **yard_options)
-        self.settings = LiveSettings(Settings())
+        self.settings = LiveSettings(settings or Settings())
         self.notices, self.autopilot, self.clock = Notices(), FakeAutopilot(), HandClock(10.0)
         link: Any = self.autopilot
         sender = SetpointSender(link, self.settings, self.notices)

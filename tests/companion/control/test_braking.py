@@ -15,6 +15,7 @@ from companion.control.braking import (
     for_link,
     late,
     loop_latency_s,
+    overshoot_m,
     stopping_distance_m,
 )
 from companion.control.following import Following
@@ -62,3 +63,13 @@ def test_steps_of_the_link_are_rounded_up_and_a_setting_may_ask_for_more() -> No
 def test_the_farthest_target_is_horizon_and_stopping_distance() -> None:
     guidance = SETTINGS.guidance
     assert farthest_m(2.0, guidance) == guidance.horizon_m + stopping_distance_m(2.0, guidance)
+
+
+@pytest.mark.parametrize(
+    ("distance_m", "speed_m_s", "beyond_m"),
+    [(1.0, 0.0, 0.1), (20.0, 0.0, 0.35), (0.3, 0.5, 0.1), (0.9, 1.0, 0.2), (1.5, 2.0, 0.2), (3.0, 2.0, 0.3)],
+)
+def test_it_stands_beyond_a_place_by_a_share_of_the_distance_and_farther_if_it_rolls(
+    distance_m: float, speed_m_s: float, beyond_m: float
+) -> None:
+    assert overshoot_m(distance_m, speed_m_s, SETTINGS.guidance) == pytest.approx(beyond_m)

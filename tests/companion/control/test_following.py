@@ -10,6 +10,8 @@ from companion.control.following import AS_SHIPPED, following_of, within_limits
 from companion.core.rover_limits import RoverLimits
 from companion.settings import MotionSettings
 
+ROVER = RoverLimits(0.4, 2.0, 8.0)
+
 
 def test_without_settings_and_parameters_it_is_as_shipped() -> None:
     assert following_of(MotionSettings(), {}) == AS_SHIPPED
@@ -40,13 +42,13 @@ def test_what_is_set_counts_before_what_the_autopilot_says() -> None:
     assert follows[1:4] == (0.5, 0.6, 0.7)
 
 
-def test_no_motion_is_planned_that_the_autopilot_would_cut_short() -> None:
-    rover = RoverLimits(0.4, 2.0, 8.0)
-    limited = within_limits(rover, {"WP_SPEED": 1.2, "ATC_STR_RAT_MAX": 45.0})
-    assert limited.cruise_speed_m_s == 1.2 and limited.turns_most_rad_s == pytest.approx(0.25 * math.pi)
-    assert within_limits(rover, {"WP_SPEED": 5.0}) == rover, "the mission's speed is the lower one"
+def test_what_the_autopilot_would_cut_short_is_a_limit() -> None:
+    limited = within_limits(ROVER, {"WP_SPEED": 1.2, "CRUISE_SPEED": 0.5, "ATC_STR_RAT_MAX": 45.0})
+    assert limited.told_most_m_s == 1.2 and limited.turns_most_rad_s == pytest.approx(0.25 * math.pi)
+    assert limited.cruise_speed_m_s == ROVER.cruise_speed_m_s
+    assert within_limits(ROVER, {"WP_SPEED": 0.0, "CRUISE_SPEED": 0.5}).told_most_m_s == 0.5
 
 
 def test_limits_that_are_not_known_or_zero_change_nothing() -> None:
-    rover = RoverLimits(0.4, 2.0, 8.0)
-    assert within_limits(rover, {}) == within_limits(rover, {"WP_SPEED": 0.0, "ATC_STR_RAT_MAX": 0.0}) == rover
+    zero = {"WP_SPEED": 0.0, "CRUISE_SPEED": 0.0, "ATC_STR_RAT_MAX": 0.0}
+    assert within_limits(ROVER, {}) == within_limits(ROVER, zero) == ROVER

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from companion.control.controller import Purpose
+from companion.control.following import within_limits
 from companion.control.local_view import LocalView
 from companion.control.motion_controller import MotionController, _latest, rover_model
 from companion.control.motion_kernels import clearance_m, moved
@@ -232,3 +233,12 @@ def test_a_seed_gives_the_same_commands() -> None:
         leads = controller(5)
         told.append([leads.follow(PATH, view(posts(2), Pose(3.0, 10.0, 0.0, TICK_S * i))) for i in range(5)])
     assert told[0] == told[1]
+
+
+def test_no_motion_is_faster_or_turns_faster_than_the_autopilot_lets_it() -> None:
+    """Whatever speed the target has: the limits are kept apart from it."""
+    at = view(ground(), Pose(3.0, 10.0, 0.0, 0.0)).with_speeds(3.5, 3.5)
+    free, limits = rover_model(at), {"WP_SPEED": 1.2, "ATC_STR_RAT_MAX": 30.0}
+    held = rover_model(replace(at, rover=within_limits(at.rover, limits)))
+    assert free.fastest_m_s == 3.5 and free.turn_fastest_rad_s == at.settings.motion.turn_rad_s
+    assert held.fastest_m_s == 1.2 and held.turn_fastest_rad_s == pytest.approx(math.radians(30.0))

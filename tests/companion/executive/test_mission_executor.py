@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +17,9 @@ from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.safety.reasons import RunPhase
-from companion.settings import Settings
+from companion.settings import Settings, parse_settings
+from companion.vehicle.events import ParameterSeen
+from companion.vehicle.state import fold
 from tests.companion.safety.test_mode_latch import PLACE
 from tests.support.desk import Desk
 from tests.support.rig import GATE
@@ -156,3 +159,14 @@ def test_settings_count_from_the_tick_after_they_were_replaced(desk: Desk) -> No
     desk.settings.replace(Settings.model_validate({"guidance": {"max_speed_m_s": 0.7}}))
     step(desk)
     assert desk.executor.view(desk.run.vehicle, desk.now_s).settings.guidance.max_speed_m_s == 0.7
+
+
+@pytest.mark.parametrize(("controller", "most_m_s"), [("points", math.inf), ("motion-ga", 1.2)])
+def test_planned_motions_keep_within_the_autopilots_limits(tmp_path: Path, controller: str, most_m_s: float) -> None:
+    """Points are not told velocities along a path; their speed is told to the autopilot."""
+    desk = Desk(tmp_path, STAYING, parse_settings({"guidance": {"controller": controller}}, "here"))
+    desk.stand(0.0, 0.0)
+    desk.begin()
+    step(desk)
+    vehicle = fold(desk.run.vehicle, ParameterSeen(desk.now_s, "WP_SPEED", 1.2))
+    assert desk.executor.view(vehicle, desk.now_s).rover.told_most_m_s == most_m_s

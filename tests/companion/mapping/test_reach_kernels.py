@@ -12,7 +12,8 @@ from companion.mapping.reach_kernels import Stopping, first_to_stop_at, may_stop
 
 HEIGHT, WIDTH = 64, 48
 STOPPING = Stopping(
-    radius=2.0, map_radius=2.0, room=0.0, overshoot=1.0, held=0.0, unsure=0.0, flank=2.2, near=3.0, slack=0.2, edge=0.04
+    radius=2.0, map_radius=2.0, room=0.0, overshoot=1.0, rolling=0.0, held=0.0, unsure=0.0,
+    flank=2.2, near=3.0, slack=0.2, edge=0.04,
 )  # fmt: skip
 START = (24.0, 10.0)
 

@@ -54,7 +54,11 @@ def test_each_limit_is_asked_for_until_it_is_known() -> None:
 def test_one_that_is_never_answered_is_asked_for_a_few_times_and_then_told() -> None:
     found = asked("motion-ga", LIMITS[:-1])
     assert found.names.count(LIMITS[0]) == 1 and found.names.count(LIMITS[-1]) == TRIES
-    assert found.said == [f"The autopilot does not tell {LIMITS[-1]}: taken to be as shipped"]
+    assert found.said == ["The autopilot does not tell ATC_STR_RAT_MAX: taken to be no limit"]
+    several = asked("motion-ga", LIMITS[1:-1]).said
+    assert several == [
+        "The autopilot does not tell ATC_ACCEL_MAX: taken to be as shipped; ATC_STR_RAT_MAX: taken to be no limit"
+    ]
 
 
 def test_without_planned_motions_they_are_not_needed() -> None:
