@@ -55,7 +55,7 @@ class Motors(StrEnum):
 
 
 HEAD = ("mission", "drives", "deaths", "touched", "run into", "ended", "person")
-CONTACT_HEAD = ("drive", "seed", "at s", "m/s", "with", "s after a death")
+CONTACT_HEAD = ("drive", "seed", "at s", "N m", "E m", "m/s", "with", "s after a death")
 TIME_LIMIT_S = 1800.0
 LIVES_S = (2.0, 20.0)
 """A companion lives for so long, drawn evenly, from the moment at which it leads the rover."""
@@ -72,6 +72,9 @@ class Contact:
     mover: str | None
     since_death_s: float | None
     """None before the first death."""
+    north_m: float
+    east_m: float
+    """From where the rover began."""
 
 
 @dataclass(slots=True)
@@ -170,7 +173,8 @@ def drive_with_deaths(
     for hit in simulator.collisions:
         before = [death_s for death_s in result.deaths if death_s <= hit.time_s]
         since_s = hit.time_s - before[-1] if before else None
-        result.contacts.append(Contact(hit.time_s, hit.speed_m_s, hit.mover, since_s))
+        place_m = hit.north_m - scenario.start.north_m, hit.east_m - scenario.start.east_m
+        result.contacts.append(Contact(hit.time_s, hit.speed_m_s, hit.mover, since_s, *place_m))
     return result
 
 
@@ -231,6 +235,8 @@ class KilledReport(ExperimentReport):
                 f"{_kind(drive)}, {drive.suite}",
                 f"{drive.seed}",
                 f"{one.time_s:.1f}",
+                f"{one.north_m:.1f}",
+                f"{one.east_m:.1f}",
                 f"{one.speed_m_s:.2f}",
                 one.mover or "what stands",
                 "-" if one.since_death_s is None else f"{one.since_death_s:.1f}",

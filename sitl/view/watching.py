@@ -141,7 +141,6 @@ class Watching:
         began = self._began = self._began or (now_s, simulator.time_s)
         times = (simulator.time_s - began[1]) / max(now_s - began[0], 1e-3)
         north_m, east_m = truth.north_m - simulator.start.north_m, truth.east_m - simulator.start.east_m
-        collisions = len(simulator.collisions)
         facts = (
             Fact("mode", f"{vehicle.mode.name}, {'armed' if vehicle.armed else 'disarmed'}"),
             Fact("time", f"{simulator.time_s:.0f} s, {times:.1f} times"),
@@ -150,7 +149,7 @@ class Watching:
             Fact("position", f"N {north_m:.1f}, E {east_m:.1f} m"),
             *_health(simulator),
             Fact("driven", f"{simulator.driven_m:.0f} m"),
-            Fact("collisions", f"{collisions}", alarm=collisions > 0),
+            Fact("collisions", _collisions(simulator), alarm=len(simulator.collisions) > 0),
         )
         return Section("Rover", facts)
 
@@ -163,6 +162,14 @@ class Watching:
             facts.append(Fact(name, ""))
             facts.append(Fact("", f"in {heard:.0f}/s, out {sent:.0f}/s"))
         return Section("Links", tuple(facts))
+
+
+def _collisions(simulator: Simulator) -> str:
+    """How many, and the last one: when, how fast, with what."""
+    if not simulator.collisions:
+        return "0"
+    last = simulator.collisions[-1]
+    return f"{len(simulator.collisions)}, last at {last.time_s:.1f} s, {last.speed_m_s:.1f} m/s, {last.what}"
 
 
 def _health(simulator: Simulator) -> tuple[Fact, ...]:

@@ -20,7 +20,7 @@ from sitl.world.doors import Door
 from sitl.world.movers import Mover, timed_track
 from sitl.world.truth import SimStart
 from sitl.world.world import World
-from tests.support.sitl_client import READY_S, Client, open_ground
+from tests.support.sitl_client import HOME, READY_S, Client, open_ground, ready
 
 
 def scene(fields: list[str], rover: tuple[float, float] = (0.5, 0.5), heading_deg: float = 0.0, **more: Any) -> Scene:
@@ -171,7 +171,21 @@ def test_the_simulator_as_it_is_seen() -> None:
     assert "door open" in opened and "door closed" not in opened and "2.0 times" in opened and "out " in opened
 
 
-def test_way_target_and_collisions_are_shown() -> None:
+def test_the_last_collision_is_shown_with_time_speed_and_what() -> None:
+    solid = np.zeros((20, 20), dtype=np.bool_)
+    solid[6] = True
+    simulator = Simulator(World(solid, 1.0), SimStart(2.5, 10.0, 0.0, HOME), sensors="none", noise=False)
+    watching = Watching("Wall", simulator)
+    assert ("collisions", "0") in [(fact.name, fact.value) for fact in watching.vehicle_section(0.0).facts]
+    client = ready(simulator)
+    client.drive_to(6.0, 0.0)
+    client.run_for(6.0)
+    (hit,) = simulator.collisions
+    (shown,) = (fact for fact in watching.vehicle_section(0.0).facts if fact.name == "collisions")
+    assert shown.alarm and shown.value == f"1, last at {hit.time_s:.1f} s, {hit.speed_m_s:.1f} m/s, an obstacle"
+
+
+def test_way_and_target_are_shown() -> None:
     simulator = open_ground()
     client = Client(simulator)
     client.run_for(READY_S)
