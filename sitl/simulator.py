@@ -293,7 +293,7 @@ class Simulator:
         self._tick += done
         self._sensing.time_s = self.time_s
         if int(rover["contacts"]) > contacts:
-            self._collisions.append(collision_of(rover, self.world.movers, self.time_s))
+            self._collisions.append(collision_of(rover, self.world, self.time_s))
 
     def _send(self) -> None:
         if not self.is_off:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
+from pydantic import TypeAdapter
+from typing_extensions import TypedDict
 
 from companion.cli.images import save_decision, save_motions
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture
@@ -22,6 +23,7 @@ EXIT_SAME, EXIT_DIFFERENT = 0, 1
 SHOWN = 20
 COLLISIONS, MOST_BYTES = "collisions.json", 1_000_000
 """What a simulated drive leaves in its record if the rover touched something; it knows no more of that by itself."""
+Contact = TypedDict("Contact", {"time_s": float, "north_m": float, "east_m": float, "speed_m_s": float, "with": str})
 
 
 def replay(
@@ -79,13 +81,13 @@ def _collisions(directory: Path) -> list[str]:
     if not file.exists():
         return []
     try:
-        contacts = json.loads(read_at_most(file, MOST_BYTES))
+        contacts = TypeAdapter(list[Contact]).validate_json(read_at_most(file, MOST_BYTES), strict=True)
         lines = [
             f"collision at {one['time_s']} s of the simulation: {one['with']}, {one['speed_m_s']} m/s, "
             f"north {one['north_m']} m, east {one['east_m']} m of the start"
             for one in contacts
         ]
-    except (OSError, ValueError, TypeError, KeyError):
+    except (OSError, ValueError):
         return [f"{file}: cannot be read; delete it, or drive again with --record"]
     more = len(lines) - SHOWN
     return [*lines[:SHOWN], *([f"... and {more} more collisions"] if more > 0 else [])]

@@ -27,10 +27,13 @@ from sitl.network.mavlink_client import FORMS, ClientLink, open_link
 from sitl.scenario import Scenario, ScenarioError, equipped, scenario_from_mission
 from sitl.world.geodesy import ALTITUDE_M
 
+FIRMWARE_PORT = 9002
+"""Where ArduPilot asks if nothing else is said."""
+
 
 def physics(
     mission_file: Annotated[Path, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.")],
-    port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port at which the firmware asks.")] = 9002,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port at which the firmware asks.")] = FIRMWARE_PORT,
     host: Annotated[str, typer.Option(help="Address to listen on; 0.0.0.0 for other computers.")] = "127.0.0.1",
     mavlink: Annotated[
         str | None,
@@ -96,9 +99,10 @@ def _greeting(behind: Physics, host: str, port: int, mavlink: str | None, parame
     heading_deg = math.degrees(start.heading_rad) % 360.0
     home = f"{start.home.lat_deg:.7f},{start.home.lon_deg:.7f},{ALTITUDE_M:g},{heading_deg:.0f}"
     defaults = f" --defaults {parameters}" if parameters else ""
+    out = "" if port == FIRMWARE_PORT else f" --sim-port-out {port}"
     lines = [
         f"listening on udp {host}:{port}",
-        f"start the firmware with --model JSON:127.0.0.1 --home {home}{defaults}",
+        f"start the firmware with --model JSON:127.0.0.1{out} --home {home}{defaults}",
     ]
     if behind.suite.lidar and mavlink is None:
         lines.append("the lidar is not published: give --mavlink URL, for instance tcp:127.0.0.1:5762")

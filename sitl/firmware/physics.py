@@ -248,7 +248,7 @@ class Physics:
         advance(self._rover, self._surroundings, self.time_s, (servo_1, servo_3), steps, step_s / steps)
         self.time_s += step_s
         if int(self._rover[0]["contacts"]) > contacts:
-            self.collisions += (collision_of(self._rover[0], world.movers, self.time_s),)
+            self.collisions += (collision_of(self._rover[0], world, self.time_s),)
 
     def _body(self, before: Motion, now: Motion, step_s: float) -> BodyState:
         """The reported state, with mean turn rate and acceleration of the step.

@@ -171,13 +171,23 @@ def _draw_track(axes: Axes, north: NDArray[np.float64], east: NDArray[np.float64
 
 
 def _draw_collisions(axes: Axes, run: Drive) -> None:
-    """A red cross where the rover touched something, with time and speed."""
+    """A red cross where the rover touched something, with time, speed and what it was."""
     for number, collision in enumerate(run.simulator.collisions):
         place = (collision.east_m, collision.north_m)
         label = "collision" if number == 0 else None
         axes.plot(*place, "X", color="#ff0000", markeredgecolor="white", markersize=13, zorder=10, label=label)
-        text = f"{collision.time_s:.1f} s, {collision.speed_m_s:.1f} m/s"
-        axes.annotate(text, place, textcoords="offset points", xytext=(9, -12), color="#ff0000", fontsize=9, zorder=10)
+        text = f"{collision.time_s:.1f} s, {collision.speed_m_s:.1f} m/s, {collision.what}"
+        behind = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0}
+        axes.annotate(
+            text,
+            place,
+            textcoords="offset points",
+            xytext=(9, -14),
+            color="#d00000",
+            fontsize=9,
+            zorder=11,
+            bbox=behind,
+        )
 
 
 def _draw_rover(axes: Axes, run: Drive) -> None:

@@ -5,11 +5,15 @@ Nouns: Collision, Truth.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 from sitl.world import geodesy
+from sitl.world.world import World
+
+DOOR_NEAR_M = 0.1
+"""A door so near to the rover's outline is what it touched."""
 
 
 class GeoPlace(Protocol):
@@ -64,7 +68,8 @@ class Truth:
 class Collision:
     """The rover touched an obstacle: when, and where its centre was (world frame).
 
-    ``mover``: name of the moving obstacle, if it was one; ``speed_m_s``: the rover's own speed then, without a sign.
+    ``mover``: name of the moving obstacle, if it was one; ``speed_m_s``: the rover's own speed then, without a sign;
+    ``door``: name of the door, if it was one.
     """
 
     time_s: float
@@ -72,39 +77,36 @@ class Collision:
     east_m: float
     mover: str | None
     speed_m_s: float
+    door: str | None = None
 
     @property
     def what(self) -> str:
         """What was touched."""
-        return "an obstacle" if self.mover is None else self.mover
+        return self.mover or self.door or "an obstacle"
 
     def told(self, start: SimStart) -> str:
-        """What was touched, how fast, when, and where from the rover's start, like LOCAL_POSITION_NED."""
-        north_m, east_m = self.north_m - start.north_m, self.east_m - start.east_m
+        """The rover's own speed, what was touched, when, and where from the rover's start, like LOCAL_POSITION_NED."""
+        # Zero is added so that there is no minus before a rounded zero.
+        north_m, east_m = (round(v, 1) + 0.0 for v in (self.north_m - start.north_m, self.east_m - start.east_m))
         where = f"north {north_m:.1f} m, east {east_m:.1f} m of its start"
-        return f"the rover touched {self.what} with {self.speed_m_s:.1f} m/s at {self.time_s:.1f} s, {where}"
+        return f"the rover, driving {self.speed_m_s:.1f} m/s, touched {self.what} at {self.time_s:.1f} s, {where}"
 
     def as_json(self, start: SimStart) -> dict[str, float | str]:
         """The same, with metres from the rover's start."""
         return {
             "time_s": round(self.time_s, 2),
-            "north_m": round(self.north_m - start.north_m, 3),
-            "east_m": round(self.east_m - start.east_m, 3),
+            "north_m": round(self.north_m - start.north_m, 3) + 0.0,
+            "east_m": round(self.east_m - start.east_m, 3) + 0.0,
             "speed_m_s": round(self.speed_m_s, 3),
             "with": self.what,
         }
 
 
-class Named(Protocol):
-    """Anything with a name for people."""
-
-    @property
-    def name(self) -> str:
-        """The name."""
-        ...
-
-
-def collision_of(rover: Any, movers: Sequence[Named], time_s: float) -> Collision:
-    """The contact that the plant's record has just noted; ``movers``: the world's, in their order."""
+def collision_of(rover: Any, world: World, time_s: float) -> Collision:
+    """The contact that the plant's record has just noted."""
     struck, here = int(rover["struck"]), (float(rover["north_m"]), float(rover["east_m"]))
-    return Collision(time_s, *here, movers[struck - 1].name if struck else None, abs(float(rover["struck_m_s"])))
+    speed_m_s = abs(float(rover["struck_m_s"]))
+    if struck:
+        return Collision(time_s, *here, world.movers[struck - 1].name, speed_m_s)
+    reach_m = math.hypot(max(rover["front_m"], rover["rear_m"], rover["radius_m"]), rover["half_width_m"])
+    return Collision(time_s, *here, None, speed_m_s, world.nearest_door(*here, reach_m + DOOR_NEAR_M, time_s))

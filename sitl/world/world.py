@@ -256,3 +256,16 @@ class World:
     def clearance_m(self, north_m: float, east_m: float, reach_m: float, time_s: float = 0.0) -> float:
         """Metres from a place to the nearest obstacle that stands at a moment, at most ``reach_m``."""
         return float(clearance_m(self.layers(time_s).solid, north_m, east_m, reach_m))
+
+    def nearest_door(self, north_m: float, east_m: float, reach_m: float, time_s: float) -> str | None:
+        """The name of the closed door that is the nearest obstacle to a place; None if there is none, or not so near.
+
+        A place in a door that has just closed counts, too.
+        """
+        nearest_m = self.clearance_m(north_m, east_m, reach_m, time_s)
+        for door in self.doors:
+            if not door.is_open(time_s) and nearest_m < reach_m:
+                door_m = float(clearance_m(self._grid(door.fields), north_m, east_m, reach_m))
+                if door_m <= nearest_m + 1e-9:
+                    return door.name
+        return None

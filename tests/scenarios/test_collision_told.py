@@ -57,10 +57,12 @@ def test_in_lines_table_figures_record_and_picture(tmp_path: Path, monkeypatch: 
     replayed = CliRunner().invoke(companion, ["replay", "run"])
     told = f"collision at {contact['time_s']} s of the simulation: an obstacle, {contact['speed_m_s']} m/s"
     assert replayed.exit_code == 0 and told in replayed.output
-    Path("run/collisions.json").write_text("[1]")
-    assert "collisions.json: cannot be read" in CliRunner().invoke(companion, ["replay", "run"]).output
+    for text in ("[1]", "{}", '[{"time_s": "x", "north_m": 0, "east_m": 0, "speed_m_s": 0, "with": 3}]'):
+        Path("run/collisions.json").write_text(text)
+        assert "collisions.json: cannot be read" in CliRunner().invoke(companion, ["replay", "run"]).output
     line = (
-        f"collision 1: the rover touched an obstacle with {contact['speed_m_s']:.1f} m/s at {contact['time_s']:.1f} s"
+        f"collision 1: the rover, driving {contact['speed_m_s']:.1f} m/s, touched an obstacle "
+        f"at {contact['time_s']:.1f} s"
     )
     assert line in result.output
     assert f"{contact['time_s']} s: an obstacle, {contact['speed_m_s']} m/s" in result.output

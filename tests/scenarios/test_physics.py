@@ -76,8 +76,9 @@ def test_a_firmware_drives_and_starts_again_and_the_physics_ends_cleanly(tmp_pat
             again.drive(0.1)
         assert again.state["position"] == [0.0, 0.0, 0.0]
         said = stopped(child, signal.SIGINT)
+    options = f"--sim-port-out {port} --home 53.1325000,23.1688000,120,90 --defaults {file}"
     assert said == [
-        f"start the firmware with --model JSON:127.0.0.1 --home 53.1325000,23.1688000,120,90 --defaults {file}",
+        f"start the firmware with --model JSON:127.0.0.1 {options}",
         "the firmware has started and is answered",
         "a datagram was no frame of ArduPilot's JSON interface; ignored, like all that follow",
         "the firmware has started again: the rover is back at its start, the time is 0",

@@ -138,7 +138,7 @@ def test_every_collision_is_told_of_with_its_place_once_a_second_and_at_the_end(
     touched.append(Collision(61.3, start.north_m + 3.0, start.east_m - 1.5, None, 0.62))
     log.look(cast(Simulator, stand_in))
     assert said == [
-        "collision 1: the rover touched an obstacle with 0.6 m/s at 61.3 s, north 3.0 m, east -1.5 m of its start"
+        "collision 1: the rover, driving 0.6 m/s, touched an obstacle at 61.3 s, north 3.0 m, east -1.5 m of its start"
     ]
     for _ in range(3):
         touched.append(Collision(61.5, start.north_m, start.east_m, "cart", 1.0))
@@ -146,7 +146,9 @@ def test_every_collision_is_told_of_with_its_place_once_a_second_and_at_the_end(
     assert len(said) == 1
     real_s = 1.5
     log.look(cast(Simulator, stand_in))
-    assert [line[:35] for line in said[1:]] == [f"collision {n}: the rover touched cart" for n in (2, 3, 4)]
+    assert [line[:53] for line in said[1:]] == [
+        f"collision {n}: the rover, driving 1.0 m/s, touched cart" for n in (2, 3, 4)
+    ]
     touched.append(Collision(61.6, start.north_m, start.east_m, "cart", 1.0))
     log.look(cast(Simulator, stand_in))
     assert len(said) == 4

@@ -103,6 +103,7 @@ def test_one_that_closes_on_the_rover_touches_it_at_that_moment(closes_s: float)
     client = ready(Simulator(behind(door((0.0, closes_s))), SimStart(8.5, 5.5, 0.0, HOME), "none", noise=False))
     client.run_to(60.0)
     (touched,) = client.simulator.collisions
+    assert touched.what == "door"
     assert touched.time_s == pytest.approx(math.ceil(closes_s * 50.0) / 50.0 + 0.02)
 
 
