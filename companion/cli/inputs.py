@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import importlib.metadata
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -58,6 +58,18 @@ def writable(path: Path | None, suffix: str = "") -> None:
             pass
         if not existed:
             path.unlink()
+
+
+def apart(outputs: Iterable[Path | None], inputs: Iterable[Path | None]) -> None:
+    """No output is a file that is read, or another output: nothing is lost. Raises OutputError."""
+    used = {os.path.realpath(path) for path in inputs if path is not None}
+    for path in outputs:
+        if path is None:
+            continue
+        place = os.path.realpath(path)
+        if place in used:
+            raise OutputError(f"{path}: is another file of this command; choose another name")
+        used.add(place)
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.cli.images import save_plan
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, picture, usable_settings
 from companion.core.clock import stopwatch_s
 from companion.core.grid import Cell, Grid
 from companion.mapping.map_files import MapError, load_map
@@ -213,6 +213,7 @@ def plan(
             place_of("--target", target, grid, top_left),
             kinematics=wanted_kinematics(name, settings, turning_radius_m, heading_deg, grid),
         )
+        apart((image,), (map_file, settings_file))
         picture(image)
         answer = search(grid, problem, name, settings, seed, top_left)
         if image is not None:

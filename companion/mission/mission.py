@@ -186,3 +186,10 @@ class Mission:
     stored: str = ""
     notes: tuple[str, ...] = ()
     also_read: tuple[Path, ...] = ()
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files that belong to it."""
+        simulated = () if self.sitl is None else (self.sitl.world, self.sitl.parameters)
+        files = (self.source, self.prior_map, *self.also_read, *simulated)
+        return tuple(file for file in files if file is not None)

@@ -80,7 +80,7 @@ def drive(
         if record is not None:
             files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
             recorder = Recorder(record, mission, settings, seed, arm=True, files=files, start_us=RECORD_START_US)
-        wanted.check()
+        wanted.check((settings_file, faults, _file(sensors), *mission.files))
         with console.status("loading the planner ..."):
             if not kernels_warm(settings, mission.rover.turning_radius_m):
                 typer.echo(COMPILING, err=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -10,7 +11,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from companion.cli.inputs import OutputError, picture, writable, written
+from companion.cli.inputs import OutputError, apart, picture, writable, written
 from companion.mapping.map_files import MapError
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings.versions import made_with
@@ -29,8 +30,10 @@ class Outputs:
     map_stem: Path | None = None
     json_file: Path | None = None
 
-    def check(self) -> None:
-        """Check before the drive that all can be written. Raises OutputError."""
+    def check(self, inputs: Iterable[Path | None]) -> None:
+        """Check before the drive that all can be written, over no input and no other output. Raises OutputError."""
+        maps = [] if self.map_stem is None else [Path(f"{self.map_stem}{end}") for end in (".yaml", ".pgm")]
+        apart((self.image, self.json_file, *maps), inputs)
         picture(self.image)
         writable(self.json_file)
         writable(self.map_stem, ".yaml")

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich.console import Console
 
-from companion.cli.inputs import OutputError, writable, written
+from companion.cli.inputs import OutputError, apart, writable, written
 from companion.core.clock import WallClock
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
@@ -51,9 +52,10 @@ def physics(
     clock = WallClock()
     link: ClientLink | None = None
     try:
-        scenario = scenario_from_mission(equipped(load_mission(mission_file), sensors, params))
+        mission = equipped(load_mission(mission_file), sensors, params)
+        scenario = scenario_from_mission(mission)
         behind = scenario.physics(seed, linked=mavlink is not None)
-        _write_parameters(scenario, behind, write_params)
+        _write_parameters(scenario, behind, write_params, (params, *mission.files))
         link = open_link(mavlink) if mavlink else None
         # Compile everything before the firmware waits for answers.
         with Console(stderr=True).status("starting ..."):
@@ -80,10 +82,11 @@ def physics(
     tell(summary(behind))
 
 
-def _write_parameters(scenario: Scenario, behind: Physics, file: Path | None) -> None:
+def _write_parameters(scenario: Scenario, behind: Physics, file: Path | None, inputs: Iterable[Path | None]) -> None:
     """Write the parameters for the firmware, if requested; print remarks about the user's own parameters."""
     parameters: dict[str, float] | None = None
     if file is not None:
+        apart((file,), inputs)
         writable(file)
         parameters = firmware_parameters(scenario.parameters, behind.suite, steered=scenario.turning_radius_m > 0.0)
         with written(file):
