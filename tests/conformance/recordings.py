@@ -26,7 +26,11 @@ WORLD_M = 60
 
 @dataclass(frozen=True)
 class Recording:
-    """Conditions of a recording: the rover's heading, its sensors, and how much earlier its start-up was."""
+    """Conditions of a recording: the rover's heading, its sensors, and how much earlier its start-up was.
+
+    ``put_ahead``: at this vehicle time the rover, which stands, is put so many metres ahead, to where the recorded one
+    stood: what it then does depends on the side of WP_RADIUS on which it is.
+    """
 
     name: str
     heading_deg: float = 0.0
@@ -35,6 +39,7 @@ class Recording:
     post_m: tuple[float, float] | None = None
     folder: str = "ardurover-4.7-transcripts"
     parameters: tuple[tuple[str, float], ...] = ()
+    put_ahead: tuple[float, float] | None = None
 
 
 RECORDINGS = (
@@ -56,7 +61,13 @@ FAST_SKID = (("WP_SPEED", 2.0), ("WP_RADIUS", 1.0))
 FAST = (
     Recording("velocity-and-turn-rate", -10.0, folder="real-firmware"),
     Recording("turns-at-speed-jerk-0", -10.0, folder="real-firmware", parameters=(*FAST_SKID, ("WP_JERK", 0.0))),
-    Recording("turns-at-speed-jerk-3", -10.0, folder="real-firmware", parameters=(*FAST_SKID, ("WP_JERK", 3.0))),
+    Recording(
+        "turns-at-speed-jerk-3",
+        -10.0,
+        folder="real-firmware",
+        parameters=(*FAST_SKID, ("WP_JERK", 3.0)),
+        put_ahead=(129.0, 0.067),  # 1.033 m beyond its last place instead of 0.966 m
+    ),
 )
 """Recordings of motion alone, at up to 2 m/s: velocities with turn rates, and positions far to the side."""
 
@@ -133,11 +144,19 @@ def simulator_for(recording: Recording) -> Simulator:
     return Simulator(world, SimStart(0.0, 0.0, heading_rad, HOME), suite, noise=False)
 
 
+def put_ahead(simulator: Simulator, distance_m: float) -> None:
+    """Put the rover so far ahead."""
+    heading_rad, rover = simulator.truth.heading_rad, simulator._rover
+    rover["north_m"] += distance_m * math.cos(heading_rad)
+    rover["east_m"] += distance_m * math.sin(heading_rad)
+
+
 def replay(recording: Recording) -> Replay:
     """Send the recorded packets to the simulator at their vehicle times, and keep what it sends."""
     real, sent = read(SHARED / "data" / recording.folder / f"{recording.name}.tlog")
     client = Client(simulator_for(recording), *source(sent[0][1]))
     ours: list[Heard] = []
+    ahead_s, ahead_m = recording.put_ahead or (math.inf, 0.0)
 
     def run_to(time_s: float) -> None:
         now_s = client.simulator.time_s
@@ -146,6 +165,9 @@ def replay(recording: Recording) -> Replay:
             ours.extend(Heard(step_s - recording.early_s, message) for message in fresh if source(message) == AUTOPILOT)
 
     for time_s, _, raw in sent:
+        if time_s >= ahead_s:
+            ahead_s = math.inf
+            put_ahead(client.simulator, ahead_m)
         run_to(time_s + recording.early_s)
         client.link.receive(raw)
     run_to(real[-1].time_s + recording.early_s + 0.1)
