@@ -87,3 +87,10 @@ def test_the_first_target_that_is_near_enough_is_taken() -> None:
     assert first_to_stop_at(seen(40), START, targets, 20.0, STOPPING) == 3
     assert first_to_stop_at(seen(40), START, targets, 5.0, STOPPING) == -1
     assert first_to_stop_at(seen(), START, np.array([START]), 99.0, STOPPING) == -1, "where it stands already"
+
+
+def test_a_rolling_rover_needs_more_ground_beyond_a_near_place() -> None:
+    """Two and a half cells ahead: a tenth of that is seen beyond its front, what it rolls is not."""
+    place, ground = (START[0], START[1] + 2.5), seen(15)
+    assert may_stop_at(ground, START, place, STOPPING)
+    assert not may_stop_at(ground, START, place, STOPPING._replace(rolling=1.0))
