@@ -16,7 +16,7 @@ from companion.mapping.evidence_map import EvidenceMap
 from companion.settings import Settings
 from companion.vehicle.commands import Setpoint
 
-MOST_FURTHER_M = 1.5
+MOST_FURTHER_M = 3.0
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -24,7 +24,7 @@ class LocalView:
     """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
 
     ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
-    ``held_m_s``: so much slower than it was told the ground holds it. ``rolls_back``: it moves tail first.
+    ``held_m_s``: so much slower than its throttle would let it go on firm ground. ``rolls_back``: it moves tail first.
     ``following``: how it follows velocities, as far as is known. ``body``: its outline, if it is no circle.
     """
 
@@ -53,7 +53,7 @@ class LocalView:
 
     @property
     def further_m(self) -> float:
-        """So much farther than usual the rover may shoot past a position: where rough ground ends, if it is held."""
+        """So much farther than usual the rover may go before it stands: where ground ends that holds it."""
         return min(self.settings.guidance.held_overshoot_s * self.held_m_s, MOST_FURTHER_M)
 
     def with_speeds(self, cruise_speed_m_s: float, fastest_m_s: float) -> LocalView:

@@ -35,6 +35,8 @@ OVERRUN_M = 0.3
 STANDS_M_S = 0.1
 CREEPS_M = 0.1
 """It does not creep less far."""
+SHOOTS_M = 0.1
+"""A rover that the ground holds may go so much farther: then it counts as rolling, however slow it is."""
 CREEPS_NARROW_M = 0.4
 """Near walls of which thin beams saw only points it creeps no farther at a time: the map may be off by as much."""
 ANEW_S = 0.15
@@ -101,7 +103,7 @@ class PointController:
     def _command(self, path: ReferencePath, view: LocalView) -> ControlCommand:
         pose, settings = view.pose, view.settings.guidance
         needed_m = braking_distance_m(view.speed_m_s, settings)
-        if _would_touch(view, needed_m):
+        if _would_touch(view, needed_m + view.further_m):
             return stop_for(Purpose.BRAKE)
         reach = farthest_clear(path, view)
         distance_m = pose.point.distance_m(path.end)
@@ -148,9 +150,13 @@ class PointController:
 
 
 def turn_to(bearing_rad: float, view: LocalView) -> ControlCommand:
-    """Turn on the spot; a rover that still rolls brakes first, so that it does not drive an arc."""
+    """Turn on the spot; a rover that still rolls brakes first, so that it does not drive an arc.
+
+    So does one that the ground holds, until it could not shoot into anything: its throttle closes while it brakes.
+    """
     settings = view.settings.guidance
-    if view.speed_m_s > settings.roll_out_m_s:
+    shoots = view.further_m >= SHOOTS_M and _would_touch_turning(view, bearing_rad)
+    if view.speed_m_s > settings.roll_out_m_s or shoots:
         return stop_for(Purpose.BRAKE)
     return ControlCommand(Purpose.LOOK, GuidedHeading(bearing_rad), settings.min_speed_m_s)
 
@@ -201,7 +207,7 @@ def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> f
 def _would_touch(view: LocalView, needed_m: float) -> bool:
     """Whether the rover, going straight on, would touch something before it could stop."""
     pose = view.pose
-    if view.speed_m_s <= view.settings.guidance.roll_out_m_s:
+    if view.speed_m_s <= view.settings.guidance.roll_out_m_s and view.further_m < SHOOTS_M:
         return False
     ahead = pose.point.moved(pose.heading_rad, needed_m)
     return look_along(view.evidence, pose.point, ahead, view.rover.radius_m + 0.05).clear_m < needed_m - 1e-6
@@ -209,7 +215,7 @@ def _would_touch(view: LocalView, needed_m: float) -> bool:
 
 def _would_touch_turning(view: LocalView, bearing_rad: float) -> bool:
     """Whether the rover could touch something if it turns to the bearing while it still rolls: it stops in between."""
-    pose, roll_m = view.pose, braking_distance_m(view.speed_m_s, view.settings.guidance)
+    pose, roll_m = view.pose, braking_distance_m(view.speed_m_s, view.settings.guidance) + view.further_m
     turn_rad = wrap_pi_rad(bearing_rad - pose.heading_rad)
     for share in ROLL_SHARES:
         there = pose.point.moved(pose.heading_rad + share * turn_rad, roll_m)

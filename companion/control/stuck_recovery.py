@@ -21,6 +21,8 @@ TURNED_RAD = math.radians(15.0)
 FRESH_PENALTY = 0.15
 FINAL_PENALTY = 1.0
 TRIES_AT_ONE_PLACE = 3
+TURNS_RAD_S = 0.3
+"""A rover that turns slower goes back straight."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +78,15 @@ class StuckRecovery:
         return now_s < self._back_until_s
 
     def backing(self, view: LocalView) -> ControlCommand | None:
-        """Straight back over ground that is known to be free, and no farther; None when not under way."""
+        """Straight back over ground that is known to be free, and no farther; None when not under way.
+
+        A rover that still turns stands first: it would not go straight.
+        """
         if not self.is_backing(view.pose.time_s):
             return None
         self._progress = None
+        if abs(view.yaw_rate_rad_s) > TURNS_RAD_S:
+            return STANDSTILL
         speed_m_s = backing_speed_m_s(view)
         if speed_m_s < BACK_LEAST_M_S:
             self._back_until_s = view.pose.time_s

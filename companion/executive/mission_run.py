@@ -12,7 +12,7 @@ from enum import Enum, auto
 import numpy as np
 
 from companion.control.controller import STANDSTILL, ControlCommand
-from companion.control.drag import DragWatch
+from companion.control.drag import DragWatch, full_throttle_m_s
 from companion.control.setpoint_check import SetpointCheck
 from companion.control.told import Told, after
 from companion.core.frames import Pose
@@ -174,7 +174,9 @@ class MissionRun:
             return None
         executor, view = self.executor, self.executor.view(self.vehicle, now_s)
         told = None if self._told is None else self._told.setpoint
-        view = replace(view, held_m_s=self._drag.held_m_s(self._told, view), told=told, lately=self._lately)
+        full_m_s = full_throttle_m_s(self.vehicle.parameters)
+        held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
+        view = replace(view, held_m_s=held_m_s, told=told, lately=self._lately)
         executor.learn(view)
         wanted = executor.guide(task, self.vehicle, view)
         wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)

@@ -39,6 +39,7 @@ from companion.vehicle.events import (
     RangeSeen,
     TargetSeen,
     TextSeen,
+    ThrottleSeen,
 )
 from companion.vehicle.link_latency import TimeAnswered
 from companion.vehicle.rc_input import SticksSeen
@@ -97,6 +98,7 @@ class Decoder:
             mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: _item_reached,
             mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: _item_current,
             mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
+            mavlink.MAVLINK_MSG_ID_VFR_HUD: _throttle,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: _home,
             mavlink.MAVLINK_MSG_ID_TIMESYNC: _time_answered,
             mavlink.MAVLINK_MSG_ID_RC_CHANNELS: _sticks,
@@ -317,6 +319,10 @@ def _parameter(message: Any, time_s: float) -> Event:
 
 def _prearm(message: Any, time_s: float) -> Event:
     return PrearmSeen(time_s, bool(message.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_PREARM_CHECK))
+
+
+def _throttle(message: Any, time_s: float) -> Event:
+    return ThrottleSeen(time_s, min(message.throttle, 100) / 100.0)
 
 
 def _fence_status(message: Any, time_s: float) -> Event:

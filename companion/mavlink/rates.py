@@ -19,7 +19,9 @@ EKF_HZ = 5.0
 """A second without stops the rover: so several in a row may be lost."""
 SLOW_HZ = 2.0
 STICKS_HZ = 5.0
+THROTTLE_HZ = 10.0
 POWER_HZ = 1.0
+THROTTLE_UNSEEN = "ground that holds the rover back is not noticed"
 STICKS_UNSEEN = "the pilot's sticks are not seen"
 HEARTBEAT_HZ = 5.0
 """Only the heartbeat shows mode and arming: at its default of 1 Hz a pilot could be overlooked for a second."""
@@ -70,6 +72,7 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
         WantedRate(mavlink.MAVLINK_MSG_ID_ATTITUDE, settings.attitude_rate_hz),
         WantedRate(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, SLOW_HZ),
         WantedRate(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, EKF_HZ),
+        WantedRate(mavlink.MAVLINK_MSG_ID_VFR_HUD, THROTTLE_HZ, told=False, silence=THROTTLE_UNSEEN),
         WantedRate(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, STICKS_HZ, told=False, silence=STICKS_UNSEEN),
         WantedRate(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, settings.range_rate_hz, always=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_RANGEFINDER, settings.range_rate_hz, always=False),

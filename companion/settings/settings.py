@@ -147,9 +147,9 @@ class GuidanceSettings(Section):
         0.35, ge=0.0, description="how far beyond a guided position the rover may stop (ArduRover: 0.30 m)"
     )
     held_overshoot_s: float = Field(
-        1.0,
+        2.0,
         ge=0.0,
-        description="so much farther for each m/s that the ground holds the rover back",
+        description="so much farther for each m/s by which the ground holds the rover back",
     )
     resend_s: float = Field(1.0, gt=0.0, description="a target is repeated at least this often")
     change_after_s: float = Field(0.1, ge=0.0, description="minimum time between targets that differ")
@@ -163,7 +163,7 @@ class GuidanceSettings(Section):
         "and the position drifts between readings",
     )
     narrow_speed_m_s: float = Field(
-        1.5, gt=0.0, description="maximum speed with single thin beams, which leave gaps unseen"
+        1.0, gt=0.0, description="maximum speed with single thin beams, which leave gaps unseen"
     )
     min_speed_m_s: float = Field(0.5, gt=0.0, description="minimum commanded speed")
     max_speed_m_s: float = Field(20.0, gt=0.0, description="maximum commanded speed, whatever the mission says")

@@ -1,4 +1,4 @@
-"""The limits monitor: reads the autopilot's limits of acceleration and turning, by which motions are planned.
+"""The limits monitor: reads the autopilot's limits, by which motions are planned, and what its throttle does.
 
 Nouns: limits monitor.
 """
@@ -13,7 +13,7 @@ from companion.safety.watchdogs import Monitor
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events import Event
-from companion.vehicle.motion_limits import CHANGES, LIMITS
+from companion.vehicle.motion_limits import CHANGES, CRUISE_THROTTLE, DRIVE, LIMITS
 from companion.vehicle.state import VehicleState
 
 ASK_S = 1.0
@@ -37,24 +37,25 @@ class LimitsMonitor(Monitor):
     def tick(self, now_s: float) -> None:
         """Ask for what is not known, each second, a few times; then tell that it is assumed."""
         plans = self._settings.current.guidance.controller != "points"
-        missing = [name for name in LIMITS if name not in self._vehicle.parameters]
-        if not plans or not missing or self._vehicle.heartbeat is None or self._told:
+        needed = dict.fromkeys((*LIMITS, *DRIVE) if plans else DRIVE)
+        missing = [name for name in needed if name not in self._vehicle.parameters]
+        if not missing or self._vehicle.heartbeat is None or self._told:
             return
         if now_s - self._asked_s < ASK_S:
             return
         if self._tries >= TRIES:
             self._told = True
-            self._notifier.tell(_not_told(missing), Severity.WARNING)
+            self._notifier.tell(_not_told(missing, plans=plans), Severity.WARNING)
         else:
             self._asked_s, self._tries = now_s, self._tries + 1
             for name in missing:
                 self._autopilot.send(ReadParameter(name), now_s)
 
 
-def _not_told(missing: list[str]) -> str:
-    """What is assumed instead."""
-    shipped = [name for name in missing if name in CHANGES]
-    others = [name for name in missing if name not in CHANGES]
+def _not_told(missing: list[str], *, plans: bool) -> str:
+    """What is assumed instead. ``plans``: the names are of limits, too."""
+    shipped = [name for name in missing if name in (*CHANGES, CRUISE_THROTTLE) or not plans]
+    others = [name for name in missing if name not in shipped]
     parts = [f"{', '.join(shipped)}: taken to be as shipped"] if shipped else []
     parts += [f"{', '.join(others)}: taken to be no limit"] if others else []
     return f"The autopilot does not tell {'; '.join(parts)}"

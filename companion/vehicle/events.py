@@ -89,6 +89,14 @@ class OtherSeen:
 
 
 @dataclass(frozen=True, slots=True)
+class ThrottleSeen:
+    """VFR_HUD: how far the throttle is open, forwards or backwards, 0 to 1."""
+
+    time_s: float
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
 class EkfStatusSeen:
     """EKF_STATUS_REPORT flags."""
 
@@ -361,6 +369,7 @@ Event = (
     HeartbeatSeen
     | LocalPositionSeen
     | AttitudeSeen
+    | ThrottleSeen
     | GlobalPositionSeen
     | OtherSeen
     | EkfStatusSeen

@@ -32,9 +32,10 @@ from companion.vehicle.events import (
     RangeSeen,
     RoverMode,
     TargetSeen,
+    ThrottleSeen,
 )
 from companion.vehicle.link_latency import BACK_S, Latency, TimeAnswered, latency_after_answer, latency_after_report
-from companion.vehicle.motion_limits import LIMITS
+from companion.vehicle.motion_limits import DRIVE, LIMITS
 from companion.vehicle.rc_input import Sticks, SticksSeen, sticks_after
 
 EKF_ATTITUDE, EKF_VELOCITY = 1, 2
@@ -44,7 +45,7 @@ EKF_POSITION = 8 | 16
 EKF_CONST_POSITION = 128
 """CONST_POS_MODE must not be set. No other flag counts: GPS_GLITCH alone stops neither ArduRover nor the companion."""
 PARAMETERS_KEPT = frozenset(
-    ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS", "WP_RADIUS", *LIMITS)
+    ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS", "WP_RADIUS", *LIMITS, *DRIVE)
 )
 """The parameters that a run needs: the autopilot sends hundreds whenever a ground station lists them."""
 OTHERS_KEPT = 64
@@ -69,6 +70,7 @@ class VehicleState:
     heartbeat: HeartbeatSeen | None = None
     position: LocalPositionSeen | None = None
     attitude: AttitudeSeen | None = None
+    throttle: ThrottleSeen | None = None
     global_position: GlobalPositionSeen | None = None
     ekf: EkfStatusSeen | None = None
     origin: OriginSeen | None = None
@@ -175,6 +177,8 @@ def fold(state: VehicleState, event: Event) -> VehicleState:
             return _with_position(state, event)
         case AttitudeSeen():
             return replace(state, attitude=event)
+        case ThrottleSeen():
+            return replace(state, throttle=event)
         case GlobalPositionSeen():
             return replace(state, global_position=event)
         case EkfStatusSeen():

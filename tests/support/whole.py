@@ -28,7 +28,9 @@ from companion.vehicle.events import (
     HomeSeen,
     LocalPositionSeen,
     OriginSeen,
+    ParameterSeen,
     RangeSeen,
+    ThrottleSeen,
 )
 from companion.vehicle.rc_input import Sticks
 from tests.companion.safety.test_mode_latch import EKF_GOOD, GUIDED, MANUAL, PLACE
@@ -94,6 +96,9 @@ class Whole:
             LocalPositionSeen(now_s, now_s, 0.0, 0.0, 0.0, 0.0),
             AttitudeSeen(now_s, now_s, 0.0, 0.0),
             EkfStatusSeen(now_s, EKF_GOOD),
+            ThrottleSeen(now_s, 0.0),
+            ParameterSeen(now_s, "CRUISE_SPEED", 3.0),
+            ParameterSeen(now_s, "CRUISE_THROTTLE", 75.0),
             RangeSeen(now_s, RangeScan(now_s, bearings, ranges, 0.1, 8.0, 0.1, "lidar")),
         ]
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from companion.control.braking import fastest_within_m, stopping_distance_m
 from companion.control.controller import ControlCommand, Purpose
 from companion.control.local_view import LocalView
-from companion.control.point_controller import PointController
+from companion.control.point_controller import PointController, turn_to
 from companion.control.reference_path import (
     STEP_M,
     ReferencePath,
@@ -217,6 +217,34 @@ def test_whatever_holds_it_it_is_sent_nowhere_where_it_would_overshoot_into_a_wa
         assert distance_m + beyond_m <= row / ground.map.subdivisions - HERE.north_m - ROVER.radius_m + 0.07
     else:
         assert wall_m < 2.0 or held_m_s > 0.0
+
+
+def beside_wall(wall_m: float) -> Ground:
+    """All ground is seen; a wall runs north so far east of the rover."""
+    ground = looked()
+    column = int((HERE.east_m + wall_m) * ground.map.subdivisions)
+    ground.map.log_odds[:] = -1.0
+    ground.map.log_odds[:, column : column + 4] = 3.0
+    return ground
+
+
+@pytest.mark.parametrize(("held_m_s", "brakes"), [(0.0, False), (0.5, True)])
+def test_one_that_is_held_does_not_turn_towards_a_wall_before_its_throttle_is_closed(held_m_s: float, brakes: bool):
+    moment = replace(view(beside_wall(1.2)), speed_m_s=0.2, held_m_s=held_m_s)
+    answer = turn_to(0.5 * math.pi, moment)
+    assert answer.purpose is (Purpose.BRAKE if brakes else Purpose.LOOK)
+    assert turn_to(-0.5 * math.pi, moment).purpose is Purpose.LOOK
+
+
+@pytest.mark.parametrize(("held_m_s", "brakes"), [(0.0, False), (0.5, True)])
+def test_one_that_is_held_brakes_before_a_wall_however_slow_it_is(held_m_s: float, brakes: bool):
+    ground = looked()
+    row = int((HERE.north_m + 1.2) * ground.map.subdivisions)
+    ground.map.log_odds[:] = -1.0
+    ground.map.log_odds[row : row + 4] = 3.0
+    moment = replace(view(ground), speed_m_s=0.2, held_m_s=held_m_s)
+    answer = PointController().follow(northward(ground), moment)
+    assert (answer.purpose is Purpose.BRAKE) == brakes
 
 
 def test_far_aside_it_turns_first():

@@ -77,6 +77,14 @@ def test_it_backs_out_as_far_as_the_settings_say() -> None:
     assert recovery.backing(view(ends_s, evidence)) is None
 
 
+def test_one_that_still_turns_stands_first_as_it_would_not_go_straight() -> None:
+    recovery, evidence = watching(), seen_map()
+    recovery.back_out(view(1.0, evidence), AHEAD)
+    assert recovery.backing(replace(view(1.0, evidence), yaw_rate_rad_s=-1.0)) == STANDSTILL
+    command = recovery.backing(replace(view(1.5, evidence), yaw_rate_rad_s=-0.2))
+    assert command is not None and command.speed_m_s > 0.0
+
+
 def test_without_room_behind_it_stands_and_that_is_all() -> None:
     recovery, evidence = watching(), seen_map()
     evidence.log_odds[:78] = 2.0

@@ -116,7 +116,7 @@ def test_places_are_asked_for_until_known_and_seldom_after() -> None:
     assert len(bench.commands(33.0, 512)) == 2
 
 
-QUIET = {65: 5.0, 147: 1.0, 162: 1.0}
+QUIET = {74: 10.0, 65: 5.0, 147: 1.0, 162: 1.0}
 """What is asked for again without a word."""
 
 
@@ -130,6 +130,7 @@ def feed_rates(bench: Bench, begin_s: float, end_s: float, rates_hz: dict[int, f
         33: lambda ms: bench.rover.pack(mavlink.MAVLink_global_position_int_message(ms, 1, 1, 0, 0, 0, 0, 0, 0)),
         1: lambda ms: bench.rover.pack(mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 12600, -1, -1, *[0] * 6)),
         193: lambda ms: bench.rover.pack(mavlink.MAVLink_ekf_status_report_message(831, 0, 0, 0, 0, 0)),
+        74: lambda ms: bench.rover.pack(mavlink.MAVLink_vfr_hud_message(0, 1, 90, ms % 100, 0, 0)),
         65: lambda ms: bench.rover.pack(mavlink.MAVLink_rc_channels_message(ms, 16, *[1500] * 18, 0)),
         147: lambda ms: bench.rover.pack(mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, ms, 0, 90)),
         162: lambda ms: bench.rover.pack(mavlink.MAVLink_fence_status_message(0, 0, 0, ms)),
@@ -188,7 +189,7 @@ def test_what_never_comes_is_asked_for_again_and_again(message_id: int) -> None:
 
 def test_that_the_sticks_are_never_seen_is_told_but_not_that_they_are_seen_seldom() -> None:
     bench = Bench()
-    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0, 147: 1.0, 162: 1.0}
+    steady = {0: 5.0, 30: 20.0, 32: 10.0, 33: 2.0, 193: 5.0, 1: 1.0, 74: 10.0, 147: 1.0, 162: 1.0}
     feed_rates(bench, 0.05, 10.0, {**steady, 65: 1.0})
     assert bench.link.rate_faults == ()
     feed_rates(bench, 10.0, 20.0, steady)

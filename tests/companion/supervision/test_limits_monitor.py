@@ -11,8 +11,11 @@ from companion.settings.live_settings import LiveSettings
 from companion.supervision.limits_monitor import TRIES, LimitsMonitor
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events import HeartbeatSeen, ParameterSeen
-from companion.vehicle.motion_limits import LIMITS
+from companion.vehicle.motion_limits import DRIVE, LIMITS
 from companion.vehicle.state import VehicleState, fold
+
+PLANS = tuple(dict.fromkeys((*LIMITS, *DRIVE)))
+"""What planned motions need."""
 
 
 class Asked:
@@ -48,18 +51,22 @@ def asked(controller: str, answers: tuple[str, ...], seconds: int = 30) -> Asked
 
 
 def test_each_limit_is_asked_for_until_it_is_known() -> None:
-    assert asked("motion-ga", LIMITS).names == list(LIMITS)
+    assert asked("motion-ga", PLANS).names == list(PLANS)
 
 
 def test_one_that_is_never_answered_is_asked_for_a_few_times_and_then_told() -> None:
-    found = asked("motion-ga", LIMITS[:-1])
-    assert found.names.count(LIMITS[0]) == 1 and found.names.count(LIMITS[-1]) == TRIES
+    found = asked("motion-ga", tuple(name for name in PLANS if name != "ATC_STR_RAT_MAX"))
+    assert found.names.count(LIMITS[0]) == 1 and found.names.count("ATC_STR_RAT_MAX") == TRIES
     assert found.said == ["The autopilot does not tell ATC_STR_RAT_MAX: taken to be no limit"]
-    several = asked("motion-ga", LIMITS[1:-1]).said
+    several = asked("motion-ga", PLANS[1:-2]).said
     assert several == [
-        "The autopilot does not tell ATC_ACCEL_MAX: taken to be as shipped; ATC_STR_RAT_MAX: taken to be no limit"
+        "The autopilot does not tell ATC_ACCEL_MAX, CRUISE_THROTTLE: taken to be as shipped; "
+        "ATC_STR_RAT_MAX: taken to be no limit"
     ]
 
 
-def test_without_planned_motions_they_are_not_needed() -> None:
-    assert asked("points", ()).names == []
+def test_without_planned_motions_only_what_its_throttle_does_is_needed() -> None:
+    assert asked("points", DRIVE).names == list(DRIVE)
+    assert asked("points", ()).said == [
+        "The autopilot does not tell CRUISE_SPEED, CRUISE_THROTTLE: taken to be as shipped"
+    ]

@@ -23,6 +23,7 @@ from companion.vehicle.events import (
     RangeSeen,
     TargetSeen,
     TextSeen,
+    ThrottleSeen,
 )
 from companion.vehicle.state import PARAMETERS_KEPT, EkfQuantity, VehicleState, fold
 
@@ -37,6 +38,7 @@ SCAN = RangeScan(1.0, np.full(1, np.pi), np.ones(1), 0.2, 8.0, 0.1, "behind")
         (LocalPositionSeen(1.0, 1.0, 2.0, 3.0, 0.0, 0.0), "position"),
         (AttitudeSeen(1.0, 1.0, 0.5, 0.1), "attitude"),
         (GlobalPositionSeen(1.0, 1.0, PLACE), "global_position"),
+        (ThrottleSeen(1.0, 0.4), "throttle"),
         (EkfStatusSeen(1.0, 831), "ekf"),
         (OriginSeen(1.0, PLACE), "origin"),
         (HomeSeen(1.0, PLACE), "home"),
