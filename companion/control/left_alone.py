@@ -83,7 +83,7 @@ class Rasters(NamedTuple):
 def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] | None:
     """The ways on which it may end, as it turns as told, less or more; None if it would never stand."""
     follows, off = view.following, view.following.off_model
-    latest_s = follows.dead_s * (1.0 + off)
+    latest_s = _latest_s(follows)
     tells = _tells(setpoint, view, latest_s)
     start = np.array((*_from_corner(view), view.pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s))
     ends_s = latest_s + view.settings.guidance.velocity_lasts_s
@@ -126,6 +126,11 @@ def _worst(follows: Following) -> Rover:
     return Rover(follows.gains_most_m_s2, brakes_m_s2, follows.turn_acceleration_rad_s2)
 
 
+def _latest_s(follows: Following) -> float:
+    """When a command has its effect at the latest, in whole steps: it lasts on from there, so later leads farther."""
+    return math.ceil(follows.dead_s * (1.0 + follows.off_model) / STEP_S - 1e-6) * STEP_S
+
+
 def _tells(setpoint: GuidedVelocity, view: LocalView, latest_s: float) -> NDArray[np.float64]:
     """From when on which speed and turn rate have their effect, one a row; the last one is the setpoint's.
 
@@ -163,11 +168,12 @@ def way_of(start, tells, ends_s, gain, rover):
         most = (rover.brakes_m_s2 if slows else rover.gains_m_s2) * STEP_S
         most_turn = rover.turns_rad_s2 * STEP_S
         speed = min(max(goes_m_s, speed - most), speed + most)
-        turn = min(max(turns_rad_s, turn - most_turn), turn + most_turn)
-        heading += 0.5 * turn * STEP_S
+        turned = min(max(turns_rad_s, turn - most_turn), turn + most_turn)
+        turns, turn = 0.5 * (turn + turned) * STEP_S, turned
+        heading += 0.5 * turns
         north += speed * STEP_S * math.cos(heading)
         east += speed * STEP_S * math.sin(heading)
-        heading += 0.5 * turn * STEP_S
+        heading += 0.5 * turns
         stands = middle_s >= ends_s and abs(speed) < STANDS_M_S and abs(turn) < STANDS_RAD_S
         if stands or (step + 1) % every == 0:
             places[count] = north, east, heading, speed

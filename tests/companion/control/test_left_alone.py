@@ -15,6 +15,8 @@ from shapely import affinity
 
 from companion.control.left_alone import Met, first_met, ways_left_alone
 from companion.control.local_view import LocalView
+from companion.control.motion_controller import ALONE_STEP_S, _latest, _pending, rover_model, worst_model
+from companion.control.motion_kernels import moved
 from companion.control.setpoint_check import fault_of
 from companion.control.told import ToldVelocity
 from companion.core.footprint import Footprint
@@ -221,3 +223,35 @@ def test_its_way_is_as_long_as_physics_makes_it(lasts_s: float) -> None:
     follows = at.following
     wanted_m = 1.3 * follows.dead_s + lasts_s + 0.5 / (0.7 * follows.deceleration_m_s2)
     assert ways[0][-1, 0] - MIDDLE == pytest.approx(wanted_m, abs=0.06)
+
+
+@runs(max_examples=200, deadline=None)
+@given(
+    st.lists(st.tuples(st.floats(-1.0, 2.0), st.floats(-1.5, 1.5)), max_size=10),
+    st.tuples(st.floats(-1.0, 2.0), st.floats(-1.5, 1.5)),
+    st.floats(0.0, 1.5),
+    st.floats(-1.5, 1.5),
+    st.sampled_from([0.1, 0.2, 0.33, 0.5]),
+)
+def test_it_leads_where_the_planning_thinks_though_reckoned_apart(
+    lately: list[tuple[float, float]], told: tuple[float, float], speed_m_s: float, turn_rad_s: float, dead_s: float
+) -> None:
+    """A last look that went another way would refuse what was planned well."""
+    moment = replace(
+        view(open_ground(), speed_m_s),
+        yaw_rate_rad_s=turn_rad_s,
+        lately=tuple(ToldVelocity(-0.05 * (len(lately) - i), *one) for i, one in enumerate(lately)),
+        settings=Settings.model_validate({"guidance": {"controller": "motion-ga"}}),
+    )
+    moment = replace(moment, following=moment.following._replace(dead_s=dead_s))
+    model = worst_model(rover_model(moment), moment.following)
+    pending = _pending(moment, _latest(moment), ALONE_STEP_S)
+    ways = ways_left_alone(GuidedVelocity(*told), moment)
+    off = moment.following.off_model
+    assert ways is not None
+    for way, gain in zip(ways, (1.0, 1.0 - off, 1.0 + off), strict=True):
+        state, planned = (MIDDLE, MIDDLE, 0.0, speed_m_s, turn_rad_s), []
+        for told_m_s, told_rad_s in [*pending, *[told] * 60, *[(0.0, 0.0)] * 200]:
+            state = moved(state, told_m_s, gain * told_rad_s, model, ALONE_STEP_S)
+            planned.append((state[1], state[0]))
+        assert np.hypot(*(way[-1, :2] - planned[-1])) < 0.02
