@@ -38,6 +38,8 @@ OFF_PATH_RADII = 1.0
 """A manoeuvre that ends farther from the path than this, in turning radii, is void."""
 TOUCH_M = 0.05
 """Room beside the rover's radius that is kept in any case."""
+NARROW_SHARE = 0.5
+"""With thin beams arcs are driven at this share of the speed that is allowed to a rover that drives straight."""
 LEFT_ALONE_M_S = 0.15
 """A rover that could only be left alone at less than this is not driven."""
 RATE_STEP_RAD_S = 0.02
@@ -255,6 +257,9 @@ class _Ways:
         speed_m_s = max(min(limit_m_s, bend_m_s, beside_m_s), slowest_m_s)
         if backwards:
             speed_m_s = min(speed_m_s, 2.0 * slowest_m_s)
+        if view.rover.narrow_sight:
+            # A velocity lasts for seconds, and thin beams do not look along arcs.
+            speed_m_s = min(speed_m_s, max(NARROW_SHARE * guidance.narrow_speed_m_s, LEFT_ALONE_M_S))
         speed_m_s = self._left_alone_m_s(speed_m_s, ahead.curvature_per_m, backwards=backwards)
         if speed_m_s <= 0.0:
             return self.brake()

@@ -88,9 +88,10 @@ def fastest_blind_m_s(distance_m: float, settings: GuidanceSettings) -> float:
     return a * (math.sqrt(t * t + 2.0 * max(distance_m, 0.0) / a) - t)
 
 
-def farthest_m(speed_m_s: float, settings: GuidanceSettings) -> float:
-    """How far away a guided target may lie, straight."""
-    return settings.horizon_m + stopping_distance_m(speed_m_s, settings)
+def farthest_m(speed_m_s: float, settings: GuidanceSettings, *, narrow: bool = False) -> float:
+    """How far away a guided target may lie, straight. ``narrow``: the sensor is single thin beams."""
+    horizon_m = min(settings.narrow_horizon_m, settings.horizon_m) if narrow else settings.horizon_m
+    return horizon_m + stopping_distance_m(speed_m_s, settings)
 
 
 def fastest_within_m(distance_m: float, settings: GuidanceSettings) -> float:

@@ -70,7 +70,7 @@ class _Search:
         settings, frame = view.settings.guidance, view.evidence.frame
         self._path, self._view = path, view
         self._last = min(len(path.points) - 1, path.progress + int(settings.horizon_m / STEP_M))
-        self._limit_m = farthest_m(view.speed_m_s, settings)
+        self._limit_m = farthest_m(view.speed_m_s, settings, narrow=view.rover.narrow_sight)
         self._ground = ground_at(view.evidence, view.pose)
         self._start = frame.xy(view.pose.point)
         # From the farthest on, in double steps, for speed.

@@ -51,7 +51,7 @@ def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fa
     settings, evidence = view.settings.guidance, view.evidence
     here, there = view.pose.point, setpoint.point
     distance_m = here.distance_m(there)
-    if not distance_m <= farthest_m(view.speed_m_s, settings) + SLACK_M:
+    if not distance_m <= farthest_m(view.speed_m_s, settings, narrow=view.rover.narrow_sight) + SLACK_M:
         return Reason(SetpointFault.BEYOND_HORIZON)
     overshoots_m = overshoot_m(distance_m, view.speed_m_s, settings) + view.further_m
     stands = here.moved(here.bearing_rad(there), distance_m + overshoots_m)

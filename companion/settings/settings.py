@@ -162,6 +162,11 @@ class GuidanceSettings(Section):
         description="added to the rover's radius with single thin beams: they see points of a wall, "
         "and the position drifts between readings",
     )
+    narrow_horizon_m: float = Field(
+        1.5,
+        gt=0.0,
+        description="`horizon_m` with single thin beams: a wall that they have missed may stand on a longer way",
+    )
     narrow_speed_m_s: float = Field(
         1.0, gt=0.0, description="maximum speed with single thin beams, which leave gaps unseen"
     )

@@ -254,4 +254,4 @@ def test_it_leads_where_the_planning_thinks_though_reckoned_apart(
         for told_m_s, told_rad_s in [*pending, *[told] * 60, *[(0.0, 0.0)] * 200]:
             state = moved(state, told_m_s, gain * told_rad_s, model, ALONE_STEP_S)
             planned.append((state[1], state[0]))
-        assert np.hypot(*(way[-1, :2] - planned[-1])) < 0.02
+        assert np.hypot(*(way[-1, :2] - planned[-1])) < 0.04
