@@ -1,6 +1,7 @@
 """The controller of a rover that cannot turn on the spot: arcs that it can drive, over ground that it knows."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -201,6 +202,14 @@ def test_what_comes_up_on_its_arc_stops_it_on_that_arc() -> None:
     assert now.purpose is Purpose.BRAKE
     assert isinstance(now.setpoint, GuidedVelocity) and now.setpoint.forward_m_s == 0.0
     assert now.setpoint.yaw_rate_rad_s == pytest.approx(car.curvature * max(car.speed_m_s, 1.0), abs=0.15)
+
+
+def test_with_thin_beams_arcs_are_slow() -> None:
+    beams, guidance = replace(ROVER, narrow_sight=True), SETTINGS.guidance
+    moment = replace(view(ground(), pose(time_s=1.0), 0.5), rover=beams)
+    told = ArcController().follow(path((0, 0), (15, 0)), moment)
+    assert 0.0 < told.speed_m_s <= 0.5 * guidance.narrow_speed_m_s
+    assert ArcController().follow(path((0, 0), (15, 0)), replace(moment, rover=ROVER)).speed_m_s > 1.0
 
 
 def test_slow_arcs_are_told_as_if_at_one_metre_a_second() -> None:

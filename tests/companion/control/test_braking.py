@@ -63,6 +63,10 @@ def test_steps_of_the_link_are_rounded_up_and_a_setting_may_ask_for_more() -> No
 def test_the_farthest_target_is_horizon_and_stopping_distance() -> None:
     guidance = SETTINGS.guidance
     assert farthest_m(2.0, guidance) == guidance.horizon_m + stopping_distance_m(2.0, guidance)
+    near_m = farthest_m(1.0, guidance, narrow=True)
+    assert near_m == guidance.narrow_horizon_m + stopping_distance_m(1.0, guidance) < farthest_m(1.0, guidance)
+    short = guidance.model_copy(update={"horizon_m": 1.0})
+    assert farthest_m(1.0, short, narrow=True) == farthest_m(1.0, short)
 
 
 @pytest.mark.parametrize(

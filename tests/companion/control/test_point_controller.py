@@ -219,6 +219,14 @@ def test_whatever_holds_it_it_is_sent_nowhere_where_it_would_overshoot_into_a_wa
         assert wall_m < 2.0 or held_m_s > 0.0
 
 
+def test_with_thin_beams_a_position_is_near_as_a_wall_that_they_missed_may_stand_on_the_way():
+    ground, beams = looked(), replace(ROVER, narrow_sight=True)
+    answer = PointController().follow(northward(ground), view(ground, rover=beams))
+    assert isinstance(answer.setpoint, GuidedPosition)
+    assert 1.0 < HERE.point.distance_m(answer.setpoint.point) <= SETTINGS.narrow_horizon_m + STEP_M
+    assert answer.speed_m_s <= SETTINGS.narrow_speed_m_s
+
+
 def beside_wall(wall_m: float) -> Ground:
     """All ground is seen; a wall runs north so far east of the rover."""
     ground = looked()

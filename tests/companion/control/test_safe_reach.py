@@ -55,9 +55,9 @@ def test_the_target_leaves_room_for_front_and_overshoot_before_what_was_not_seen
 def test_a_rover_that_the_ground_holds_gets_so_much_more_room_however_near_its_position_is() -> None:
     for seen_north_m in (8.0, 11.0):
         free = view(ground(seen_north_m))
-        held = replace(free, held_m_s=1.0)
+        held = replace(free, held_m_s=0.5)
         nearer_m = farthest_clear(NORTHWARD, free).distance_m - farthest_clear(NORTHWARD, held).distance_m
-        assert nearer_m == pytest.approx(1.0, abs=0.2)
+        assert nearer_m == pytest.approx(0.5 * GUIDANCE.held_overshoot_s, abs=0.2)
 
 
 def test_a_flank_that_was_not_seen_ends_it_however_far_away() -> None:
