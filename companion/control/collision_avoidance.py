@@ -23,7 +23,7 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from companion.control.braking import blind_distance_m
+from companion.control.braking import blind_distance_m, farthest_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.motion_prediction import (
@@ -335,7 +335,7 @@ def _aside(outlook: Outlook, bearing_rad: float) -> list[Option]:
     going_m_s = min(view.rover.cruise_speed_m_s, ASIDE_M_S)
     for aside_m in ASIDE_M:
         there = pose.point.moved(bearing_rad, aside_m)
-        if not _may_stand(view, there):
+        if aside_m > farthest_m(0.0, guidance, narrow=view.rover.narrow_sight) or not _may_stand(view, there):
             continue
         after_s = np.maximum(outlook.times_s - turns_s, 0.0)
         along_m = np.minimum(0.5 * guidance.deceleration_m_s2 * after_s**2, aside_m)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 
-from companion.control.braking import braking_distance_m, fastest_within_m, overshoot_m, stopping_distance_m
+from companion.control.braking import braking_distance_m, farthest_m, fastest_within_m, overshoot_m, stopping_distance_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, Points, ReferencePath
@@ -113,7 +113,7 @@ class PointController:
             needed_m + (settings.brake_on_m if self._braking else 0.0), distance_m - 0.1
         ):
             return stop_for(Purpose.BRAKE)
-        wanted_m = settings.least_reach_m if self._looking_rad is None else settings.reach_after_look_m
+        wanted_m = settings.least_reach_m if self._looking_rad is None else _reach_after_look_m(view)
         if reach.distance_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach.distance_m > 0.0):
             if self._looking_rad is not None and not _is_turned_to(self._looking_rad, pose, settings):
                 return turn_to(self._looking_rad, view)
@@ -226,6 +226,13 @@ def _would_touch_turning(view: LocalView, bearing_rad: float) -> bool:
 
 def _is_turned_to(bearing_rad: float, pose: Pose, settings: GuidanceSettings) -> bool:
     return abs(wrap_pi_rad(bearing_rad - pose.heading_rad)) <= math.radians(settings.turned_deg)
+
+
+def _reach_after_look_m(view: LocalView) -> float:
+    """With how much clear way ahead a rover that has looked sets off; with thin beams none is longer."""
+    settings = view.settings.guidance
+    longest_m = farthest_m(0.0, settings, narrow=view.rover.narrow_sight)
+    return min(settings.reach_after_look_m, longest_m - STEP_M)
 
 
 def _look_or_blocked(path: ReferencePath, view: LocalView) -> ControlCommand:

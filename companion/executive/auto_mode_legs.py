@@ -6,6 +6,7 @@ Nouns: legs of AUTO.
 from __future__ import annotations
 
 from companion.control.controller import ControlCommand, Purpose
+from companion.control.local_view import LocalView
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_executor import MissionExecutor
@@ -48,14 +49,19 @@ class AutoModeLegs:
             self._begin(leg, executor)
         return self._leg is None and executor.progress.ended
 
-    def guide(self, wanted: ControlCommand, executor: MissionExecutor, slow_m_s: float) -> ControlCommand:
-        """What to do. Once the target is reached, the autopilot may want the rover nearer (a small WP_RADIUS)."""
+    def guide(self, wanted: ControlCommand, executor: MissionExecutor, view: LocalView) -> ControlCommand:
+        """What to do. Once the target is reached, the autopilot may want the rover nearer (a small WP_RADIUS).
+
+        A rover that the ground holds waits until its throttle is closed.
+        """
         progress = executor.progress
         if self._leg is None or wanted.purpose is not Purpose.STAND or progress.phase is not MissionPhase.STAY:
             return wanted
         if progress.statuses[progress.index] is not TargetStatus.REACHED:
             return wanted
-        return ControlCommand(Purpose.DRIVE, GuidedPosition(progress.goal.point), slow_m_s)
+        if view.further_m > 0.0:
+            return wanted
+        return ControlCommand(Purpose.DRIVE, GuidedPosition(progress.goal.point), view.settings.guidance.min_speed_m_s)
 
     def _begin(self, leg: GuidedLeg, executor: MissionExecutor) -> None:
         index = _index_of(leg.point, executor)

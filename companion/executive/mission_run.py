@@ -179,7 +179,7 @@ class MissionRun:
         view = replace(view, held_m_s=held_m_s, told=told, lately=self._lately)
         executor.learn(view)
         wanted = executor.guide(task, self.vehicle, view)
-        wanted = self.legs.guide(wanted, executor, self._settings.current.guidance.min_speed_m_s)
+        wanted = self.legs.guide(wanted, executor, view)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
 
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:

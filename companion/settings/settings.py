@@ -164,7 +164,7 @@ class GuidanceSettings(Section):
     )
     narrow_horizon_m: float = Field(
         1.5,
-        gt=0.0,
+        ge=1.0,
         description="`horizon_m` with single thin beams: a wall that they have missed may stand on a longer way",
     )
     narrow_speed_m_s: float = Field(

@@ -1,6 +1,7 @@
 """Making way: before what crosses, for what comes straight on, and not for what is no danger."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,15 +9,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from companion.control.collision_avoidance import CollisionAvoidance, Option, avoided, first_near, least_room_m
-from companion.control.controller import ControlCommand, Purpose
+from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.local_view import LocalView
 from companion.control.motion_prediction import Points
 from companion.control.reference_path import ReferencePath
+from companion.control.setpoint_check import fault_of
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.mapping.evidence_map import EvidenceMap, integrate, new_map
+from companion.mission.bounds import Bounds
 from companion.perception.moving_obstacles import Moving
 from companion.settings import Settings
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
@@ -99,6 +102,18 @@ def test_it_moves_aside_for_what_comes_straight_at_it() -> None:
     # And it keeps to the side it has chosen.
     again = avoided(standing, PATH, view(0.0), (towards,), aside_rad=option.aside_rad)
     assert again.aside_rad == option.aside_rad
+
+
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.3])
+def test_with_thin_beams_it_is_told_no_place_aside_that_the_last_look_refuses(speed_m_s: float) -> None:
+    """Turned aside already, it is told to drive there."""
+    towards = Moving("m", 100.0, NedPoint(26.0, 20.0), -1.5, 0.0, 0.5)
+    east = replace(HERE, heading_rad=0.5 * math.pi)
+    moment = view(speed_m_s, pose=east)
+    moment = replace(moment, rover=replace(moment.rover, narrow_sight=True))
+    option = avoided(stop_for(Purpose.STAND), None, moment, (towards,), aside_rad=0.5 * math.pi)
+    assert isinstance(option.command.setpoint, GuidedPosition)
+    assert fault_of(option.command.setpoint, moment, Bounds()) is None
 
 
 def test_it_backs_off_between_walls() -> None:

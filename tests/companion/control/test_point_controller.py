@@ -227,6 +227,27 @@ def test_with_thin_beams_a_position_is_near_as_a_wall_that_they_missed_may_stand
     assert answer.speed_m_s <= SETTINGS.narrow_speed_m_s
 
 
+@pytest.mark.parametrize("bend_deg", [30.0, 60.0, 90.0])
+@pytest.mark.parametrize("lead_m", [0.5, 0.75, 1.0, 1.25])
+@pytest.mark.parametrize("from_deg", [-120.0, 0.0, 60.0, 180.0])
+def test_with_thin_beams_it_sets_off_round_a_bend_once_it_has_looked(bend_deg: float, lead_m: float, from_deg: float):
+    """It stands, all ground is seen, and what is near makes it turn before it drives."""
+    ground, beams, controller = beside_wall(-1.6), replace(ROVER, narrow_sight=True), PointController()
+    bend_rad, steps = math.radians(bend_deg), np.arange(0.0, 8.0, STEP_M)
+    after_m = np.maximum(steps - lead_m, 0.0)
+    north_m = HERE.north_m + np.minimum(steps, lead_m) + after_m * math.cos(bend_rad)
+    path = ReferencePath(np.column_stack((north_m, HERE.east_m + after_m * math.sin(bend_rad))))
+    heading_rad = math.radians(from_deg)
+    for tick in range(160):
+        pose = replace(HERE, heading_rad=heading_rad, time_s=0.05 * tick)
+        setpoint = controller.follow(path, view(ground, pose, rover=beams)).setpoint
+        if isinstance(setpoint, GuidedPosition):
+            return
+        if isinstance(setpoint, GuidedHeading):
+            heading_rad += min(max(wrap_pi_rad(setpoint.heading_rad - heading_rad), -0.06), 0.06)
+    pytest.fail("it looks to and fro")
+
+
 def beside_wall(wall_m: float) -> Ground:
     """All ground is seen; a wall runs north so far east of the rover."""
     ground = looked()

@@ -151,10 +151,13 @@ def test_a_leg_that_was_reached_before_auto_ends_it_stays_reached(tmp_path: Path
     served.follow(live)
     progress = served.executor.progress
     served.executor.progress = on_reached(progress, 10.0)
-    nearer = served.legs.guide(STANDSTILL, served.executor, 0.5)
+    at = served.executor.view(served.run.vehicle, 10.0)
+    nearer = served.legs.guide(STANDSTILL, served.executor, at)
     assert nearer.setpoint == GuidedPosition(progress.goal.point) and nearer.speed_m_s == 0.5
+    held = replace(at, held_m_s=0.5)
+    assert served.legs.guide(STANDSTILL, served.executor, held) == STANDSTILL, "until its throttle is closed"
     braking = ControlCommand(Purpose.BRAKE, STOP, 0.0)
-    assert served.legs.guide(braking, served.executor, 0.5) == braking, "it makes way"
+    assert served.legs.guide(braking, served.executor, at) == braking, "it makes way"
     assert served.follow(replace(live, state=LegState.OVER))
     assert served.executor.progress.statuses == (TargetStatus.REACHED,)
 

@@ -83,7 +83,7 @@ def test_values_agree_with_pymavlink() -> None:
     flags = [m.flags for m in theirs if m.get_type() == "EKF_STATUS_REPORT"]
     assert [e.flags for e in events if isinstance(e, EkfStatusSeen)] == flags
     shares = [m.throttle / 100.0 for m in theirs if m.get_type() == "VFR_HUD"]
-    assert [e.share for e in events if isinstance(e, ThrottleSeen)] == shares and max(shares, default=1.0) > 0.1
+    assert [e.share for e in events if isinstance(e, ThrottleSeen)] == shares and max(shares) > 0.1
     targets = [m for m in theirs if m.get_type() == "POSITION_TARGET_GLOBAL_INT"]
     assert [(e.point.lat_deg, e.point.lon_deg, e.type_mask) for e in events if isinstance(e, TargetSeen)] == [
         (m.lat_int / 1e7, m.lon_int / 1e7, m.type_mask) for m in targets
