@@ -24,7 +24,7 @@ from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import LinkError, open_link
 from companion.settings import SettingsError
-from companion.vehicle.motion_limits import LIMITS
+from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
 from companion.vehicle.survey import Survey
 
 STEP_S = 0.05
@@ -91,7 +91,8 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None)
     if seen.rover_heard:
         version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"
         console.print(f"rover: system {seen.system}{version}, on {seen.place}", soft_wrap=True, markup=False)
-        if known := {name: seen.parameters[name] for name in LIMITS if name in seen.parameters}:
+        names = dict.fromkeys((*LIMITS, *THROTTLE_SCALE))
+        if known := {name: seen.parameters[name] for name in names if name in seen.parameters}:
             limits = ", ".join(f"{name} {value:g}" for name, value in known.items())
             console.print(f"limits: {limits}", soft_wrap=True, markup=False)
         if estimate is not None and estimate.known > 0.0:

@@ -10,27 +10,16 @@ Nouns: drag watch.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 
 from companion.control.local_view import LocalView
 from companion.vehicle.events import ThrottleSeen
-from companion.vehicle.motion_limits import CRUISE, CRUISE_THROTTLE
 
 SLACK_M_S = 0.3
 """A rover on firm ground is so much slower than its throttle says: it is read in whole per cent, and late."""
 FORGOTTEN_S = 0.5
-STALE_S = 1.0
+"""What it was held by falls off with this time constant: the throttle is read ten times a second."""
+STALE_S = 0.5
 """An older reading of the throttle says nothing."""
-CRUISE_M_S, CRUISE_PERCENT = 2.0, 50.0
-"""``CRUISE_SPEED`` and ``CRUISE_THROTTLE`` as ArduRover is shipped."""
-
-
-def full_throttle_m_s(parameters: Mapping[str, float]) -> float:
-    """How fast the rover goes on firm ground with its throttle fully open: 100 CRUISE_SPEED / CRUISE_THROTTLE."""
-    speed_m_s, percent = parameters.get(CRUISE, 0.0), parameters.get(CRUISE_THROTTLE, 0.0)
-    if speed_m_s <= 0.0 or percent <= 0.0:
-        speed_m_s, percent = CRUISE_M_S, CRUISE_PERCENT
-    return 100.0 * speed_m_s / percent
 
 
 class DragWatch:

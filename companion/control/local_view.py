@@ -17,6 +17,7 @@ from companion.settings import Settings
 from companion.vehicle.commands import Setpoint
 
 MOST_FURTHER_M = 3.0
+"""No rover shoots farther: its throttle closes meanwhile."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

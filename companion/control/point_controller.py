@@ -205,7 +205,7 @@ def _turn_first_rad(close: bool, turning: bool, settings: GuidanceSettings) -> f
 
 
 def _would_touch(view: LocalView, needed_m: float) -> bool:
-    """Whether the rover, going straight on, would touch something before it could stop."""
+    """Whether the rover, going straight on, would touch something before it could stop; slow or not, if it is held."""
     pose = view.pose
     if view.speed_m_s <= view.settings.guidance.roll_out_m_s and view.further_m < SHOOTS_M:
         return False

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.vehicle.events import RoverMode
-from companion.vehicle.motion_limits import LIMITS
+from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE, full_throttle_m_s
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
 from companion.vehicle.survey import Survey
@@ -19,6 +19,8 @@ FIRMWARE = (4, 7)
 ROVER, BOAT = 10, 11
 ARDUPILOT = 3
 LOST_SHARE = 0.1
+UNLIKELY = 4.0
+"""A rover is not driven at less than a fourth of what it could."""
 EKF_UNINITIALISED, EKF_GPS_GLITCH = 1024, 32768
 MAVLINK_SOURCE = 2
 """PRX1_TYPE that takes OBSTACLE_DISTANCE."""
@@ -44,7 +46,7 @@ PARAMETERS = (
     "RNGFND1_TYPE",
     "FS_GCS_ENABLE",
     "FENCE_ENABLE",
-    *LIMITS,
+    *dict.fromkeys((*LIMITS, *THROTTLE_SCALE)),
     *STICKS,
     *STATIONS,
 )
@@ -307,8 +309,26 @@ def guided(seen: Survey) -> Iterator[Finding]:
         how = "slowly" if jerk_m_s3 < wanted_m_s3 else "abruptly"
         says = f"The rover begins and ends its way to a target {how}; the companion was tried with {wanted_m_s3:g}."
         yield to_set("wp-jerk", Level.NOTE, says, "WP_JERK", jerk_m_s3, wanted_m_s3)
+    yield from throttle(seen)
     if seen.parameters.get("WP_SPEED") == 0.0:
         yield to_set("wp-speed", Level.WARN, "Guided speed is left to CRUISE_SPEED.", "WP_SPEED", 0.0, 2.0)
+
+
+def throttle(seen: Survey) -> Iterator[Finding]:
+    """Whether the throttle's scale can be right: by it the companion notices ground that holds the rover."""
+    known = {name: seen.parameters[name] for name in THROTTLE_SCALE if name in seen.parameters}
+    wanted_m_s = seen.parameters.get("WP_SPEED", 0.0) or known.get("CRUISE_SPEED", 0.0)
+    if len(known) < len(THROTTLE_SCALE) or wanted_m_s <= 0.0:
+        return
+    full_m_s = full_throttle_m_s(known)
+    if min(known.values()) > 0.0 and wanted_m_s <= full_m_s <= UNLIKELY * wanted_m_s:
+        return
+    says = (
+        f"By CRUISE_SPEED {known['CRUISE_SPEED']:g} the rover drives {full_m_s:.1f} m/s with full throttle. If it does "
+        "not, ground that holds it back is not noticed, or firm ground is taken for such and it drives slowly."
+    )
+    remedy = "set both to what it drives on firm ground; ArduRover learns them (RCx_OPTION 50)"
+    yield Finding("cruise-throttle", Level.WARN, says, remedy, "CRUISE_THROTTLE", known["CRUISE_THROTTLE"])
 
 
 def guarded(seen: Survey) -> Iterator[Finding]:

@@ -12,7 +12,7 @@ from enum import Enum, auto
 import numpy as np
 
 from companion.control.controller import STANDSTILL, ControlCommand
-from companion.control.drag import DragWatch, full_throttle_m_s
+from companion.control.drag import DragWatch
 from companion.control.setpoint_check import SetpointCheck
 from companion.control.told import Told, after
 from companion.core.frames import Pose
@@ -32,6 +32,7 @@ from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, Wait
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import Command, SetMode
 from companion.vehicle.events import RoverMode
+from companion.vehicle.motion_limits import full_throttle_m_s
 from companion.vehicle.state import VehicleState
 
 MakeExecutor = Callable[[MissionLayout, MissionProgress, RangeScan], MissionExecutor]

@@ -13,7 +13,7 @@ from companion.safety.watchdogs import Monitor
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events import Event
-from companion.vehicle.motion_limits import CHANGES, CRUISE_THROTTLE, DRIVE, LIMITS
+from companion.vehicle.motion_limits import CHANGES, CRUISE_THROTTLE, LIMITS, THROTTLE_SCALE
 from companion.vehicle.state import VehicleState
 
 ASK_S = 1.0
@@ -21,7 +21,7 @@ TRIES = 10
 
 
 class LimitsMonitor(Monitor):
-    """Never a reason not to drive: what is not answered is assumed to be as shipped, and that is told."""
+    """Never a reason not to drive: what is not answered is assumed, and that is told."""
 
     def __init__(self, autopilot: AutopilotLink, settings: LiveSettings, notifier: TextSink) -> None:
         self._notifier = notifier
@@ -37,7 +37,7 @@ class LimitsMonitor(Monitor):
     def tick(self, now_s: float) -> None:
         """Ask for what is not known, each second, a few times; then tell that it is assumed."""
         plans = self._settings.current.guidance.controller != "points"
-        needed = dict.fromkeys((*LIMITS, *DRIVE) if plans else DRIVE)
+        needed = dict.fromkeys((*LIMITS, *THROTTLE_SCALE) if plans else THROTTLE_SCALE)
         missing = [name for name in needed if name not in self._vehicle.parameters]
         if not missing or self._vehicle.heartbeat is None or self._told:
             return
@@ -53,7 +53,7 @@ class LimitsMonitor(Monitor):
 
 
 def _not_told(missing: list[str], *, plans: bool) -> str:
-    """What is assumed instead. ``plans``: the names are of limits, too."""
+    """What is assumed instead. Where motions are planned (``plans``), most of the names are of limits."""
     shipped = [name for name in missing if name in (*CHANGES, CRUISE_THROTTLE) or not plans]
     others = [name for name in missing if name not in shipped]
     parts = [f"{', '.join(shipped)}: taken to be as shipped"] if shipped else []

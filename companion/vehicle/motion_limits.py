@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 ACCELERATION, DECELERATION, TURN_ACCELERATION = "ATC_ACCEL_MAX", "ATC_DECEL_MAX", "ATC_STR_ACC_MAX"
 """m/s², m/s² (0: the one before) and degrees/s²; 0: without a limit."""
 FASTEST, CRUISE, TURN_RATE = "WP_SPEED", "CRUISE_SPEED", "ATC_STR_RAT_MAX"
@@ -10,5 +12,18 @@ CRUISE_THROTTLE = "CRUISE_THROTTLE"
 """Per cent with which it drives at ``CRUISE_SPEED`` on firm ground."""
 CHANGES = (ACCELERATION, DECELERATION, TURN_ACCELERATION)
 LIMITS = (*CHANGES, FASTEST, CRUISE, TURN_RATE)
-DRIVE = (CRUISE, CRUISE_THROTTLE)
+THROTTLE_SCALE = (CRUISE, CRUISE_THROTTLE)
 """What tells how fast the rover drives with which throttle."""
+CRUISE_M_S, CRUISE_PERCENT = 2.0, 50.0
+"""Both as ArduRover is shipped."""
+
+
+def full_throttle_m_s(parameters: Mapping[str, float]) -> float:
+    """How fast the rover goes on firm ground with its throttle fully open: 100 CRUISE_SPEED / CRUISE_THROTTLE.
+
+    Where either is not known or 0, both are taken to be as shipped.
+    """
+    speed_m_s, percent = (parameters.get(name, 0.0) for name in THROTTLE_SCALE)
+    if speed_m_s <= 0.0 or percent <= 0.0:
+        speed_m_s, percent = CRUISE_M_S, CRUISE_PERCENT
+    return 100.0 * speed_m_s / percent

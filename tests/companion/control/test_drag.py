@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import pytest
 
-from companion.control.drag import FORGOTTEN_S, SLACK_M_S, STALE_S, DragWatch, full_throttle_m_s
+from companion.control.drag import FORGOTTEN_S, SLACK_M_S, STALE_S, DragWatch
 from companion.control.local_view import MOST_FURTHER_M
 from companion.core.frames import Pose
 from companion.vehicle.events import ThrottleSeen
+from companion.vehicle.motion_limits import full_throttle_m_s
 from tests.companion.control.test_safe_reach import SETTINGS, ground, view
 
 FULL_M_S = 4.0

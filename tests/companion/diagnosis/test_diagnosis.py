@@ -35,7 +35,7 @@ WELL_SET = {
     "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0, "GUID_OPTIONS": 0.0, "GUID_TIMEOUT": 3.0, "WP_RADIUS": 1.0, "WP_SPEED": 2.0,
     "WP_JERK": 3.0, "PRX1_TYPE": 0.0, "RNGFND1_TYPE": 0.0, "FS_GCS_ENABLE": 1.0, "FENCE_ENABLE": 0.0,
     "ATC_ACCEL_MAX": 1.0, "ATC_DECEL_MAX": 0.0, "ATC_STR_ACC_MAX": 120.0, "ATC_STR_RAT_MAX": 120.0, "CRUISE_SPEED": 2.0,
-    "MAV_GCS_SYSID": 255.0, "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0,
+    "CRUISE_THROTTLE": 50.0, "MAV_GCS_SYSID": 255.0, "RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0,
 }  # fmt: skip
 WELL = Survey(
     place="memory",
@@ -86,6 +86,9 @@ CASES: list[tuple[str, Level, Survey]] = [
     ("wp-radius", W, with_set(WP_RADIUS=3.0)),
     ("wp-jerk", N, with_set(WP_JERK=0.0)),
     ("wp-jerk", N, with_set(WP_JERK=20.0)),
+    ("cruise-throttle", W, with_set(CRUISE_SPEED=3.0, CRUISE_THROTTLE=25.0)),
+    ("cruise-throttle", W, with_set(CRUISE_SPEED=1.0, CRUISE_THROTTLE=75.0)),
+    ("cruise-throttle", W, with_set(CRUISE_SPEED=3.0, CRUISE_THROTTLE=0.0)),
     ("guard", N, with_state(guard=None)),
     ("wp-speed", W, with_set(WP_SPEED=0.0)),
     ("echo", N, with_set(PRX1_TYPE=2.0)),

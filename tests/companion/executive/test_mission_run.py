@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +15,7 @@ from companion.executive.mission_run import LocatedScan, MissionRun, Order, Stop
 from companion.safety.mode_latch import Reaction, Verdict
 from companion.safety.reasons import Activity, Doubt, EndReason, Reason, RunPhase, WaitReason
 from companion.vehicle.commands import GuidedPosition, SetMode
-from companion.vehicle.events import RoverMode
+from companion.vehicle.events import RoverMode, ThrottleSeen
 from tests.support.desk import Desk
 
 DRIVE = Verdict(Reaction.DRIVE)
@@ -63,14 +64,15 @@ def test_a_mission_that_drives_speaks_setpoints_that_were_checked(tmp_path: Path
     assert desk.run.setpoint_check.refused.total() == 0
 
 
-def test_positions_come_nearer_once_the_ground_holds_the_rover(tmp_path: Path) -> None:
-    """Told to drive, and standing for five seconds; what was not sent does not count."""
+def test_positions_come_nearer_where_the_throttle_is_open_and_the_rover_stands(tmp_path: Path) -> None:
+    """By CRUISE_SPEED and CRUISE_THROTTLE firm ground would let it go at 1.6 m/s."""
     ways_m = {}
-    for spoken in (True, False):
+    for share in (0.0, 0.4):
         desk = Desk(tmp_path, '[[target]]\nname = "north"\nfield = [2, 14]\n')
         desk.begin()
+        parameters = {"CRUISE_SPEED": 2.0, "CRUISE_THROTTLE": 50.0}
         places_m = []
-        for tick in range(100):
+        for tick in range(20):
             desk.clock.time_s += 0.05
             seen = desk.stand(0.0, 0.0)
             pose = seen.pose_at(desk.now_s)
@@ -78,14 +80,16 @@ def test_positions_come_nearer_once_the_ground_holds_the_rover(tmp_path: Path) -
             if tick < 3:
                 desk.run.map([LocatedScan(pose, 0.0, seen.scan.scan)])
                 evidence = desk.executor.evidence
-                evidence.log_odds[round((7.5 + 6.0) / evidence.evidence_m) :] = 0.0  # unseen from 6 m on
+                evidence.log_odds[round((7.5 + 3.5) / evidence.evidence_m) :] = 0.0  # unseen from 3.5 m on
+            throttle = ThrottleSeen(desk.now_s, share if tick > 10 else 0.0)
+            desk.run.vehicle = replace(desk.run.vehicle, throttle=throttle, parameters=parameters)
             command = desk.run.guide(desk.run.decide(DRIVE, desk.now_s), desk.now_s)
             assert isinstance(command, ControlCommand)
-            desk.run.speak(command if spoken else None, desk.now_s)
+            desk.run.speak(command, desk.now_s)
             if isinstance(command.setpoint, GuidedPosition):
                 places_m.append(pose.point.distance_m(command.setpoint.point))
-        ways_m[spoken] = places_m[-1] - places_m[0]
-    assert ways_m[True] < -0.8 and ways_m[False] == pytest.approx(0.0, abs=0.05)
+        ways_m[share] = places_m[-1] - places_m[0]
+    assert ways_m[0.4] < -0.8 and ways_m[0.0] == pytest.approx(0.0, abs=0.05)
 
 
 @pytest.mark.parametrize("stands", ["stopped", "ending"])

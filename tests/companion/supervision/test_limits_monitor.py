@@ -11,10 +11,10 @@ from companion.settings.live_settings import LiveSettings
 from companion.supervision.limits_monitor import TRIES, LimitsMonitor
 from companion.vehicle.commands import ReadParameter
 from companion.vehicle.events import HeartbeatSeen, ParameterSeen
-from companion.vehicle.motion_limits import DRIVE, LIMITS
+from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
 from companion.vehicle.state import VehicleState, fold
 
-PLANS = tuple(dict.fromkeys((*LIMITS, *DRIVE)))
+PLANS = tuple(dict.fromkeys((*LIMITS, *THROTTLE_SCALE)))
 """What planned motions need."""
 
 
@@ -66,7 +66,7 @@ def test_one_that_is_never_answered_is_asked_for_a_few_times_and_then_told() -> 
 
 
 def test_without_planned_motions_only_what_its_throttle_does_is_needed() -> None:
-    assert asked("points", DRIVE).names == list(DRIVE)
+    assert asked("points", THROTTLE_SCALE).names == list(THROTTLE_SCALE)
     assert asked("points", ()).said == [
         "The autopilot does not tell CRUISE_SPEED, CRUISE_THROTTLE: taken to be as shipped"
     ]
