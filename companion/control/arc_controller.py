@@ -40,6 +40,12 @@ TOUCH_M = 0.05
 """Room beside the rover's radius that is kept in any case."""
 NARROW_SHARE = 0.5
 """With thin beams arcs are driven at this share of the speed that is allowed to a rover that drives straight."""
+NARROW_ROOM_M = 0.15
+"""With thin beams this room is kept beside the radius of a rover that is left alone: its position is off by more."""
+GAP_M = 0.7
+"""Thin beams leave gaps in a wall: unseen ground that is nearer to an obstacle than this may be wall."""
+BESIDE_GAP_M_S = 0.2
+"""A rover that would come beside such ground, left alone, is driven at no more than this."""
 LEFT_ALONE_M_S = 0.15
 """A rover that could only be left alone at less than this is not driven."""
 RATE_STEP_RAD_S = 0.02
@@ -286,16 +292,20 @@ class _Ways:
         guidance, steering = self.view.settings.guidance, self.view.settings.steering
         course_rad = self._course_rad(backwards=backwards)
         rate, now_m_s = self._turn_rate(curvature_per_m), abs(self.rolling.speed_m_s)
-        room_m, speed_m_s = self._room_m(TOUCH_M), wanted_m_s
+        narrow = self.view.rover.narrow_sight
+        room_m, speed_m_s = self._room_m(NARROW_ROOM_M if narrow else TOUCH_M), wanted_m_s
         while speed_m_s > LEFT_ALONE_M_S:
             reach_m = blind_distance_m(max(speed_m_s, now_m_s), guidance) + TOUCH_M
+            gap_m = GAP_M if narrow and speed_m_s > BESIDE_GAP_M_S else 0.0
             free_m = math.inf
             for arc_m_s in (now_m_s, speed_m_s):
                 arc_per_m = rate / max(arc_m_s, steering.scale_base_m_s)
-                free_m = min(free_m, self._arcs.arc_clear_m(course_rad, arc_per_m, room_m, reach_m, Until.UNSEEN))
+                arc_m = self._arcs.arc_clear_m(course_rad, arc_per_m, room_m, reach_m, Until.UNSEEN, gap_m)
+                free_m = min(free_m, arc_m)
             if free_m >= reach_m - 1e-6:
                 return speed_m_s
-            speed_m_s = min(speed_m_s - 0.1, fastest_blind_m_s(free_m - TOUCH_M, guidance))
+            slower_m_s = min(speed_m_s - 0.1, fastest_blind_m_s(free_m - TOUCH_M, guidance))
+            speed_m_s = max(slower_m_s, BESIDE_GAP_M_S) if gap_m > 0.0 else slower_m_s
         return 0.0
 
     def _turn_rate(self, curvature_per_m: float) -> float:

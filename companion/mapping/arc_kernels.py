@@ -100,19 +100,45 @@ def kept_room(ground: Any, x: float, y: float, room: float, least: float) -> flo
 
 
 @njit(cache=True, nogil=True)
+def is_beside_gap(ground: Any, x: float, y: float, room: float, gap: float) -> bool:
+    """Whether ground within ``room`` has not been seen and has an obstacle nearer than ``gap``: a wall may go on there.
+
+    With a ``gap`` of 0 nothing does.
+    """
+    if gap <= 0.0:
+        return False
+    for cy in range(int(math.floor(y - room)), int(math.floor(y + room)) + 1):
+        for cx in range(int(math.floor(x - room)), int(math.floor(x + room)) + 1):
+            middle_x, middle_y = cx + 0.5, cy + 0.5
+            if math.hypot(middle_x - x, middle_y - y) > room or not is_unseen(ground, middle_x, middle_y):
+                continue
+            if nearest(ground.log_odds, middle_x, middle_y, gap, ground.occupied_at) < gap:
+                return True
+    return False
+
+
+@njit(cache=True, nogil=True)
 def arc_clear(
-    ground: Any, x: float, y: float, course: float, curvature: float, room: float, length: float, stop_at: int
+    ground: Any,
+    x: float,
+    y: float,
+    course: float,
+    curvature: float,
+    room: float,
+    length: float,
+    stop_at: int,
+    gap: float,
 ) -> float:
     """How far the rover can go on an arc before it stands on a place of kind ``stop_at`` (UNSEEN or BLOCKED) or worse.
 
-    At most ``length``. ``course``: direction of travel.
+    At most ``length``. ``course``: direction of travel. ``gap``: see ``is_beside_gap``; it does not stand there either.
     """
     gone = 0.0
     while gone < length:
         step = min(STEP_CELLS, length - gone)
         middle = course + 0.5 * curvature * step
         x, y, course = x + step * math.sin(middle), y + step * math.cos(middle), course + curvature * step
-        if place(ground, x, y, room) >= stop_at:
+        if place(ground, x, y, room) >= stop_at or is_beside_gap(ground, x, y, room, gap):
             return gone
         gone += step
     return gone

@@ -134,16 +134,26 @@ class ArcQueries:
         return self._frame.metres(kept_room(self._ground, self._x, self._y, wanted, least))
 
     def arc_clear_m(
-        self, course_rad: float, curvature_per_m: float, room_m: float, length_m: float, until: Until
+        self,
+        course_rad: float,
+        curvature_per_m: float,
+        room_m: float,
+        length_m: float,
+        until: Until,
+        gap_m: float = 0.0,
     ) -> float:
         """How far the rover can go on an arc with so much room round its middle, at most ``length_m``.
 
         ``course_rad``: direction of travel. ``curvature_per_m``: clockwise positive, as seen in the direction of
-        travel.
+        travel. ``gap_m``: ground within the room that has not been seen ends it too, if an obstacle is nearer to that
+        ground than this.
         """
         frame = self._frame
         curvature, room, length = frame.per_cell(curvature_per_m), frame.cells(room_m), frame.cells(length_m)
-        return frame.metres(arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, length, int(until)))
+        stop_at, gap = int(until), frame.cells(gap_m)
+        return frame.metres(
+            arc_clear(self._ground, self._x, self._y, course_rad, curvature, room, length, stop_at, gap)
+        )
 
     def arc_is_clear(
         self, course_rad: float, curvature_per_m: float, room_m: float, length_m: float, until: Until

@@ -56,7 +56,7 @@ class Motors(StrEnum):
 
 HEAD = ("mission", "drives", "deaths", "touched", "run into", "ended", "person")
 CONTACT_HEAD = ("drive", "seed", "at s", "N m", "E m", "m/s", "with", "s after a death")
-TIME_LIMIT_S = 1800.0
+TIME_LIMIT_S = 3600.0
 LIVES_S = (2.0, 20.0)
 """A companion lives for so long, drawn evenly, from the moment at which it leads the rover."""
 ABSENT_S = (1.0, 8.0)

@@ -212,6 +212,17 @@ def test_with_thin_beams_arcs_are_slow() -> None:
     assert ArcController().follow(path((0, 0), (15, 0)), replace(moment, rover=ROVER)).speed_m_s > 1.0
 
 
+def test_with_thin_beams_it_creeps_where_a_wall_has_a_gap() -> None:
+    """Two pieces of a wall were seen, and what lies between was not: it may be wall."""
+    moment = replace(view(ground(), pose(0.0, 0.0, -0.03, 1.0), 0.3), rover=replace(ROVER, narrow_sight=True))
+    pieces: Boxes = [(20.4, 20.75, 20.6, 21.0), (21.6, 20.75, 21.8, 21.0)]
+    gap: Boxes = [(20.6, 20.375, 21.6, 20.5)]
+    way = path((0, -0.03), (8, -0.03))
+    for seen, unseen, most_m_s in ((pieces, gap, 0.2), (pieces, [], 0.5), ([], gap, 0.5)):
+        told = ArcController().follow(way, replace(moment, evidence=ground(seen, unseen))).speed_m_s
+        assert told == pytest.approx(most_m_s), (seen, unseen)
+
+
 def test_slow_arcs_are_told_as_if_at_one_metre_a_second() -> None:
     """Below MOT_SPD_SCA_BASE ArduRover drives only the share of a turn rate that the speed is of it."""
     turned = np.linspace(0.0, 4.0, 100)

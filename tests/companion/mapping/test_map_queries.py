@@ -138,6 +138,22 @@ def test_an_arc_ends_at_unseen_ground_only_if_asked_to() -> None:
     assert arcs.arc_clear_m(0.0, 0.0, RADIUS_M, 12.0, Until.BLOCKED) == pytest.approx(8.0, abs=0.13), "the edge"
 
 
+@pytest.mark.parametrize("corner", CORNERS)
+def test_an_arc_ends_beside_unseen_ground_that_is_near_an_obstacle(corner: NedPoint) -> None:
+    """0.3 m east of the way is unseen ground, and an obstacle is 1 m away from the nearest of it."""
+    evidence = seen_map(corner)
+    here = at(corner, 4.0, 8.06)
+    arcs = ArcQueries(evidence, Pose(here.north_m, here.east_m, 0.0, 0.0))
+    put(evidence, 8.0, 8.3, 0.0)
+    put(evidence, 8.0, 9.3)
+
+    def clear_m(gap_m: float) -> float:
+        return arcs.arc_clear_m(0.0, 0.0, RADIUS_M, 7.0, Until.UNSEEN, gap_m)
+
+    assert clear_m(0.0) == clear_m(0.8) == pytest.approx(7.0)
+    assert clear_m(1.1) == pytest.approx(4.0 - RADIUS_M, abs=0.25)
+
+
 def test_closed_fields_end_an_arc_but_not_the_one_that_the_rover_stands_in() -> None:
     evidence = seen_map()
     here = Pose(8.5, 8.5, 0.0, 0.0)
