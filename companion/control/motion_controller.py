@@ -1,7 +1,8 @@
 """Controller that plans motions: each tick a motion planner finds what to do next, and its beginning is told.
 
 It is told only as long as the rover may be left alone with it: held for as long as a velocity lasts
-(``guidance.velocity_lasts_s``), and braked then, the rover stays on ground that is free and seen.
+(``guidance.velocity_lasts_s``), and braked then, the rover stays on ground that is free and seen. Without a guard
+that is slow, and where the way ahead is straight and wide a position takes its place (``position_ahead``).
 
 Nouns: motion controller.
 """
@@ -30,6 +31,7 @@ from companion.control.motion_kernels import (
     way_of,
 )
 from companion.control.motion_planners import Found, MotionPlanner
+from companion.control.position_ahead import PositionAhead
 from companion.control.reference_path import Points, ReferencePath
 from companion.control.told import ToldVelocity, in_force
 from companion.core.footprint import Footprint
@@ -65,13 +67,17 @@ PLANNED_SHARE = 0.8
 
 @dataclass(frozen=True, eq=False, slots=True)
 class MotionChoice:
-    """What was judged in one tick, and what was told then. Places: metres east and north of ``corner``."""
+    """What was judged in one tick, and what was told then. Places: metres east and north of ``corner``.
+
+    ``ahead``: told in its place, as it leads on faster.
+    """
 
     time_s: float
     problem: MotionProblem
     found: Found
     told: ToldVelocity
     corner: NedPoint
+    ahead: ControlCommand | None = None
 
 
 class MotionController:
@@ -81,6 +87,7 @@ class MotionController:
         places_m, radius_m = footprint.discs()
         self._body = Body(places_m, radius_m, float(np.abs(places_m).max()) + radius_m)
         self._planner = planner
+        self._position = PositionAhead()
         self._window: Window | None = None
         self._looked_s = self._time_s = -math.inf
         self.choice: MotionChoice | None = None
@@ -93,8 +100,8 @@ class MotionController:
         return path
 
     def foreseen(self, path: ReferencePath, view: LocalView, times_s: Points) -> Points | None:
-        """The motion that was chosen, as told, and then on along the path."""
-        if self.choice is None or self.choice.time_s != view.pose.time_s:
+        """The motion that was chosen, as told, and then on along the path; None while a position leads along it."""
+        if self.choice is None or self.choice.time_s != view.pose.time_s or self.choice.ahead is not None:
             return None
         motion, problem, corner = self.choice.found.motion.copy(), self.choice.problem, self.choice.corner
         motion[0] = self.choice.told.speed_m_s, self.choice.told.turn_rad_s
@@ -113,10 +120,11 @@ class MotionController:
     def reset(self) -> None:
         """The path is void, and what was planned along it."""
         self._planner.forget()
+        self._position = PositionAhead()
         self._window = None
 
     def follow(self, path: ReferencePath, view: LocalView) -> ControlCommand:
-        """The beginning of the best motion, or of a slower one, or to brake."""
+        """The beginning of the best motion, or of a slower one, or to brake; or a position that leads on faster."""
         now_s, model = view.pose.time_s, rover_model(view)
         self.backwards = view.rolls_back
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
@@ -133,7 +141,10 @@ class MotionController:
         found = self._planner.plan(problem, passed_s)
         told = self._safe(found.motion[0], view, worst)
         assert self._window is not None
-        self.choice = MotionChoice(now_s, problem, found, told, self._window.corner)
+        ahead = self._position.faster_than(told.speed_m_s, path, view)
+        self.choice = MotionChoice(now_s, problem, found, told, self._window.corner, ahead)
+        if ahead is not None:
+            return ahead
         if abs(told.speed_m_s) < 1e-6:
             if view.speed_m_s > STANDS_M_S:
                 return ControlCommand(Purpose.BRAKE, GuidedVelocity(0.0, told.turn_rad_s), 0.0)

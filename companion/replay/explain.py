@@ -255,6 +255,8 @@ def motion_lines(choice: MotionChoice) -> list[str]:
         f"chosen: cost {choice.found.cost_s:.2f} s; told: {told.speed_m_s:.2f} m/s, "
         f"{math.degrees(told.turn_rad_s):.0f} deg/s"
     )
+    if choice.ahead is not None:
+        lines.append(f"a position ahead was told in its place: it leads on faster, at {choice.ahead.speed_m_s:.2f} m/s")
     return lines
 
 

@@ -75,11 +75,12 @@ def driven(mission: Mission, limit_s: float) -> tuple[float, list[str]]:
     return came_m, [text for text in drive.companion.outcome.said if "uarded" in text]
 
 
-def test_it_is_told_at_the_start_and_lets_planned_motions_be_faster(guarded: Mission) -> None:
+def test_it_is_told_at_the_start(guarded: Mission) -> None:
+    """On open ground the rover comes as far without it: positions lead there (narrow ground: test_barn.py)."""
     assert guarded.sitl is not None
     came_m, said = driven(guarded, UNDER_WAY_S)
     alone_m, nothing = driven(replace(guarded, sitl=replace(guarded.sitl, parameters=None)), UNDER_WAY_S)
-    assert came_m > 1.1 * alone_m > 5.0, "in the same time"
+    assert came_m > 5.0 and alone_m > 0.85 * came_m, "in the same time"
     assert len(said) == 1 and nothing == []
 
 

@@ -22,7 +22,7 @@ from companion.core.rover_limits import RoverLimits
 from companion.mapping.distance_field import distance_field
 from companion.mapping.evidence_map import EvidenceMap
 from companion.settings import Settings
-from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+from companion.vehicle.commands import GuidedPosition, GuidedVelocity, Setpoint
 from tests.companion.control.test_motion_ground import PATH, ground, wall
 
 FOOTPRINT = Footprint.rectangle(0.6, 0.4)
@@ -58,8 +58,7 @@ def driven(
         at = replace(at, yaw_rate_rad_s=turn, lately=lately, rolls_back=speed < 0.0)
         path = advanced(path, at.pose)
         setpoint = leads.follow(path, at).setpoint
-        assert isinstance(setpoint, GuidedVelocity)
-        told.append((setpoint.forward_m_s, setpoint.yaw_rate_rad_s))
+        told.append(_as_velocity(setpoint, at.pose))
         lately = after(lately, setpoint, now_s)
         model = rover_model(at)
         model = model._replace(
@@ -72,6 +71,15 @@ def driven(
         least_m = min(least_m, clearance_m(gap_m, evidence.evidence_m, body, state[0], state[1], state[2]))
         left_m = NedPoint(state[1], state[0]).distance_m(PATH.end)
     return left_m, least_m, now_s
+
+
+def _as_velocity(setpoint: Setpoint, pose: Pose) -> tuple[float, float]:
+    """What the autopilot makes of it: to a position as fast as it can stop there, turning to it within a second."""
+    if isinstance(setpoint, GuidedVelocity):
+        return setpoint.forward_m_s, setpoint.yaw_rate_rad_s
+    assert isinstance(setpoint, GuidedPosition)
+    aside_rad = math.remainder(pose.point.bearing_rad(setpoint.point) - pose.heading_rad, 2.0 * math.pi)
+    return min(2.0, math.sqrt(pose.point.distance_m(setpoint.point))), min(max(aside_rad, -1.0), 1.0)
 
 
 def posts(seed: int) -> EvidenceMap:
@@ -95,6 +103,26 @@ def test_it_gets_through_posts_and_touches_none_whatever_the_rover_is(gain: floa
 def test_without_a_guard_it_goes_slower_and_touches_nothing_either() -> None:
     guarded, strict = driven(posts(1), 1), driven(posts(1), 1, settings=STRICT)
     assert strict[1] > 0.0 and strict[2] > guarded[2]
+
+
+def test_without_a_guard_a_position_leads_where_the_way_is_straight_and_wide() -> None:
+    """It ends by itself, so that the rover may go faster than with a velocity that goes on for three seconds."""
+    walled, pose = ground(), Pose(3.0, 10.0, 0.0, 1.0)
+    wall(walled, 9.0, 0.0, 20.0)
+    guarded = controller().follow(PATH, view(walled, pose, 1.0))
+    strict, moment = controller(), view(walled, pose, 1.0, STRICT)
+    ahead = strict.follow(PATH, moment)
+    assert isinstance(guarded.setpoint, GuidedVelocity) and isinstance(ahead.setpoint, GuidedPosition)
+    assert ahead.purpose is Purpose.DRIVE and ahead.speed_m_s > 1.5
+    assert strict.choice is not None and strict.choice.ahead is ahead
+    assert strict.choice.told.speed_m_s < ahead.speed_m_s - 0.3
+    assert strict.foreseen(PATH, moment, np.array([0.0, 1.0])) is None, "it follows the path"
+
+
+def test_on_open_ground_it_is_there_as_soon_without_a_guard() -> None:
+    guarded, strict = driven(ground(), 0), driven(ground(), 0, settings=STRICT)
+    assert guarded[0] < 0.5 and strict[0] < 0.5
+    assert strict[2] < 1.15 * guarded[2]
 
 
 def test_it_stops_before_ground_that_was_not_seen() -> None:

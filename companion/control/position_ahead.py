@@ -1,0 +1,59 @@
+"""Position ahead: without a guard a guided position may lead on faster than any velocity that may be told.
+
+A velocity goes on for seconds after the last word; a position ends by itself. So where a position straight ahead may
+be told that the rover drives to faster, it is told that position, chosen as ``PointController`` does.
+
+Nouns: position ahead.
+"""
+
+from __future__ import annotations
+
+import math
+
+from companion.control.braking import fastest_within_m
+from companion.control.controller import ControlCommand, Purpose
+from companion.control.local_view import LocalView
+from companion.control.point_controller import PointController
+from companion.control.reference_path import ReferencePath
+from companion.core.frames import wrap_pi_rad
+from companion.vehicle.commands import GuidedPosition
+
+LONG_S = 1.0
+"""Where a velocity lasts no longer, because a guard ends it, motions are as fast as positions."""
+MOST_ASIDE_RAD = math.radians(20.0)
+"""A place farther aside is no place ahead: the rover would turn for it."""
+LEAST_M = 1.0
+"""Nor is one that is nearer."""
+BEGINS_M_S, GOES_ON_M_S = 0.3, 0.1
+"""A position must be faster by this than the velocity, and by the second once positions lead."""
+
+
+class PositionAhead:
+    """Remembers whether positions lead, and what ``PointController`` does."""
+
+    def __init__(self) -> None:
+        self._points = PointController()
+        self._leads = False
+
+    def faster_than(self, speed_m_s: float, path: ReferencePath, view: LocalView) -> ControlCommand | None:
+        """The command with a position on which the rover gets faster than this; None where there is none."""
+        wanted_m_s = speed_m_s + (GOES_ON_M_S if self._leads else BEGINS_M_S)
+        command = self._ahead(wanted_m_s, path, view)
+        self._leads = command is not None
+        return command
+
+    def _ahead(self, wanted_m_s: float, path: ReferencePath, view: LocalView) -> ControlCommand | None:
+        guidance, pose = view.settings.guidance, view.pose
+        if guidance.velocity_lasts_s <= LONG_S or view.rolls_back:
+            return None
+        command = self._points.follow(path, view)
+        if command.purpose is not Purpose.DRIVE or not isinstance(command.setpoint, GuidedPosition):
+            return None
+        place = command.setpoint.point
+        aside_rad, distance_m = (
+            wrap_pi_rad(pose.point.bearing_rad(place) - pose.heading_rad),
+            pose.point.distance_m(place),
+        )
+        if distance_m < LEAST_M or abs(aside_rad) > MOST_ASIDE_RAD:
+            return None
+        return command if min(command.speed_m_s, fastest_within_m(distance_m, guidance)) > wanted_m_s else None
