@@ -8,6 +8,7 @@ Nouns: LockstepClock, Drive.
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
@@ -33,13 +34,32 @@ from sitl.simulator import Simulator
 TRACK_PERIOD_S = 0.5
 
 
-class LockstepClock:
-    """The simulator's clock; sleeping exchanges bytes and advances the world."""
+class _Way:
+    """One way of the link: bytes arrive so much later than they were sent."""
 
-    def __init__(self, simulator: Simulator, vehicle_end: SimLink, companion_end: MemoryLink) -> None:
+    def __init__(self, late_s: float) -> None:
+        self._late_s = late_s
+        self._under_way: deque[tuple[float, bytes]] = deque()
+
+    def passed(self, now_s: float, sent: bytes) -> bytes:
+        """What arrives now."""
+        self._under_way.append((now_s + self._late_s, sent))
+        arrived = b""
+        while self._under_way and self._under_way[0][0] <= now_s + 1e-9:
+            arrived += self._under_way.popleft()[1]
+        return arrived
+
+
+class LockstepClock:
+    """The simulator's clock; sleeping exchanges bytes and advances the world. ``late_s``: of the link, each way."""
+
+    def __init__(
+        self, simulator: Simulator, vehicle_end: SimLink, companion_end: MemoryLink, late_s: float = 0.0
+    ) -> None:
         self._simulator = simulator
         self._vehicle_end = vehicle_end
         self._companion_end = companion_end
+        self._up, self._down = _Way(late_s), _Way(late_s)
         self._now_s = simulator.time_s
         self.overhear: Callable[[float, bytes], None] | None = None
         """Called with the time to which the world advances, and the bytes that the companion has written."""
@@ -55,9 +75,9 @@ class LockstepClock:
         said = self._companion_end.read()
         if self.overhear is not None:
             self.overhear(time_s, said)
-        self._vehicle_end.receive(said)
+        self._vehicle_end.receive(self._up.passed(self._now_s, said))
         self._simulator.advance_to_s(time_s)
-        self._companion_end.write(self._vehicle_end.take())
+        self._companion_end.write(self._down.passed(time_s, self._vehicle_end.take()))
         if self._vehicle_end.dropped:
             # The autopilot has rebooted: connect again at once.
             self._vehicle_end = self._simulator.connect(name="companion")
@@ -138,6 +158,8 @@ class Drive:
     time_limit_s: float = 3600.0
     checkpointer: Checkpointer | None = None
     """Saves the companion's state."""
+    late_s: float = 0.0
+    """So long each message takes over the link, each way."""
 
     def __post_init__(self) -> None:
         self.report = Report(self.seed)
@@ -151,7 +173,7 @@ class Drive:
     def _start_companion(self) -> None:
         near, far = MemoryLink.pair()
         self._link = self.simulator.connect(name="companion")
-        self.clock = LockstepClock(self.simulator, self._link, far)
+        self.clock = LockstepClock(self.simulator, self._link, far, self.late_s)
         codec = Codec(self.settings.link)
         autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder)
         self.companion = Companion(

@@ -15,7 +15,7 @@ from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, writable, written
 from companion.mapping.map_files import MapError
 from companion.settings import Settings
 from companion.settings.versions import made_with
-from sitl.experiments.experiment import Checked, Experiment, ExperimentError, ExperimentReport, Options
+from sitl.experiments.experiment import OFF_MODEL, Checked, Experiment, ExperimentError, ExperimentReport, Options
 
 EXPERIMENTS = (
     "adaptive-control-points",
@@ -38,6 +38,7 @@ EXPERIMENTS = (
 ON_ANY_MAP = ("navigation", "driving")
 OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
 WITH_CONTROLLERS = ("barn", "controllers", "gates", "killed-companion", "missions")
+WITH_MISMATCH = ("barn", "controllers", "gates", "missions")
 WITH_GUARD = ("killed-companion", "missions")
 EXIT_FAILED = 3
 LINES = 10
@@ -88,6 +89,18 @@ def experiment(
     guard: Annotated[
         bool, typer.Option("--guard", help="killed-companion, missions: with the guard on the autopilot.")
     ] = False,
+    off: Annotated[
+        float,
+        typer.Option(
+            min=0.0, max=0.9, help=f"{', '.join(WITH_MISMATCH)}: so far the rover is off its model, at most: a share."
+        ),
+    ] = OFF_MODEL,
+    late: Annotated[
+        float,
+        typer.Option(
+            min=0.0, max=2.0, help=f"{', '.join(WITH_MISMATCH)}: seconds that a message takes over the link, each way."
+        ),
+    ] = 0.0,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
         Path | None,
@@ -106,9 +119,11 @@ def experiment(
         writable(json_file)
         writable(docs and docs / "results.md")
         _refuse_unused(name, planners=planners, world=world, maps=maps)
-        _refuse_unused_motion(name, worlds=worlds, controllers=controllers, setups=setups, guard=guard)
-        leads, driven = _names(controllers), _names(setups)
-        options = Options(runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, leads, driven, guard)
+        options = Options(
+            runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, _names(controllers), _names(setups),
+            guard, off, late,
+        )  # fmt: skip
+        _refuse_unused_motion(name, options)
         report = _with_progress(name, options, console)
         _put_out(report, console, json_file, docs)
         if isinstance(report, Checked) and report.failure:
@@ -134,17 +149,21 @@ def _refuse_unused(name: str, *, planners: str, world: list[Path] | None, maps: 
         raise ExperimentError(f"--maps: {name} draws the paper's own environments, it reads no maps")
 
 
-def _refuse_unused_motion(name: str, *, worlds: Path | None, controllers: str, setups: str, guard: bool) -> None:
+def _refuse_unused_motion(name: str, options: Options) -> None:
     """The same, of the options about motion. Raises ExperimentError."""
-    if worlds and name != "barn":
+    if options.archive and name != "barn":
         raise ExperimentError(f"--worlds: {name} does not take it; the option is for barn")
-    if setups and name != "barn":
+    if options.setups and name != "barn":
         raise ExperimentError(f"--setups: {name} does not take it; the option is for barn")
-    if controllers and name not in WITH_CONTROLLERS:
-        takers = f"{', '.join(WITH_CONTROLLERS[:-1])} and {WITH_CONTROLLERS[-1]}"
-        raise ExperimentError(f"--controllers: {name} does not take it; the option is for {takers}")
-    if guard and name not in WITH_GUARD:
-        raise ExperimentError(f"--guard: {name} does not take it; the option is for {' and '.join(WITH_GUARD)}")
+    for option, is_given, takers in (
+        ("--controllers", bool(options.controllers), WITH_CONTROLLERS),
+        ("--guard", options.guard, WITH_GUARD),
+        ("--off", options.off != OFF_MODEL, WITH_MISMATCH),
+        ("--late", options.late_s > 0.0, WITH_MISMATCH),
+    ):
+        if is_given and name not in takers:
+            listed = f"{', '.join(takers[:-1])} and {takers[-1]}"
+            raise ExperimentError(f"{option}: {name} does not take it; the option is for {listed}")
 
 
 def _with_progress(name: str, options: Options, console: Console) -> ExperimentReport:

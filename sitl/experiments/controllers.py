@@ -18,6 +18,7 @@ from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
 from sitl.experiments.experiment import (
     CONTROLLERS,
+    OFF_MODEL,
     POINTS,
     Advance,
     ExperimentReport,
@@ -26,7 +27,7 @@ from sitl.experiments.experiment import (
     each,
 )
 from sitl.experiments.narrow_grounds import GroundKind, NarrowGround, drawn
-from sitl.experiments.off_model import OFF_MODEL, off_model, parameters_for
+from sitl.experiments.off_model import off_model, parameters_for
 from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
 from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
@@ -81,7 +82,7 @@ def mission_on(ground: NarrowGround, controller: str, seed: int) -> Mission:
     return Mission(f"{ground.kind} {seed}", (Target("goal", place, 0.0, OnBlocked.SKIP),), grid, ROVER, sitl=sitl)
 
 
-def drive(kind: GroundKind, controller: str, seed: int, off: float = OFF_MODEL) -> GroundDrive:
+def drive(kind: GroundKind, controller: str, seed: int, off: float = OFF_MODEL, late_s: float = 0.0) -> GroundDrive:
     """One drive. ``off``: the rover differs by up to this share from what the companion takes it for."""
     ground = drawn(kind, seed)
     mission = mission_on(ground, controller, seed)
@@ -89,7 +90,7 @@ def drive(kind: GroundKind, controller: str, seed: int, off: float = OFF_MODEL) 
     parameters = {**parameters_for(ROVER, controller), **limits}
     start = SimStart(*ground.start_m, np.pi / 2.0, SOMEWHERE)
     scenario = Scenario(ground.world, start, SENSORS, outline_of(ROVER), parameters, drivetrain=drivetrain)
-    run = Drive(mission, scenario, settings_for(controller), seed, NullRecorder(), TIME_LIMIT_S)
+    run = Drive(mission, scenario, settings_for(controller), seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report = run.run()
     reached = run.companion.outcome.complete and report.outcome in (DriveOutcome.REACHED, DriveOutcome.COLLISION)
     return GroundDrive(controller, kind, seed, reached, report.collisions, report.refused, report.driving_time_s)
@@ -130,7 +131,7 @@ class ControllersReport(ExperimentReport):
 
 Random grounds of three kinds, {self.options.runs} of each: clutter, rooms with doors, a yard with fences and gates
 (doors and gates of 1.3 to 2 m). A rover of {ROVER.radius_m:g} m radius at {SPEED_M_S:g} m/s with `{SENSORS}`, whose
-speed, lag, turn rate and limits are off by up to {100.0 * OFF_MODEL:.0f} % from what the companion takes them for.
+speed, lag, turn rate and limits are {self.options.mismatch}.
 `{POINTS}` drives on the way of `{REFERENCE_PLANNER}` on fields of {POINTS_RESOLUTION_M:g} m; the others plan motions,
 on the way of the navigator as shipped, with the guard on the autopilot. *refused*: setpoints that the last look
 replaced by a stop; *pairs*: grounds on which this controller and `{POINTS}` reach the goal; *mean s*, *points s*: their
@@ -175,7 +176,7 @@ def run(options: Options, advance: Advance) -> ControllersReport:
     chosen = chosen_controllers(options, CONTROLLERS)
     names = dict.fromkeys((POINTS, *chosen))
     tasks = [
-        (kind, name, seed)
+        (kind, name, seed, options.off, options.late_s)
         for name in names
         for kind in GroundKind
         for seed in range(options.seed, options.seed + options.runs)

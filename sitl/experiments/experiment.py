@@ -30,6 +30,8 @@ POINTS: ControllerKind = "points"
 CONTROLLERS: tuple[ControllerKind, ...] = get_args(ControllerKind)
 GUARD = {"SCR_ENABLE": 1.0, "SCR_USER1": 300.0}
 """The guard on the autopilot puts HOLD so many milliseconds after the companion's last packet."""
+OFF_MODEL = 0.3
+"""So far a rover is off what the companion takes it for, at most, unless it is said."""
 START, TARGET = Cell(0, 24), Cell(98, 24)
 """Section 5 of Kwasniewski & Gosiewski 2018; all maps are 100 x 50 fields."""
 
@@ -60,6 +62,10 @@ class Options:
     """``barn``: what is driven; none: the experiment's own choice."""
     guard: bool = False
     """The autopilot has the guard, for experiments in which that is to be chosen."""
+    off: float = OFF_MODEL
+    """So far the rover is off its model, at most: a share."""
+    late_s: float = 0.0
+    """So long each message takes over the link, each way."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""
@@ -67,8 +73,21 @@ class Options:
         chosen += f" --controllers {','.join(self.controllers)}" if self.controllers else ""
         chosen += f" --setups {','.join(self.setups)}" if self.setups else ""
         chosen += " --guard" if self.guard else ""
+        chosen += "" if self.off == OFF_MODEL else f" --off {self.off:g}"
+        chosen += f" --late {self.late_s:g}" if self.late_s else ""
         chosen += f" --worlds {self.archive.name}" if self.archive else ""
         return f"rover-sitl experiment {name} --runs {self.runs} --seed {self.seed}{chosen} --docs docs"
+
+    @property
+    def usual(self) -> bool:
+        """Whether the rover is as far off its model as usual, over a link without delay."""
+        return self.off == OFF_MODEL and self.late_s == 0.0
+
+    @property
+    def mismatch(self) -> str:
+        """What is not as the companion expects it, in words."""
+        late = f", and each message takes {self.late_s:g} s over the link, each way" if self.late_s else ""
+        return f"off by up to {100.0 * self.off:.0f} % from what the companion takes them for{late}"
 
 
 def chosen_controllers(options: Options, otherwise: tuple[ControllerKind, ...]) -> tuple[ControllerKind, ...]:
@@ -88,8 +107,9 @@ class ExperimentReport(ABC):
 
     @property
     def section_name(self) -> str:
-        """Of its section there."""
-        return self.name
+        """Of its section there. One with another rover or link than usual stands beside the usual one."""
+        options: Options | None = getattr(self, "options", None)
+        return self.name if options is None or options.usual else f"{self.name}-off-model"
 
     @abstractmethod
     def tables(self) -> list[Table]:

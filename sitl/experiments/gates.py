@@ -13,8 +13,8 @@ from companion.core.footprint import Footprint
 from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
 from companion.recording.recorder import NullRecorder
 from companion.settings.settings_file import parse_settings
-from sitl.experiments.experiment import Advance, ExperimentReport, Options, chosen_controllers, each
-from sitl.experiments.off_model import OFF_MODEL, off_model, parameters_for
+from sitl.experiments.experiment import OFF_MODEL, Advance, ExperimentReport, Options, chosen_controllers, each
+from sitl.experiments.off_model import off_model, parameters_for
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
@@ -62,7 +62,9 @@ def world_of(width_m: float, angle_deg: float, aside_m: float) -> World:
     return World(solid, FINE_M)
 
 
-def drive(controller: str, width_m: float, angle_deg: float, seed: int, off: float = OFF_MODEL) -> GateDrive:
+def drive(
+    controller: str, width_m: float, angle_deg: float, seed: int, off: float = OFF_MODEL, late_s: float = 0.0
+) -> GateDrive:
     """One drive from one side of the wall to the other."""
     rng = np.random.default_rng((seed, 53))
     world = world_of(width_m, angle_deg, float(rng.uniform(-ASIDE_M, ASIDE_M)))
@@ -75,7 +77,7 @@ def drive(controller: str, width_m: float, angle_deg: float, seed: int, off: flo
     parameters = {**parameters_for(ROVER, controller), **limits}
     scenario = Scenario(world, start, SENSORS, outline_of(ROVER), parameters, drivetrain=drivetrain)
     settings = parse_settings({"guidance": {"controller": controller}}, NAME)
-    run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S)
+    run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report = run.run()
     reached = run.companion.outcome.complete and report.outcome in (DriveOutcome.REACHED, DriveOutcome.COLLISION)
     return GateDrive(controller, width_m, angle_deg, seed, reached, report.collisions, report.driving_time_s)
@@ -119,9 +121,9 @@ class GatesReport(ExperimentReport):
 
 A wall across a yard of {SIDE_M:g} m with one gap, straight on and turned by 30 and 60 degrees, up to {ASIDE_M:g} m
 beside the line to the goal. The rover's outline is {size},
-with `{SENSORS}`, at 2 m/s; it is off its model by up to {100.0 * OFF_MODEL:.0f} %, and the mission has nothing but a
-target. Planned motions have the guard on the autopilot. Drives of {self.options.runs} that reached the goal, all
-contacts, and the mean driving time:
+with `{SENSORS}`, at 2 m/s. Its speed, lag, turn rate and limits are {self.options.mismatch}.
+The mission has nothing but a target. Planned motions have the guard on the autopilot. Drives of
+{self.options.runs} that reached the goal, all contacts, and the mean driving time:
 
 {markdown_table(HEAD, self._rows())}
 """
@@ -130,7 +132,7 @@ contacts, and the mean driving time:
 def run(options: Options, advance: Advance) -> GatesReport:
     """Every controller through every gate."""
     tasks = [
-        (name, width_m, angle_deg, seed)
+        (name, width_m, angle_deg, seed, options.off, options.late_s)
         for name in chosen_controllers(options, ("motion-ga",))
         for width_m in WIDTHS_M
         for angle_deg in ANGLES_DEG

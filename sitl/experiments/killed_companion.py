@@ -54,6 +54,11 @@ class Motors(StrEnum):
     EAGER = "eager"
 
 
+TITLE_ENDS = {
+    NAME: "",
+    f"{NAME}-guarded": ", with the guard",
+    f"{NAME}-strict": ", with planned motions and no guard",
+}
 HEAD = ("mission", "drives", "deaths", "touched", "run into", "ended", "person")
 CONTACT_HEAD = ("drive", "seed", "at s", "N m", "E m", "m/s", "with", "s after a death")
 TIME_LIMIT_S = 3600.0
@@ -205,7 +210,14 @@ class KilledReport(ExperimentReport):
     @property
     def section_name(self) -> str:
         """See ``ExperimentReport``."""
-        return f"{NAME}-guarded" if self.options.guard else NAME
+        if self.options.guard:
+            return f"{NAME}-guarded"
+        return f"{NAME}-strict" if self._planned else NAME
+
+    @property
+    def _planned(self) -> int:
+        """Deaths in drives in which motions were planned."""
+        return sum(len(drive.deaths) for drive in self.drives if drive.controller != POINTS)
 
     def tables(self) -> list[Table]:
         """One for each suite of sensors, and one of contacts."""
@@ -254,13 +266,12 @@ class KilledReport(ExperimentReport):
         deaths = sum(len(drive.deaths) for drive in self.drives)
         touched, run_into = sum(d.touched for d in self.drives), sum(d.run_into for d in self.drives)
         guard = f"The guard on the autopilot waits {GUARD['SCR_USER1']:g} ms.\n\n" if self.options.guard else ""
-        planned = sum(len(drive.deaths) for drive in self.drives if drive.controller != POINTS)
-        if planned:
-            guard += f"""Motions were planned in the drives with {planned} of these deaths; with thin beams and on arcs
-`{POINTS}` leads the rover whatever is asked for.
+        if self._planned:
+            guard += f"""Motions were planned in the drives with {self._planned} of these deaths;
+with thin beams and on arcs `{POINTS}` leads the rover whatever is asked for.
 
 """
-        return f"""## A companion that is killed and resumed{", with the guard" if guard else ""}
+        return f"""## A companion that is killed and resumed{TITLE_ENDS[self.section_name]}
 
 `{self.options.command(NAME)}`
 

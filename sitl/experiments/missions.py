@@ -15,7 +15,17 @@ from companion.recording.recorder import NullRecorder
 from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
 from sitl.experiments.dead_companion import STOOD_M_S, SUITES, shipped, with_suite
-from sitl.experiments.experiment import GUARD, POINTS, Advance, ExperimentReport, Options, chosen_controllers, each
+from sitl.experiments.experiment import (
+    GUARD,
+    OFF_MODEL,
+    POINTS,
+    Advance,
+    ExperimentReport,
+    Options,
+    chosen_controllers,
+    each,
+)
+from sitl.experiments.off_model import off_model
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
@@ -47,14 +57,28 @@ class MissionDrive:
     """From the first movement to the last."""
 
 
-def drive(mission: Mission, controller: ControllerKind, seed: int, guarded: bool) -> MissionDrive:
-    """One drive. ``guarded``: with the guard on the autopilot."""
+def drive(
+    mission: Mission,
+    controller: ControllerKind,
+    seed: int,
+    guarded: bool,
+    off: float = OFF_MODEL,
+    late_s: float = 0.0,
+) -> MissionDrive:
+    """One drive. ``guarded``: with the guard on the autopilot.
+
+    ``off``: a rover that turns on the spot differs by up to this share from what the companion takes it for.
+    ``late_s``: so long each message takes over the link, each way.
+    """
     suite = str(mission.sitl.sensors) if mission.sitl is not None else ""
     scenario = scenario_from_mission(mission)
+    if mission.rover.turning_radius_m <= 0.0:
+        drivetrain, limits = off_model(np.random.default_rng((seed, 54)), off)
+        scenario = replace(scenario, drivetrain=drivetrain, parameters={**scenario.parameters, **limits})
     if guarded:
         scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
     settings = parse_settings({"guidance": {"controller": controller}}, NAME)
-    run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S)
+    run = Drive(mission, scenario, settings, seed, NullRecorder(), TIME_LIMIT_S, late_s=late_s)
     report, executor = run.run(), run.companion.mission_run.executor
     hits = run.simulator.collisions
     run_into = sum(hit.mover is not None and abs(hit.speed_m_s) < STOOD_M_S for hit in hits)
@@ -97,7 +121,8 @@ class MissionsReport(ExperimentReport):
 
 `{self.options.command(NAME)}`
 
-Each mission with each suite of sensors, {self.options.runs} seeds each{guard}. *touched*: contacts while the rover
+Each mission with each suite of sensors, {self.options.runs} seeds each{guard}. Speed, lag, turn rate and limits of a
+rover that turns on the spot are {self.options.mismatch}. *touched*: contacts while the rover
 moved; *run into*: it stood, and something that moves came along; *refused*: setpoints that the last look replaced by a
 stop; *missed*: targets not reached though there is a way; *mean s*: driving time, with its 95 % interval by resampling
 seeds. With thin beams, and on arcs, points lead the rover whatever is asked for.
@@ -119,7 +144,7 @@ def _row(mission: str, controller: str, drives: Iterable[MissionDrive]) -> list[
 def run(options: Options, advance: Advance) -> MissionsReport:
     """Every mission, suite, controller and seed."""
     tasks = [
-        (with_suite(mission, suite), controller, seed, options.guard)
+        (with_suite(mission, suite), controller, seed, options.guard, options.off, options.late_s)
         for controller in chosen_controllers(options, (POINTS,))
         for mission in shipped(options)
         for suite in SUITES

@@ -13,8 +13,6 @@ from sitl.autopilot.parameters import DEFAULTS
 from sitl.experiments.experiment import GUARD, POINTS
 from sitl.plant.rover import SIM_ROVER, Drivetrain
 
-OFF_MODEL = 0.3
-
 
 class Limits(NamedTuple):
     """Of the autopilot, and what the rover's speed lags behind its motors."""

@@ -106,7 +106,9 @@ def test_every_shortfall_of_navigation_is_said() -> None:
     assert navigation.shortfalls(tuple(ours)) == ""
 
 
-@pytest.mark.parametrize("option", ["--guard", "--controllers=points", "--worlds=here.npz", "--setups=strict"])
+@pytest.mark.parametrize(
+    "option", ["--guard", "--controllers=points", "--worlds=here.npz", "--setups=strict", "--off=0.5", "--late=0.1"]
+)
 def test_an_option_of_another_experiment_is_refused_by_its_name(option: str) -> None:
     result = CliRunner().invoke(app, ["experiment", "navigation", "--runs", "1", option])
     assert result.exit_code == 2

@@ -14,12 +14,29 @@ from sitl.experiments.missions import NO_WAY, MissionDrive, MissionsReport, driv
 MISSIONS = Path(__file__).resolve().parents[3] / "missions"
 
 
+CASES = ((0.3, 0.0), (0.5, 0.0), (0.3, 0.2))
+"""How far the rover is off its model, and how long a message takes."""
+
+
 @pytest.mark.thorough
 def test_a_drive_says_who_led_it() -> None:
     mission = with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "lidar-90")
     one = drive(mission, "motion-ga", 0, guarded=True)
     assert (one.mission, one.suite, one.controller) == (mission.name, "lidar-90", "motion-ga")
     assert (one.touched, one.run_into, one.refused, one.missed) == (0, 0, 0, 0) and 10.0 < one.seconds < 200.0
+
+
+def test_a_rover_further_off_and_a_late_link_are_driven_with_and_told() -> None:
+    mission = with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "lidar-360")
+    usual, off, late = (drive(mission, "points", 0, guarded=False, off=o, late_s=s) for o, s in CASES)
+    assert (usual.touched, off.touched, late.touched) == (0, 0, 0)
+    assert len({usual.seconds, off.seconds, late.seconds}) == 3 and late.seconds > usual.seconds
+    options = Options(2, off=0.5, late_s=0.2)
+    report = MissionsReport(options, (off, late))
+    assert (
+        report.section_name == "missions-off-model" and MissionsReport(Options(2), (usual,)).section_name == "missions"
+    )
+    assert "--off 0.5 --late 0.2" in report.section() and "each message takes 0.2 s" in report.section()
 
 
 def test_the_mission_without_a_way_is_named_as_it_is() -> None:
