@@ -20,12 +20,12 @@ from companion.vehicle.commands import GuidedPosition
 
 LONG_S = 1.0
 """Where a velocity lasts no longer, because a guard ends it, motions are as fast as positions."""
-MOST_ASIDE_RAD = math.radians(20.0)
+MOST_ASIDE_RAD = math.radians(60.0)
 """A place farther aside is no place ahead: the rover would turn for it."""
-LEAST_M = 1.0
+LEAST_M = 0.5
 """Nor is one that is nearer."""
-BEGINS_M_S, GOES_ON_M_S = 0.3, 0.1
-"""A position must be faster by this than the velocity, and by the second once positions lead."""
+SLOWER_M_S = 0.3
+"""Once positions lead they may be slower than the velocity by this: they do not take turns."""
 
 
 class PositionAhead:
@@ -37,8 +37,7 @@ class PositionAhead:
 
     def faster_than(self, speed_m_s: float, path: ReferencePath, view: LocalView) -> ControlCommand | None:
         """The command with a position on which the rover gets faster than this; None where there is none."""
-        wanted_m_s = speed_m_s + (GOES_ON_M_S if self._leads else BEGINS_M_S)
-        command = self._ahead(wanted_m_s, path, view)
+        command = self._ahead(speed_m_s - (SLOWER_M_S if self._leads else 0.0), path, view)
         self._leads = command is not None
         return command
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from companion.control.local_view import LocalView
-from companion.control.position_ahead import BEGINS_M_S, GOES_ON_M_S, PositionAhead
+from companion.control.position_ahead import SLOWER_M_S, PositionAhead
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
@@ -34,12 +33,12 @@ def test_it_lies_ahead_on_the_path_where_that_is_faster() -> None:
     assert command.setpoint.point.east_m == pytest.approx(10.0) and command.setpoint.point.north_m > 8.0
 
 
-@pytest.mark.parametrize("speed_m_s", np.linspace(0.0, CRUISE_M_S, 9))
-def test_it_must_be_faster_and_by_less_once_positions_lead(speed_m_s: float) -> None:
+@pytest.mark.parametrize("speed_m_s", [0.0, 0.5, 1.0, 1.5, 1.9, 2.1, 2.25, 2.35])
+def test_it_must_be_faster_but_for_a_little_once_positions_lead(speed_m_s: float) -> None:
     first, leads = PositionAhead(), PositionAhead()
     assert leads.faster_than(0.0, PATH, view()) is not None
-    assert (first.faster_than(speed_m_s, PATH, view()) is not None) == (speed_m_s + BEGINS_M_S < CRUISE_M_S)
-    assert (leads.faster_than(speed_m_s, PATH, view()) is not None) == (speed_m_s + GOES_ON_M_S < CRUISE_M_S)
+    assert (first.faster_than(speed_m_s, PATH, view()) is not None) == (speed_m_s < CRUISE_M_S)
+    assert (leads.faster_than(speed_m_s, PATH, view()) is not None) == (speed_m_s - SLOWER_M_S < CRUISE_M_S)
 
 
 def test_with_a_guard_there_is_none() -> None:
@@ -49,11 +48,11 @@ def test_with_a_guard_there_is_none() -> None:
 def test_none_for_a_rover_that_rolls_back_or_would_have_to_turn() -> None:
     assert PositionAhead().faster_than(0.8, PATH, replace(view(), rolls_back=True)) is None
     assert PositionAhead().faster_than(0.8, PATH, view(heading_deg=15.0)) is not None
-    assert PositionAhead().faster_than(0.8, PATH, view(heading_deg=25.0)) is None
+    assert PositionAhead().faster_than(0.8, PATH, view(heading_deg=70.0)) is None
 
 
 def test_none_that_is_near_or_before_which_the_rover_could_not_get_fast() -> None:
-    near = ReferencePath(PATH.points[: round(0.8 / STEP_M)])
+    near = ReferencePath(PATH.points[: round(0.45 / STEP_M)])
     assert PositionAhead().faster_than(0.0, near, view()) is None
     walled = ground()
     wall(walled, 5.5, 6.0, 14.0)
