@@ -61,6 +61,12 @@ NONE_ADMITTED = np.zeros((TURNS, 2))
 FASTER_S, BLUR_S, MOST_BLUR_RAD = 0.05, 1.15, math.radians(10.0)
 """Left alone, the rover keeps so much more room for each m/s; more where a reading speaks for a wide angle: how far to
 the side something ends that is as far away as the rover needs to stop is known only to within half of that."""
+GUARDED_S, DRIFT_M_S, DRIFT_SHARE = 1.0, 0.025, 0.05
+"""For each second longer than the first that a velocity lasts, a rover that is left alone keeps so much more room, and
+so much more for each m/s: meanwhile its position, by which the map was made, drifts, and small errors grow."""
+OFF_ALONE = 0.5
+"""For as long as a velocity lasts without a guard a rover may turn by such a share more or less: an autopilot that is
+not tuned to it overshoots in the first seconds of a turn, though on the whole it turns as told."""
 PLANNED_SHARE = 0.8
 """Motions are planned with so much of the braking there should be, so that the last look seldom says no."""
 
@@ -188,20 +194,31 @@ def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
     turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
     admitted: NDArray[np.float64] = admitted_speeds(
-        turns_rad_s, lasts_s, _gains(view), WEIGHTS.margin_m, _faster_s(view), worst
+        turns_rad_s, lasts_s, np.array(_gains(view)), _margin_m(view), _faster_s(view), worst
     )
     return admitted
 
 
+def _alone_s(view: LocalView) -> float:
+    """How much longer a velocity lasts than with a guard."""
+    return max(view.settings.guidance.velocity_lasts_s - GUARDED_S, 0.0)
+
+
+def _margin_m(view: LocalView) -> float:
+    """Room that a rover keeps which is left alone."""
+    return WEIGHTS.margin_m + DRIFT_M_S * _alone_s(view)
+
+
 def _faster_s(view: LocalView) -> float:
-    """Room for each m/s."""
-    return max(FASTER_S, BLUR_S * min(view.rover.beam_rad, MOST_BLUR_RAD))
+    """More room for each m/s."""
+    return max(FASTER_S, BLUR_S * min(view.rover.beam_rad, MOST_BLUR_RAD)) + DRIFT_SHARE * _alone_s(view)
 
 
-def _gains(view: LocalView) -> tuple[float, float, float]:
-    """The rover may turn so much more or less than it is told."""
+def _gains(view: LocalView) -> tuple[float, ...]:
+    """The rover may turn so much more or less than it is told; without a guard by more than it is known to, as well."""
     off = view.following.off_model
-    return 1.0, 1.0 - off, 1.0 + off
+    shares = (off, OFF_ALONE) if _alone_s(view) > 0.0 else (off,)
+    return 1.0, *(1.0 + sign * share for share in shares for sign in (-1.0, 1.0))
 
 
 def _least_spare_m(turn_rad_s: float, gains: tuple[float, ...], worst: MotionProblem) -> float:
@@ -213,7 +230,7 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem
     """Whether this may be the last command, however the rover turns."""
     lasts_s = view.settings.guidance.velocity_lasts_s
     return all(
-        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, _faster_s(view), worst)
+        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, _margin_m(view), _faster_s(view), worst)
         for gain in _gains(view)
     )
 

@@ -57,7 +57,7 @@ def position_in_sight(setpoint: Setpoint, view: LocalView, bounds: Bounds) -> Fa
     stands = here.moved(here.bearing_rad(there), distance_m + overshoots_m)
     if not evidence.base.contains(evidence.base.cell_at(stands)):
         stands, overshoots_m = there, 0.0  # nothing is known beyond the edge of the map
-    line = look_along(evidence, here, stands, evidence.rover_radius_m)
+    line = look_along(evidence, here, stands, view.rover.radius_m)
     if line.clear_m < distance_m + overshoots_m - SLACK_M:
         return Reason(SetpointFault.BEHIND_OBSTACLE)
     beyond_m = braking_distance_m(settings.min_speed_m_s, settings)

@@ -39,6 +39,7 @@ ON_ANY_MAP = ("navigation", "driving")
 OWN_ENVIRONMENTS = ("wang-table4", "achour-table1")
 WITH_CONTROLLERS = ("barn", "controllers", "gates", "killed-companion", "missions")
 WITH_MISMATCH = ("barn", "controllers", "gates", "missions")
+DRIVES = ("barn", "controllers", "dead-companion", "gates", "killed-companion", "missions")
 WITH_GUARD = ("killed-companion", "missions")
 EXIT_FAILED = 3
 LINES = 10
@@ -101,6 +102,13 @@ def experiment(
             min=0.0, max=2.0, help=f"{', '.join(WITH_MISMATCH)}: seconds that a message takes over the link, each way."
         ),
     ] = 0.0,
+    keep: Annotated[
+        Path | None,
+        typer.Option(
+            help=f"{', '.join(DRIVES)}: a folder that keeps each result (needs joblib). After an end before the time, "
+            "the same command goes on. Results of other code are not used."
+        ),
+    ] = None,
     json_file: Annotated[Path | None, typer.Option("--json", help="Write all figures as JSON.")] = None,
     docs: Annotated[
         Path | None,
@@ -121,7 +129,7 @@ def experiment(
         _refuse_unused(name, planners=planners, world=world, maps=maps)
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, _names(controllers), _names(setups),
-            guard, off, late,
+            guard, off, late, keep,
         )  # fmt: skip
         _refuse_unused_motion(name, options)
         report = _with_progress(name, options, console)
@@ -160,6 +168,7 @@ def _refuse_unused_motion(name: str, options: Options) -> None:
         ("--guard", options.guard, WITH_GUARD),
         ("--off", options.off != OFF_MODEL, WITH_MISMATCH),
         ("--late", options.late_s > 0.0, WITH_MISMATCH),
+        ("--keep", options.keep is not None, DRIVES),
     ):
         if is_given and name not in takers:
             listed = f"{', '.join(takers[:-1])} and {takers[-1]}"

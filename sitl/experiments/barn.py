@@ -339,7 +339,7 @@ def run(options: Options, advance: Advance) -> BarnReport:
         for world in worlds
     ]
     runs: list[BarnRun] = []
-    for done, one in enumerate(each(options.jobs, drive, tasks), start=1):
+    for done, one in enumerate(each(options.jobs, drive, tasks, options.keep), start=1):
         runs.append(one)
         advance(done, len(tasks))
     series = {

@@ -182,7 +182,7 @@ def run(options: Options, advance: Advance) -> ControllersReport:
         for seed in range(options.seed, options.seed + options.runs)
     ]
     drives: list[GroundDrive] = []
-    for done, one in enumerate(each(options.jobs, drive, tasks), start=1):
+    for done, one in enumerate(each(options.jobs, drive, tasks, options.keep), start=1):
         drives.append(one)
         advance(done, len(tasks))
     return ControllersReport(options, tuple(drives))

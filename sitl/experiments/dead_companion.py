@@ -196,7 +196,7 @@ def run(options: Options, advance: Advance) -> DeadReport:
     missions = [with_suite(mission, suite) for mission in shipped(options) for suite in SUITES]
     deaths: list[Death] = []
     tasks = ((mission, options.seed + number, options.runs) for number, mission in enumerate(missions))
-    for done, some in enumerate(each(options.jobs, deaths_of, tasks), start=1):
+    for done, some in enumerate(each(options.jobs, deaths_of, tasks, options.keep), start=1):
         deaths += some
         advance(done, len(missions))
     return DeadReport(options, tuple(deaths))

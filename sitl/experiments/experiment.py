@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from importlib.metadata import version
+from importlib.resources import files
 from itertools import starmap
 from os import cpu_count
 from pathlib import Path
@@ -66,6 +68,8 @@ class Options:
     """So far the rover is off its model, at most: a share."""
     late_s: float = 0.0
     """So long each message takes over the link, each way."""
+    keep: Path | None = None
+    """The folder in which the results of single runs are kept; None: nowhere."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""
@@ -152,21 +156,36 @@ Experiment = Callable[[Options, Advance], ExperimentReport]
 Result = TypeVar("Result")
 
 
-def each(jobs: int, work: Callable[..., Result], tasks: Iterable[tuple[object, ...]]) -> Iterator[Result]:
+def each(
+    jobs: int, work: Callable[..., Result], tasks: Iterable[tuple[object, ...]], keep: Path | None = None
+) -> Iterator[Result]:
     """The results of ``work`` for each tuple of arguments, in their order, made by ``jobs`` processes.
 
-    Raises ExperimentError if several processes are wanted, and what they need is not installed.
+    ``keep``: a folder in which each result is kept; one that is there is not made again.
+    Raises ExperimentError if joblib is needed and not installed.
     """
-    if jobs == 1:
+    if jobs == 1 and keep is None:
         return starmap(work, tasks)
     try:
-        from joblib import Parallel, delayed
+        from joblib import Memory, Parallel, delayed
     except ImportError as error:
+        option = f"--jobs {jobs}" if keep is None else f"--keep {keep}"
         raise ExperimentError(
-            f"--jobs {jobs}: joblib is not installed; install rover-companion[experiments], or leave the option out"
+            f"{option}: joblib is not installed; install rover-companion[experiments], or leave the option out"
         ) from error
-    made: Iterator[Result] = Parallel(n_jobs=jobs, return_as="generator")(delayed(work)(*task) for task in tasks)
+    do = work if keep is None else Memory(keep / code_digest(), verbose=0).cache(work)
+    made: Iterator[Result] = Parallel(n_jobs=jobs, return_as="generator")(delayed(do)(*task) for task in tasks)
     return made
+
+
+def code_digest() -> str:
+    """A name for the code as it stands: results that other code made are not taken for its own."""
+    digest = hashlib.sha256()
+    for package in ("companion", "sitl"):
+        folder = Path(str(files(package)))
+        for file in sorted(folder.rglob("*.py")):
+            digest.update(file.relative_to(folder).as_posix().encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 def planners_of(options: Options, usual: Iterable[str]) -> tuple[str, ...]:

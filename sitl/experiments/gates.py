@@ -139,7 +139,7 @@ def run(options: Options, advance: Advance) -> GatesReport:
         for seed in range(options.seed, options.seed + options.runs)
     ]
     drives: list[GateDrive] = []
-    for done, one in enumerate(each(options.jobs, drive, tasks), start=1):
+    for done, one in enumerate(each(options.jobs, drive, tasks, options.keep), start=1):
         drives.append(one)
         advance(done, len(tasks))
     return GatesReport(options, tuple(drives))

@@ -320,7 +320,7 @@ def run(options: Options, advance: Advance) -> KilledReport:
         (mission, motors, seed, options.runs, controller, options.guard)
         for (mission, motors, controller), seed in zip(missions, seeds, strict=True)
     )
-    for done, some in enumerate(each(options.jobs, deaths_of, tasks), start=1):
+    for done, some in enumerate(each(options.jobs, deaths_of, tasks, options.keep), start=1):
         drives += some
         advance(done, len(missions))
     return KilledReport(options, tuple(drives))

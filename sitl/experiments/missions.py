@@ -98,6 +98,11 @@ class MissionsReport(ExperimentReport):
     options: Options
     drives: tuple[MissionDrive, ...]
 
+    @property
+    def section_name(self) -> str:
+        """See ``ExperimentReport``."""
+        return super().section_name + ("-guarded" if self.options.guard else "")
+
     def tables(self) -> list[Table]:
         """One for each suite of sensors."""
         return [terminal_table(f"{NAME}: {suite}", HEAD, self._rows(suite)) for suite in SUITES]
@@ -117,7 +122,7 @@ class MissionsReport(ExperimentReport):
         """See ``ExperimentReport``."""
         tables = "\n\n".join(f"`{suite}`:\n\n{markdown_table(HEAD, self._rows(suite))}" for suite in SUITES)
         guard = ", with the guard on the autopilot" if self.options.guard else ""
-        return f"""## Every shipped mission
+        return f"""## Every shipped mission{guard}
 
 `{self.options.command(NAME)}`
 
@@ -151,7 +156,7 @@ def run(options: Options, advance: Advance) -> MissionsReport:
         for seed in range(options.seed, options.seed + options.runs)
     ]
     drives: list[MissionDrive] = []
-    for done, one in enumerate(each(options.jobs, drive, tasks), start=1):
+    for done, one in enumerate(each(options.jobs, drive, tasks, options.keep), start=1):
         drives.append(one)
         advance(done, len(tasks))
     return MissionsReport(options, tuple(drives))

@@ -9,9 +9,17 @@ import numpy as np
 import pytest
 
 from companion.control.controller import Purpose
-from companion.control.following import within_limits
+from companion.control.following import AS_SHIPPED, within_limits
 from companion.control.local_view import LocalView
-from companion.control.motion_controller import MotionController, _latest, rover_model
+from companion.control.motion_controller import (
+    WEIGHTS,
+    MotionController,
+    _faster_s,
+    _gains,
+    _latest,
+    _margin_m,
+    rover_model,
+)
 from companion.control.motion_kernels import clearance_m, moved
 from companion.control.motion_planners import MotionKind, motion_planner
 from companion.control.reference_path import ReferencePath, advanced
@@ -29,6 +37,7 @@ FOOTPRINT = Footprint.rectangle(0.6, 0.4)
 TICK_S = 0.05
 GUARDED = Settings.model_validate({"guidance": {"controller": "motion-ga", "velocity_lasts_s": 0.3}})
 STRICT = Settings.model_validate({"guidance": {"controller": "motion-ga"}})
+KNOWN = AS_SHIPPED._replace(off_model=0.1)
 
 
 def view(evidence: EvidenceMap, pose: Pose, speed_m_s: float = 0.0, settings: Settings = GUARDED) -> LocalView:
@@ -270,3 +279,12 @@ def test_no_motion_is_faster_or_turns_faster_than_the_autopilot_lets_it() -> Non
     held = rover_model(replace(at, rover=within_limits(at.rover, limits)))
     assert free.fastest_m_s == 3.5 and free.turn_fastest_rad_s == at.settings.motion.turn_rad_s
     assert held.fastest_m_s == 1.2 and held.turn_fastest_rad_s == pytest.approx(math.radians(30.0))
+
+
+def test_without_a_guard_a_rover_keeps_more_room_and_more_of_it_in_turns() -> None:
+    """Three seconds of a turn: small errors add up, and so does the drift of the position."""
+    pose = Pose(3.0, 10.0, 0.0, 1.0)
+    guarded, strict = (replace(view(ground(), pose, 0.5, one), following=KNOWN) for one in (GUARDED, STRICT))
+    assert _gains(guarded) == (1.0, 0.9, 1.1) and _gains(strict) == (1.0, 0.9, 1.1, 0.5, 1.5)
+    assert (_margin_m(guarded), _margin_m(strict)) == (WEIGHTS.margin_m, pytest.approx(WEIGHTS.margin_m + 0.05))
+    assert _faster_s(strict) == pytest.approx(_faster_s(guarded) + 0.1)

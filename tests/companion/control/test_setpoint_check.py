@@ -74,6 +74,18 @@ def test_a_position_is_not_behind_the_wall_into_which_the_rover_would_overshoot(
     assert found is not None and found.kind is SetpointFault.BEHIND_OBSTACLE
 
 
+def test_the_way_to_a_position_is_as_wide_as_the_rover_not_as_what_the_map_keeps() -> None:
+    """Where motions are planned the map keeps more room, and a position is chosen with the rover's own."""
+    evidence = new_map(empty_grid(SIDE, SIDE), RADIUS_M + 0.1, SETTINGS.mapping)
+    evidence.log_odds.fill(-1.0)
+    there, pose = GuidedPosition(NedPoint(8.0, MIDDLE)), Pose(4.0, MIDDLE, 0.0, 0.0)
+    for beside_m, kind in ((RADIUS_M + 0.05, None), (RADIUS_M - 0.1, SetpointFault.BEHIND_OBSTACLE)):
+        near = evidence.log_odds.copy()
+        patched(evidence, 6.0, MIDDLE + beside_m, 0.1, 2.0)
+        assert fault(Output(there, pose, 0.0), evidence) is kind
+        evidence.log_odds[:] = near
+
+
 def patched(evidence: EvidenceMap, north_m: float, east_m: float, size_m: float, value: float) -> None:
     y, x = (round(v / evidence.evidence_m) for v in (north_m, east_m))
     size = max(1, round(size_m / evidence.evidence_m))
