@@ -87,6 +87,9 @@ def experiment(
             "default: guarded."
         ),
     ] = "",
+    missions: Annotated[
+        str, typer.Option(help="missions: names of shipped missions, separated by commas; default: all.")
+    ] = "",
     guard: Annotated[
         bool, typer.Option("--guard", help="killed-companion, missions: with the guard on the autopilot.")
     ] = False,
@@ -129,7 +132,7 @@ def experiment(
         _refuse_unused(name, planners=planners, world=world, maps=maps)
         options = Options(
             runs, seed, jobs, maps, tuple(world or ()), _names(planners), worlds, _names(controllers), _names(setups),
-            guard, off, late, keep,
+            guard, off, late, keep, _names(missions),
         )  # fmt: skip
         _refuse_unused_motion(name, options)
         report = _with_progress(name, options, console)
@@ -169,9 +172,10 @@ def _refuse_unused_motion(name: str, options: Options) -> None:
         ("--off", options.off != OFF_MODEL, WITH_MISMATCH),
         ("--late", options.late_s > 0.0, WITH_MISMATCH),
         ("--keep", options.keep is not None, DRIVES),
+        ("--missions", bool(options.missions), ("missions",)),
     ):
         if is_given and name not in takers:
-            listed = f"{', '.join(takers[:-1])} and {takers[-1]}"
+            listed = " and ".join(filter(None, (", ".join(takers[:-1]), takers[-1])))
             raise ExperimentError(f"{option}: {name} does not take it; the option is for {listed}")
 
 

@@ -17,7 +17,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import Mission, SitlSpec
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
-from sitl.experiments.experiment import Advance, ExperimentReport, Options, each, shipped_missions
+from sitl.experiments.experiment import Advance, ExperimentError, ExperimentReport, Options, each, shipped_missions
 from sitl.experiments.results_page import markdown_table, terminal_table
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
@@ -215,5 +215,10 @@ def with_suite(mission: Mission, suite: str) -> Mission:
 
 
 def shipped(options: Options) -> list[Mission]:
-    """All missions that ship with the project."""
-    return [load_mission(file) for file in shipped_missions(options.maps, MISSIONS)]
+    """The missions that ship with the project, or those of them that were chosen. Raises ExperimentError."""
+    named = {file.removesuffix(".toml"): file for file in MISSIONS}
+    for name in options.missions:
+        if name not in named:
+            raise ExperimentError(f"--missions: {name!r:.60} is unknown; known are {', '.join(named)}")
+    chosen = tuple(file for name, file in named.items() if name in options.missions)
+    return [load_mission(file) for file in shipped_missions(options.maps, chosen or MISSIONS)]

@@ -70,11 +70,14 @@ class Options:
     """So long each message takes over the link, each way."""
     keep: Path | None = None
     """The folder in which the results of single runs are kept; None: nowhere."""
+    missions: tuple[str, ...] = ()
+    """``missions``: which of those that ship with the project; none: all."""
 
     def command(self, name: str) -> str:
         """What writes this experiment's part of the results page again."""
         chosen = f" --planners {','.join(self.planners)}" if self.planners else ""
         chosen += f" --controllers {','.join(self.controllers)}" if self.controllers else ""
+        chosen += f" --missions {','.join(self.missions)}" if self.missions else ""
         chosen += f" --setups {','.join(self.setups)}" if self.setups else ""
         chosen += " --guard" if self.guard else ""
         chosen += "" if self.off == OFF_MODEL else f" --off {self.off:g}"

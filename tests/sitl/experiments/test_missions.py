@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from companion.mission.load import load_mission
-from sitl.experiments.dead_companion import with_suite
-from sitl.experiments.experiment import Options
+from sitl.experiments.dead_companion import shipped, with_suite
+from sitl.experiments.experiment import ExperimentError, Options
 from sitl.experiments.missions import NO_WAY, MissionDrive, MissionsReport, drive
 
 MISSIONS = Path(__file__).resolve().parents[3] / "missions"
@@ -36,11 +36,22 @@ def test_a_rover_further_off_and_a_late_link_are_driven_with_and_told() -> None:
     assert (
         report.section_name == "missions-off-model" and MissionsReport(Options(2), (usual,)).section_name == "missions"
     )
+    assert MissionsReport(Options(2, guard=True), (usual,)).section_name == "missions-guarded"
     assert "--off 0.5 --late 0.2" in report.section() and "each message takes 0.2 s" in report.section()
 
 
 def test_the_mission_without_a_way_is_named_as_it_is() -> None:
     assert load_mission(MISSIONS / "sealed.toml").name in NO_WAY
+
+
+def test_some_missions_can_be_chosen_by_their_files() -> None:
+    chosen = shipped(Options(missions=("depot", "field.plan")))
+    assert [mission.name for mission in chosen] == [
+        load_mission(MISSIONS / file).name for file in ("field.plan", "depot.toml")
+    ]
+    assert "--missions depot,field.plan" in Options(missions=("depot", "field.plan")).command("missions")
+    with pytest.raises(ExperimentError, match="--missions: 'hill' is unknown; known are open, one-obstacle"):
+        shipped(Options(missions=("hill",)))
 
 
 def test_the_table_counts_each_mission_and_all() -> None:
