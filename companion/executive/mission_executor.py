@@ -142,6 +142,8 @@ class MissionExecutor:
         searcher = PathSearcher(planner, rng)
         self.driver = GoalDriver(self._controller(rng), searcher, runner)
         self._tracker = ObjectTracker(layout.evidence)
+        self.moving: tuple[Moving, ...] = ()
+        """What moves round the rover, as of the last tick."""
 
     @property
     def evidence(self) -> EvidenceMap:
@@ -268,6 +270,7 @@ class MissionExecutor:
     def decide(self, vehicle: VehicleState, now_s: float) -> MissionTask:
         """What to do for the mission now, and by which path: legs begin and end here, and the navigator decides."""
         view = self.view(vehicle, now_s)
+        self.moving = self._moving(vehicle, view)
         self.trail.enter(self.evidence.base.cell_at(view.pose.point), view.pose.point)
         waited = self.progress.phase is MissionPhase.WAIT
         self.progress = on_time(self.progress, now_s)
@@ -288,15 +291,15 @@ class MissionExecutor:
             self.driver.head_for(self.progress.goal, view, way, driven)
         self._rolls_until_s = None
         self.phase = RunPhase.DRIVING
-        decision = self.driver.decide(view, self._moving(vehicle, view))
+        decision = self.driver.decide(view, self.moving)
         if decision is not None:
             self._take_decision(decision, now_s)
         return MissionTask.DRIVE
 
-    def guide(self, task: MissionTask, vehicle: VehicleState, view: LocalView) -> ControlCommand:
-        """How to do it now: the setpoint and the speed."""
-        moving = self._moving(vehicle, view)
-        return self.driver.standing(view, moving) if task is MissionTask.STAND else self.driver.guide(view, moving)
+    def guide(self, task: MissionTask, view: LocalView) -> ControlCommand:
+        """How to do now what was decided: the setpoint and the speed."""
+        stands = task is MissionTask.STAND
+        return self.driver.standing(view, self.moving) if stands else self.driver.guide(view, self.moving)
 
     def learn(self, view: LocalView) -> None:
         """One more moment that may tell how the rover follows velocities. ``view`` knows what was told lately."""

@@ -123,6 +123,11 @@ class MissionRun:
         return Activity(phase, self.stop.reason, self.stop.awaited)
 
     @property
+    def told(self) -> ControlCommand | None:
+        """What was told in the last tick; None where the rover is not driven."""
+        return self._told
+
+    @property
     def stopped(self) -> bool:
         """Whether the rover was not to be driven in the last tick."""
         return self.stop is not None
@@ -179,7 +184,7 @@ class MissionRun:
         held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
         view = replace(view, held_m_s=held_m_s, told=told, lately=self._lately)
         executor.learn(view)
-        wanted = executor.guide(task, self.vehicle, view)
+        wanted = executor.guide(task, view)
         wanted = self.legs.guide(wanted, executor, view)
         return self.setpoint_check.passed(wanted, view, executor.layout.bounds)
 

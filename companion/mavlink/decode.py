@@ -23,6 +23,7 @@ from companion.vehicle.events import (
     Event,
     FenceStatusSeen,
     GlobalPositionSeen,
+    GpsSeen,
     GuardSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -51,6 +52,9 @@ MISSION_ACK_COMMAND = -1
 NOT_TOLD = 0xFFFF
 """``total`` of MISSION_CURRENT."""
 NO_CELL_MV = 65535
+NO_SATELLITES = 255
+GPS_FIXES = {0: "no GPS", 1: "no fix", 2: "2D", 3: "3D", 4: "3D DGPS", 5: "RTK float", 6: "RTK fixed"}
+"""By GPS_FIX_TYPE."""
 OF_SYS_STATUS = -1
 MIN_GUARD_MS, MAX_GUARD_MS = 50.0, 5000.0
 """Another script may use the guard's name for something else."""
@@ -99,6 +103,7 @@ class Decoder:
             mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: _item_current,
             mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT: _ekf,
             mavlink.MAVLINK_MSG_ID_VFR_HUD: _throttle,
+            mavlink.MAVLINK_MSG_ID_GPS_RAW_INT: _gps,
             mavlink.MAVLINK_MSG_ID_HOME_POSITION: _home,
             mavlink.MAVLINK_MSG_ID_TIMESYNC: _time_answered,
             mavlink.MAVLINK_MSG_ID_RC_CHANNELS: _sticks,
@@ -302,6 +307,11 @@ def _target(message: Any, time_s: float) -> Event | None:
 
 def _ekf(message: Any, time_s: float) -> Event:
     return EkfStatusSeen(time_s, message.flags)
+
+
+def _gps(message: Any, time_s: float) -> Event:
+    satellites = None if message.satellites_visible == NO_SATELLITES else message.satellites_visible
+    return GpsSeen(time_s, GPS_FIXES.get(message.fix_type, f"fix {message.fix_type}"), satellites)
 
 
 def _sticks(message: Any, time_s: float) -> Event:

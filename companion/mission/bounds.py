@@ -70,6 +70,10 @@ class Bounds:
         """How many borders there are."""
         return len(self._bounds)
 
+    def __iter__(self) -> Iterator[Bound]:
+        """Each border."""
+        return iter(self._bounds)
+
     def outside(self, point: NedPoint) -> str:
         """The name of the border that the rover's middle has crossed; empty if none."""
         place = shapely.Point(point.east_m, point.north_m)

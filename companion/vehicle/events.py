@@ -105,6 +105,15 @@ class EkfStatusSeen:
 
 
 @dataclass(frozen=True, slots=True)
+class GpsSeen:
+    """GPS_RAW_INT: what the receiver says of itself. ``fix``: as in ``GPS_FIXES``; ``satellites``: None if unknown."""
+
+    time_s: float
+    fix: str
+    satellites: int | None
+
+
+@dataclass(frozen=True, slots=True)
 class OriginSeen:
     """GPS_GLOBAL_ORIGIN: the origin of the local frame."""
 
@@ -373,6 +382,7 @@ Event = (
     | GlobalPositionSeen
     | OtherSeen
     | EkfStatusSeen
+    | GpsSeen
     | OriginSeen
     | HomeSeen
     | RangeSeen

@@ -15,9 +15,11 @@ from companion.vehicle.auto_leg import GuidedLeg, LegState, leg_after, leg_at_he
 from companion.vehicle.dead_reckoning import Drift, Reckoning, drift_after, jump_m, reckoning_after
 from companion.vehicle.events import (
     AttitudeSeen,
+    BatterySeen,
     EkfStatusSeen,
     Event,
     GlobalPositionSeen,
+    GpsSeen,
     GuardSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -47,6 +49,7 @@ EKF_CONST_POSITION = 128
 FENCE = ("FENCE_ENABLE", "FENCE_TYPE", "FENCE_MARGIN", "FENCE_RADIUS", "FENCE_OPTIONS")
 PARAMETERS_KEPT = frozenset((*FENCE, "WP_RADIUS", *LIMITS, *THROTTLE_SCALE))
 """The parameters that a run needs: the autopilot sends hundreds whenever a ground station lists them."""
+FIRST_BATTERY = 0
 OTHERS_KEPT = 64
 OTHERS_FORGOTTEN_S = 30.0
 WIDER_S = 1.0
@@ -79,6 +82,9 @@ class VehicleState:
     """The newest range data that covers straight ahead: without it the rover would drive blind."""
     target: TargetSeen | None = None
     prearm: PrearmSeen | None = None
+    gps: GpsSeen | None = None
+    battery: BatterySeen | None = None
+    """The first one; for people only."""
     guard: GuardSeen | None = None
     jump_m: float = 0.0
     """How far the last position report was from where the velocity led."""
@@ -207,6 +213,10 @@ def _fold_rare(state: VehicleState, event: Event) -> VehicleState:
             return replace(state, leg=leg_after(state.leg, event))
         case PrearmSeen():
             return replace(state, prearm=event)
+        case GpsSeen():
+            return replace(state, gps=event)
+        case BatterySeen():
+            return replace(state, battery=event) if event.number == FIRST_BATTERY else state
         case GuardSeen():
             return replace(state, guard=event)
         case ParameterSeen():

@@ -42,7 +42,7 @@ def step(desk: Desk, after_s: float = 0.05) -> MissionTask:
     desk.stand(position.north_m, position.east_m)
     task = desk.executor.decide(desk.run.vehicle, desk.now_s)
     if task is not MissionTask.END:
-        desk.executor.guide(task, desk.run.vehicle, desk.executor.view(desk.run.vehicle, desk.now_s))
+        desk.executor.guide(task, desk.executor.view(desk.run.vehicle, desk.now_s))
     return task
 
 

@@ -1,0 +1,284 @@
+"""Frames and scenes: what a viewer shows of one moment of a run, as plain values that become JSON.
+
+``docs/viewer.md`` lists the keys. Places are [north, east] in metres of the local frame, headings radians clockwise
+from north.
+
+Nouns: scene, frame.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely.geometry.base import BaseGeometry
+
+from companion.app import Companion, Status
+from companion.control.controller import ControlCommand
+from companion.control.motion_controller import MotionController
+from companion.control.motion_kernels import way_of
+from companion.core.footprint import Footprint
+from companion.core.frames import LocalFrame, NedPoint
+from companion.core.scan import RangeScan
+from companion.core.severity import Severity
+from companion.executive.mission_executor import MissionExecutor
+from companion.executive.mission_run import MissionRun
+from companion.mapping.map_queries import clearance_m
+from companion.mission.bounds import Bound
+from companion.mission.mission import Mission
+from companion.safety.mode_latch import Control
+from companion.safety.reasons import RunPhase
+from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
+from companion.vehicle.events import RoverMode
+from companion.vehicle.state import VehicleState
+from companion.viewer.map_tiles import TILE
+
+FORMAT = 1
+CIRCLE = 24
+"""Corners of a round outline."""
+MOST_PATH, MOST_RAYS = 200, 180
+CLEARANCE_M = 5.0
+"""No wider clearance is told."""
+NEWEST_S = 0.5
+"""A scan or a planned motion that is older is not shown."""
+STATES = {
+    RunPhase.CONNECTING: "connecting",
+    RunPhase.WAITING: "waiting",
+    RunPhase.DRIVING: "driving",
+    RunPhase.STAYING: "driving",
+    RunPhase.WAY_BLOCKED: "waiting",
+    RunPhase.STOPPED: "stopped",
+    RunPhase.STOPPED_AND_WAITING: "stopped",
+    RunPhase.ENDED: "ended",
+}
+LEVELS = {Severity.WARNING: "warning", Severity.NOTICE: "notice", Severity.INFO: "info", Severity.DEBUG: "info"}
+"""Whatever is worse is an error."""
+DRIVES = {
+    RoverMode.MANUAL: "pilot",
+    RoverMode.HOLD: "nobody",
+    RoverMode.AUTO: "autopilot",
+    RoverMode.RTL: "autopilot",
+    RoverMode.GUIDED: "ground station",
+}
+"""Who drives where the companion does not; in a mode that is not named here it is the pilot."""
+
+Json = dict[str, Any]
+
+
+def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
+    """What stays as it is for a while. ``epoch``: another number for another map."""
+    executor, vehicle = run.executor, run.vehicle
+    layout = None if executor is None else executor.layout
+    origin = None if layout is None else layout.origin
+    home = None if layout is None else LocalFrame(layout.origin).to_ned(layout.home)
+    return {
+        "kind": "scene",
+        "format": FORMAT,
+        "mission": mission.name,
+        "map_epoch": epoch,
+        "home": None if home is None else _place(home),
+        "origin": None if origin is None else [origin.lat_deg, origin.lon_deg],
+        "rover": {"outline": _outline(mission.rover.footprint)},
+        "targets": [] if layout is None else [{"name": one.name, "place": _place(one.point)} for one in layout.targets],
+        "borders": [] if layout is None else [border for one in layout.bounds for border in _border(one)],
+        "map": None if executor is None else _map(executor),
+        "vehicle": None if vehicle.heartbeat is None else vehicle.heartbeat.system_id,
+    }
+
+
+def frame_of(companion: Companion, status: Status) -> Json:
+    """The moment. ``news`` are those of this tick alone."""
+    run, executor = companion.mission_run, companion.executor
+    vehicle, now_s, pose = run.vehicle, status.time_s, status.pose
+    activity = status.activity
+    goal = None if executor is None or executor.progress.ended else executor.progress.goal
+    drives = f" to {status.target}" if activity.phase is RunPhase.DRIVING and status.target else ""
+    return {
+        "kind": "frame",
+        "t": round(now_s, 2),
+        "pose": None if pose is None else [*_place(pose.point), round(pose.heading_rad, 4)],
+        "speed": round(vehicle.forward_m_s, 3),
+        "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
+        **_mode(vehicle, run),
+        "line": f"{status.doing}{drives}",
+        "state": STATES[activity.phase],
+        "statuses": [str(one) for _, one in run.statuses()],
+        "goal": None if goal is None else {"name": goal.name, "place": _place(goal.point)},
+        "path": _path(executor),
+        "motion": _motion(executor, now_s),
+        "setpoint": _setpoint(run.told),
+        "rays": _rays(vehicle, now_s),
+        "movers": [] if executor is None else _movers(executor, now_s),
+        "figures": _figures(companion, status),
+        "battery": _battery(vehicle),
+        "gps": _gps(vehicle),
+        "guard": None if executor is None else vehicle.guard_at(now_s) is not None,
+        "news": news_of(status),
+    }
+
+
+def news_of(status: Status) -> list[Json]:
+    """The texts of this tick."""
+    return [
+        {"t": round(status.time_s, 2), "level": LEVELS.get(one.severity, "error"), "text": one.text, "own": one.own}
+        for one in status.news
+    ]
+
+
+def _place(point: NedPoint) -> list[float]:
+    return [round(point.north_m, 3), round(point.east_m, 3)]
+
+
+def _places(points: NDArray[np.float64], most: int) -> list[list[float]]:
+    """Rows north and east, thinned to at most so many, with both ends."""
+    if len(points) > most:
+        points = points[np.linspace(0, len(points) - 1, most).astype(int)]
+    rounded: list[list[float]] = np.round(points, 2).tolist()
+    return rounded
+
+
+def _outline(footprint: Footprint) -> list[list[float]]:
+    """Corners: metres ahead and to the right."""
+    if footprint.is_circle:
+        angles = np.arange(CIRCLE) * (2.0 * math.pi / CIRCLE)
+        corners = footprint.front_m * np.column_stack((np.cos(angles), np.sin(angles)))
+        rounded: list[list[float]] = np.round(corners, 3).tolist()
+        return rounded
+    front, rear, side = footprint.front_m, -footprint.rear_m, footprint.half_width_m
+    return [[front, side], [rear, side], [rear, -side], [front, -side]]
+
+
+def _border(bound: Bound) -> list[Json]:
+    """A border, one for each of its rings."""
+    rings: list[BaseGeometry] = []
+    for part in shapely.get_parts(bound.shape):
+        rings += [part.exterior, *part.interiors] if hasattr(part, "exterior") else [part]
+    return [
+        {
+            "name": bound.name,
+            "keeps_in": bound.keeps_in,
+            "corners": np.round(shapely.get_coordinates(ring)[:, ::-1], 3).tolist(),
+        }
+        for ring in rings
+    ]
+
+
+def _map(executor: MissionExecutor) -> Json:
+    evidence = executor.evidence
+    rows, columns = evidence.log_odds.shape
+    corner = evidence.base.south_west
+    return {
+        "south_m": corner.north_m,
+        "west_m": corner.east_m,
+        "cell_m": evidence.evidence_m,
+        "columns": columns,
+        "rows": rows,
+        "tile": TILE,
+    }
+
+
+def _mode(vehicle: VehicleState, run: MissionRun) -> Json:
+    heartbeat = vehicle.heartbeat
+    if heartbeat is None:
+        return {"mode": None, "armed": None, "drives": "nobody"}
+    named = heartbeat.mode in RoverMode.__members__.values()
+    mode = RoverMode(heartbeat.mode).name if named else f"mode {heartbeat.mode}"
+    drives = DRIVES[RoverMode(heartbeat.mode)] if named else "pilot"
+    if run.latch.control is Control.COMPANION and vehicle.is_ours:
+        drives = "companion"
+    return {"mode": mode, "armed": heartbeat.armed, "drives": drives if heartbeat.armed else "nobody"}
+
+
+def _path(executor: MissionExecutor | None) -> list[list[float]]:
+    path = None if executor is None else executor.driver.path
+    return [] if path is None else _places(path.points[path.progress :], MOST_PATH)
+
+
+def _motion(executor: MissionExecutor | None, now_s: float) -> list[list[float]]:
+    """The motion that was planned last."""
+    controller = None if executor is None else executor.driver.controller
+    choice = controller.choice if isinstance(controller, MotionController) else None
+    if choice is None or now_s - choice.time_s > NEWEST_S:
+        return []
+    corner = np.array((choice.corner.north_m, choice.corner.east_m))
+    return _places(corner + way_of(choice.found.motion, choice.problem)[:, ::-1], MOST_PATH)
+
+
+def _setpoint(told: ControlCommand | None) -> Json | None:
+    match None if told is None else told.setpoint:
+        case None:
+            return None
+        case GuidedPosition(point):
+            return {"kind": "position", "place": _place(point)}
+        case GuidedHeading(heading_rad):
+            return {"kind": "heading", "heading": round(heading_rad, 3)}
+        case GuidedVelocity(0.0, 0.0):
+            return {"kind": "stop"}
+        case GuidedVelocity(forward_m_s, yaw_rate_rad_s):
+            return {"kind": "velocity", "speed": round(forward_m_s, 2), "turn": round(yaw_rate_rad_s, 3)}
+
+
+def _rays(vehicle: VehicleState, now_s: float) -> Json | None:
+    """The newest scan, thinned."""
+    seen = vehicle.scan
+    if seen is None or now_s - seen.time_s > NEWEST_S or len(seen.scan.bearing_rad) == 0:
+        return None
+    return {**_thinned(seen.scan), "age_s": round(now_s - seen.time_s, 2)}
+
+
+def _thinned(scan: RangeScan) -> Json:
+    every = math.ceil(len(scan.bearing_rad) / MOST_RAYS)
+    bearings, ranges = scan.bearing_rad[::every], scan.range_m[::every]
+    step = float(bearings[1] - bearings[0]) if len(bearings) > 1 else 0.0
+    far_m = round(scan.max_range_m, 2)
+    metres = [None if math.isnan(one) else (far_m if math.isinf(one) else round(one, 2)) for one in ranges.tolist()]
+    return {"from": round(float(bearings[0]), 4), "step": round(step, 5), "m": metres, "max_m": far_m}
+
+
+def _movers(executor: MissionExecutor, now_s: float) -> list[Json]:
+    return [
+        {
+            "place": _place(one.at(now_s)),
+            "velocity": [round(one.north_m_s, 2), round(one.east_m_s, 2)],
+            "radius_m": round(one.radius_m, 2),
+            "name": one.name,
+        }
+        for one in executor.moving
+    ]
+
+
+def _figures(companion: Companion, status: Status) -> Json:
+    run, executor, pose = companion.mission_run, companion.executor, status.pose
+    ticks = companion.outcome.tick_seconds
+    clear_m = None
+    if executor is not None and pose is not None:
+        room_m = clearance_m(executor.evidence, pose.point, CLEARANCE_M) - run.mission.rover.footprint.inscribed_m
+        clear_m = round(max(room_m, 0.0), 2)
+    return {
+        "clearance_m": clear_m,
+        "planning_ms": None if executor is None else round(1e3 * executor.driver.step_s, 1),
+        "latency_ms": round(1e3 * run.vehicle.latency_s, 1),
+        "tick_ms": round(1e3 * ticks[-1], 2) if ticks else None,
+    }
+
+
+def _battery(vehicle: VehicleState) -> Json | None:
+    seen = vehicle.battery
+    return None if seen is None else {"volts": seen.volts, "percent": seen.percent}
+
+
+def _gps(vehicle: VehicleState) -> Json | None:
+    seen = vehicle.gps
+    return None if seen is None else {"fix": seen.fix, "satellites": seen.satellites}
+
+
+KEPT_OF_PAST = ("kind", "t", "pose", "speed", "state", "figures", "news", "mode", "statuses")
+
+
+def past_frame(frame: Mapping[str, Any], news: Sequence[Json]) -> Json:
+    """What is kept of a frame for those who come later."""
+    return {**{key: frame[key] for key in KEPT_OF_PAST}, "news": list(news)}

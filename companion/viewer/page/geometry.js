@@ -1,0 +1,38 @@
+// Small computations with places, [north, east] in metres.
+
+/** Metres between two places; NaN when one is missing. */
+export function distance(a, b) {
+  return a && b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : NaN;
+}
+
+/** Length of a line of places. */
+export function length(line) {
+  let sum = 0;
+  for (let i = 1; i < line.length; i += 1) sum += distance(line[i - 1], line[i]);
+  return sum;
+}
+
+/** A point of a rover's outline [forward, right] at a pose [north, east, heading]. */
+export function placed([forward, right], [north, east, heading]) {
+  const cos = Math.cos(heading);
+  const sin = Math.sin(heading);
+  return [north + forward * cos - right * sin, east + forward * sin + right * cos];
+}
+
+/** The index of the last value not above `wanted` in a growing list; -1 when all are above. */
+export function lastNotAbove(values, wanted, count = values.length) {
+  let low = 0;
+  let high = count;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (values[middle] <= wanted) low = middle + 1;
+    else high = middle;
+  }
+  return low - 1;
+}
+
+/** An angle between two, on the shorter way. */
+export function between(a, b, share) {
+  const turn = Math.atan2(Math.sin(b - a), Math.cos(b - a));
+  return a + turn * share;
+}

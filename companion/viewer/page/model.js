@@ -1,0 +1,92 @@
+// What the page knows: scene, newest frame, map, track, news, figures. The live page feeds it with messages; the report
+// sets it to a moment of a record. Views read it and never change it.
+
+import { Figures } from "viewer/figures.js";
+import { split, TileMap } from "viewer/tiles.js";
+import { Track } from "viewer/track.js";
+
+const NEWS_KEPT = 500;
+/** A clock that goes back by more than this is another run's. */
+const BACK_S = 1;
+/** After a gap as long as this, what lay between is not known: the track must not cross it as a straight line. */
+const GAP_S = 5;
+
+export class Model {
+  constructor() {
+    this.listeners = new Set();
+    this.scene = null;
+    this.map = new TileMap(null);
+    this.track = new Track();
+    this.until = Infinity; // how many points of the track are past; only a report has later ones
+    this.figures = new Figures();
+    this.forget();
+  }
+
+  /** Forgets everything that a run has left behind, except the scene. */
+  forget() {
+    this.frame = null;
+    this.news = [];
+    this.newsCount = 0; // grows with every news, also when old ones are dropped
+    this.lastT = -Infinity;
+    this.track.clear();
+    this.figures.clear();
+  }
+
+  tell() {
+    for (const listener of this.listeners) listener();
+  }
+
+  /** A new connection: its first scene begins the map anew, because all tiles are sent again. */
+  connected() {
+    this.mapIsOld = true;
+  }
+
+  /** Takes a message of the source; unknown kinds are left alone, so an older page works with a newer source. */
+  take(message) {
+    if (message.kind === "scene") this.takeScene(message);
+    else if (message.kind === "past") this.takePast(message.frames ?? []);
+    else if (message.kind === "frame") this.takeFrame(message);
+    else return;
+    this.tell();
+  }
+
+  takeTiles(buffer) {
+    for (const { column, row, bytes } of split(buffer)) this.map.put(column, row, bytes);
+    this.tell();
+  }
+
+  takeScene(scene) {
+    const before = this.scene;
+    const another = before && (before.map_epoch !== scene.map_epoch || before.began_unix_s !== scene.began_unix_s);
+    const shapeChanged = JSON.stringify(before?.map ?? null) !== JSON.stringify(scene.map ?? null);
+    if (another) this.forget();
+    if (another || shapeChanged || this.mapIsOld) this.map = new TileMap(scene.map ?? null);
+    this.mapIsOld = false;
+    this.scene = scene;
+  }
+
+  // After a lost connection the past overlaps with what is known; the rest of it fills the gap.
+  takePast(frames) {
+    const last = frames.at(-1);
+    if (last && last.t < this.lastT - BACK_S) this.forget();
+    for (const frame of frames) this.follow(frame);
+  }
+
+  takeFrame(frame) {
+    if (frame.t < this.lastT - BACK_S) this.forget();
+    this.follow(frame);
+    this.frame = frame;
+  }
+
+  follow(frame) {
+    if (!(frame.t > this.lastT)) return;
+    if (!frame.pose || frame.t - this.lastT > GAP_S) this.track.interrupt();
+    if (frame.pose) this.track.add(frame.t, frame.pose[0], frame.pose[1], frame.speed);
+    this.figures.add(frame);
+    this.lastT = frame.t;
+    if (!frame.news?.length) return;
+    this.news.push(...frame.news);
+    this.newsCount += frame.news.length;
+    if (this.news.length > NEWS_KEPT) this.news = this.news.slice(-NEWS_KEPT);
+  }
+}
