@@ -36,6 +36,19 @@ class Following(NamedTuple):
     gains_most_m_s2: float = 1.3
 
 
+GUARDED_S = 1.0
+"""A velocity that lasts no longer is ended by a guard."""
+OFF_ALONE = 0.4
+"""For as long as a velocity lasts without a guard a rover may turn by such a share more or less: an autopilot that is
+not tuned to it overshoots in the first seconds of a turn, though on the whole it turns as told."""
+
+
+def turn_gains(follows: Following, lasts_s: float) -> tuple[float, ...]:
+    """By which factors more than told a rover may turn that is left alone with a velocity which lasts so long."""
+    shares = (follows.off_model, OFF_ALONE) if lasts_s > GUARDED_S else (follows.off_model,)
+    return 1.0, *(1.0 + sign * share for share in shares for sign in (-1.0, 1.0))
+
+
 AS_SHIPPED = Following()
 """ArduRover's parameters as shipped, and its measured dead time with some to spare."""
 

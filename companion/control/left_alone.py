@@ -19,11 +19,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.control.following import Following
+from companion.control.following import Following, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.told import in_force
 from companion.mapping.evidence_map import EvidenceMap
-from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+from companion.vehicle.commands import GuidedVelocity
 
 STEP_S = 0.05
 ANY_S = 0.1
@@ -33,8 +33,9 @@ MOST_STEPS = 1200
 STANDS_M_S, STANDS_RAD_S = 0.02, 0.02
 NEARER_M, NEARER_UNSEEN_M = 0.05, 0.1
 """So deep the outline may lie over the middle of a cell: steps in time and cells make ways differ by as much."""
-AWAY_M = 0.02
-"""A rover whose outline lies deeper over something may get so much deeper, so that it gets away."""
+AWAY_M, AWAY = 0.02, 0.1
+"""A rover whose outline lies deeper over something may get so much deeper, so that it gets away; but with each metre it
+must get out of it by the second."""
 UNDER_M, BESIDE = 0.3, 2.0
 """No sensor sees the ground on which the rover can turn and so much round it, nor what lies that many times its half
 width beside it."""
@@ -82,13 +83,13 @@ class Rasters(NamedTuple):
 
 def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] | None:
     """The ways on which it may end, as it turns as told, less or more; None if it would never stand."""
-    follows, off = view.following, view.following.off_model
+    follows, lasts_s = view.following, view.settings.guidance.velocity_lasts_s
     latest_s = _latest_s(follows)
     tells = _tells(setpoint, view, latest_s)
     start = np.array((*_from_corner(view), view.pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s))
-    ends_s = latest_s + view.settings.guidance.velocity_lasts_s
+    ends_s = latest_s + lasts_s
     ways = []
-    for gain in (1.0, 1.0 - off, 1.0 + off):
+    for gain in turn_gains(follows, lasts_s):
         places, stands = way_of(start, tells, ends_s, follows.turn_gain * gain, _worst(follows))
         if not stands:
             return None
@@ -137,7 +138,7 @@ def _tells(setpoint: GuidedVelocity, view: LocalView, latest_s: float) -> NDArra
     Where no velocity was told, the rover goes on as it does; a position tells it to drive on.
     """
     now_s, on_m_s = view.pose.time_s, view.forward_m_s
-    if isinstance(view.told, GuidedPosition):
+    if view.by_position(now_s - latest_s):
         on_m_s = view.rover.cruise_speed_m_s
     first = in_force(view.lately, now_s - latest_s)
     rows = [(-math.inf, on_m_s, view.yaw_rate_rad_s) if first is None else (-math.inf, *first[1:])]
@@ -228,11 +229,11 @@ def _is_closed(place, evidence):
 def meets(places, outline, under, under_m, evidence):
     """The number of a ``Met``. Ground counts as seen within ``under_m`` of the place ``under``."""
     begins_m, _ = _deepest(places[0], outline, under, under_m, evidence)
-    allowed_m = max(begins_m + AWAY_M, NEARER_M)
     was_closed = _is_closed(places[0], evidence)
     for at in range(1, places.shape[0]):
         obstacle_m, unseen_m = _deepest(places[at], outline, under, under_m, evidence)
-        if obstacle_m > allowed_m:
+        gone_m = math.hypot(places[at, 0] - places[0, 0], places[at, 1] - places[0, 1])
+        if obstacle_m > max(begins_m + AWAY_M - AWAY * gone_m, NEARER_M):
             return 1
         if unseen_m > NEARER_UNSEEN_M:
             return 2

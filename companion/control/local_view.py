@@ -5,6 +5,7 @@ Nouns: local view.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 from companion.control.following import AS_SHIPPED, Following
@@ -14,7 +15,7 @@ from companion.core.frames import Pose
 from companion.core.rover_limits import RoverLimits
 from companion.mapping.evidence_map import EvidenceMap
 from companion.settings import Settings
-from companion.vehicle.commands import Setpoint
+from companion.vehicle.commands import GuidedPosition, Setpoint
 
 MOST_FURTHER_M = 3.0
 """No rover shoots farther: its throttle closes meanwhile."""
@@ -25,6 +26,7 @@ class LocalView:
     """One moment, local frame. ``speed_m_s``: over ground, without a sign; ``yaw_rate_rad_s``: clockwise positive.
 
     ``told``: the setpoint of the tick before; None where there was none. ``lately``: the velocities told before.
+    ``placed_s``: when a position was told last.
     ``held_m_s``: so much slower than its throttle would let it go on firm ground. ``rolls_back``: it moves tail first.
     ``following``: how it follows velocities, as far as is known. ``body``: its outline, if it is no circle.
     """
@@ -38,6 +40,7 @@ class LocalView:
     held_m_s: float = 0.0
     told: Setpoint | None = None
     lately: Told = ()
+    placed_s: float = -math.inf
     rolls_back: bool = False
     following: Following = AS_SHIPPED
     body: Footprint | None = None
@@ -51,6 +54,10 @@ class LocalView:
     def forward_m_s(self) -> float:
         """Its speed, below 0 if it rolls tail first."""
         return -self.speed_m_s if self.rolls_back else self.speed_m_s
+
+    def by_position(self, time_s: float) -> bool:
+        """Whether a position was in force then."""
+        return isinstance(self.told, GuidedPosition) or time_s <= self.placed_s
 
     @property
     def further_m(self) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.following import Following
+from companion.control.following import GUARDED_S, Following, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import NEAR_M, Window, look_round
 from companion.control.motion_kernels import (
@@ -36,7 +36,7 @@ from companion.control.reference_path import Points, ReferencePath
 from companion.control.told import ToldVelocity, in_force
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
-from companion.vehicle.commands import GuidedPosition, GuidedVelocity
+from companion.vehicle.commands import GuidedVelocity
 
 HORIZON_S, STEP_S = 2.5, 0.1
 ALONE_STEP_S = 0.05
@@ -52,8 +52,6 @@ BRAKE_TURNS = (0.0, -0.5, 0.5, -1.0, 1.0)
 """Turn rates to brake with, as shares of the fastest."""
 ENOUGH_M = 0.1
 """With so much room it does not turn while it brakes."""
-BRAKES_S = 0.3
-"""So long it is looked how braking goes on."""
 STANDS_M_S = 0.05
 TURNS = 17
 """Turn rates for which the fastest speed is looked for that may be told."""
@@ -61,12 +59,9 @@ NONE_ADMITTED = np.zeros((TURNS, 2))
 FASTER_S, BLUR_S, MOST_BLUR_RAD = 0.05, 1.15, math.radians(10.0)
 """Left alone, the rover keeps so much more room for each m/s; more where a reading speaks for a wide angle: how far to
 the side something ends that is as far away as the rover needs to stop is known only to within half of that."""
-GUARDED_S, DRIFT_M_S, DRIFT_SHARE = 1.0, 0.025, 0.05
-"""For each second longer than the first that a velocity lasts, a rover that is left alone keeps so much more room, and
-so much more for each m/s: meanwhile its position, by which the map was made, drifts, and small errors grow."""
-OFF_ALONE = 0.5
-"""For as long as a velocity lasts without a guard a rover may turn by such a share more or less: an autopilot that is
-not tuned to it overshoots in the first seconds of a turn, though on the whole it turns as told."""
+DRIFT_SHARE = 0.1
+"""For each second longer than with a guard that a velocity lasts, a rover that is left alone keeps so much more room
+for each m/s: meanwhile its position, by which the map was made, drifts, and small errors grow."""
 PLANNED_SHARE = 0.8
 """Motions are planned with so much of the braking there should be, so that the last look seldom says no."""
 
@@ -182,8 +177,8 @@ class MotionController:
     def _braking(self, view: LocalView, worst: MotionProblem) -> ToldVelocity:
         """The way to brake that keeps most room, straight on where there is enough."""
         now_s, fastest_rad_s = self._time_s, worst.model.turn_fastest_rad_s
-        gains = _gains(view)
-        spare_m = {share: _least_spare_m(share * fastest_rad_s, gains, worst) for share in BRAKE_TURNS}
+        lasts_s = view.settings.guidance.velocity_lasts_s
+        spare_m = {share: _least_spare_m(share * fastest_rad_s, lasts_s, _gains(view), worst) for share in BRAKE_TURNS}
         best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M))
         rolls = abs(worst.start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
@@ -194,7 +189,7 @@ def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
     turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
     admitted: NDArray[np.float64] = admitted_speeds(
-        turns_rad_s, lasts_s, np.array(_gains(view)), _margin_m(view), _faster_s(view), worst
+        turns_rad_s, lasts_s, np.array(_gains(view)), WEIGHTS.margin_m, _faster_s(view), worst
     )
     return admitted
 
@@ -204,33 +199,26 @@ def _alone_s(view: LocalView) -> float:
     return max(view.settings.guidance.velocity_lasts_s - GUARDED_S, 0.0)
 
 
-def _margin_m(view: LocalView) -> float:
-    """Room that a rover keeps which is left alone."""
-    return WEIGHTS.margin_m + DRIFT_M_S * _alone_s(view)
-
-
 def _faster_s(view: LocalView) -> float:
-    """More room for each m/s."""
+    """Room for each m/s."""
     return max(FASTER_S, BLUR_S * min(view.rover.beam_rad, MOST_BLUR_RAD)) + DRIFT_SHARE * _alone_s(view)
 
 
 def _gains(view: LocalView) -> tuple[float, ...]:
-    """The rover may turn so much more or less than it is told; without a guard by more than it is known to, as well."""
-    off = view.following.off_model
-    shares = (off, OFF_ALONE) if _alone_s(view) > 0.0 else (off,)
-    return 1.0, *(1.0 + sign * share for share in shares for sign in (-1.0, 1.0))
+    """The rover may turn so much more or less than it is told."""
+    return turn_gains(view.following, view.settings.guidance.velocity_lasts_s)
 
 
-def _least_spare_m(turn_rad_s: float, gains: tuple[float, ...], worst: MotionProblem) -> float:
-    """The room that is left where the rover brakes turning, however much it turns."""
-    return min(float(spare_m(0.0, turn_rad_s, BRAKES_S, gain, 0.0, 0.0, worst)) for gain in gains)
+def _least_spare_m(turn_rad_s: float, lasts_s: float, gains: tuple[float, ...], worst: MotionProblem) -> float:
+    """The room that is left where the rover brakes and turns for so long, however much it turns."""
+    return min(float(spare_m(0.0, turn_rad_s, lasts_s, gain, 0.0, 0.0, worst)) for gain in gains)
 
 
 def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem) -> bool:
     """Whether this may be the last command, however the rover turns."""
     lasts_s = view.settings.guidance.velocity_lasts_s
     return all(
-        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, _margin_m(view), _faster_s(view), worst)
+        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, _faster_s(view), worst)
         for gain in _gains(view)
     )
 
@@ -246,10 +234,12 @@ def _pending(view: LocalView, steps: int, step_s: float) -> NDArray[np.float64]:
     Where that was no velocity, the rover goes on as it does; a position tells it to drive on.
     """
     rows = np.zeros((steps, 2))
-    on_m_s = view.rover.cruise_speed_m_s if isinstance(view.told, GuidedPosition) else view.forward_m_s
     for step, row in enumerate(rows):
-        told = in_force(view.lately, view.pose.time_s + (step + 0.5 - steps) * step_s)
-        row[:] = (on_m_s, view.yaw_rate_rad_s) if told is None else (told.speed_m_s, told.turn_rad_s)
+        then_s = view.pose.time_s + (step + 0.5 - steps) * step_s
+        if (told := in_force(view.lately, then_s)) is not None:
+            row[:] = told.speed_m_s, told.turn_rad_s
+        else:
+            row[:] = view.rover.cruise_speed_m_s if view.by_position(then_s) else view.forward_m_s, view.yaw_rate_rad_s
     return rows
 
 

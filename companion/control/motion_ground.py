@@ -66,7 +66,10 @@ def look_round(evidence: EvidenceMap, here: NedPoint, path: ReferencePath, body:
     (left, low), (right, high) = _window(evidence, np.vstack((ahead, (here.north_m, here.east_m))))
     log_odds = evidence.log_odds[low:high, left:right]
     cell_m, unseen = evidence.evidence_m, log_odds == 0.0
-    blocked = (log_odds >= evidence.settings.occupied_at) | _closed(evidence, (left, low), (right, high), body.radius_m)
+    closed, costly = _closed(evidence, (left, low), (right, high), body.radius_m)
+    # Fields that experience closed may lie under the rover: those do not keep it there.
+    costly &= ~_under(evidence, here, (left, low), costly.shape, body.around_m)
+    blocked = (log_odds >= evidence.settings.occupied_at) | closed | costly
     _close_edge(blocked, (left, low), evidence)
     # To the surface: the map marks what lies a little behind it.
     behind_m = np.float32(max(0.5 * cell_m, evidence.settings.hit_depth_m))
@@ -125,8 +128,8 @@ def _window(evidence: EvidenceMap, places: Floats) -> tuple[tuple[int, int], tup
 
 def _closed(
     evidence: EvidenceMap, first: tuple[int, int], last: tuple[int, int], body_radius_m: float
-) -> NDArray[np.bool_]:
-    """Evidence cells of fields that the mission, a fence or experience closed to the rover's outline.
+) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Evidence cells of fields closed to the rover's outline: by the mission or a fence, and those by experience.
 
     What the mission closes has grown by the rover's radius, for its middle, at worst by half a field less. Here its
     outline keeps the distance, so a strip as wide as that is taken off again: else the rover would keep it twice.
@@ -144,7 +147,7 @@ def _closed(
     if closed.any():
         deep_m = distance_field(~closed) * evidence.evidence_m
         closed = deep_m > max(body_radius_m - 0.5 * evidence.base.resolution_m, 0.0)
-    return closed | cells(base + penalty >= 1.0) & ~cells(base >= 1.0)
+    return closed, cells((base + penalty >= 1.0) & (base < 1.0))
 
 
 def _unseen_to_m(body: Body) -> float:

@@ -39,6 +39,9 @@ ENDLESS = 600
 NEARER_M, NEAREST_M = 0.01, -0.04
 """A rover that is too near to something may come nearer by the first, so that it gets away, but only down to the
 second: else it would come nearer with every look."""
+AWAY = 0.1
+"""One whose outline lies over something must get out of it by so much for each metre it goes: it may leave, but not
+touch the next thing as deep."""
 
 
 class MotionGround(NamedTuple):
@@ -171,6 +174,14 @@ def _least_m(raster, cell_m, body, start, outside_m=AS_AT_EDGE):
 
 
 @njit(cache=True, nogil=True)
+def _still_m(least_m, start, state):
+    """The clearance that such a rover must keep at a place on its way."""
+    if least_m >= 0.0:
+        return least_m
+    return min(least_m + AWAY * math.hypot(state[0] - start.x_m, state[1] - start.y_m), 0.0)
+
+
+@njit(cache=True, nogil=True)
 def told_at(knots, share):
     """The command at a share (0 to 1) of the horizon."""
     last = knots.shape[0] - 1
@@ -225,7 +236,7 @@ def cost_s(knots, problem):
         state = moved(state, told_m_s, told_rad_s, model, step_s)
         x, y, heading, speed = state[0], state[1], state[2], abs(state[3])
         room = clearance_m(ground.gap_m, ground.cell_m, body, x, y, heading)
-        if room < min(0.0, least):
+        if room < min(0.0, _still_m(least, start, state)):
             return BLOCKED_S * (2.0 - step / steps) + left_s(ground, x, y)
         margin = weights.margin_m + weights.margin_s * speed
         if room < margin:
@@ -242,7 +253,7 @@ def cost_s(knots, problem):
             extra += HASTE * max(speed - stops_m_s, 0.0) * step_s
         if left < ARRIVED_S:
             return step * step_s + extra
-    return steps * step_s + extra + _after_s(state, least, problem)
+    return steps * step_s + extra + _after_s(state, _still_m(least, start, state), problem)
 
 
 @njit(cache=True, nogil=True)
@@ -356,7 +367,7 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, en
         elif step < early + held:
             now_m_s, now_rad_s = told_m_s, told_rad_s
         state = moved(state, now_m_s, gain * now_rad_s, model, step_s)
-        room_m = min(margin_m + margin_s * abs(state[3]), least)
+        room_m = min(margin_m + margin_s * abs(state[3]), _still_m(least, start, state))
         spare = min(spare, clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - room_m)
         seen_m = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2], 0.0)
         spare = min(spare, seen_m - min(margin_m, least_seen))

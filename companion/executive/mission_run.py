@@ -5,6 +5,7 @@ Nouns: mission run, order, stop.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import Enum, auto
@@ -30,7 +31,7 @@ from companion.recording.recorder import RunLog
 from companion.safety.mode_latch import LatchState, Reaction, Verdict
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, WaitReason
 from companion.settings.live_settings import LiveSettings
-from companion.vehicle.commands import Command, SetMode
+from companion.vehicle.commands import Command, GuidedPosition, SetMode
 from companion.vehicle.events import RoverMode
 from companion.vehicle.motion_limits import full_throttle_m_s
 from companion.vehicle.state import VehicleState
@@ -105,6 +106,7 @@ class MissionRun:
         self._told: ControlCommand | None = None
         """What was sent, or still held, in the tick before."""
         self._lately: Told = ()
+        self._placed_s = -math.inf
         self.legs = AutoModeLegs(notifier)
         self._settings = settings
         self._make_executor = make_executor
@@ -182,7 +184,7 @@ class MissionRun:
         told = None if self._told is None else self._told.setpoint
         full_m_s = full_throttle_m_s(self.vehicle.parameters)
         held_m_s = self._drag.held_m_s(self.vehicle.throttle, full_m_s, view)
-        view = replace(view, held_m_s=held_m_s, told=told, lately=self._lately)
+        view = replace(view, held_m_s=held_m_s, told=told, lately=self._lately, placed_s=self._placed_s)
         executor.learn(view)
         wanted = executor.guide(task, view)
         wanted = self.legs.guide(wanted, executor, view)
@@ -191,7 +193,10 @@ class MissionRun:
     def speak(self, command: ControlCommand | Command | None, now_s: float) -> None:
         """Send it, if it is new or due again."""
         self._told = command if isinstance(command, ControlCommand) else None
-        self._lately = after(self._lately, None if self._told is None else self._told.setpoint, now_s)
+        setpoint = None if self._told is None else self._told.setpoint
+        self._lately = after(self._lately, setpoint, now_s)
+        if isinstance(setpoint, GuidedPosition):
+            self._placed_s = now_s
         self.sender.speak(command, now_s)
 
 

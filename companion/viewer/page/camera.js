@@ -6,24 +6,27 @@
 const SMALLEST = 0.02; // pixels a metre
 const LARGEST = 400;
 /** In follow mode with the heading up, more of what lies ahead is shown. */
-const AHEAD = 0.68;
-const MARGIN_PX = 70;
+const AHEAD = 0.62;
+/** What "fit" leaves free at each edge: names, scale and buttons stand there. */
+const MARGINS_PX = { left: 40, right: 34, top: 44, bottom: 64 };
 
 export class Camera {
   constructor() {
     Object.assign(this, { north: 0, east: 0, scale: 20, up: 0, width: 1, height: 1, ratio: 1 });
     this.mode = "fit";
+    this.covered = 0; // pixels at the lower edge under something else
+    this.coveredRight = 60; // and at the right edge, under the buttons
     this.headingUp = false;
-    this.changed = () => {};
+    this.listeners = new Set();
   }
 
-  /** Canvas pixels a metre; `scale` counts CSS pixels. */
-  get pixels() {
-    return this.scale;
+  changed() {
+    for (const listener of this.listeners) listener();
   }
 
   get anchor() {
-    return [this.width / 2, this.height * (this.mode === "follow" && this.headingUp ? AHEAD : 0.5)];
+    if (this.mode !== "follow") return [this.width / 2, this.height / 2];
+    return [this.width / 2, (this.height - this.covered) * (this.headingUp ? AHEAD : 0.5)];
   }
 
   resize(width, height, ratio) {
@@ -69,10 +72,8 @@ export class Camera {
   }
 
   pan(dx, dy) {
-    const [x, y] = this.anchor;
-    const [north, east] = this.toPlace(x - dx, y - dy);
     this.free();
-    Object.assign(this, { north, east });
+    [this.north, this.east] = this.toPlace(this.width / 2 - dx, this.height / 2 - dy);
     this.changed();
   }
 
@@ -91,7 +92,7 @@ export class Camera {
 
   /** Shows a place in the middle. */
   centre([north, east]) {
-    this.free();
+    this.mode = "free";
     Object.assign(this, { north, east });
     this.changed();
   }
@@ -115,33 +116,45 @@ export class Camera {
     this.changed();
   }
 
-  /** Keeps what the mode promises; called before each drawing. `interest` are the places that "fit" shows. */
+  /** Keeps what the mode promises; called before each drawing. `interest()` gives the places that "fit" shows. */
   hold(pose, interest) {
     if (this.headingUp && pose) this.up = pose[2];
     if (this.mode === "follow" && pose) [this.north, this.east] = pose;
-    if (this.mode === "fit" && interest.length) this.fit(interest);
+    if (this.mode !== "fit") return;
+    const places = interest();
+    if (places.length) this.fit(places);
   }
 
   // Only moves the map when something left it or it has become far too small: a map that breathes is hard to read.
   fit(interest) {
-    const right = interest.map(([n, e]) => e * Math.cos(this.up) - n * Math.sin(this.up));
-    const ahead = interest.map(([n, e]) => n * Math.cos(this.up) + e * Math.sin(this.up));
-    const box = [Math.min(...right), Math.max(...right), Math.min(...ahead), Math.max(...ahead)];
-    const margin = Math.min(MARGIN_PX, this.width / 5, this.height / 5);
+    const across = interest.map(([n, e]) => e * Math.cos(this.up) - n * Math.sin(this.up));
+    const along = interest.map(([n, e]) => n * Math.cos(this.up) + e * Math.sin(this.up));
+    const box = [Math.min(...across), Math.max(...across), Math.min(...along), Math.max(...along)];
+    const { left, right, top, bottom } = this.margins();
     const wide = Math.max(box[1] - box[0], 4);
     const high = Math.max(box[3] - box[2], 4);
-    const ideal = Math.min((this.width - 2 * margin) / wide, (this.height - 2 * margin) / high, 80);
-    const key = `${this.width} ${this.height} ${this.up}`;
+    const ideal = Math.min((this.width - left - right) / wide, (this.height - top - bottom) / high, 80);
+    const key = `${this.width} ${this.height} ${this.covered} ${this.coveredRight}`;
     const inside = interest.every(([n, e]) => {
       const [x, y] = this.toScreen(n, e);
-      return x > margin / 2 && x < this.width - margin / 2 && y > margin / 2 && y < this.height - margin / 2;
+      return x > left * 0.6 && x < this.width - right * 0.9 && y > top * 0.6 && y < this.height - bottom * 0.8;
     });
     if (inside && ideal < 1.5 * this.scale && this.fitted === key) return;
     this.fitted = key;
     this.scale = Math.min(LARGEST, Math.max(SMALLEST, ideal));
-    const x = (box[0] + box[1]) / 2;
-    const y = (box[2] + box[3]) / 2;
+    const x = (box[0] + box[1]) / 2 + (right - left) / 2 / this.scale;
+    const y = (box[2] + box[3]) / 2 - (bottom - top) / 2 / this.scale;
     this.north = y * Math.cos(this.up) - x * Math.sin(this.up);
     this.east = x * Math.cos(this.up) + y * Math.sin(this.up);
+  }
+
+  // On a small screen they shrink, or nothing would be left for the map.
+  margins() {
+    const small = Math.min(1, this.width / 500, this.height / 400);
+    const scaled = Object.entries(MARGINS_PX).map(([edge, pixels]) => [edge, Math.max(pixels * small, 28)]);
+    const margins = Object.fromEntries(scaled);
+    margins.right += this.coveredRight;
+    margins.bottom += this.covered;
+    return margins;
   }
 }

@@ -4,31 +4,89 @@
 // colour alone: each has a sign, too. The CSS takes its colours from here, so canvas and page cannot differ.
 
 const LIGHT = {
-  page: "#eef1f4", panel: "#ffffff", raised: "#ffffff", text: "#0d1319", soft: "#36414c", line: "#b9c2cb", accent: "#0b5cad",
-  unknown: "#c5ccd3", free: "#ffffff", obstacle: "#12181e", closed: "#e9c9dc", closedLine: "#c58bb0", costly: "#f2e3b3",
-  grid: "rgba(20, 40, 60, 0.13)", fence: "#8e2a6b", halo: "#ffffff", ink: "#0d1319",
-  rover: "#e04a00", roverEdge: "#1a0a00", path: "#e04a00", motion: "#a3005c", setpoint: "#a3005c", goal: "#e04a00",
-  goalText: "#ffffff", ray: "rgba(0, 90, 170, 0.13)", rayEnd: "rgba(0, 80, 160, 0.65)", mover: "#6a3fc0", home: "#0d1319",
-  done: "#00665a", failed: "#a8200d", pending: "#ffffff", future: "rgba(20, 40, 60, 0.4)", casing: "rgba(255, 255, 255, 0.9)",
+  page: "#eef1f4",
+  panel: "#ffffff",
+  raised: "#ffffff",
+  text: "#0d1319",
+  soft: "#36414c",
+  line: "#b9c2cb",
+  accent: "#0b5cad",
+  unknown: "#c5ccd3",
+  free: "#ffffff",
+  obstacle: "#12181e",
+  closed: "#e9c9dc",
+  closedLine: "#c58bb0",
+  costly: "#f2e3b3",
+  grid: "rgba(20, 40, 60, 0.13)",
+  fence: "#8e2a6b",
+  halo: "#ffffff",
+  ink: "#0d1319",
+  rover: "#e04a00",
+  roverEdge: "#1a0a00",
+  path: "#e04a00",
+  motion: "#a3005c",
+  setpoint: "#a3005c",
+  goal: "#e04a00",
+  goalText: "#ffffff",
+  ray: "rgba(0, 90, 170, 0.13)",
+  rayEnd: "rgba(0, 80, 160, 0.65)",
+  mover: "#6a3fc0",
+  home: "#0d1319",
+  done: "#00665a",
+  failed: "#a8200d",
+  pending: "#ffffff",
+  future: "rgba(20, 40, 60, 0.4)",
+  casing: "rgba(255, 255, 255, 0.9)",
   speeds: ["#5a1e8c", "#3b4fa3", "#1f7a94", "#149a76", "#5cb531"],
   others: ["#8a5a00", "#0072b2", "#b0407f", "#00806a", "#5f6b00"],
 };
 
 const DARK = {
-  page: "#0a0d10", panel: "#13181d", raised: "#1d242b", text: "#f4f7f9", soft: "#c9d2da", line: "#3d4853", accent: "#79bdff",
-  unknown: "#101418", free: "#2c353d", obstacle: "#f3f6f8", closed: "#4f2b45", closedLine: "#8a4f79", costly: "#4a4329",
-  grid: "rgba(210, 230, 250, 0.10)", fence: "#f08cc8", halo: "#0a0d10", ink: "#f4f7f9",
-  rover: "#ff7a33", roverEdge: "#fff3ea", path: "#ff8a47", motion: "#ff6fc0", setpoint: "#ff6fc0", goal: "#ff7a33",
-  goalText: "#1a0a00", ray: "rgba(120, 190, 255, 0.13)", rayEnd: "rgba(140, 200, 255, 0.7)", mover: "#bda0ff", home: "#f4f7f9",
-  done: "#39d0b4", failed: "#ff7b66", pending: "#13181d", future: "rgba(210, 230, 250, 0.4)", casing: "rgba(10, 13, 16, 0.9)",
+  page: "#0a0d10",
+  panel: "#13181d",
+  raised: "#1d242b",
+  text: "#f4f7f9",
+  soft: "#c9d2da",
+  line: "#3d4853",
+  accent: "#79bdff",
+  unknown: "#101418",
+  free: "#36414b",
+  obstacle: "#f3f6f8",
+  closed: "#4f2b45",
+  closedLine: "#8a4f79",
+  costly: "#4a4329",
+  grid: "rgba(210, 230, 250, 0.10)",
+  fence: "#f08cc8",
+  halo: "#0a0d10",
+  ink: "#f4f7f9",
+  rover: "#ff7a33",
+  roverEdge: "#fff3ea",
+  path: "#ff8a47",
+  motion: "#ff6fc0",
+  setpoint: "#ff6fc0",
+  goal: "#ff7a33",
+  goalText: "#1a0a00",
+  ray: "rgba(120, 190, 255, 0.13)",
+  rayEnd: "rgba(140, 200, 255, 0.7)",
+  mover: "#bda0ff",
+  home: "#f4f7f9",
+  done: "#39d0b4",
+  failed: "#ff7b66",
+  pending: "#13181d",
+  future: "rgba(210, 230, 250, 0.4)",
+  casing: "rgba(10, 13, 16, 0.9)",
   speeds: ["#b98af0", "#8a9df5", "#59bfd9", "#45dca8", "#e2ec4e"],
   others: ["#ffc46b", "#7cc4ff", "#ff9ccb", "#6fe3c8", "#d3de62"],
 };
 
 /** What the page calls them; the same in light and dark, because they are large areas with their own text colour. */
 const STATES = {
-  driving: ["#0b5cad", "#ffffff"], waiting: ["#ffc531", "#161000"], stopped: ["#b3220c", "#ffffff"],
-  ended: ["#33414e", "#ffffff"], connecting: ["#33414e", "#ffffff"], offline: ["#000000", "#ffffff"],
+  driving: ["#0b5cad", "#ffffff"],
+  waiting: ["#ffc531", "#161000"],
+  stopped: ["#b3220c", "#ffffff"],
+  ended: ["#33414e", "#ffffff"],
+  connecting: ["#33414e", "#ffffff"],
+  offline: ["#000000", "#ffffff"],
 };
 
 /** Levels of news and facts: text colours for light and dark. */
@@ -67,6 +125,7 @@ class Theme {
       if (typeof value === "string") root.style.setProperty(`--${name}`, value);
     }
     this.colours.speeds.forEach((value, index) => root.style.setProperty(`--speed-${index}`, value));
+    this.colours.others.forEach((value, index) => root.style.setProperty(`--other-${index}`, value));
     for (const [name, value] of Object.entries(LEVELS[this.dark ? "dark" : "light"])) {
       root.style.setProperty(`--${name}`, value);
     }

@@ -27,5 +27,8 @@ export function setAttribute(node, name, value) {
 
 /** Whether a key press belongs to what has the focus (a text, a choice) and not to the page. */
 export function typesInto(target) {
-  return target instanceof Element && target.closest("input:not([type=range]):not([type=checkbox]), select, textarea") !== null;
+  return (
+    target instanceof Element &&
+    target.closest("input:not([type=range]):not([type=checkbox]), select, textarea") !== null
+  );
 }

@@ -35,7 +35,10 @@ export class Figures {
 
   cut() {
     const oldest = this.times.at(-1) - this.keptS;
-    const gone = Math.max(this.times.findIndex((t) => t >= oldest), this.times.length - MOST);
+    const gone = Math.max(
+      this.times.findIndex((t) => t >= oldest),
+      this.times.length - MOST,
+    );
     this.times.splice(0, gone);
     for (const values of this.values) values.splice(0, gone);
   }

@@ -37,11 +37,15 @@ export function listen(canvas, camera, tap) {
   };
   canvas.addEventListener("pointerup", release);
   canvas.addEventListener("pointercancel", release);
-  canvas.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    const lines = event.deltaMode === 1 ? 16 : 1;
-    camera.zoom(Math.exp(-event.deltaY * lines * (event.ctrlKey ? PINCH_WHEEL : WHEEL)), ...spot(event));
-  }, { passive: false });
+  canvas.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      const lines = event.deltaMode === 1 ? 16 : 1;
+      camera.zoom(Math.exp(-event.deltaY * lines * (event.ctrlKey ? PINCH_WHEEL : WHEEL)), ...spot(event));
+    },
+    { passive: false },
+  );
   canvas.addEventListener("dblclick", (event) => camera.zoom(2, ...spot(event)));
 }
 
@@ -67,7 +71,10 @@ function apart(spots) {
 /** Keys of the whole page: `actions` maps a key to a function. Arrows move the map while it has the focus. */
 export function listenKeys(canvas, camera, actions) {
   const pans = {
-    ArrowLeft: [KEY_PAN_PX, 0], ArrowRight: [-KEY_PAN_PX, 0], ArrowUp: [0, KEY_PAN_PX], ArrowDown: [0, -KEY_PAN_PX],
+    ArrowLeft: [KEY_PAN_PX, 0],
+    ArrowRight: [-KEY_PAN_PX, 0],
+    ArrowUp: [0, KEY_PAN_PX],
+    ArrowDown: [0, -KEY_PAN_PX],
   };
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.altKey || typesInto(event.target)) return;

@@ -64,7 +64,7 @@ export class TileMap {
     if (column >= this.across || row >= this.up) return;
     const key = row * this.across + column;
     let cells = this.tiles.get(key);
-    if (!cells) this.tiles.set(key, cells = new Uint8Array(this.shape.tile ** 2));
+    if (!cells) this.tiles.set(key, (cells = new Uint8Array(this.shape.tile ** 2)));
     unpack(bytes, cells);
     this.dirty.add(key);
   }
@@ -88,7 +88,7 @@ export class TileMap {
     const { south_m: south, west_m: west, cell_m: cell, tile } = this.shape;
     const side = tile * TILES_A_BLOCK * cell;
     const coarse = camera.scale * cell < COARSE_BELOW_PX;
-    const seam = 0.5 / camera.pixels; // blocks overlap by half a pixel, or a hair line would show between them
+    const seam = 0.5 / camera.scale; // blocks overlap by half a pixel, or a hair line would show between them
     context.imageSmoothingEnabled = camera.scale * cell < 1;
     for (const block of this.blocks.values()) {
       const east = west + block.column * side;

@@ -82,26 +82,27 @@ export class Track {
     return lastNotAbove(this.times, t) + 1;
   }
 
-  /** Draws the track, with the context's transform set to (east, north) in metres. What is later than `until` is faint. */
+  /** Draws the track, with the context's transform set to (east, north) in metres. Points after `until` are faint. */
   draw(context, camera, colours, until = Infinity) {
     const count = Math.min(this.points.length, until);
-    const level = camera.scale * SPACINGS_M[2] < SPACING_PX * 1.5 ? 2 : camera.scale * SPACINGS_M[1] < SPACING_PX ? 1 : 0;
+    const level = levelFor(camera.scale);
     context.lineJoin = "round";
     context.lineCap = "round";
     this.build();
     if (count < this.points.length) {
-      context.lineWidth = 2 / camera.pixels;
+      context.lineWidth = 2 / camera.scale;
       context.strokeStyle = colours.future;
       for (const batch of this.batches) {
         if (batch.to > count - 1 && batch.inView(camera)) context.stroke(batch.form(level).whole);
       }
     }
-    const drawn = this.batches.filter((batch) => batch.from < count && batch.inView(camera))
+    const drawn = this.batches
+      .filter((batch) => batch.from < count && batch.inView(camera))
       .map((batch) => (batch.to <= count ? batch : this.part(batch, count)).form(level));
-    context.lineWidth = 6 / camera.pixels;
+    context.lineWidth = 6 / camera.scale;
     context.strokeStyle = colours.casing;
     for (const form of drawn) context.stroke(form.whole);
-    context.lineWidth = 3.5 / camera.pixels;
+    context.lineWidth = 3.5 / camera.scale;
     for (let kind = 0; kind < CLASSES; kind += 1) {
       context.strokeStyle = colours.speeds[kind];
       for (const form of drawn) if (form.classes[kind]) context.stroke(form.classes[kind]);
@@ -141,6 +142,12 @@ export class Track {
       [Math.max(...boxes.map((box) => box[2])), Math.max(...boxes.map((box) => box[3]))],
     ];
   }
+}
+
+// The coarsest form whose spacing is hardly seen.
+function levelFor(scale) {
+  if (scale * SPACINGS_M[2] < 1.5 * SPACING_PX) return 2;
+  return scale * SPACINGS_M[1] < SPACING_PX ? 1 : 0;
 }
 
 class Batch {

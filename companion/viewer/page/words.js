@@ -40,18 +40,19 @@ export function lasting(seconds) {
 
 /** A place as steps from the frame's zero. */
 export function place([north, east]) {
-  return `${number(Math.abs(north))} m ${north < 0 ? "south" : "north"}, ${number(Math.abs(east))} m ${east < 0 ? "west" : "east"}`;
+  const first = `${number(Math.abs(north))} m ${north < 0 ? "south" : "north"}`;
+  return `${first}, ${number(Math.abs(east))} m ${east < 0 ? "west" : "east"}`;
 }
 
 /** Radians a second, clockwise, as degrees with the side. */
 export function turning(rate) {
-  const degrees = Math.round(Math.abs(rate) * 180 / Math.PI);
+  const degrees = Math.round((Math.abs(rate) * 180) / Math.PI);
   return degrees === 0 ? "straight" : `${degrees}°/s ${rate > 0 ? "right" : "left"}`;
 }
 
 /** A heading in degrees, 000 to 359. */
 export function heading(radians) {
-  const degrees = Math.round(radians * 180 / Math.PI) % 360;
+  const degrees = Math.round((radians * 180) / Math.PI) % 360;
   return `${String((degrees + 360) % 360).padStart(3, "0")}°`;
 }
 

@@ -142,6 +142,16 @@ def test_what_the_mission_or_experience_closed_is_an_obstacle() -> None:
     assert np.isinf(togo_s(seen(evidence), BEYOND))
 
 
+def test_a_field_closed_by_experience_under_the_rover_does_not_keep_it_there() -> None:
+    evidence = ground()
+    evidence.penalty[3:9, 10] = 1.0
+    window = seen(evidence)
+    at, ahead = (
+        tuple(int(v / window.ground.cell_m) for v in window.place(place)) for place in (HERE, NedPoint(6.5, 10.5))
+    )
+    assert window.ground.gap_m[at[1], at[0]] > 0.15 and window.ground.gap_m[ahead[1], ahead[0]] < 0.0
+
+
 @pytest.mark.parametrize("fields", [4, 5])
 def test_the_edge_of_the_map_is_closed_on_all_sides_however_many_cells_it_has(fields: int) -> None:
     """Five fields of five cells are 25: the window has whole cells of two."""

@@ -220,3 +220,19 @@ def test_less_is_admitted_towards_a_wall_and_the_less_the_longer_it_lasts() -> N
     for told_m_s in (shorter[1, 0], longer[1, 0]):
         lasts_s = 0.3 if told_m_s == shorter[1, 0] else 3.0
         assert may_be_last(told_m_s, 0.0, lasts_s, 1.0, 0.03, 0.05, problem((40, 42, 0, SIDE)))
+
+
+def test_a_rover_that_touches_something_may_leave_it_but_not_touch_the_next_thing() -> None:
+    """It stands 5 cm over a wall behind it; 3 m ahead there is another one."""
+    start = STANDING._replace(y_m=2.0 + BODY.around_m - 0.05)
+    behind, ahead, both = (
+        problem(*walls, start=start)
+        for walls in ([(19, 20, 0, SIDE)], [(50, 52, 0, SIDE)], [(19, 20, 0, SIDE), (50, 52, 0, SIDE)])
+    )
+    room_m = clearance_m(both.ground.gap_m, CELL_M, BODY, start.x_m, start.y_m, start.heading_rad)
+    assert -0.1 < room_m < -0.02
+    speeds_m_s = np.arange(0.05, 1.5, 0.01)
+    assert all(may_be_last(speed, 0.0, 3.0, 1.0, 0.03, 0.05, behind) for speed in speeds_m_s)
+    passed = [speed for speed in speeds_m_s if may_be_last(speed, 0.0, 3.0, 1.0, 0.03, 0.05, both)]
+    assert 0.3 < max(passed) < 1.0
+    assert all(may_be_last(speed, 0.0, 3.0, 1.0, 0.0, 0.0, ahead) for speed in passed)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from companion.control.local_view import LocalView
@@ -57,3 +58,13 @@ def test_none_that_is_near_or_before_which_the_rover_could_not_get_fast() -> Non
     walled = ground()
     wall(walled, 5.5, 6.0, 14.0)
     assert PositionAhead().faster_than(0.8, PATH, view(walled)) is None
+
+
+def test_a_place_aside_only_where_the_way_on_which_the_rover_rolls_is_clear_too() -> None:
+    """Told a place 45 degrees aside at 1.5 m/s it first goes on for 2.8 m."""
+    walled = ground()
+    wall(walled, 6.0, 6.5, 8.5)
+    for evidence, told in ((ground(), True), (walled, False)):
+        seen = replace(view(evidence), pose=Pose(3.0, 7.5, math.radians(0.0), 1.0))
+        aside = ReferencePath(np.array([(3.0 + d, 7.5 + d) for d in np.arange(0.0, 4.0, STEP_M / math.sqrt(2.0))]))
+        assert (PositionAhead().faster_than(0.2, aside, seen) is not None) == told

@@ -1,0 +1,151 @@
+// Buttons that tell the rover something: pause, go on, skip the target, go to a place. Only where the source allows it.
+
+import { make, setText } from "viewer/dom.js";
+import { distance } from "viewer/geometry.js";
+import { icon, setIcon } from "viewer/icons.js";
+import { metres, place as placeText, sentence } from "viewer/words.js";
+
+const ANSWER_MS = 4000;
+const TOAST_MS = 6000;
+const NAMES = { pause: "Pause", resume: "Go on", skip: "Skip target", goto: "Send here" };
+
+export class Actions {
+  constructor(bar, stage, model, view, send) {
+    Object.assign(this, { bar, stage, model, view, send, aiming: false, aim: null });
+    this.toast = make(
+      "div",
+      { class: "toast", role: "status", hidden: true },
+      make("span", { class: "toast-sign" }),
+      make("span"),
+    );
+    this.buttons = make(
+      "div",
+      { class: "actions", role: "toolbar", "aria-label": "Rover" },
+      this.button("pause", "pause", () => this.act("pause")),
+      this.button("resume", "play", () => this.act("resume")),
+      this.button("skip", "skip", () => this.act("skip")),
+      (this.goto = this.button("goto", "send", () => this.toggleAim())),
+    );
+    this.question = make("span", { class: "question" });
+    this.yes = make("button", { type: "button", class: "strong", onclick: () => this.sendThere() }, "Send");
+    this.confirm = make(
+      "div",
+      { class: "confirm", hidden: true },
+      this.question,
+      this.yes,
+      make("button", { type: "button", class: "wide", onclick: () => this.endAim() }, "Cancel"),
+    );
+    view.above.push((pen) => this.drawAim(pen));
+    this.shown = false;
+  }
+
+  button(action, sign, onclick) {
+    return make("button", { type: "button", class: "wide", onclick }, icon(sign), make("span", {}, NAMES[action]));
+  }
+
+  /** Shows the buttons where acting is allowed, and locks them while nobody would hear. */
+  show(allowed, connected) {
+    if (allowed !== this.shown) {
+      this.shown = allowed;
+      if (allowed) this.bar.append(this.toast, this.confirm, this.buttons);
+      else this.bar.replaceChildren();
+    }
+    for (const button of [...this.buttons.children, this.yes]) button.disabled = !connected;
+    if (!allowed && this.aiming) this.endAim();
+  }
+
+  act(action, place) {
+    const message = place ? { kind: "act", action, place } : { kind: "act", action };
+    if (!this.send(message)) {
+      this.say("error", "Not sent: no connection");
+      return;
+    }
+    this.say("notice", `${NAMES[action]}: sent`, false);
+    clearTimeout(this.silence);
+    this.silence = setTimeout(
+      () => this.say("warning", `${NAMES[action]}: no answer. Sent once, not repeated.`),
+      ANSWER_MS,
+    );
+  }
+
+  /** An answer of the source. */
+  take(answer) {
+    clearTimeout(this.silence);
+    const name = NAMES[answer.action] ?? answer.action;
+    this.say(answer.ok ? "good" : "error", `${name}: ${answer.text || (answer.ok ? "done" : "refused")}`);
+  }
+
+  say(level, text, ends = true) {
+    this.toast.hidden = false;
+    this.toast.dataset.level = level;
+    setIcon(this.toast.firstElementChild, level);
+    setText(this.toast.lastElementChild, sentence(text));
+    clearTimeout(this.hide);
+    if (ends)
+      this.hide = setTimeout(() => {
+        this.toast.hidden = true;
+      }, TOAST_MS);
+  }
+
+  toggleAim() {
+    if (this.aiming) {
+      this.endAim();
+      return;
+    }
+    this.aiming = true;
+    this.toast.hidden = true;
+    this.goto.setAttribute("aria-pressed", "true");
+    this.stage.classList.add("aiming");
+    this.ask("Now click a place on the map.");
+  }
+
+  /** A tap on the map. Returns whether it was meant for this. */
+  tap(x, y) {
+    if (!this.aiming) return false;
+    this.aim = this.view.camera.toPlace(x, y);
+    const far = distance(this.model.frame?.pose, this.aim);
+    const from = Number.isFinite(far) ? `, ${metres(far)} from the rover` : "";
+    this.ask(`Send the rover to ${placeText(this.aim)}${from}?`);
+    this.yes.focus();
+    this.view.invalidate();
+    return true;
+  }
+
+  ask(text) {
+    this.confirm.hidden = false;
+    this.yes.hidden = this.aim === null;
+    setText(this.question, text);
+  }
+
+  sendThere() {
+    const place = this.aim?.map((value) => Math.round(value * 100) / 100);
+    this.endAim();
+    if (place) this.act("goto", place);
+  }
+
+  endAim() {
+    [this.aiming, this.aim] = [false, null];
+    this.goto.setAttribute("aria-pressed", "false");
+    this.stage.classList.remove("aiming");
+    this.confirm.hidden = true;
+    this.view.invalidate();
+  }
+
+  drawAim(pen) {
+    if (!this.aim) return;
+    const [x, y] = pen.camera.toScreen(...this.aim);
+    pen.context.beginPath();
+    for (const [dx, dy] of [
+      [1, 0],
+      [-1, 0],
+      [0, 1],
+      [0, -1],
+    ]) {
+      pen.context.moveTo(x + dx * 6, y + dy * 6);
+      pen.context.lineTo(x + dx * 22, y + dy * 22);
+    }
+    pen.stroke(pen.colours.halo, 7);
+    pen.stroke(pen.colours.ink, 3);
+    pen.disc(x, y, 14, null, pen.colours.ink, 2);
+  }
+}

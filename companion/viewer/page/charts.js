@@ -1,0 +1,129 @@
+// Small charts of the figures, drawn by uPlot. They are filled at most twice a second and only while they are seen.
+
+import uPlot from "viewer/uplot.js";
+import { theme } from "viewer/colours.js";
+import { make, setText } from "viewer/dom.js";
+import { KINDS } from "viewer/figures.js";
+import { elapsed, lasting, number } from "viewer/words.js";
+
+const EVERY_MS = 500;
+const HEIGHT = 92;
+const STEPS_S = [5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 18000];
+
+export class Charts {
+  /** `jump(t)`, of a report, goes to a time that is clicked. */
+  constructor(place, model, jump) {
+    Object.assign(this, { place, model, jump, version: -1, last: 0, stale: false });
+    this.parts = KINDS.map((kind, index) => this.part(kind, index));
+    place.append(...this.parts.map((part) => part.node));
+    new ResizeObserver(() => this.resize()).observe(place);
+    theme.listeners.add(() => this.parts.forEach((part) => part.plot?.redraw(false, true)));
+  }
+
+  part(kind, index) {
+    const value = make("b");
+    const body = make("div", { class: "chart-body" });
+    const node = make("div", { class: "chart" }, make("h3", {}, kind.name, " ", value), body);
+    return { kind, index, value, body, node, plot: null };
+  }
+
+  get begin() {
+    return this.model.figures.times[0] ?? 0;
+  }
+
+  get seen() {
+    return this.place.offsetWidth > 0 && this.place.offsetHeight > 0;
+  }
+
+  resize() {
+    if (!this.seen) return;
+    for (const part of this.parts) {
+      const width = part.body.clientWidth;
+      if (!part.plot && width > 0) part.plot = this.plot(part, width);
+      else if (part.plot && part.plot.width !== width) part.plot.setSize({ width, height: HEIGHT });
+    }
+    this.fill();
+  }
+
+  plot(part, width) {
+    const text = () => theme.colours.text;
+    const axis = {
+      stroke: text,
+      grid: { stroke: () => theme.colours.grid, width: 1 },
+      ticks: { show: false },
+      font: "12px system-ui",
+    };
+    const plot = new uPlot(
+      {
+        width,
+        height: HEIGHT,
+        padding: [6, 18, 0, 0],
+        legend: { show: false },
+        cursor: { y: false, drag: { x: false, y: false }, points: { size: 7 } },
+        scales: { x: { time: false }, y: { range: (_, __, most) => [0, Math.max(most ?? 0, 0.1) * 1.1] } },
+        axes: [
+          {
+            ...axis,
+            size: 20,
+            space: 60,
+            gap: 2,
+            splits: (each) => this.splits(each),
+            values: (_, marks) => marks.map((t) => this.mark(t)),
+          },
+          { ...axis, size: 34, space: 26, gap: 3 },
+        ],
+        series: [{}, { stroke: () => theme.colours.accent, width: 2, points: { show: false }, spanGaps: false }],
+        hooks: { draw: [(each) => this.drawNow(each)], setCursor: [(each) => this.showValue(part, each.cursor.idx)] },
+      },
+      [[], []],
+      part.body,
+    );
+    if (this.jump) plot.over.addEventListener("click", () => this.jump(plot.posToVal(plot.cursor.left, "x")));
+    return plot;
+  }
+
+  // Live: how long ago. A record: the time since its beginning.
+  mark(t) {
+    if (this.jump) return elapsed(t - this.begin + 0.001);
+    const ago = Math.round((this.model.figures.times.at(-1) ?? t) - t);
+    return ago < 1 ? (this.stale ? "last" : "now") : ago < 60 || ago % 60 ? `−${lasting(ago)}` : `−${ago / 60} min`;
+  }
+
+  // Marks at round times before now; in a record, after its beginning.
+  splits({ scales, width }) {
+    const { min, max } = scales.x;
+    if (!(max > min)) return [];
+    const step = STEPS_S.find((each) => (max - min) / each <= width / 80) ?? STEPS_S.at(-1);
+    const first = this.jump
+      ? this.begin + Math.ceil((min - this.begin) / step) * step
+      : max - Math.floor((max - min) / step) * step;
+    return Array.from({ length: Math.min(20, Math.floor((max - first) / step + 1.001)) }, (_, i) => first + i * step);
+  }
+
+  drawNow(plot) {
+    if (!this.jump || !Number.isFinite(this.model.frame?.t)) return;
+    const x = plot.valToPos(this.model.frame.t, "x", true);
+    plot.ctx.fillStyle = theme.colours.rover;
+    plot.ctx.fillRect(Math.round(x) - 1, plot.bbox.top, 2 * devicePixelRatio, plot.bbox.height);
+  }
+
+  showValue(part, at) {
+    const value = Number.isInteger(at) ? part.plot?.data[1][at] : part.kind.of(this.model.frame ?? {});
+    setText(part.value, Number.isFinite(value) ? `${number(value, part.kind.digits)} ${part.kind.unit}` : "–");
+  }
+
+  /** Shows what is new, when it is time to. */
+  show(now = performance.now()) {
+    if (now - this.last < EVERY_MS || !this.seen) return;
+    this.last = now;
+    if (this.model.figures.version === this.version) {
+      for (const part of this.parts) part.plot?.redraw(false, true);
+    } else this.fill();
+    for (const part of this.parts) this.showValue(part, part.plot?.cursor.idx);
+  }
+
+  fill() {
+    this.version = this.model.figures.version;
+    for (const part of this.parts) part.plot?.setData(this.model.figures.series(part.index));
+  }
+}

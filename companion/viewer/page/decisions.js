@@ -1,0 +1,135 @@
+// The decisions of a record: a list, and for the chosen one why it was made and what else was possible.
+
+import { make, setAttribute, setText } from "viewer/dom.js";
+import { lastNotAbove } from "viewer/geometry.js";
+import { clock, number } from "viewer/words.js";
+
+/** So many rows around the current one are in the page; a long drive has thousands of decisions. */
+const ROWS = 120;
+
+export class Decisions {
+  constructor(record, jump) {
+    Object.assign(this, { record, jump, current: -1, hovered: null, from: -1 });
+    this.changed = () => {};
+    this.head = make("h2");
+    this.why = make("div", { class: "why-decision" });
+    this.list = make("ol", { class: "decision-list" });
+    this.node = make("div", { class: "decisions" }, this.why, make("section", {}, this.head, this.list));
+    setText(this.head, `${record.decisions.length} decisions`);
+  }
+
+  /** The decision that is valid at a time. */
+  at(t) {
+    return this.record.decisions[(this.current = lastNotAbove(this.record.decisionTimes, t))] ?? null;
+  }
+
+  /** Goes to the decision before or after a time. */
+  step(t, direction) {
+    const { decisionTimes } = this.record;
+    const at = lastNotAbove(decisionTimes, t);
+    // In the middle of a decision, back means its beginning, as everywhere where something is played.
+    const back = at >= 0 && t - decisionTimes[at] > 0.05 ? at : at - 1;
+    const wanted = decisionTimes[direction > 0 ? at + 1 : back];
+    if (wanted !== undefined) this.jump(wanted);
+  }
+
+  show(t) {
+    const decision = this.at(t);
+    if (decision === this.shown && this.built) return;
+    [this.shown, this.built, this.hovered] = [decision, true, null];
+    this.why.replaceChildren(
+      ...(decision ? this.explain(decision) : [make("p", { class: "nothing" }, "No decision yet.")]),
+    );
+    this.showList();
+  }
+
+  explain(decision) {
+    const scene = this.record.scene;
+    return [
+      make("h2", {}, `Decision ${decision.number}: ${decision.action}`),
+      make("p", {}, `${clock(decision.t, scene)} · to ${decision.target || "no target"} · part ${decision.part}`),
+      make("p", { class: "reason" }, decision.reason),
+      this.candidates(decision.candidates ?? []),
+      make("ul", { class: "lines" }, ...(decision.lines ?? []).map((line) => make("li", {}, line))),
+    ];
+  }
+
+  candidates(candidates) {
+    if (!candidates.length) return make("p", { class: "nothing" }, "Nothing else was weighed.");
+    const row = (one, i) =>
+      make(
+        "tr",
+        {
+          class: one.taken ? "taken" : null,
+          onmouseenter: () => this.hover(i),
+          onmouseleave: () => this.hover(null),
+        },
+        make("td", {}, make("span", { class: "letter" }, letter(i))),
+        make("td", {}, one.name),
+        make("td", {}, one.note ?? ""),
+        make("td", { class: "right" }, one.cost === null ? "–" : number(one.cost, 2)),
+        make("td", {}, one.taken ? "taken" : ""),
+      );
+    return make(
+      "table",
+      { class: "candidates" },
+      make("thead", {}, make("tr", {}, ...["", "candidate", "", "cost", ""].map((name) => make("th", {}, name)))),
+      make("tbody", {}, ...candidates.map(row)),
+    );
+  }
+
+  hover(index) {
+    this.hovered = index;
+    this.changed();
+  }
+
+  showList() {
+    const from = Math.max(0, Math.min(this.current - ROWS / 2, this.record.decisions.length - ROWS));
+    if (from !== this.from) {
+      this.from = from;
+      this.list.replaceChildren(
+        ...this.record.decisions.slice(from, from + ROWS).map((decision) => this.row(decision)),
+      );
+    }
+    [...this.list.children].forEach((row, i) =>
+      setAttribute(row, "aria-current", from + i === this.current ? "true" : null),
+    );
+    const row = this.list.children[this.current - from];
+    if (row) this.list.scrollTop = row.offsetTop - this.list.offsetTop - this.list.clientHeight / 2;
+  }
+
+  row(decision) {
+    return make(
+      "li",
+      {},
+      make(
+        "button",
+        { type: "button", onclick: () => this.jump(decision.t) },
+        make("time", {}, clock(decision.t, this.record.scene)),
+        make("b", {}, decision.number),
+        make("span", {}, `${decision.action}: ${decision.reason}`),
+      ),
+    );
+  }
+
+  /** Draws the candidates; the one taken is strong, the one under the mouse, too. */
+  draw(pen) {
+    const candidates = this.shown?.candidates ?? [];
+    const order = candidates.map((_, i) => i).sort((a, b) => candidates[a].taken - candidates[b].taken);
+    for (const i of order) {
+      const { cells, curve, taken, cost } = candidates[i];
+      const line = curve ?? cells ?? [];
+      const strong = taken || i === this.hovered;
+      const colour = pen.colours.others[i % pen.colours.others.length];
+      pen.line(line, { colour, width: strong ? 6 : 2.5, dash: taken ? [] : [7, 5], casing: strong ? 4 : 2 });
+      if (!line.length) continue;
+      const [x, y] = pen.camera.toScreen(...line[Math.min(line.length - 1, Math.ceil(line.length * 0.6))]);
+      const text = `${letter(i)} ${Number.isFinite(cost) ? number(cost, 1) : "–"}${taken ? " taken" : ""}`;
+      pen.label(text, x, y, 9, { size: strong ? 15 : 13, weight: strong ? 800 : 650, colour });
+    }
+  }
+}
+
+function letter(index) {
+  return String.fromCharCode(97 + (index % 26));
+}

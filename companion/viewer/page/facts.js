@@ -1,0 +1,101 @@
+// The facts of the panel: what each is called, what it says, and when it is a warning.
+
+import { distance, length } from "viewer/geometry.js";
+import { heading, lasting, metres, number, turning, UNKNOWN } from "viewer/words.js";
+
+const OLD_HEARTBEAT_S = 3;
+const LOST_HEARTBEAT_S = 6;
+const SLOW_HZ = 1;
+const LOW_PERCENT = 20;
+
+/** The three large numbers: [name, value, unit]. */
+export function readouts(frame) {
+  const goal = frame?.goal;
+  const rest = frame?.path?.length && frame.pose ? length([frame.pose, ...frame.path]) : NaN;
+  const far = Number.isFinite(rest) ? rest : distance(frame?.pose, goal?.place);
+  return [
+    ["speed", number(Math.abs(frame?.speed ?? NaN)), "m/s"],
+    [
+      Number.isFinite(rest) ? "to go" : "to goal",
+      goal ? metres(far).replace(/ .*/, "") : UNKNOWN,
+      far >= 9999.5 ? "km" : "m",
+    ],
+    ["mode", frame?.mode ?? UNKNOWN, ""],
+  ];
+}
+
+/** Rows of [name, value, level]; the level is null, "warning" or "error". */
+export function facts(frame) {
+  if (!frame) return [];
+  const { rates = {}, figures = {} } = frame;
+  return [
+    ["Driven by", frame.drives ?? UNKNOWN, null],
+    ["Armed", yesNo(frame.armed), null],
+    ["Goal", goalOf(frame), null],
+    ["Setpoint", setpointOf(frame), null],
+    ["Heading", frame.pose ? `${heading(frame.pose[2])}, ${turning(frame.turn ?? 0)}` : UNKNOWN, null],
+    ["Link", linkOf(rates, figures), heartbeatLevel(rates.heartbeat_age_s)],
+    ["Position", rateOf(rates.position), rateLevel(rates.position)],
+    ["Range sensor", rateOf(rates.range), rateLevel(rates.range)],
+    ["GPS", gpsOf(frame.gps), frame.gps && /no|none|1d|2d/i.test(frame.gps.fix ?? "no") ? "warning" : null],
+    ["Battery", batteryOf(frame.battery), frame.battery?.percent < LOW_PERCENT ? "warning" : null],
+    ["Guard", { true: "on guard", false: "none heard" }[frame.guard] ?? "not asked", null],
+    ["Contacts", frame.contacts ?? UNKNOWN, frame.contacts > 0 ? "error" : null],
+    ["Decision", frame.decision ?? UNKNOWN, null],
+    ["Tick", Number.isFinite(figures.tick_ms) ? `${number(figures.tick_ms)} ms` : UNKNOWN, null],
+  ];
+}
+
+function yesNo(value) {
+  return value === true ? "yes" : value === false ? "no" : UNKNOWN;
+}
+
+function goalOf(frame) {
+  if (!frame.goal) return "none";
+  return frame.pose
+    ? `${frame.goal.name}, ${metres(distance(frame.pose, frame.goal.place))} straight`
+    : frame.goal.name;
+}
+
+function setpointOf({ setpoint, pose }) {
+  if (!setpoint) return "none";
+  if (setpoint.kind === "position") return `position, ${metres(distance(pose, setpoint.place))} away`;
+  if (setpoint.kind === "velocity") return `${number(setpoint.speed, 2)} m/s, ${turning(setpoint.turn)}`;
+  return setpoint.kind === "heading" ? `turn to ${heading(setpoint.heading)}` : setpoint.kind;
+}
+
+function linkOf(rates, figures) {
+  const age = rates.heartbeat_age_s;
+  if (age === undefined) return UNKNOWN;
+  if (!Number.isFinite(age)) return "no heartbeat yet";
+  if (age > OLD_HEARTBEAT_S) return `last heartbeat ${lasting(age)} ago`;
+  return Number.isFinite(figures.latency_ms) ? `good, ${number(figures.latency_ms, 0)} ms` : "good";
+}
+
+function heartbeatLevel(age) {
+  if (age === undefined) return null; // this source does not tell it
+  if (!Number.isFinite(age)) return "warning";
+  return age > LOST_HEARTBEAT_S ? "error" : age > OLD_HEARTBEAT_S ? "warning" : null;
+}
+
+function rateOf(rate) {
+  return Number.isFinite(rate) ? `${number(rate)} a second` : UNKNOWN;
+}
+
+function rateLevel(rate) {
+  return Number.isFinite(rate) && rate < SLOW_HZ ? "warning" : null;
+}
+
+function gpsOf(gps) {
+  if (!gps) return UNKNOWN;
+  return gps.satellites === null || gps.satellites === undefined ? gps.fix : `${gps.fix}, ${gps.satellites} satellites`;
+}
+
+function batteryOf(battery) {
+  if (!battery) return UNKNOWN;
+  const known = [
+    [battery.percent, "%", 0],
+    [battery.volts, "V", 1],
+  ].filter(([value]) => Number.isFinite(value));
+  return known.map(([value, unit, digits]) => `${number(value, digits)} ${unit}`).join(", ") || UNKNOWN;
+}

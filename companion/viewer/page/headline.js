@@ -1,0 +1,66 @@
+// The one large line: what the rover does, or why it stands. Its colour and its sign are the state.
+
+import { make, setAttribute, setText } from "viewer/dom.js";
+import { setIcon } from "viewer/icons.js";
+import { distance, length } from "viewer/geometry.js";
+import { clock, metres, number, sentence } from "viewer/words.js";
+
+const SIGNS = new Set(["driving", "waiting", "stopped", "ended", "connecting"]);
+
+export class Headline {
+  constructor() {
+    this.sign = make("span", { class: "sign", "aria-hidden": "true" });
+    this.state = make("span", { class: "state" });
+    this.line = make("h1", { class: "line" });
+    // Read out apart from the line, because the line may hold seconds that count.
+    this.spoken = make("span", { class: "spoken", role: "status" });
+    this.why = make("p", { class: "why" });
+    this.mission = make("span", { class: "mission" });
+    this.clock = make("span", { class: "clock" });
+    this.badge = make("span", { class: "badge" });
+    this.node = make(
+      "header",
+      { class: "headline" },
+      this.sign,
+      make("div", { class: "words" }, this.line, this.why, this.spoken),
+      make("div", { class: "about" }, this.mission, make("span", { class: "when" }, this.badge, this.clock)),
+    );
+    this.show(null, null);
+  }
+
+  /** Shows scene and frame. `trouble`, a text, stands instead of the rover's own line when data is not fresh. */
+  show(scene, frame, trouble = "") {
+    const state = trouble ? "offline" : SIGNS.has(frame?.state) ? frame.state : "connecting";
+    setAttribute(this.node, "data-state", state);
+    setIcon(this.sign, state);
+    setText(this.line, trouble || sentence(frame?.line) || "Connecting");
+    setText(this.spoken, trouble ? trouble.replace(/ since.*/, "") : (frame?.line ?? ""));
+    setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
+    setText(this.mission, scene?.mission ?? "");
+    setText(this.badge, scene ? badge(scene) : "");
+    setText(this.clock, frame ? clock(frame.t, scene) : "");
+    // A report keeps the title of its file.
+    if (scene?.live !== false)
+      document.title = `${trouble || frame?.line || "connecting"} · ${scene?.mission ?? "rover"}`;
+  }
+}
+
+function badge(scene) {
+  return [scene.live ? "live" : "record", scene.simulated ? "simulated" : ""].filter(Boolean).join(", ");
+}
+
+function lastKnown(frame) {
+  return frame?.line ? `Last known: ${frame.line}` : "";
+}
+
+// While driving the second line says how far it still is; when standing it says why.
+function reason(frame, state) {
+  if (!frame) return "";
+  if (frame.why) return sentence(frame.why);
+  if (state !== "driving" || !frame.goal || !frame.pose) return "";
+  const rest = frame.path?.length ? length([frame.pose, ...frame.path]) : NaN;
+  const way = Number.isFinite(rest)
+    ? `${metres(rest)} to go`
+    : `${metres(distance(frame.pose, frame.goal.place))} away`;
+  return `${way} · ${number(Math.abs(frame.speed ?? NaN))} m/s`;
+}

@@ -1,0 +1,78 @@
+// What belongs to the map as a picture: scale bar, north arrow, colours of speed.
+
+import { roundLength } from "viewer/layer_ground.js";
+import { number } from "viewer/words.js";
+
+const BAR_PX = 80;
+const LEFT = 16;
+
+/** Draws them at the edges, above what covers the lower one. */
+export function drawFrame(pen, model) {
+  const bottom = pen.camera.height - 18 - pen.camera.covered;
+  const right = drawScale(pen, bottom);
+  drawNorth(pen);
+  if (model.track.points.length > 1) drawSpeeds(pen, model.track.topSpeed, right + 16, bottom - 7);
+}
+
+function plate(pen, left, top, width, height) {
+  const { context, colours } = pen;
+  context.globalAlpha = 0.85;
+  context.fillStyle = colours.panel;
+  context.beginPath();
+  context.roundRect(left, top, width, height, 5);
+  context.fill();
+  context.globalAlpha = 1;
+}
+
+function drawScale(pen, bottom) {
+  const { context, camera, colours } = pen;
+  const length = roundLength(camera.scale, BAR_PX);
+  const width = length * camera.scale;
+  const text = length >= 1000 ? `${length / 1000} km` : length >= 1 ? `${length} m` : `${number(length * 100, 0)} cm`;
+  plate(pen, LEFT - 8, bottom - 24, width + 16, 34);
+  context.beginPath();
+  context.moveTo(LEFT, bottom - 5);
+  context.lineTo(LEFT, bottom + 2);
+  context.lineTo(LEFT + width, bottom + 2);
+  context.lineTo(LEFT + width, bottom - 5);
+  context.lineCap = "butt";
+  pen.stroke(colours.ink, 2);
+  pen.text(text, LEFT + width / 2, bottom - 11, { size: 13, weight: 700, align: "center", halo: false });
+  return LEFT + width + 8;
+}
+
+function drawNorth(pen) {
+  const { context, camera, colours } = pen;
+  context.save();
+  context.translate(32, 36);
+  pen.disc(0, 0, 22, colours.panel, colours.line, 1);
+  context.rotate(-camera.up);
+  context.beginPath();
+  for (const corner of [
+    [0, -18],
+    [7, -2],
+    [-7, -2],
+  ])
+    context.lineTo(...corner);
+  context.closePath();
+  context.fillStyle = colours.ink;
+  context.fill();
+  context.translate(0, 8);
+  context.rotate(camera.up);
+  pen.text("N", 0, 1, { size: 13, weight: 800, align: "center", halo: false });
+  context.restore();
+}
+
+function drawSpeeds(pen, top, left, y) {
+  const { context, colours } = pen;
+  const step = 15;
+  const text = `${Number(top.toFixed(1))} m/s`;
+  const width = 5 * step + 26 + pen.widthOf(text, { size: 12 });
+  plate(pen, left - 8, y - 17, width + 12, 34);
+  pen.text("0", left, y + 1, { size: 12, halo: false });
+  colours.speeds.forEach((colour, i) => {
+    context.fillStyle = colour;
+    context.fillRect(left + 12 + i * step, y - 4, step, 9);
+  });
+  pen.text(text, left + 18 + 5 * step, y + 1, { size: 12, halo: false });
+}

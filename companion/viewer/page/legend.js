@@ -1,0 +1,57 @@
+// Says what the colours and signs of the map mean, and which keys there are.
+
+import { make } from "viewer/dom.js";
+import { icon } from "viewer/icons.js";
+
+const AREAS = [
+  ["free", "seen free"],
+  ["obstacle", "obstacle"],
+  ["unknown", "not seen yet"],
+  ["closed", "closed by fence or mission"],
+  ["costly", "possible, but costs more"],
+];
+const LINES = [
+  ["rover", "rover; its tip shows where it heads"],
+  ["path", "path that is left"],
+  ["motion", "planned motion"],
+  ["setpoint", "what the autopilot was told"],
+  ["track", "way driven, by speed"],
+  ["ray", "what the sensor sees"],
+  ["fence", "fence; strokes on the closed side"],
+  ["mover", "moving thing, with where it will be in 2 s"],
+  ["goal", "where the rover goes now"],
+  ["done", "target reached"],
+  ["failed", "target not reached"],
+];
+const KEYS = "Keys: + − zoom, 0 all, F follow, N north or heading up, T light or dark, L legend";
+
+export class Legend {
+  constructor(more = "") {
+    const row = (name, text) => make("li", {}, make("span", { class: `swatch ${name}` }), text);
+    this.node = make(
+      "div",
+      { class: "legend", hidden: true, role: "dialog", "aria-label": "What the signs mean" },
+      make(
+        "button",
+        { class: "square plain", type: "button", "aria-label": "Close", onclick: () => this.toggle() },
+        icon("close"),
+      ),
+      make("h2", {}, "What the map shows"),
+      make("ul", {}, ...AREAS.map((area) => row(...area)), ...LINES.map((line) => row(...line))),
+      (this.keys = make("p", { class: "keys" }, KEYS + more)),
+    );
+  }
+
+  /** Adds keys that only one of the pages has. */
+  addKeys(text) {
+    this.keys.append(text);
+  }
+
+  close() {
+    this.node.hidden = true;
+  }
+
+  toggle() {
+    this.node.hidden = !this.node.hidden;
+  }
+}

@@ -1,0 +1,113 @@
+// The live page: connects to a run and shows it, and says so when what is shown is no longer fresh.
+
+import { Actions } from "viewer/actions.js";
+import { Camera } from "viewer/camera.js";
+import { Charts } from "viewer/charts.js";
+import { addFiguresButton } from "viewer/figures_button.js";
+import { listen, listenKeys } from "viewer/gestures.js";
+import { Link } from "viewer/link.js";
+import { MapView } from "viewer/map_view.js";
+import { Model } from "viewer/model.js";
+import { Panel } from "viewer/panel.js";
+import { buildShell, watchEdges } from "viewer/shell.js";
+import { askToken, findToken } from "viewer/token.js";
+import { lasting } from "viewer/words.js";
+
+/** Frames come five a second. Without one for as long as this, what is shown is old. */
+const STALE_MS = 1500;
+const LOOK_MS = 250;
+
+class LivePage {
+  constructor(root) {
+    this.model = new Model();
+    this.camera = new Camera();
+    this.parts = buildShell(root, this.camera);
+    const { canvas, bar, charts, panel, viewer } = this.parts;
+    this.view = new MapView(canvas, this.model, this.camera);
+    this.panel = new Panel(this.model, { go: (place) => this.camera.centre(place) });
+    panel.append(this.panel.node);
+    this.charts = new Charts(charts, this.model);
+    this.actions = new Actions(bar, viewer, this.model, this.view, (message) => this.link.send(message));
+    addFiguresButton(this.parts);
+    watchEdges(this.parts, this.view);
+    listen(canvas, this.camera, (x, y) => this.actions.tap(x, y));
+    this.parts.keys.Escape = () => {
+      this.parts.legend.close();
+      this.actions.endAim();
+    };
+    listenKeys(canvas, this.camera, this.parts.keys);
+    this.heard = performance.now();
+    this.connect();
+  }
+
+  connect() {
+    const address = new URL("ws", location.href);
+    address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
+    address.hash = "";
+    this.link = new Link(address.href, {
+      opened: () => this.model.connected(),
+      message: (message) => this.take(message),
+      tiles: (buffer) => this.model.takeTiles(buffer),
+      closed: () => this.refresh(),
+      denied: (text) => this.deny(text),
+    });
+    this.link.token = findToken();
+    this.model.listeners.add(() => this.later());
+    setInterval(() => this.refresh(), LOOK_MS);
+    this.link.connect();
+  }
+
+  deny(text) {
+    this.denied = true;
+    this.refresh();
+    askToken(this.parts.viewer, text, (token) => {
+      this.denied = false;
+      this.link.token = token;
+      this.link.connect();
+    });
+  }
+
+  take(message) {
+    if (message.kind === "answer") this.actions.take(message);
+    else this.model.take(message);
+    if (message.kind === "frame") this.heard = performance.now();
+  }
+
+  // Many messages may come at once after a connection; the page is brought up to date once for all of them.
+  later() {
+    if (this.pending) return;
+    this.pending = true;
+    requestAnimationFrame(() => {
+      this.pending = false;
+      this.refresh();
+    });
+  }
+
+  refresh() {
+    const { viewer, headline } = this.parts;
+    const { scene, frame } = this.model;
+    const trouble = this.trouble();
+    this.charts.stale = trouble !== "" || (frame !== null && this.silentFor() > STALE_MS);
+    viewer.classList.toggle("stale", this.charts.stale);
+    headline.show(scene, frame, trouble);
+    this.panel.show();
+    this.charts.show();
+    this.actions.show(scene?.may_act === true, this.link?.open === true);
+  }
+
+  silentFor() {
+    return performance.now() - this.heard;
+  }
+
+  /** Why what is shown is not to be believed, or an empty text. A run that has ended stays ended. */
+  trouble() {
+    if (this.denied) return "Not connected: a token is needed";
+    const silent = this.silentFor();
+    if (silent < STALE_MS || this.model.frame?.state === "ended") return "";
+    const since = lasting(silent / 1000);
+    if (this.link?.open) return this.model.frame ? `No data since ${since}` : "";
+    return `No connection since ${since}`;
+  }
+}
+
+new LivePage(document.getElementById("app"));

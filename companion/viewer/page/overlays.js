@@ -1,0 +1,81 @@
+// What a report draws on the map beside the run itself: contacts, and the tracks of other records.
+
+import { make } from "viewer/dom.js";
+import { lastNotAbove } from "viewer/geometry.js";
+import { star } from "viewer/timeline.js";
+
+const DASHES = [
+  [9, 5],
+  [3, 4],
+  [14, 4, 3, 4],
+  [6, 6],
+  [2, 6],
+];
+
+/** Contacts up to a time, as stars. */
+export function drawContacts(pen, contacts, t) {
+  const { context, camera, colours } = pen;
+  for (const contact of contacts) {
+    if (contact.t > t) break;
+    const [x, y] = camera.toScreen(...contact.place);
+    context.beginPath();
+    star(x, y, 12).forEach(([px, py]) => context.lineTo(px, py));
+    context.closePath();
+    context.lineJoin = "round";
+    pen.stroke(colours.halo, 4);
+    context.fillStyle = colours.failed;
+    context.fill();
+    pen.label("contact", x, y, 14, { size: 12, colour: colours.failed });
+  }
+}
+
+/** Other records: dashed lines, each with its colour and its dashes, and a ring where that rover was at this time. */
+export class Others {
+  constructor(others, begin, changed) {
+    // Clocks differ between runs: each is counted from its own beginning.
+    this.others = others.map((other) => ({
+      ...other,
+      shown: true,
+      times: other.track.map(([t]) => t - other.track[0][0]),
+      line: other.track.map((p) => p.slice(1)),
+    }));
+    this.begin = begin;
+    const row = (other, i) => {
+      const box = make("input", {
+        type: "checkbox",
+        checked: true,
+        onchange: () => {
+          other.shown = box.checked;
+          changed();
+        },
+      });
+      const swatch = make("span", { class: `other other-${i % DASHES.length}` });
+      return make("label", {}, box, swatch, other.name);
+    };
+    this.node = make(
+      "div",
+      { class: "others", hidden: others.length === 0 },
+      make("h2", {}, "Other records"),
+      ...this.others.map(row),
+    );
+  }
+
+  drawTracks(pen) {
+    this.others.forEach((other, i) => {
+      const colour = pen.colours.others[i % pen.colours.others.length];
+      if (other.shown) pen.line(other.line, { colour, width: 2.5, dash: DASHES[i % DASHES.length], casing: 2 });
+    });
+  }
+
+  drawPlaces(pen, t) {
+    this.others.forEach((other, i) => {
+      if (!other.shown) return;
+      const colour = pen.colours.others[i % pen.colours.others.length];
+      const at = lastNotAbove(other.times, t - this.begin);
+      if (at < 0) return;
+      const [x, y] = pen.camera.toScreen(...other.line[at]);
+      pen.disc(x, y, 8, pen.colours.halo, colour, 4);
+      pen.label(other.name, x, y, 12, { size: 12, colour });
+    });
+  }
+}

@@ -1,0 +1,114 @@
+// The panel beside the map: large numbers, targets, news, facts.
+
+import { make, setAttribute, setText } from "viewer/dom.js";
+import { facts, readouts } from "viewer/facts.js";
+import { distance } from "viewer/geometry.js";
+import { setIcon } from "viewer/icons.js";
+import { kindOf } from "viewer/layer_marks.js";
+import { NewsList } from "viewer/news.js";
+import { metres } from "viewer/words.js";
+
+const MOST_TARGETS = 200;
+
+export class Panel {
+  /** `go(place)` shows a place on the map; `jump(t)`, of a report, goes to a time. */
+  constructor(model, { go, jump }) {
+    this.model = model;
+    this.go = go;
+    this.numbers = [0, 1, 2].map(() => readout());
+    this.targetsHead = make("h2", {}, "Targets");
+    this.targets = make("ol", { class: "targets" });
+    this.news = new NewsList(model, jump);
+    this.rows = [];
+    this.facts = make("dl", { class: "facts" });
+    this.node = make(
+      "div",
+      { class: "sections" },
+      make("div", { class: "readouts" }, ...this.numbers.map((each) => each.node)),
+      make("section", { class: "targets-section" }, this.targetsHead, this.targets),
+      make("section", { class: "news-section" }, make("h2", {}, "News"), this.news.node),
+      make("section", { class: "facts-section" }, make("h2", {}, "Facts"), this.facts),
+    );
+  }
+
+  show() {
+    const { frame } = this.model;
+    readouts(frame).forEach(([name, value, unit], i) => this.numbers[i].set(name, value, unit));
+    this.showFacts(facts(frame));
+    this.showTargets();
+    this.news.show();
+  }
+
+  showFacts(list) {
+    while (this.rows.length < list.length) this.rows.push(this.addFact());
+    list.forEach(([name, value, level], i) => {
+      setText(this.rows[i].name, name);
+      setText(this.rows[i].value, value);
+      setAttribute(this.rows[i].row, "data-level", level);
+      setIcon(this.rows[i].sign, level ?? "good");
+    });
+  }
+
+  addFact() {
+    const [name, value, sign] = [make("dt"), make("dd"), make("span", { class: "fact-sign", "aria-hidden": "true" })];
+    const row = make("div", { class: "fact" }, name, value, sign);
+    this.facts.append(row);
+    return { row, name, value, sign };
+  }
+
+  showTargets() {
+    const { scene, frame } = this.model;
+    const targets = (scene?.targets ?? []).slice(0, MOST_TARGETS);
+    const key = JSON.stringify(targets.map((target) => [target.name, target.place]));
+    if (key !== this.targetsKey) this.buildTargets(targets, key);
+    let reached = 0;
+    let seen = false;
+    targets.forEach((target, i) => {
+      const status = frame?.statuses?.[i] ?? "pending";
+      const now = !seen && frame?.goal && status === "pending" && frame.goal.name === target.name;
+      seen ||= now;
+      if (status === "reached") reached += 1;
+      const row = this.targetRows[i];
+      setAttribute(row.node, "data-kind", now ? "now" : kindOf(status));
+      setIcon(row.sign, now ? "now" : ({ skipped: "skip" }[kindOf(status)] ?? kindOf(status)));
+      setText(row.status, now ? "going there" : status);
+      setText(row.far, frame?.pose ? metres(distance(frame.pose, target.place)) : "");
+    });
+    setText(this.targetsHead, targets.length ? `Targets, ${reached} of ${scene.targets.length} reached` : "No targets");
+  }
+
+  buildTargets(targets, key) {
+    this.targetsKey = key;
+    this.targetRows = targets.map((target, i) => {
+      const [sign, status, far] = ["target-sign", "target-status", "target-far"].map((name) =>
+        make("span", { class: name }),
+      );
+      const button = make(
+        "button",
+        { type: "button", class: "target", title: "Show on the map", onclick: () => this.go(target.place) },
+        sign,
+        make("span", { class: "target-name" }, `${i + 1}. ${target.name}`),
+        status,
+        far,
+      );
+      return { node: make("li", {}, button), sign, status, far };
+    });
+    this.targets.replaceChildren(...this.targetRows.map((row) => row.node));
+  }
+}
+
+function readout() {
+  const [name, value, unit] = ["readout-name", "readout-value", "readout-unit"].map((each) =>
+    make("span", { class: each }),
+  );
+  const set = (nameText, valueText, unitText) => {
+    setText(name, nameText);
+    setText(value, valueText);
+    setText(unit, unitText);
+    setAttribute(value, "data-long", String(valueText).length > 5 ? "" : null);
+  };
+  return {
+    node: make("div", { class: "readout" }, name, make("span", { class: "readout-line" }, value, " ", unit)),
+    set,
+  };
+}

@@ -1,0 +1,49 @@
+// The tables of a record, and its settings and versions in folds.
+
+import { make } from "viewer/dom.js";
+
+const NUMBER = /^([-−+]?\d[\d.,\s]*%?|–|)$/;
+
+/** All tables, then what the run was made with. */
+export function buildTables(record) {
+  const { settings = {}, versions = {} } = record.scene;
+  const fold = (title, values) =>
+    make(
+      "details",
+      {},
+      make("summary", {}, title),
+      table(
+        ["name", "value"],
+        Object.entries(values).map(([name, value]) => [
+          name,
+          typeof value === "string" ? value : JSON.stringify(value),
+        ]),
+      ),
+    );
+  return make(
+    "div",
+    { class: "tables" },
+    ...record.tables.map(({ title, head, rows }) => make("section", {}, make("h2", {}, title), table(head, rows))),
+    fold("Settings", settings),
+    fold("Versions", versions),
+  );
+}
+
+function table(head, rows) {
+  const numeric = head.map((_, i) => rows.every((row) => NUMBER.test(String(row[i] ?? "–"))));
+  const cell = (value, i) => make("td", { class: numeric[i] ? "right" : null }, String(value ?? "–"));
+  return make(
+    "div",
+    { class: "scroll" },
+    make(
+      "table",
+      {},
+      make(
+        "thead",
+        {},
+        make("tr", {}, ...head.map((name, i) => make("th", { class: numeric[i] ? "right" : null }, name))),
+      ),
+      make("tbody", {}, ...rows.map((row) => make("tr", {}, ...row.map(cell)))),
+    ),
+  );
+}
