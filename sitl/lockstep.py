@@ -195,16 +195,18 @@ class Drive:
         self.checkpointer = resumed
         self._start_companion()
 
-    def run(self, observe: Callable[[Status], None] = lambda status: None) -> Report:
-        """Drive until the mission has ended or the time limit is reached."""
+    def run(self, observe: Callable[[Status], None] = lambda status: None, every_s: float = TRACK_PERIOD_S) -> Report:
+        """Drive until the mission has ended or the time limit is reached; ``observe`` is called every few ticks."""
         began_s = stopwatch_s()
-        next_track_s = 0.0
+        next_track_s = next_look_s = 0.0
         while not self.companion.done and self.simulator.time_s < self.time_limit_s:
             self.companion.tick()
             self._news += self.companion.status().news
             if self.simulator.time_s >= next_track_s:
                 next_track_s += TRACK_PERIOD_S
                 self._note_track()
+            if self.simulator.time_s >= next_look_s:
+                next_look_s += every_s
                 observe(self.take_status())
         self._note_track()
         self.report.wall_time_s = stopwatch_s() - began_s

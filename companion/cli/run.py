@@ -19,6 +19,7 @@ from companion.cli.live import Live, LiveConsole, Reader, levelled, reader_of
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
 from companion.cli.state import RunState, StateFiles
+from companion.cli.web import Token, Web, WebError, served, web_viewer
 from companion.control.model_estimate import described
 from companion.core.clock import WallClock
 from companion.core.severity import Severity
@@ -36,6 +37,7 @@ from companion.recording.recorder import NullRecorder, Recorder
 from companion.safety.reasons import PowerReason, Reason
 from companion.settings import Settings, SettingsError
 from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
+from companion.viewer.live_viewer import LiveViewer
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 STDERR = 2
@@ -48,6 +50,7 @@ BAD_INPUT = (
     StateDirectoryError,
     OutputError,
     SigningKeyError,
+    WebError,
 )
 UNHURRIED_S = 10.0
 """A run that ends by itself waits this long for a slow disk."""
@@ -79,6 +82,8 @@ def run(
     signing_key: Annotated[
         Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
     ] = None,
+    web: Web = None,
+    web_token: Token = None,
 ) -> None:
     """Drive MISSION.
 
@@ -98,6 +103,10 @@ def run(
             files = StateFiles(state, budget)
             ends.callback(files.close)
             settings = files.settings(usable_settings(settings_file), say)
+            page = web_viewer(web, web_token)
+            if page is not None:
+                ends.callback(page.close)
+                say(served(page))
             signer = files.signer(signing_key)
             source = Source(mission_file, connect, from_autopilot=from_autopilot)
             mission = source.mission(settings, signer, stop, say)
@@ -129,7 +138,7 @@ def run(
             keeping.start(budget)
             autopilot = AutopilotLink(link, Codec(settings.link, signer=signer), settings.link, recorder)
             live = Live(console, mission.name, reader)
-            rig = _Rig(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget)
+            rig = _Rig(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget, page)
             code = _drive(rig, seed=seed, arm=arm)
     except BAD_INPUT as error:
         typer.echo(levelled(str(error), Severity.ERROR, reader) if reader is Reader.JOURNAL else str(error), err=True)
@@ -154,6 +163,7 @@ class _Rig:
     live: Live
     stop: _StopSignals
     budget: ShutdownBudget
+    page: LiveViewer | None
 
 
 def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
@@ -174,9 +184,14 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
     rig.stop.listener = companion
     service = Service(os.environ)
 
+    if rig.page is not None:
+        rig.page.follow(companion, rig.settings, simulated=False)
+
     def show(status: Status) -> None:
         rig.live.show(status)
         service.show(status)
+        if rig.page is not None:
+            rig.page.show(status)
 
     service.ready()
     try:

@@ -142,6 +142,8 @@ class MissionExecutor:
         searcher = PathSearcher(planner, rng)
         self.driver = GoalDriver(self._controller(rng), searcher, runner)
         self._tracker = ObjectTracker(layout.evidence)
+        self.decisions = 0
+        """How many the navigator has made."""
         self.moving: tuple[Moving, ...] = ()
         """What moves round the rover, as of the last tick."""
 
@@ -379,6 +381,7 @@ class MissionExecutor:
 
     def _take_decision(self, decision: Decision, now_s: float) -> None:
         goal = self.progress.goal
+        self.decisions += 1
         self._log.write_decision(now_s, goal.name, decision)
         if decision.action is Action.REACHED:
             self._notifier.tell(f"Reached {goal.name}", Severity.INFO)

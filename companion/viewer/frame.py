@@ -9,7 +9,6 @@ Nouns: scene, frame.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -94,9 +93,7 @@ def frame_of(companion: Companion, status: Status) -> Json:
     """The moment. ``news`` are those of this tick alone."""
     run, executor = companion.mission_run, companion.executor
     vehicle, now_s, pose = run.vehicle, status.time_s, status.pose
-    activity = status.activity
     goal = None if executor is None or executor.progress.ended else executor.progress.goal
-    drives = f" to {status.target}" if activity.phase is RunPhase.DRIVING and status.target else ""
     return {
         "kind": "frame",
         "t": round(now_s, 2),
@@ -104,8 +101,7 @@ def frame_of(companion: Companion, status: Status) -> Json:
         "speed": round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **_mode(vehicle, run),
-        "line": f"{status.doing}{drives}",
-        "state": STATES[activity.phase],
+        **_doing(status),
         "statuses": [str(one) for _, one in run.statuses()],
         "goal": None if goal is None else {"name": goal.name, "place": _place(goal.point)},
         "path": _path(executor),
@@ -116,6 +112,7 @@ def frame_of(companion: Companion, status: Status) -> Json:
         "figures": _figures(companion, status),
         "battery": _battery(vehicle),
         "gps": _gps(vehicle),
+        "decision": 0 if executor is None else executor.decisions,
         "guard": None if executor is None else vehicle.guard_at(now_s) is not None,
         "news": news_of(status),
     }
@@ -179,6 +176,16 @@ def _map(executor: MissionExecutor) -> Json:
         "rows": rows,
         "tile": TILE,
     }
+
+
+def _doing(status: Status) -> Json:
+    """One large line, and what is awaited where it says why the rover stands."""
+    activity, line, why = status.activity, status.doing, ""
+    if activity.phase is RunPhase.DRIVING and status.target:
+        line = f"driving to {status.target}"
+    elif activity.phase is RunPhase.STOPPED_AND_WAITING:
+        line, why = f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
+    return {"line": line, "why": why, "state": STATES[activity.phase]}
 
 
 def _mode(vehicle: VehicleState, run: MissionRun) -> Json:
@@ -274,11 +281,3 @@ def _battery(vehicle: VehicleState) -> Json | None:
 def _gps(vehicle: VehicleState) -> Json | None:
     seen = vehicle.gps
     return None if seen is None else {"fix": seen.fix, "satellites": seen.satellites}
-
-
-KEPT_OF_PAST = ("kind", "t", "pose", "speed", "state", "figures", "news", "mode", "statuses")
-
-
-def past_frame(frame: Mapping[str, Any], news: Sequence[Json]) -> Json:
-    """What is kept of a frame for those who come later."""
-    return {**{key: frame[key] for key in KEPT_OF_PAST}, "news": list(news)}

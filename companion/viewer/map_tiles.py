@@ -8,13 +8,13 @@ from __future__ import annotations
 import math
 import struct
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from companion.core.frames import NedPoint
-from companion.core.grid import OBSTACLE
+from companion.core.grid import BASE_WEIGHT, OBSTACLE
 from companion.mapping.evidence_map import EvidenceMap
 
 TILE = 64
@@ -24,7 +24,6 @@ UNKNOWN, FREE, SEEN_OBSTACLE, CLOSED, COSTLY = range(5)
 MAGIC = b"TIL1"
 MOST_RUN = 32
 """A run's length takes five bits of its byte, what it is made of the other three."""
-COSTLY_FROM = 0.05
 IN_TURN = 8
 """Tiles out of the sensors' reach that are looked at each time: the mission's own, and what was forgotten."""
 
@@ -40,7 +39,7 @@ def cell_classes(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> T
     rows, columns = np.arange(y0, y1) // s, np.arange(x0, x1) // s
     base = evidence.base.weights[np.ix_(rows, columns)]
     classes = np.where(found < 0.0, FREE, UNKNOWN).astype(np.uint8)
-    classes[(base >= COSTLY_FROM) & (base < OBSTACLE)] = COSTLY
+    classes[(base > BASE_WEIGHT) & (base < OBSTACLE)] = COSTLY
     classes[base >= OBSTACLE] = CLOSED
     classes[found >= evidence.settings.occupied_at] = SEEN_OBSTACLE
     return classes
@@ -56,6 +55,12 @@ def run_lengths(cells: Tile) -> bytes:
     for kind, full, left in zip(flat[begins].tolist(), whole.tolist(), rest.tolist(), strict=True):
         pieces.append(bytes([kind << 5 | (MOST_RUN - 1)]) * full + (bytes([kind << 5 | (left - 1)]) if left else b""))
     return b"".join(pieces)
+
+
+def run_lengths_of(tiles: Mapping[Place, bytes]) -> Iterator[tuple[Place, bytes]]:
+    """The cells of whole tiles as runs."""
+    for place, cells in tiles.items():
+        yield place, run_lengths(np.frombuffer(cells, np.uint8))
 
 
 def cells_of(runs: bytes) -> Tile:
@@ -90,6 +95,16 @@ class TileWatch:
         self._in_turn = deque(_places_with_something(evidence))
         self._known = set(self._in_turn)
 
+    @property
+    def told(self) -> dict[Place, bytes]:
+        """The cells of each tile that has been told."""
+        return self._told
+
+    def forget(self, places: Iterable[Place]) -> None:
+        """These were not told after all."""
+        for place in places:
+            self._told.pop(place, None)
+
     def changed(self, evidence: EvidenceMap, around: NedPoint, reach_m: float) -> list[tuple[Place, bytes]]:
         """The tiles that differ from what was told: round a place, and a few of the others in turn."""
         places = self._places_around(evidence, around, reach_m)
@@ -121,7 +136,7 @@ class TileWatch:
 def _places_with_something(evidence: EvidenceMap) -> list[Place]:
     """Where the mission itself says something of the ground, or an earlier run has seen something."""
     s = evidence.subdivisions
-    field_y, field_x = np.nonzero(evidence.base.weights >= COSTLY_FROM)
+    field_y, field_x = np.nonzero(evidence.base.weights > BASE_WEIGHT)
     seen_y, seen_x = np.nonzero(evidence.log_odds)
     corners = [(field_x * s, field_y * s), (field_x * s + s - 1, field_y * s + s - 1), (seen_x, seen_y)]
     places = np.concatenate([np.column_stack((x // TILE, y // TILE)) for x, y in corners])

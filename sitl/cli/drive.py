@@ -11,27 +11,30 @@ from rich.console import Console
 
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
+from companion.cli.web import Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
 from companion.mapping.map_files import MapError
-from companion.mission.mission import MissionError
+from companion.mission.mission import Mission, MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
-from companion.settings import SettingsError
+from companion.settings import Settings, SettingsError
+from companion.viewer.live_viewer import LiveViewer
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_turning_on_the_spot
 from sitl.cli.drive_outputs import outputs, print_summary, write_collisions
-from sitl.cli.drive_progress import Pace, Unattended, run_with_progress
+from sitl.cli.drive_progress import Also, Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.faults.fault_file import FaultFileError
 from sitl.lockstep import Drive
-from sitl.scenario import ScenarioError, equipped, simulated
+from sitl.scenario import Scenario, ScenarioError, equipped, simulated
 
 BAD_INPUT = (
-    SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError,
+    SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError, WebError,
 )  # fmt: skip
+WEB_EVERY_S = 0.1
 RECORD_START_US = 1_577_836_800_000_000
 """2020-01-01: simulated time has no date, and the same run must give the same record."""
 
@@ -56,6 +59,8 @@ def drive(
     time_limit_s: options.TimeLimitS = 3600.0,
     speedup: options.Speedup = None,
     view: options.View = False,
+    web: Web = None,
+    web_token: Token = None,
 ) -> None:
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
@@ -65,30 +70,30 @@ def drive(
     console, wanted = Console(), outputs(image, map_stem, json_file)
     recorder: Recorder | NullRecorder = NullRecorder()
     run: Drive | None = None
-    viewer: Viewer | None = None
-    pace = Pace(options.VIEWED_SPEEDUP if view and speedup is None else speedup, WallClock())
+    page: LiveViewer | None = None
+    usual = options.VIEWED_SPEEDUP if view else options.WEB_SPEEDUP if web else None
+    pace = Pace(usual if speedup is None else speedup, WallClock())
     try:
-        screen = terminal() if view else None
+        viewer, page = Viewer(terminal()) if view else None, web_viewer(web, web_token)
         settings = usable_settings(settings_file)
         mission = mission_to_drive(mission_file, OnWorld(world, start, target, resolution_m, top_left, prior))
         mission = equipped(mission, sensors, params)
         refuse_blind(mission)
         scenario = simulated(mission, faults)
         refuse_turning_on_the_spot(mission, scenario)
-        for note in scenario.notes:
-            typer.echo(note, err=True)
+        _note(scenario)
+        files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
         if record is not None:
-            files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
             recorder = Recorder(record, mission, settings, seed, arm=True, files=files, start_us=RECORD_START_US)
-        wanted.check((settings_file, faults, _file(sensors), *mission.files))
+        wanted.check((*files.values(), *mission.files))
         with console.status("loading the planner ..."):
-            if not kernels_warm(settings, mission.rover.turning_radius_m):
-                typer.echo(COMPILING, err=True)
+            _say_if_compiling(settings, mission)
             run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
-        if screen is None:
-            report = run_with_progress(run, console, pace)
+        also = Also() if page is None else _shown(run, page, settings)
+        if viewer is None:
+            report = run_with_progress(run, console, pace, also)
         else:
-            report, viewer = run_with_view(run, screen, _paced(run, pace))
+            report = run_with_view(run, viewer, _paced(run, pace), also)
     except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -98,10 +103,11 @@ def drive(
             with contextlib.suppress(OutputError):  # the program ends with what it can say
                 write_collisions(run, recorder)
         raise StoppedError(_stopped(run, recorder)) from None
+    finally:
+        _closed(page)
     recorder.close()
     print_summary(report, console)
-    if viewer is not None:
-        viewer.print_last()
+    _print_last(viewer)
     try:
         wanted.write(run, recorder, console)
     except OutputError as error:
@@ -126,6 +132,33 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
         what = f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}{told}"
     kept = f"record so far: {recorder.directory}" if isinstance(recorder, Recorder) else "nothing was written"
     return f"{what}; {kept}"
+
+
+def _print_last(viewer: Viewer | None) -> None:
+    if viewer is not None:
+        viewer.print_last()
+
+
+def _note(scenario: Scenario) -> None:
+    for note in scenario.notes:
+        typer.echo(note, err=True)
+
+
+def _say_if_compiling(settings: Settings, mission: Mission) -> None:
+    if not kernels_warm(settings, mission.rover.turning_radius_m):
+        typer.echo(COMPILING, err=True)
+
+
+def _closed(page: LiveViewer | None) -> None:
+    if page is not None:
+        page.close()
+
+
+def _shown(run: Drive, page: LiveViewer, settings: Settings) -> Also:
+    """The page, which begins to show the run."""
+    typer.echo(served(page), err=True)
+    page.follow(run.companion, settings, simulated=True)
+    return Also(lambda status: page.show(status, len(run.simulator.collisions)), WEB_EVERY_S)
 
 
 def _paced(run: Drive, pace: Pace) -> Callable[[float], None]:

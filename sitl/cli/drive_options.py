@@ -9,6 +9,8 @@ import typer
 
 VIEWED_SPEEDUP = 10.0
 """Default speed with --view: slow enough to follow."""
+WEB_SPEEDUP = 1.0
+"""Default speed with --web: as a real rover drives."""
 
 MissionFile = Annotated[
     Path | None, typer.Argument(metavar="MISSION", help="TOML, .plan or .waypoints file.", show_default=False)

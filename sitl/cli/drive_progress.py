@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 
 from companion.app import Status
 from companion.core.clock import Clock
-from sitl.lockstep import Drive, Report
+from sitl.lockstep import TRACK_PERIOD_S, Drive, Report
 
 LINE_EVERY_S = 60.0
 NOBODY_S = 60.0
@@ -30,6 +31,14 @@ class Pace:
             return
         began_s, first_s = self._began = self._began or (self._clock.now_s(), time_s)
         self._clock.sleep_until_s(began_s + (time_s - first_s) / self._speedup)
+
+
+@dataclass(frozen=True, slots=True)
+class Also:
+    """What else looks at the run, and how often, in simulated time."""
+
+    show: Callable[[Status], None] = lambda status: None
+    every_s: float = TRACK_PERIOD_S
 
 
 class Unattended:
@@ -78,10 +87,10 @@ class Telling:
         self._console.print(f"{self._name}: {text}", style=style, soft_wrap=True, markup=False, highlight=False)
 
 
-def run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:
+def run_with_progress(run: Drive, console: Console, pace: Pace, also: Also = Also()) -> Report:
     """Drive to the end, with one changing line; without a terminal (a log file, CI) with lines now and then."""
     if not console.is_terminal:
-        return _run_with_lines(run, console, pace)
+        return _run_with_lines(run, console, pace, also)
     columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[state]}"), TimeElapsedColumn())
     with Progress(*columns, console=console) as progress:
         task = progress.add_task(run.mission.name, total=None, state="")
@@ -92,15 +101,16 @@ def run_with_progress(run: Drive, console: Console, pace: Pace) -> Report:
             telling.tell(status)
             progress.update(task, state=_state(run, status))
             unattended.look(status)
+            also.show(status)
             pace.wait(status.time_s)
 
-        report = run.run(observe)
+        report = run.run(observe, also.every_s)
         telling.tell(run.take_status())
         progress.update(task, total=1, completed=1, state=report.outcome)
     return report
 
 
-def _run_with_lines(run: Drive, console: Console, pace: Pace) -> Report:
+def _run_with_lines(run: Drive, console: Console, pace: Pace, also: Also) -> Report:
     telling, next_s = Telling(run, console), 0.0
     unattended = Unattended(run, telling.line)
 
@@ -111,9 +121,10 @@ def _run_with_lines(run: Drive, console: Console, pace: Pace) -> Report:
             next_s = status.time_s + LINE_EVERY_S
             telling.line(_state(run, status))
         unattended.look(status)
+        also.show(status)
         pace.wait(status.time_s)
 
-    report = run.run(observe)
+    report = run.run(observe, also.every_s)
     telling.tell(run.take_status())
     return report
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 
-from rich.console import Console
-
 from companion.app import Status
 from companion.core.clock import stopwatch_s
 from companion.core.grid import OBSTACLE
 from companion.executive.mission_progress import TargetStatus
 from companion.mapping.evidence_map import EvidenceMap, known_fields
 from companion.navigation.field_step import Part
+from sitl.cli.drive_progress import Also
 from sitl.cli.viewer import Viewer
 from sitl.lockstep import Drive, Report
 from sitl.view.sketch import Kind, Layer, Place, PlaceState, Scene
@@ -28,18 +27,19 @@ STATES = {
 PARTS = {Part.RETURN: "returning", Part.EXPLORE: "exploring", Part.SEARCH: "new path"}
 
 
-def run_with_view(run: Drive, console: Console, pace: Callable[[float], None]) -> tuple[Report, Viewer]:
+def run_with_view(run: Drive, viewer: Viewer, pace: Callable[[float], None], also: Also) -> Report:
     """Drive to the end while the view is shown; ``pace`` waits until a simulated time may be passed."""
-    with Viewer(console) as viewer:
+    with viewer:
         shown = DriveView(run, viewer)
 
         def observe(status: Status) -> None:
             shown.observe(status)
+            also.show(status)
             pace(status.time_s)
 
-        report = run.run(observe)
+        report = run.run(observe, also.every_s)
         shown.finish()
-    return report, viewer
+    return report
 
 
 class DriveView:

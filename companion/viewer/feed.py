@@ -1,0 +1,152 @@
+"""The viewer's feed: looks at a companion after each tick, and tells a web process what is new, a few times a second.
+
+It never waits, and gives up telling whatever would make it wait.
+
+Nouns: viewer feed.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections import deque
+from typing import Any, Protocol
+
+from companion.app import Companion, Status
+from companion.core.clock import stopwatch_s
+from companion.vehicle.state import VehicleState
+from companion.viewer import wire
+from companion.viewer.frame import frame_of, news_of, scene_of
+from companion.viewer.map_tiles import TileWatch, message_of, run_lengths_of
+
+FRAME_S, TILES_S, SCENE_S = 0.19, 0.5, 2.0
+"""So often each is told, in real time."""
+NEWS_KEPT = 200
+RATE_S = 2.0
+
+Json = dict[str, Any]
+
+
+class Receiver(Protocol):
+    """Takes messages without waiting: ``WebProcess``, or what stands in for it."""
+
+    begins_anew: Any
+
+    @property
+    def is_full(self) -> bool:
+        """Whether nothing more can be taken now."""
+        ...
+
+    def put(self, kind: bytes, payload: bytes) -> bool:
+        """One more message; False if it was not taken."""
+        ...
+
+
+class ViewerFeed:
+    """``always``: keys and values that each scene has, such as versions and settings."""
+
+    def __init__(self, companion: Companion, receiver: Receiver, always: Json) -> None:
+        self._companion = companion
+        self._receiver = receiver
+        self._always = always
+        self._watch: TileWatch | None = None
+        self._evidence: object = None
+        self._epoch = 0
+        self._scene: Json = {}
+        self._frame_s = self._tiles_s = self._scene_s = -math.inf
+        self._news: list[Json] = []
+        self._rates = _Rates()
+        self.contacts = 0
+        """Of a simulated rover; whoever knows them writes them here."""
+
+    def show(self, status: Status) -> None:
+        """To be called after each tick."""
+        self._news = [*self._news, *news_of(status)][-NEWS_KEPT:]
+        self._rates.note(self._companion.vehicle)
+        now_s = stopwatch_s()
+        if now_s - self._frame_s < FRAME_S and not self._companion.done:
+            return
+        if self._receiver.begins_anew.is_set():
+            self._receiver.begins_anew.clear()
+            self._scene, self._scene_s = {}, -math.inf
+            self._tell_scene(now_s)
+            self._tell_known_tiles()
+        if self._receiver.is_full:
+            return
+        self._frame_s = now_s
+        self._tell_scene(now_s)
+        self._tell_tiles(status, now_s)
+        self._tell_frame(status)
+
+    def _tell_known_tiles(self) -> None:
+        """A new process knows none of them."""
+        if self._watch is not None and self._watch.told:
+            self._receiver.put(wire.TILES, message_of(run_lengths_of(self._watch.told)))
+
+    def _tell_scene(self, now_s: float) -> None:
+        """If anything of it is new; looked at now and then only."""
+        companion = self._companion
+        another = self._notice_map()
+        if now_s - self._scene_s < SCENE_S and not another:
+            return
+        self._scene_s = now_s
+        scene = {**scene_of(companion.mission_run.mission, companion.mission_run, self._epoch), **self._always}
+        if scene != self._scene and self._put(scene):
+            self._scene = scene
+
+    def _notice_map(self) -> bool:
+        """Whether it is another map than before."""
+        executor = self._companion.executor
+        evidence = None if executor is None else executor.evidence
+        if evidence is self._evidence:
+            return False
+        self._evidence, self._epoch = evidence, self._epoch + 1
+        self._watch = None if evidence is None else TileWatch(evidence)
+        return True
+
+    def _tell_tiles(self, status: Status, now_s: float) -> None:
+        executor, pose = self._companion.executor, status.pose
+        if executor is None or pose is None or self._watch is None or now_s - self._tiles_s < TILES_S:
+            return
+        self._tiles_s = now_s
+        seen = self._companion.vehicle.scan
+        reach_m = 0.0 if seen is None else seen.scan.max_range_m
+        news = self._watch.changed(executor.evidence, pose.point, reach_m)
+        if news and not self._receiver.put(wire.TILES, message_of(news)):
+            self._watch.forget(place for place, _ in news)
+
+    def _tell_frame(self, status: Status) -> None:
+        frame = frame_of(self._companion, status)
+        frame["news"] = self._news
+        frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
+        frame["contacts"] = self.contacts
+        if self._put(frame):
+            self._news = []
+
+    def _put(self, message: Json) -> bool:
+        return self._receiver.put(wire.JSON, json.dumps(message, allow_nan=False).encode())
+
+
+class _Rates:
+    """How many positions and range readings come a second, of those that a tick can see."""
+
+    def __init__(self) -> None:
+        self._arrived: dict[str, deque[float]] = {"position": deque(), "range": deque()}
+
+    def note(self, vehicle: VehicleState) -> None:
+        """Once a tick."""
+        for name, seen in (("position", vehicle.position), ("range", vehicle.scan)):
+            times_s = self._arrived[name]
+            if seen is not None and (not times_s or seen.time_s != times_s[-1]):
+                times_s.append(seen.time_s)
+
+    def at(self, vehicle: VehicleState, now_s: float) -> Json:
+        """As of now, over the last seconds."""
+        for times_s in self._arrived.values():
+            while times_s and not 0.0 <= now_s - times_s[0] <= RATE_S:
+                times_s.popleft()
+        heartbeat = vehicle.heartbeat
+        return {
+            **{name: round(len(times_s) / RATE_S, 1) for name, times_s in self._arrived.items()},
+            "heartbeat_age_s": None if heartbeat is None else round(max(now_s - heartbeat.time_s, 0.0), 1),
+        }

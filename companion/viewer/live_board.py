@@ -1,0 +1,148 @@
+"""The live board: what a run has told its web process so far, and what each browser has still to be told.
+
+A browser that reads slowly misses frames, never tiles or news. Imports nothing heavy.
+
+Nouns: live board, spectator.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from collections import deque
+from collections.abc import Callable
+from typing import Any
+
+PAST_S = 600.0
+EVERY_S = 1.0
+"""One frame a second is kept for those who come later, for so long."""
+NEWS_KEPT = 500
+MAGIC = b"TIL1"
+TILES_AT_ONCE = 200
+KEPT_OF_PAST = ("kind", "t", "pose", "speed", "state", "figures", "statuses")
+
+Json = dict[str, Any]
+Place = tuple[int, int]
+
+
+class Spectator:
+    """One browser: what it has not been told yet. ``wake`` is called whenever there is something."""
+
+    def __init__(self, board: LiveBoard, may_act: bool, wake: Callable[[], None]) -> None:
+        self.may_act = may_act
+        self.wake = wake
+        self._board = board
+        self._answers: deque[Json] = deque(maxlen=20)
+        self.begin()
+
+    def begin(self) -> None:
+        """Everything is to be told, again."""
+        self._scene = self._past = True
+        self.stale = set(self._board.tiles)
+        self._news = self._board.news_count
+        self._frame = -1
+
+    def answer(self, answer: Json) -> None:
+        """Something for this one alone."""
+        self._answers.append(answer)
+        self.wake()
+
+    def messages(self) -> list[str | bytes]:
+        """What is to be told now: texts of JSON, and tiles."""
+        board, told = self._board, []
+        if self._scene and board.scene is not None:
+            self._scene = False
+            told.append(json.dumps({**board.scene, "may_act": self.may_act and board.takes_actions}))
+            if self._past:
+                self._past = False
+                told.append(json.dumps({"kind": "past", "frames": list(board.past)}))
+                self._news = board.news_count
+        told += [json.dumps(self._answers.popleft()) for _ in range(len(self._answers))]
+        out: list[str | bytes] = [*told]
+        if board.scene is not None and self.stale:
+            places = [self.stale.pop() for _ in range(min(TILES_AT_ONCE, len(self.stale)))]
+            out.append(_tile_message([(place, board.tiles[place]) for place in places if place in board.tiles]))
+        if board.frame is not None and board.frame_count != self._frame:
+            self._frame = board.frame_count
+            out.append(json.dumps({**board.frame, "news": board.news_since(self._news)}))
+            self._news = board.news_count
+        return out
+
+
+class LiveBoard:
+    """``takes_actions``: whether anybody may act at all."""
+
+    def __init__(self, takes_actions: bool) -> None:
+        self.takes_actions = takes_actions
+        self.scene: Json | None = None
+        self.frame: Json | None = None
+        self.frame_count = 0
+        self.tiles: dict[Place, bytes] = {}
+        self.past: deque[Json] = deque(maxlen=round(PAST_S / EVERY_S))
+        self.news_count = 0
+        self._news: deque[Json] = deque(maxlen=NEWS_KEPT)
+        self._past_news: list[Json] = []
+        self._past_s = -EVERY_S
+        self._spectators: set[Spectator] = set()
+
+    def __len__(self) -> int:
+        """How many look on."""
+        return len(self._spectators)
+
+    def join(self, may_act: bool, wake: Callable[[], None]) -> Spectator:
+        """One more."""
+        spectator = Spectator(self, may_act, wake)
+        self._spectators.add(spectator)
+        return spectator
+
+    def leave(self, spectator: Spectator) -> None:
+        """One less."""
+        self._spectators.discard(spectator)
+
+    def news_since(self, count: int) -> list[Json]:
+        """The news after the first ``count``, as far as they are kept."""
+        missed = min(self.news_count - count, len(self._news))
+        return list(self._news)[len(self._news) - missed :] if missed > 0 else []
+
+    def take(self, message: Json) -> None:
+        """A scene or a frame of the run."""
+        if message["kind"] == "scene":
+            if self.scene is not None and self.scene["map_epoch"] != message["map_epoch"]:
+                self.tiles.clear()
+            self.scene = message
+            for spectator in self._spectators:
+                spectator.begin()
+        else:
+            self._take_frame(message)
+        self._wake()
+
+    def take_tiles(self, message: bytes) -> None:
+        """Tiles of the map."""
+        at = len(MAGIC)
+        while at < len(message):
+            column, row, size = struct.unpack_from("<HHH", message, at)
+            at += 6
+            self.tiles[column, row] = message[at : at + size]
+            at += size
+            for spectator in self._spectators:
+                spectator.stale.add((column, row))
+        self._wake()
+
+    def _take_frame(self, frame: Json) -> None:
+        self.frame, self.frame_count = frame, self.frame_count + 1
+        news = frame["news"]
+        self._news.extend(news)
+        self.news_count += len(news)
+        self._past_news += news
+        if not 0.0 <= frame["t"] - self._past_s < EVERY_S:
+            self._past_s = frame["t"]
+            self.past.append({**{key: frame[key] for key in KEPT_OF_PAST}, "news": self._past_news[-NEWS_KEPT:]})
+            self._past_news = []
+
+    def _wake(self) -> None:
+        for spectator in self._spectators:
+            spectator.wake()
+
+
+def _tile_message(tiles: list[tuple[Place, bytes]]) -> bytes:
+    return MAGIC + b"".join(struct.pack("<HHH", *place, len(runs)) + runs for place, runs in tiles)

@@ -1,0 +1,242 @@
+"""The web process as the run sees it: started beside the drive, fed without ever waiting for it, started again.
+
+A thread writes to its pipe. If the process stalls, the queue fills and moments are left out; if it ends, another one is
+started and told everything anew. The drive notices neither.
+
+Nouns: web process.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ipaddress
+import json
+import queue
+import secrets
+import socket
+import subprocess
+import sys
+import threading
+from collections import deque
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+from companion.core.clock import stopwatch_s
+from companion.viewer import wire
+
+QUEUE = 20
+FIRST_WAIT_S, LONGEST_WAIT_S = 0.5, 10.0
+"""Before a web process that has ended is started again."""
+CLOSE_S = 1.5
+MOST_ACTIONS = 50
+NEEDED = ("starlette", "uvicorn", "websockets")
+TOKEN_BYTES = 16
+LEAST_TOKEN = 8
+
+Json = dict[str, Any]
+
+
+class WebError(Exception):
+    """The page cannot be served; the text is one line with place and remedy."""
+
+
+@dataclass(frozen=True, slots=True)
+class WebPlace:
+    """Where it is served: ``host``, ``port``; ``token``: empty if nobody may act."""
+
+    host: str
+    port: int
+    token: str = ""
+
+    @property
+    def private(self) -> bool:
+        """Whether others than this machine can reach it, so that only those who know the token may look on."""
+        return not _is_loopback(self.host)
+
+    @property
+    def url(self) -> str:
+        """For people. What stands behind # stays in the browser."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"http://{host}:{self.port}/{f'#token={self.token}' if self.token else ''}"
+
+
+def web_place(text: str, token_file: Path | None) -> WebPlace:
+    """The place named by ``[HOST:]PORT``; the token is read from its file, which is made if it does not exist.
+
+    Raises WebError.
+    """
+    host, _, port_text = text.rpartition(":")
+    host = host.removeprefix("[").removesuffix("]") or "127.0.0.1"
+    if not port_text.isascii() or not port_text.isdigit() or not 0 <= int(port_text) <= 65535:
+        raise WebError(f"--web {text}: not a place to serve; use PORT or HOST:PORT, for example 8000")
+    place = WebPlace(host, int(port_text), "" if token_file is None else _token(token_file))
+    if place.private and not place.token:
+        raise WebError(
+            f"--web {text}: others can reach {host}, so only those who know a token may look on: name a file for it "
+            "with --web-token FILE (it is made if it does not exist)"
+        )
+    missing = [name for name in NEEDED if find_spec(name) is None]
+    if missing:
+        raise WebError(f"--web: {', '.join(missing)} is not installed; install rover-companion[web]")
+    return place
+
+
+def _token(file: Path) -> str:
+    """The token in a file that only its owner may read. Raises WebError."""
+    try:
+        if not file.exists():
+            file.touch(mode=0o600)
+            file.write_text(secrets.token_urlsafe(TOKEN_BYTES) + "\n", encoding="ascii")
+        token = file.read_text(encoding="ascii").strip()
+    except (OSError, UnicodeDecodeError) as error:
+        why = error.strerror if isinstance(error, OSError) else "not a text of plain letters"
+        raise WebError(f"--web-token {file}: {why}") from error
+    if len(token) < LEAST_TOKEN or not token.isprintable() or " " in token:
+        raise WebError(
+            f"--web-token {file}: a token is one word of {LEAST_TOKEN} letters or more; delete the file for a new one"
+        )
+    return token
+
+
+def _is_loopback(host: str) -> bool:
+    if host == "localhost":
+        return True
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+class WebProcess:
+    """``begins_anew`` is set whenever a new process knows nothing yet; whoever feeds it clears it."""
+
+    def __init__(self, place: WebPlace) -> None:
+        """Raises WebError if the place cannot be listened on."""
+        self.place = place
+        self.begins_anew = threading.Event()
+        self.begins_anew.set()
+        self.started = 0
+        self._socket = _listening(place)
+        self.place = WebPlace(place.host, self._socket.getsockname()[1], place.token)
+        self._queue: queue.Queue[tuple[bytes, bytes] | None] = queue.Queue(QUEUE)
+        self._asked: deque[Json] = deque(maxlen=MOST_ACTIONS)
+        self._closing = threading.Event()
+        self._process: subprocess.Popen[bytes] | None = None
+        self._thread = threading.Thread(target=self._keep_up, name="web", daemon=True)
+        self._thread.start()
+
+    @property
+    def process_id(self) -> int | None:
+        """Of the process now."""
+        process = self._process
+        return None if process is None else process.pid
+
+    @property
+    def is_full(self) -> bool:
+        """Whether nothing more can be taken now."""
+        return self._queue.full()
+
+    def put(self, kind: bytes, payload: bytes) -> bool:
+        """One more message; False, at once, if the process does not keep up."""
+        try:
+            self._queue.put_nowait((kind, payload))
+        except queue.Full:
+            return False
+        return True
+
+    def asked(self) -> list[Json]:
+        """What browsers have asked for since the last call."""
+        return [self._asked.popleft() for _ in range(len(self._asked))]
+
+    def close(self) -> None:
+        """Let it tell what it has been given, and end it. Takes no longer than ``CLOSE_S``."""
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        with contextlib.suppress(queue.Full):
+            self._queue.put_nowait(None)
+        self._thread.join(CLOSE_S)
+        process = self._process
+        if process is not None:
+            with contextlib.suppress(OSError):
+                process.kill()
+        self._socket.close()
+
+    def _keep_up(self) -> None:
+        """In a thread: start the process, feed it, and start it again if it ends."""
+        wait_s = FIRST_WAIT_S
+        while not self._closing.is_set():
+            began_s = stopwatch_s()
+            with contextlib.suppress(OSError):
+                self._feed()
+            if self._closing.wait(wait_s):
+                return
+            wait_s = FIRST_WAIT_S if stopwatch_s() - began_s > LONGEST_WAIT_S else min(2.0 * wait_s, LONGEST_WAIT_S)
+
+    def _feed(self) -> None:
+        """One process, from its start to its end. Raises OSError when its pipe breaks."""
+        descriptor = self._socket.fileno()
+        command = [sys.executable, "-m", "companion.viewer.server", str(descriptor)]
+        process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, pass_fds=(descriptor,),
+            start_new_session=True,
+        )  # fmt: skip
+        self._process, self.started = process, self.started + 1
+        try:
+            assert process.stdin is not None
+            threading.Thread(target=self._hear, args=(process,), daemon=True).start()
+            place = self.place
+            self._write(
+                process,
+                wire.JSON,
+                json.dumps({"host": place.host, "token": place.token, "private": place.private}).encode(),
+            )
+            self._drain()
+            self.begins_anew.set()
+            while (message := self._queue.get()) is not None:
+                self._write(process, *message)
+            process.stdin.close()
+            process.wait(CLOSE_S)
+        except subprocess.TimeoutExpired:
+            pass
+        finally:
+            process.kill()
+            with contextlib.suppress(OSError):
+                process.wait()
+
+    def _write(self, process: subprocess.Popen[bytes], kind: bytes, payload: bytes) -> None:
+        assert process.stdin is not None
+        process.stdin.write(wire.packed(kind, payload))
+        process.stdin.flush()
+
+    def _drain(self) -> None:
+        """What was meant for the process before: the new one is told everything anew."""
+        with contextlib.suppress(queue.Empty):
+            while True:
+                if self._queue.get_nowait() is None:
+                    self._closing.set()
+                    return
+
+    def _hear(self, process: subprocess.Popen[bytes]) -> None:
+        """In a thread: what browsers ask for."""
+        assert process.stdout is not None
+        with contextlib.suppress(OSError, ValueError):
+            for line in process.stdout:
+                asked = json.loads(line)
+                if isinstance(asked, dict):
+                    self._asked.append(asked)
+
+
+def _listening(place: WebPlace) -> socket.socket:
+    """A socket that listens, so that a place that is taken is told at once. Raises WebError."""
+    try:
+        found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0]
+        listening = socket.socket(found[0], socket.SOCK_STREAM)
+        listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listening.bind(found[4])
+        listening.listen(64)
+    except OSError as error:
+        raise WebError(f"--web {place.host}:{place.port}: {error.strerror or error}; choose another one") from error
+    return listening
