@@ -38,15 +38,21 @@ class Following(NamedTuple):
 
 GUARDED_S = 1.0
 """A velocity that lasts no longer is ended by a guard."""
-OFF_ALONE = 0.4
-"""For as long as a velocity lasts without a guard a rover may turn by such a share more or less: an autopilot that is
-not tuned to it overshoots in the first seconds of a turn, though on the whole it turns as told."""
+SWINGS_S = 0.3
+"""An autopilot that is not tuned to its rover swings past a new turn rate, by so many radians for each rad/s of change:
+one that turned 2.4 times as fast as its gains were for went 0.27 and 0.4 rad too far, after changes of 1.4 rad/s."""
+RECENT_S = 0.6
+"""It changes from what was told and seen in the last moments."""
 
 
-def turn_gains(follows: Following, lasts_s: float) -> tuple[float, ...]:
-    """By which factors more than told a rover may turn that is left alone with a velocity which lasts so long."""
-    shares = (follows.off_model, OFF_ALONE) if lasts_s > GUARDED_S else (follows.off_model,)
-    return 1.0, *(1.0 + sign * share for share in shares for sign in (-1.0, 1.0))
+def turn_gains(follows: Following) -> tuple[float, ...]:
+    """By which factors more than told a rover may turn."""
+    return 1.0, 1.0 - follows.off_model, 1.0 + follows.off_model
+
+
+def swings_s(lasts_s: float) -> float:
+    """How far it may swing where a velocity lasts so long: a guard ends that before it shows."""
+    return SWINGS_S if lasts_s > GUARDED_S else 0.0
 
 
 AS_SHIPPED = Following()

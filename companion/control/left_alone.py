@@ -19,13 +19,15 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.control.following import Following, turn_gains
+from companion.control.following import RECENT_S, Following, swings_s, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.told import in_force
 from companion.mapping.evidence_map import EvidenceMap
 from companion.vehicle.commands import GuidedVelocity
 
 STEP_S = 0.05
+SWINGING_S = 1.5
+"""So long a rover that swings past a new turn rate turns too much."""
 ANY_S = 0.1
 """The outline is looked at so often."""
 MOST_STEPS = 1200
@@ -62,6 +64,14 @@ class Rover(NamedTuple):
     turns_rad_s2: float
 
 
+class Turning(NamedTuple):
+    """It turns by the factor ``gain`` more than told, and for a while from ``from_s`` on by so much more."""
+
+    gain: float
+    from_s: float
+    swing_rad_s: float
+
+
 class Outline(NamedTuple):
     """How far it reaches ahead, back and to either side; a circle reaches as far everywhere."""
 
@@ -89,8 +99,13 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
     start = np.array((*_from_corner(view), view.pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s))
     ends_s = latest_s + lasts_s
     ways = []
-    for gain in turn_gains(follows, lasts_s):
-        places, stands = way_of(start, tells, ends_s, follows.turn_gain * gain, _worst(follows))
+    swing = swings_s(lasts_s)
+    variants = [(gain, 0.0) for gain in turn_gains(follows)] + (
+        [(1.0, swing * _change_rad_s(setpoint, view))] if swing else []
+    )
+    for gain, swing_rad in variants:
+        turns = Turning(follows.turn_gain * gain, latest_s, swing_rad / SWINGING_S)
+        places, stands = way_of(start, tells, ends_s, turns, _worst(follows))
         if not stands:
             return None
         if setpoint.forward_m_s * view.forward_m_s < 0.0:
@@ -99,6 +114,13 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
             places = places[min(turned[0] if len(turned) else len(places), len(places) - 2) :]
         ways.append(places)
     return ways
+
+
+def _change_rad_s(setpoint: GuidedVelocity, view: LocalView) -> float:
+    """By how much its turn rate differs from those of the last moments, at most, with its sign."""
+    now_s = view.pose.time_s - view.following.dead_s
+    lately = [one.turn_rad_s for one in view.lately if now_s - one.time_s < RECENT_S]
+    return max((setpoint.yaw_rate_rad_s - one for one in (view.yaw_rate_rad_s, *lately)), key=abs)
 
 
 def first_met(places: Places, view: LocalView) -> Met:
@@ -148,10 +170,10 @@ def _tells(setpoint: GuidedVelocity, view: LocalView, latest_s: float) -> NDArra
 
 
 @njit(cache=True, nogil=True)
-def way_of(start, tells, ends_s, gain, rover):
+def way_of(start, tells, ends_s, turning, rover):
     """The way of a rover that does what ``tells`` and then brakes, and whether it comes to stand.
 
-    ``start``: north, east, heading, forward speed, turn rate. ``gain``: it turns by this factor more than told.
+    ``start``: north, east, heading, forward speed, turn rate.
     """
     north, east, heading, speed, turn = start
     every = int(round(ANY_S / STEP_S))
@@ -164,7 +186,9 @@ def way_of(start, tells, ends_s, gain, rover):
             at += 1
         goes_m_s, turns_rad_s = 0.0, 0.0
         if middle_s < ends_s:
-            goes_m_s, turns_rad_s = tells[at, 1], gain * tells[at, 2]
+            goes_m_s, turns_rad_s = tells[at, 1], turning.gain * tells[at, 2]
+            if turning.from_s <= middle_s < turning.from_s + SWINGING_S:
+                turns_rad_s += turning.swing_rad_s
         slows = speed * (goes_m_s - speed) < 0.0
         most = (rover.brakes_m_s2 if slows else rover.gains_m_s2) * STEP_S
         most_turn = rover.turns_rad_s2 * STEP_S

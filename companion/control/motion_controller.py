@@ -2,7 +2,7 @@
 
 It is told only as long as the rover may be left alone with it: held for as long as a velocity lasts
 (``guidance.velocity_lasts_s``), and braked then, the rover stays on ground that is free and seen. Without a guard
-that is slow, and where the way ahead is straight and wide a position takes its place (``position_ahead``).
+that is slow, and where a position leads on faster that takes its place (``position_ahead``).
 
 Nouns: motion controller.
 """
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.following import GUARDED_S, Following, turn_gains
+from companion.control.following import GUARDED_S, RECENT_S, Following, swings_s, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import NEAR_M, Window, look_round
 from companion.control.motion_kernels import (
@@ -135,6 +135,7 @@ class MotionController:
             model=worst_model(model, view.following),
             pending=_pending(view, _latest(view), ALONE_STEP_S),
             step_s=ALONE_STEP_S,
+            recent_rad_s=_recent_rad_s(view),
         )
         problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
@@ -177,8 +178,7 @@ class MotionController:
     def _braking(self, view: LocalView, worst: MotionProblem) -> ToldVelocity:
         """The way to brake that keeps most room, straight on where there is enough."""
         now_s, fastest_rad_s = self._time_s, worst.model.turn_fastest_rad_s
-        lasts_s = view.settings.guidance.velocity_lasts_s
-        spare_m = {share: _least_spare_m(share * fastest_rad_s, lasts_s, _gains(view), worst) for share in BRAKE_TURNS}
+        spare_m = {share: _least_spare_m(share * fastest_rad_s, view, worst) for share in BRAKE_TURNS}
         best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M))
         rolls = abs(worst.start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
@@ -189,7 +189,7 @@ def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
     turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
     admitted: NDArray[np.float64] = admitted_speeds(
-        turns_rad_s, lasts_s, np.array(_gains(view)), WEIGHTS.margin_m, _faster_s(view), worst
+        turns_rad_s, lasts_s, turn_gains(view.following), WEIGHTS.margin_m, _faster_s(view), worst, swings_s(lasts_s)
     )
     return admitted
 
@@ -204,23 +204,28 @@ def _faster_s(view: LocalView) -> float:
     return max(FASTER_S, BLUR_S * min(view.rover.beam_rad, MOST_BLUR_RAD)) + DRIFT_SHARE * _alone_s(view)
 
 
-def _gains(view: LocalView) -> tuple[float, ...]:
-    """The rover may turn so much more or less than it is told."""
-    return turn_gains(view.following, view.settings.guidance.velocity_lasts_s)
-
-
-def _least_spare_m(turn_rad_s: float, lasts_s: float, gains: tuple[float, ...], worst: MotionProblem) -> float:
-    """The room that is left where the rover brakes and turns for so long, however much it turns."""
-    return min(float(spare_m(0.0, turn_rad_s, lasts_s, gain, 0.0, 0.0, worst)) for gain in gains)
+def _least_spare_m(turn_rad_s: float, view: LocalView, worst: MotionProblem) -> float:
+    """The room that is left where the rover brakes and turns as told, however much it turns."""
+    lasts_s = view.settings.guidance.velocity_lasts_s
+    spares_m = [spare_m(0.0, turn_rad_s, lasts_s, gain, 0.0, 0.0, worst) for gain in turn_gains(view.following)]
+    return float(min(spares_m))
 
 
 def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem) -> bool:
     """Whether this may be the last command, however the rover turns."""
-    lasts_s = view.settings.guidance.velocity_lasts_s
-    return all(
-        may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, WEIGHTS.margin_m, _faster_s(view), worst)
-        for gain in _gains(view)
-    )
+    lasts_s, margin_m, faster_s = view.settings.guidance.velocity_lasts_s, WEIGHTS.margin_m, _faster_s(view)
+
+    def may(gain: float, swings: float) -> bool:
+        return bool(may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, margin_m, faster_s, worst, swings))
+
+    return may(1.0, swings_s(lasts_s)) and all(may(gain, 0.0) for gain in turn_gains(view.following))
+
+
+def _recent_rad_s(view: LocalView) -> tuple[float, float]:
+    """The least and the largest turn rate of the last moments, told or seen."""
+    since_s = view.pose.time_s - view.following.dead_s - RECENT_S
+    turns_rad_s = [view.yaw_rate_rad_s, *(one.turn_rad_s for one in view.lately if one.time_s > since_s)]
+    return min(turns_rad_s), max(turns_rad_s)
 
 
 def _latest(view: LocalView) -> int:
@@ -233,13 +238,11 @@ def _pending(view: LocalView, steps: int, step_s: float) -> NDArray[np.float64]:
 
     Where that was no velocity, the rover goes on as it does; a position tells it to drive on.
     """
-    rows = np.zeros((steps, 2))
+    rows, now_s = np.zeros((steps, 2)), view.pose.time_s
+    on_m_s = view.rover.cruise_speed_m_s if view.by_position(now_s - steps * step_s) else view.forward_m_s
     for step, row in enumerate(rows):
-        then_s = view.pose.time_s + (step + 0.5 - steps) * step_s
-        if (told := in_force(view.lately, then_s)) is not None:
-            row[:] = told.speed_m_s, told.turn_rad_s
-        else:
-            row[:] = view.rover.cruise_speed_m_s if view.by_position(then_s) else view.forward_m_s, view.yaw_rate_rad_s
+        told = in_force(view.lately, now_s + (step + 0.5 - steps) * step_s)
+        row[:] = (on_m_s, view.yaw_rate_rad_s) if told is None else (told.speed_m_s, told.turn_rad_s)
     return rows
 
 

@@ -39,6 +39,8 @@ ENDLESS = 600
 NEARER_M, NEAREST_M = 0.01, -0.04
 """A rover that is too near to something may come nearer by the first, so that it gets away, but only down to the
 second: else it would come nearer with every look."""
+SWINGING_S = 1.5
+"""A rover that swings past what it is told does so for so long."""
 AWAY = 0.1
 """One whose outline lies over something must get out of it by so much for each metre it goes: it may leave, but not
 touch the next thing as deep."""
@@ -121,7 +123,8 @@ class MotionProblem(NamedTuple):
 
     ``pending``: shape (n, 2), the commands told that have not had their effect yet, one a step.
     ``admitted_m_s``: shape (n, 2), the fastest speeds that may be told, forwards and backwards, at n turn rates evenly
-    from the fastest to the left to the fastest to the right.
+    from the fastest to the left to the fastest to the right. ``recent_rad_s``: the least and the largest turn rate of
+    the last moments, told or seen: a rover that changes from them may swing past what it is told.
     """
 
     start: Start
@@ -133,6 +136,7 @@ class MotionProblem(NamedTuple):
     admitted_m_s: Any
     horizon_s: float
     step_s: float
+    recent_rad_s: tuple[float, float] = (0.0, 0.0)
 
 
 @njit(cache=True, nogil=True)
@@ -337,16 +341,17 @@ def costs_s(motions, problem):
 
 
 @njit(cache=True, nogil=True)
-def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
+def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, swings_s=0.0):
     """Whether a command may be the last: held so long, then braked, it leads over ground that is free and seen.
 
     The rover keeps ``margin_m``, and ``margin_s`` more for each m/s. ``gain``: it turns by this factor more than told.
+    ``swings_s``: and by so many radians too far for each rad/s of change.
     """
-    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, 0.0) >= 0.0
+    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, 0.0, swings_s) >= 0.0
 
 
 @njit(cache=True, nogil=True)
-def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, enough_m=-math.inf):
+def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, enough_m=-math.inf, swings_s=0.0):
     """How much more room than it must keep such a rover has, at the worst place; below 0 it may not be left alone.
 
     Once it is sure to be below ``enough_m``, it is not looked at to its end.
@@ -355,6 +360,8 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, en
     pending, step_s = problem.pending, problem.step_s
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
     early, held = pending.shape[0], int(math.ceil(lasts_s / step_s))
+    swing_rad_s = swings_s * _change_rad_s(told_rad_s, problem.recent_rad_s) / SWINGING_S
+    swinging = early + int(round(SWINGING_S / step_s))
     least = _least_m(ground.gap_m, ground.cell_m, body, start)
     least_seen = _least_m(ground.seen_m, ground.cell_m, body, start, 0.0)
     step, spare = 0, FAR_M
@@ -366,7 +373,8 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, en
             now_m_s, now_rad_s = pending[step, 0], pending[step, 1]
         elif step < early + held:
             now_m_s, now_rad_s = told_m_s, told_rad_s
-        state = moved(state, now_m_s, gain * now_rad_s, model, step_s)
+        swings_rad_s = swing_rad_s if early <= step < min(swinging, early + held) else 0.0
+        state = moved(state, now_m_s, gain * now_rad_s + swings_rad_s, model, step_s)
         room_m = min(margin_m + margin_s * abs(state[3]), _still_m(least, start, state))
         spare = min(spare, clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - room_m)
         seen_m = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2], 0.0)
@@ -375,6 +383,13 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, en
             break
         step += 1
     return spare
+
+
+@njit(cache=True, nogil=True)
+def _change_rad_s(told_rad_s, recent_rad_s):
+    """By how much a turn rate differs from what was lately, at most, with its sign."""
+    up, down = told_rad_s - recent_rad_s[0], told_rad_s - recent_rad_s[1]
+    return up if abs(up) >= abs(down) else down
 
 
 @njit(cache=True, nogil=True)
@@ -403,19 +418,25 @@ def keep_within(motion, problem):
 
 
 @njit(cache=True, nogil=True)
-def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
-    """The fastest speeds at these turn rates, forwards and backwards, shape (n, 2), that may be the last command."""
+def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem, swings_s=0.0):
+    """The fastest speeds at these turn rates, forwards and backwards, shape (n, 2), that may be the last command.
+
+    Whether the rover turns by any of the factors ``gains``, or swings.
+    """
     model = problem.model
     admitted = np.zeros((turns_rad_s.size, 2))
     for at in range(turns_rad_s.size):
         for side in range(2):
             most = model.fastest_m_s if side == 0 else -model.backwards_m_s
             for share in range(TRIED, 0, -1):
-                told_m_s, safe = most * (share / TRIED) ** 2, True
+                told_m_s, turn_rad_s = most * (share / TRIED) ** 2, turns_rad_s[at]
+                safe = swings_s == 0.0 or may_be_last(
+                    told_m_s, turn_rad_s, lasts_s, 1.0, margin_m, margin_s, problem, swings_s
+                )
                 for gain in gains:
-                    if not may_be_last(told_m_s, turns_rad_s[at], lasts_s, gain, margin_m, margin_s, problem):
-                        safe = False
+                    if not safe:
                         break
+                    safe = may_be_last(told_m_s, turn_rad_s, lasts_s, gain, margin_m, margin_s, problem)
                 if safe:
                     admitted[at, side] = abs(told_m_s)
                     break

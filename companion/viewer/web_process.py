@@ -116,7 +116,6 @@ class WebProcess:
         """Raises WebError if the place cannot be listened on."""
         self.place = place
         self.begins_anew = threading.Event()
-        self.begins_anew.set()
         self.started = 0
         self._socket = _listening(place)
         self.place = WebPlace(place.host, self._socket.getsockname()[1], place.token)
@@ -184,9 +183,10 @@ class WebProcess:
             start_new_session=True,
         )  # fmt: skip
         self._process, self.started = process, self.started + 1
+        hearing = threading.Thread(target=self._hear, args=(process,), name="web requests", daemon=True)
+        hearing.start()
         try:
             assert process.stdin is not None
-            threading.Thread(target=self._hear, args=(process,), daemon=True).start()
             place = self.place
             self._write(
                 process,
@@ -205,6 +205,11 @@ class WebProcess:
             process.kill()
             with contextlib.suppress(OSError):
                 process.wait()
+            hearing.join(CLOSE_S)
+            for pipe in (process.stdin, process.stdout):
+                with contextlib.suppress(OSError):
+                    assert pipe is not None
+                    pipe.close()
 
     def _write(self, process: subprocess.Popen[bytes], kind: bytes, payload: bytes) -> None:
         assert process.stdin is not None
@@ -231,6 +236,7 @@ class WebProcess:
 
 def _listening(place: WebPlace) -> socket.socket:
     """A socket that listens, so that a place that is taken is told at once. Raises WebError."""
+    listening: socket.socket | None = None
     try:
         found = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0]
         listening = socket.socket(found[0], socket.SOCK_STREAM)
@@ -238,5 +244,7 @@ def _listening(place: WebPlace) -> socket.socket:
         listening.bind(found[4])
         listening.listen(64)
     except OSError as error:
+        if listening is not None:
+            listening.close()
         raise WebError(f"--web {place.host}:{place.port}: {error.strerror or error}; choose another one") from error
     return listening

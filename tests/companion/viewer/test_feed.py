@@ -1,0 +1,116 @@
+"""What a viewer is told of a whole drive: plain JSON, the map as it is; and the drive is no other for being watched."""
+
+from __future__ import annotations
+
+import json
+import threading
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from companion.mission.load import load_mission
+from companion.recording.recorder import NullRecorder
+from companion.settings.settings_file import parse_settings
+from companion.viewer import feed, wire
+from companion.viewer.feed import ViewerFeed
+from companion.viewer.map_tiles import TILE, cell_classes, cells_of, tiles_in
+from sitl.lockstep import Drive
+from sitl.scenario import scenario_from_mission
+
+MISSION = Path(__file__).resolve().parents[3] / "missions" / "one-obstacle.toml"
+KEYS = {
+    "kind", "t", "pose", "speed", "turn", "mode", "armed", "drives", "line", "why", "state", "statuses", "goal", "path",
+    "motion", "setpoint", "rays", "movers", "figures", "battery", "gps", "decision", "guard", "news", "rates",
+    "contacts",
+}  # fmt: skip
+
+
+class Heard:
+    """A receiver that takes everything, or nothing."""
+
+    def __init__(self) -> None:
+        self.begins_anew = threading.Event()
+        self.is_full = False
+        self.scenes: list[dict] = []
+        self.frames: list[dict] = []
+        self.tiles: dict[tuple[int, int], bytes] = {}
+
+    def put(self, kind: bytes, payload: bytes) -> bool:
+        if self.is_full:
+            return False
+        if kind == wire.TILES:
+            self.tiles.update(tiles_in(payload))
+        else:
+            message = json.loads(payload)
+            (self.scenes if message["kind"] == "scene" else self.frames).append(message)
+        return True
+
+
+def new_drive(controller: str = "motion-ga") -> Drive:
+    mission = load_mission(MISSION)
+    settings = parse_settings({"guidance": {"controller": controller}}, "test")
+    return Drive(mission, scenario_from_mission(mission), settings, 3, NullRecorder(), 300.0)
+
+
+@pytest.fixture
+def every_tick(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Real time is too slow for a test: at every look."""
+    for name in ("FRAME_S", "TILES_S", "SCENE_S"):
+        monkeypatch.setattr(feed, name, -1.0)
+
+
+@pytest.mark.usefixtures("every_tick")
+def test_a_whole_drive_is_told_and_is_no_other_for_it() -> None:
+    alone, run, heard = new_drive(), new_drive(), Heard()
+    watched = ViewerFeed(run.companion, heard, {"live": True})
+    report = run.run(watched.show, 0.2)
+    watched.show(run.take_status())
+    assert [(p.north_m, p.east_m) for p in alone.run().track] == [(p.north_m, p.east_m) for p in report.track]
+
+    assert all(set(frame) == KEYS for frame in heard.frames)
+    states = list(dict.fromkeys(frame["state"] for frame in heard.frames))
+    assert states == ["waiting", "driving", "ended"]
+    last, driving = heard.frames[-1], [frame for frame in heard.frames if frame["state"] == "driving"]
+    assert last["statuses"] == ["reached"] and last["contacts"] == 0
+    middle = driving[len(driving) // 2]
+    assert middle["drives"] == "companion" and middle["mode"] == "GUIDED" and middle["armed"] is True
+    assert middle["line"].startswith("driving to ") and middle["goal"]["name"] in middle["line"]
+    assert len(middle["path"]) > 2 and middle["rays"]["m"] and middle["figures"]["latency_ms"] >= 0.0
+    assert any(frame["motion"] for frame in driving) and any(frame["setpoint"] for frame in driving)
+    assert 5.0 < middle["rates"]["position"] < 25.0 and middle["gps"]["fix"] == "RTK fixed"
+    said = [one["text"] for frame in heard.frames for one in frame["news"]]
+    assert len(said) == len(set(said)) and any(text.startswith("Reached") for text in said)
+
+    evidence = run.companion.evidence
+    assert evidence is not None
+    rows, columns = evidence.log_odds.shape
+    seen = np.zeros((rows + TILE, columns + TILE), np.uint8)
+    for (column, row), runs in heard.tiles.items():
+        seen[row * TILE : (row + 1) * TILE, column * TILE : (column + 1) * TILE][
+            : seen.shape[0] - row * TILE, : seen.shape[1] - column * TILE
+        ] = cells_of(runs).reshape(TILE, TILE)[: seen.shape[0] - row * TILE, : seen.shape[1] - column * TILE]
+    now = cell_classes(evidence, 0, 0, columns, rows)
+    assert (seen[:rows, :columns] != now).mean() < 0.001, "all but what the last tick brought"
+    assert heard.scenes[-1]["map"]["columns"] == columns and heard.scenes[-1]["targets"]
+
+
+@pytest.mark.usefixtures("every_tick")
+def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_new_one_everything() -> None:
+    run, heard = new_drive("points"), Heard()
+    watched = ViewerFeed(run.companion, heard, {})
+    heard.is_full = True
+
+    def look(status) -> None:
+        if 50.0 < status.time_s < 50.25:
+            heard.is_full = False
+        if 60.0 < status.time_s < 60.25:
+            heard.scenes.clear()
+            heard.tiles.clear()
+            heard.begins_anew.set()
+        watched.show(status)
+
+    run.run(look, 0.2)
+    said = [one["text"] for frame in heard.frames for one in frame["news"]]
+    assert any(text.startswith("Companion:") for text in said), "it was said before anybody listened"
+    assert len(heard.scenes) >= 1 and len(heard.tiles) > 3

@@ -1,0 +1,104 @@
+"""What each browser is told of what a run has told, however slowly it reads."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from companion.viewer.live_board import NEWS_KEPT, PAST_S, TILES_AT_ONCE, LiveBoard, Spectator
+from companion.viewer.map_tiles import message_of, run_lengths, tiles_in
+
+RUNS = run_lengths(np.ones((64, 64), np.uint8))
+SCENE = {"kind": "scene", "map_epoch": 1, "mission": "yard"}
+
+
+def frame(t: float, *news: str) -> dict[str, object]:
+    told = [{"t": t, "level": "info", "text": text, "own": True} for text in news]
+    return {"kind": "frame", "t": t, "pose": [t, 0.0, 0.0], "speed": 1.0, "state": "driving", "figures": {},
+            "statuses": ["pending"], "path": [[0, 0]] * 50, "news": told}  # fmt: skip
+
+
+def heard(spectator: Spectator) -> tuple[list[dict], list[tuple[int, int]]]:
+    """Everything that it is told: messages, and places of tiles."""
+    texts, places = [], []
+    while messages := spectator.messages():
+        for message in messages:
+            if isinstance(message, bytes):
+                places += [place for place, _ in tiles_in(message)]
+            else:
+                texts.append(json.loads(message))
+    return texts, places
+
+
+def board(takes_actions: bool = False) -> LiveBoard:
+    made = LiveBoard(takes_actions)
+    made.take(SCENE)
+    return made
+
+
+def test_who_comes_late_is_told_scene_past_map_and_the_newest_frame() -> None:
+    live = board()
+    for step in range(50):
+        live.take(frame(0.2 * step, f"news {step}"))
+    live.take_tiles(message_of([((column, 0), RUNS) for column in range(TILES_AT_ONCE + 50)]))
+    texts, places = heard(live.join(False, lambda: None))
+    assert [text["kind"] for text in texts] == ["scene", "past", "frame"] and texts[0]["may_act"] is False
+    past = texts[1]["frames"]
+    assert [one["t"] for one in past] == [float(second) for second in range(10)] and "path" not in past[0]
+    assert sum(len(one["news"]) for one in past) == 46 and texts[2]["t"] == 9.8
+    assert sorted(places) == [(column, 0) for column in range(TILES_AT_ONCE + 50)]
+
+
+def test_a_slow_browser_misses_frames_but_no_news_and_no_tile() -> None:
+    live = board()
+    spectator = live.join(False, lambda: None)
+    heard(spectator)
+    for step in range(30):
+        live.take(frame(0.2 * step, f"news {step}"))
+        live.take_tiles(message_of([((step, 1), RUNS)]))
+    texts, places = heard(spectator)
+    assert [text["kind"] for text in texts] == ["frame"] and texts[0]["t"] == pytest.approx(5.8)
+    assert [one["text"] for one in texts[0]["news"]] == [f"news {step}" for step in range(30)]
+    assert sorted(places) == [(step, 1) for step in range(30)]
+    assert heard(spectator) == ([], [])
+
+
+def test_another_map_begins_with_its_scene() -> None:
+    live = board()
+    spectator = live.join(False, lambda: None)
+    live.take_tiles(message_of([((0, 0), RUNS)]))
+    heard(spectator)
+    live.take({**SCENE, "map_epoch": 2})
+    live.take_tiles(message_of([((7, 7), RUNS)]))
+    texts, places = heard(spectator)
+    assert texts[0]["map_epoch"] == 2 and places == [(7, 7)]
+
+
+def test_nothing_grows_without_bound() -> None:
+    live = board()
+    spectator = live.join(False, lambda: None)
+    for step in range(5000):
+        live.take(frame(0.5 * step, "text"))
+    assert len(live.past) == PAST_S and len(live.news_since(0)) == NEWS_KEPT
+    for _ in range(100):
+        spectator.answer({"kind": "answer"})
+    texts, _ = heard(spectator)
+    assert sum(text["kind"] == "answer" for text in texts) == 20
+
+
+def test_only_who_may_act_is_offered_to_and_only_where_anybody_may() -> None:
+    for takes, may, offered in ((True, True, True), (True, False, False), (False, True, False)):
+        texts, _ = heard(board(takes).join(may, lambda: None))
+        assert texts[0]["may_act"] is offered
+
+
+def test_each_is_woken_until_it_leaves() -> None:
+    live, woken = board(), []
+    spectator = live.join(False, lambda: woken.append(1))
+    live.take(frame(1.0))
+    assert len(woken) == 1 and len(live) == 1
+    live.leave(spectator)
+    live.take(frame(2.0))
+    assert len(woken) == 1 and len(live) == 0

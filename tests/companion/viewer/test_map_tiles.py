@@ -1,0 +1,98 @@
+"""What of the map is told to a viewer, and that a viewer has the map as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from companion.core.frames import NedPoint
+from companion.core.grid import empty_grid
+from companion.mapping.evidence_map import EvidenceMap, forget, new_map
+from companion.settings import Settings
+from companion.viewer.map_tiles import (
+    CLOSED,
+    COSTLY,
+    FREE,
+    SEEN_OBSTACLE,
+    TILE,
+    UNKNOWN,
+    TileWatch,
+    cell_classes,
+    cells_of,
+    message_of,
+    run_lengths,
+    tiles_in,
+)
+
+MAPPING = Settings().mapping
+
+
+def new_evidence(fields: int = 40) -> EvidenceMap:
+    return new_map(empty_grid(fields, fields), 0.35, MAPPING)
+
+
+@given(arrays(np.uint8, st.integers(1, 300), elements=st.integers(0, 7)))
+def test_runs_hold_any_cells(cells: np.ndarray) -> None:
+    assert np.array_equal(cells_of(run_lengths(cells)), cells)
+
+
+def test_a_tile_of_one_kind_takes_a_byte_for_32_cells() -> None:
+    assert len(run_lengths(np.zeros((TILE, TILE), np.uint8))) == TILE * TILE // 32
+
+
+@given(st.lists(st.tuples(st.tuples(st.integers(0, 65535), st.integers(0, 65535)), st.binary(max_size=50)), max_size=5))
+def test_a_message_holds_its_tiles(tiles: list[tuple[tuple[int, int], bytes]]) -> None:
+    assert list(tiles_in(message_of(tiles))) == tiles
+
+
+def test_what_is_seen_counts_more_than_what_the_mission_says() -> None:
+    evidence = new_evidence(4)
+    s = evidence.subdivisions
+    evidence.base.weights[0, :] = (0.5, 0.8, 1.0, 1.0)
+    evidence.log_odds[0, 0] = -1.0
+    evidence.log_odds[0, 3 * s] = 3.0
+    classes = cell_classes(evidence, 0, 0, 4 * s, s)
+    assert classes.shape == (s, 4 * s)
+    assert [int(classes[0, x]) for x in (0, 1, s, 2 * s, 3 * s)] == [FREE, UNKNOWN, COSTLY, CLOSED, SEEN_OBSTACLE]
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.lists(st.tuples(st.floats(0.0, 39.9), st.floats(0.0, 39.9), st.sampled_from([-1.0, 3.0])), max_size=30))
+def test_whoever_takes_every_message_has_the_map(changes: list[tuple[float, float, float]]) -> None:
+    """Things change round the rover, and the map may forget anywhere."""
+    evidence, held = new_evidence(), {}
+    evidence.base.weights[30:35, 5:9] = 1.0
+    watch = TileWatch(evidence)
+    for north_m, east_m, value in changes:
+        y, x = (int(v / evidence.evidence_m) for v in (north_m, east_m))
+        evidence.log_odds[y, x] = value
+        held.update(watch.changed(evidence, NedPoint(north_m, east_m), 3.0))
+    if changes:
+        forget(evidence)
+    for _ in range(20):
+        held.update(watch.changed(evidence, NedPoint(0.0, 0.0), 3.0))
+    height, width = evidence.log_odds.shape
+    seen = np.zeros((-(-height // TILE) * TILE, -(-width // TILE) * TILE), np.uint8)
+    for (column, row), runs in held.items():
+        seen[row * TILE : (row + 1) * TILE, column * TILE : (column + 1) * TILE] = cells_of(runs).reshape(TILE, TILE)
+    assert np.array_equal(seen[:height, :width], cell_classes(evidence, 0, 0, width, height))
+
+
+def test_only_what_changed_is_told_and_what_could_not_be_told_is_told_again() -> None:
+    evidence, here = new_evidence(), NedPoint(5.0, 5.0)
+    watch = TileWatch(evidence)
+    assert watch.changed(evidence, here, 5.0) == []
+    evidence.log_odds[10:20, 10:20] = -1.0
+    first = watch.changed(evidence, here, 5.0)
+    assert [place for place, _ in first] == [(0, 0)] and watch.changed(evidence, here, 5.0) == []
+    watch.forget([(0, 0)])
+    assert watch.changed(evidence, here, 5.0) == first
+
+
+@pytest.mark.parametrize("place", [(-50.0, -50.0), (500.0, 20.0)])
+def test_a_rover_off_the_map_is_no_fault(place: tuple[float, float]) -> None:
+    evidence = new_evidence()
+    assert TileWatch(evidence).changed(evidence, NedPoint(*place), 10.0) == []

@@ -1,0 +1,245 @@
+"""The web process with real sockets: what browsers are told, who may act, and that it never holds up the drive."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import socket
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import ClientConnection, connect
+
+from companion.viewer import wire
+from companion.viewer.map_tiles import message_of, run_lengths
+from companion.viewer.web_process import WebError, WebPlace, WebProcess, web_place
+from tests.companion.viewer.test_live_board import SCENE, frame
+
+WAIT_S = 20.0
+TOKEN = "a-token-for-tests"
+
+
+@pytest.fixture
+def web() -> Iterator[WebProcess]:
+    yield from served("")
+
+
+@pytest.fixture(scope="module")
+def with_token() -> Iterator[WebProcess]:
+    yield from served(TOKEN)
+
+
+def served(token: str) -> Iterator[WebProcess]:
+    process = WebProcess(WebPlace("127.0.0.1", 0, token))
+    try:
+        begin(process)
+        yield process
+    finally:
+        process.close()
+
+
+def begin(process: WebProcess) -> None:
+    """Once it listens, tell it the scene."""
+    wait_until(lambda: process.begins_anew.is_set() and process.started > 0 and process.process_id is not None)
+    process.begins_anew.clear()
+    assert process.put(wire.JSON, json.dumps(SCENE).encode())
+
+
+def wait_until(holds, seconds: float = WAIT_S) -> None:
+    end_s = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end_s, "it takes too long"
+        time.sleep(0.02)
+
+
+@contextmanager
+def looking(process: WebProcess, token: str | None = None, **headers: str) -> Iterator[ClientConnection]:
+    address = f"ws://127.0.0.1:{process.place.port}/ws"
+    with connect(address, additional_headers=headers, open_timeout=WAIT_S, compression=None) as client:
+        client.send(json.dumps({"kind": "hello", "token": token}))
+        yield client
+
+
+def next_of(client: ClientConnection, kind: str) -> dict:
+    while True:
+        message = client.recv(WAIT_S)
+        if isinstance(message, str) and (told := json.loads(message))["kind"] == kind:
+            return told
+
+
+def got(process: WebProcess, path: str, host: str | None = None) -> tuple[int, str]:
+    request = urllib.request.Request(f"http://127.0.0.1:{process.place.port}{path}")
+    if host is not None:
+        request.add_header("Host", host)
+    try:
+        with urllib.request.urlopen(request, timeout=WAIT_S) as answer:
+            return answer.status, answer.read().decode()
+    except urllib.error.HTTPError as error:
+        return error.code, ""
+
+
+def test_a_browser_gets_the_page_and_what_the_run_tells(web: WebProcess) -> None:
+    status, page = got(web, "/")
+    assert status == 200 and "importmap" in page and got(web, "/page/live.js")[0] == 200
+    assert got(web, "/page/../server.py")[0] == 404 and got(web, "/page/%2e%2e/server.py")[0] == 404
+    with looking(web) as client:
+        assert next_of(client, "scene")["mission"] == "yard"
+        runs = run_lengths(np.ones((64, 64), np.uint8))
+        web.put(wire.TILES, message_of([((3, 4), runs)]))
+        web.put(wire.JSON, json.dumps(frame(1.0, "hello")).encode())
+        kinds = [message if isinstance(message, bytes) else json.loads(message)["kind"] for message in
+                 (client.recv(WAIT_S) for _ in range(3))]  # fmt: skip
+        assert message_of([((3, 4), runs)]) in kinds and "frame" in kinds
+
+
+def test_no_other_page_and_no_other_name_gets_in(web: WebProcess) -> None:
+    port = web.place.port
+    for origin in ("http://evil.example", "http://127.0.0.1:1", "null"):
+        with pytest.raises(InvalidStatus, match="403"), looking(web, Origin=origin):
+            pass
+    with looking(web, Origin=f"http://127.0.0.1:{port}") as client:
+        assert next_of(client, "scene")
+    assert got(web, "/", f"evil.example:{port}")[0] == 421
+    assert got(web, "/", f"localhost:{port}")[0] == got(web, "/", f"192.168.4.1:{port}")[0] == 200
+
+
+def test_who_knows_the_token_may_act_and_nobody_else(with_token: WebProcess) -> None:
+    act = json.dumps({"kind": "act", "action": "goto", "place": [1.0, 2.0]})
+    with looking(with_token) as client:
+        assert next_of(client, "scene")["may_act"] is False
+        client.send(act)
+        assert next_of(client, "answer") == {"kind": "answer", "action": "goto", "ok": False, "text": "not allowed"}
+    with looking(with_token, TOKEN) as client:
+        assert next_of(client, "scene")["may_act"] is True
+        client.send(act)
+        asked: list[dict] = []
+        wait_until(lambda: asked.extend(with_token.asked()) or bool(asked))
+        assert [(one["action"], one["place"]) for one in asked] == [("goto", [1.0, 2.0])]
+        answer = {"kind": "answer", "number": asked[0]["number"], "action": "goto", "ok": True, "text": "accepted"}
+        with_token.put(wire.JSON, json.dumps(answer).encode())
+        assert next_of(client, "answer")["text"] == "accepted"
+    with looking(with_token, "another-token-") as client:
+        assert next_of(client, "denied")["text"] == "This token is wrong."
+        with pytest.raises(ConnectionClosed):
+            client.recv(WAIT_S)
+    assert with_token.asked() == []
+
+
+def test_without_a_token_nobody_may_act(web: WebProcess) -> None:
+    with looking(web) as client:
+        assert next_of(client, "scene")["may_act"] is False
+        client.send(json.dumps({"kind": "act", "action": "pause"}))
+        assert next_of(client, "answer")["text"] == "not allowed"
+    assert web.asked() == []
+
+
+@pytest.mark.parametrize(
+    "garbage", ["", "null", "[]", "{", "[" * 1500, '{"kind": "act"}', '{"kind":"act","action":"goto","place":[NaN,1]}']
+)
+def test_garbage_is_answered_or_passed_over(with_token: WebProcess, garbage: str) -> None:
+    with looking(with_token, TOKEN) as client:
+        next_of(client, "scene")
+        client.send(garbage)
+        assert next_of(client, "answer")["ok"] is False
+    with connect(f"ws://127.0.0.1:{with_token.place.port}/ws", open_timeout=WAIT_S) as rude:
+        rude.send("x" * 100_000)
+        with pytest.raises(ConnectionClosed):
+            rude.recv(WAIT_S)
+    assert with_token.asked() == [] and got(with_token, "/")[0] == 200
+
+
+def test_it_is_started_again_and_told_anew_when_it_is_killed(web: WebProcess) -> None:
+    first = web.process_id
+    assert first is not None
+    os.kill(first, signal.SIGKILL)
+    wait_until(lambda: web.put(wire.JSON, json.dumps(frame(1.0)).encode()) and web.started == 2)
+    begin(web)
+    with looking(web) as client:
+        assert next_of(client, "scene")["mission"] == "yard"
+    assert web.process_id != first
+
+
+def test_a_process_that_stalls_costs_moments_and_no_time(web: WebProcess) -> None:
+    process_id = web.process_id
+    assert process_id is not None
+    os.kill(process_id, signal.SIGSTOP)
+    big, longest_s, refused = json.dumps({**frame(1.0), "path": [[0.0, 0.0]] * 20_000}).encode(), 0.0, 0
+    for _ in range(200):
+        began_s = time.perf_counter()
+        refused += not web.put(wire.JSON, big)
+        longest_s = max(longest_s, time.perf_counter() - began_s)
+    assert refused > 100 and web.is_full and longest_s < 0.5
+    os.kill(process_id, signal.SIGCONT)
+    wait_until(lambda: not web.is_full)
+    began_s = time.monotonic()
+    web.close()
+    assert time.monotonic() - began_s < 5.0
+
+
+def test_a_browser_that_never_reads_holds_up_nobody(web: WebProcess) -> None:
+    deaf = socket.create_connection(("127.0.0.1", web.place.port))
+    deaf.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    upgrade = (
+        "Connection: Upgrade",
+        "Upgrade: websocket",
+        "Sec-WebSocket-Version: 13",
+        f"Sec-WebSocket-Key: {'A' * 22}==",
+    )
+    head = ("GET /ws HTTP/1.1", f"Host: 127.0.0.1:{web.place.port}", *upgrade, "", "")
+    deaf.sendall("\r\n".join(head).encode())
+    hello = b'{"kind":"hello"}'
+    deaf.sendall(bytes([0x81, 0x80 | len(hello)]) + bytes(4) + hello)
+    with looking(web) as client:
+        next_of(client, "scene")
+        for step in range(40):
+            message = json.dumps({**frame(0.2 * step), "path": [[0.0, 0.0]] * 5000}).encode()
+            wait_until(lambda told=message: web.put(wire.JSON, told))
+        while next_of(client, "frame")["t"] < 0.2 * 39 - 1e-6:
+            pass
+    deaf.close()
+
+
+def test_fifty_browsers_all_see_the_newest_moment(web: WebProcess) -> None:
+    with ExitStack() as stack:
+        clients = [stack.enter_context(looking(web)) for _ in range(50)]
+        for step in range(20):
+            message = json.dumps(frame(0.2 * step)).encode()
+            wait_until(lambda told=message: web.put(wire.JSON, told))
+        for client in clients:
+            while next_of(client, "frame")["t"] < 0.2 * 19 - 1e-6:
+                pass
+
+
+def test_places_and_tokens(tmp_path: Path) -> None:
+    assert web_place("8000", None) == WebPlace("127.0.0.1", 8000)
+    file = tmp_path / "token"
+    place = web_place("0.0.0.0:8000", file)
+    assert place.private and place.token == file.read_text().strip() and len(place.token) >= 16
+    assert file.stat().st_mode & 0o077 == 0 and web_place("[::1]:8000", file).token == place.token
+    assert place.url.endswith(f"#token={place.token}") and web_place("8000", None).url == "http://127.0.0.1:8000/"
+    for text, given, says in (
+        ("0.0.0.0:8000", None, "--web-token FILE"),
+        ("http://localhost", None, "not a place"),
+        ("70000", None, "not a place"),
+        ("8000", tmp_path, "Is a directory"),
+    ):
+        with pytest.raises(WebError, match=says):
+            web_place(text, given)
+    file.write_text("short")
+    with pytest.raises(WebError, match="8 letters or more"):
+        web_place("8000", file)
+
+
+def test_a_port_that_is_taken_is_told_at_once() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        with pytest.raises(WebError, match=rf"^--web 127.0.0.1:{port}: Address already in use; choose another one$"):
+            WebProcess(WebPlace("127.0.0.1", port))
