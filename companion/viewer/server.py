@@ -4,7 +4,7 @@
 first message on its standard input says how it serves. What browsers ask for goes to its standard output, one line of
 JSON each. It ends when its input ends. Nothing here imports numpy: it shares a small computer with the drive.
 
-Nouns: web process.
+Nouns: web app.
 """
 
 from __future__ import annotations
