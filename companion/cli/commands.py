@@ -13,6 +13,7 @@ from companion.cli.guard import guard
 from companion.cli.inputs import version_option
 from companion.cli.plan import plan
 from companion.cli.replay import replay
+from companion.cli.report import report
 from companion.cli.run import run
 
 app = typer.Typer(
@@ -27,6 +28,7 @@ app.command()(doctor)
 app.command()(guard)
 app.command()(plan)
 app.command()(replay)
+app.command()(report)
 app.command()(bench)
 app.add_typer(mission.app)
 

@@ -6,8 +6,6 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from pydantic import TypeAdapter
-from typing_extensions import TypedDict
 
 from companion.cli.images import save_decision, save_motions
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture
@@ -17,13 +15,10 @@ from companion.recording.record_format import RecordError
 from companion.replay.explain import DecisionExplainer, explanation_lines
 from companion.replay.replay import ReplayResult
 from companion.replay.replay import replay as run_again
-from companion.storage.files import read_at_most
+from companion.viewer.report_data import COLLISIONS, contacts_of
 
 EXIT_SAME, EXIT_DIFFERENT = 0, 1
 SHOWN = 20
-COLLISIONS, MOST_BYTES = "collisions.json", 1_000_000
-"""What a simulated drive leaves in its record if the rover touched something; it knows no more of that by itself."""
-Contact = TypedDict("Contact", {"time_s": float, "north_m": float, "east_m": float, "speed_m_s": float, "with": str})
 
 
 def replay(
@@ -77,18 +72,15 @@ def _explain(explainer: DecisionExplainer, image: Path) -> None:
 
 def _collisions(directory: Path) -> list[str]:
     """The contacts of a simulated drive, a line each; times are the simulator's."""
-    file = directory / COLLISIONS
-    if not file.exists():
-        return []
     try:
-        contacts = TypeAdapter(list[Contact]).validate_json(read_at_most(file, MOST_BYTES), strict=True)
+        contacts = contacts_of(directory)
         lines = [
             f"collision at {one['time_s']} s of the simulation: {one['with']}, {one['speed_m_s']} m/s, "
             f"north {one['north_m']} m, east {one['east_m']} m of the start"
             for one in contacts
         ]
     except (OSError, ValueError):
-        return [f"{file}: cannot be read; delete it, or drive again with --record"]
+        return [f"{directory / COLLISIONS}: cannot be read; delete it, or drive again with --record"]
     more = len(lines) - SHOWN
     return [*lines[:SHOWN], *([f"... and {more} more collisions"] if more > 0 else [])]
 

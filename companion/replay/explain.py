@@ -86,10 +86,20 @@ OnCandidate = Callable[[Candidate], None]
 
 
 class DecisionExplainer(ReplayObserver):
-    """Waits for one decision and keeps what led to it in ``explanation``, None until then."""
+    """Waits for one decision and keeps what led to it in ``explanation``, None until then.
 
-    def __init__(self, number: int, settings: Settings, turning_radius_m: float) -> None:
+    ``every`` is told each decision as soon as it is made, without motions.
+    """
+
+    def __init__(
+        self,
+        number: int,
+        settings: Settings,
+        turning_radius_m: float,
+        every: Callable[[Explanation], None] | None = None,
+    ) -> None:
         self.explanation: Explanation | None = None
+        self._every = every
         self._number = number
         self._settings = settings
         self._turning_radius_m = turning_radius_m
@@ -100,7 +110,7 @@ class DecisionExplainer(ReplayObserver):
 
     def step_begins(self, companion: Companion) -> None:
         """Note what is known, and wrap the planner to see its answers."""
-        if self.explanation is None:
+        if self.explanation is None or self._every is not None:
             self._scene = self._noted(companion)
             driver = companion.driver
             assert driver is not None
@@ -110,17 +120,20 @@ class DecisionExplainer(ReplayObserver):
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """Keep it if it is the decision to explain."""
         self._open = False
-        if number == self._number and self.explanation is None:
-            scene = self._scene or self._noted(companion)
-            if scene is None:
-                return
-            rest = [] if scene.state.current is None else [_rest_of_path(scene)]
-            self.explanation = Explanation(
-                number, time_s, target, decision, scene.pose, scene.state, scene.ground, scene.grid, scene.weighed,
-                scene.known, (*rest, *scene.candidates),
-            )  # fmt: skip
-            self._before, self._open = _choice(companion), True
+        wanted = number == self._number and self.explanation is None
+        scene = (self._scene or self._noted(companion)) if wanted or self._every is not None else None
         self._scene = None
+        if scene is None:
+            return
+        rest = [] if scene.state.current is None else [_rest_of_path(scene)]
+        explanation = Explanation(
+            number, time_s, target, decision, scene.pose, scene.state, scene.ground, scene.grid, scene.weighed,
+            scene.known, (*rest, *scene.candidates),
+        )  # fmt: skip
+        if wanted:
+            self.explanation, self._before, self._open = explanation, _choice(companion), True
+        if self._every is not None:
+            self._every(explanation)
 
     def ticked(self, companion: Companion, time_s: float) -> None:
         """Keep the first motions that are judged after the decision."""
