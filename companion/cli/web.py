@@ -21,7 +21,7 @@ Token = Annotated[
     typer.Option(
         "--web-token",
         metavar="FILE",
-        help="File with a token, made if it does not exist: who knows it may act, and look on from elsewhere.",
+        help="File with a token, made if it does not exist: who knows it may look on from elsewhere, too.",
     ),
 ]
 

@@ -99,10 +99,11 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
     start = np.array((*_from_corner(view), view.pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s))
     ends_s = latest_s + lasts_s
     ways = []
-    swing = swings_s(lasts_s)
-    variants = [(gain, 0.0) for gain in turn_gains(follows)] + (
-        [(1.0, swing * _change_rad_s(setpoint, view))] if swing else []
-    )
+    variants = [(gain, 0.0) for gain in turn_gains(follows)]
+    if swing := swings_s(lasts_s):
+        change_rad_s = _change_rad_s(setpoint, view)
+        off = follows.off_model if change_rad_s * setpoint.yaw_rate_rad_s > 0.0 else -follows.off_model
+        variants.append((1.0 + off, swing * change_rad_s))
     for gain, swing_rad in variants:
         turns = Turning(follows.turn_gain * gain, latest_s, swing_rad / SWINGING_S)
         places, stands = way_of(start, tells, ends_s, turns, _worst(follows))

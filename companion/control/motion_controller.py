@@ -28,6 +28,7 @@ from companion.control.motion_kernels import (
     admitted_speeds,
     may_be_last,
     spare_m,
+    swinging_gain,
     way_of,
 )
 from companion.control.motion_planners import Found, MotionPlanner
@@ -188,8 +189,9 @@ def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
     """See ``MotionProblem.admitted_m_s``: the rover may be left alone with these."""
     turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
+    follows, swings = view.following, swings_s(lasts_s)
     admitted: NDArray[np.float64] = admitted_speeds(
-        turns_rad_s, lasts_s, turn_gains(view.following), WEIGHTS.margin_m, _faster_s(view), worst, swings_s(lasts_s)
+        turns_rad_s, lasts_s, turn_gains(follows), WEIGHTS.margin_m, _faster_s(view), worst, swings, follows.off_model
     )
     return admitted
 
@@ -218,7 +220,8 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem
     def may(gain: float, swings: float) -> bool:
         return bool(may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, margin_m, faster_s, worst, swings))
 
-    return may(1.0, swings_s(lasts_s)) and all(may(gain, 0.0) for gain in turn_gains(view.following))
+    swinging = swinging_gain(told.turn_rad_s, worst.recent_rad_s, view.following.off_model)
+    return may(swinging, swings_s(lasts_s)) and all(may(gain, 0.0) for gain in turn_gains(view.following))
 
 
 def _recent_rad_s(view: LocalView) -> tuple[float, float]:

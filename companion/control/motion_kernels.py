@@ -393,6 +393,13 @@ def _change_rad_s(told_rad_s, recent_rad_s):
 
 
 @njit(cache=True, nogil=True)
+def swinging_gain(told_rad_s, recent_rad_s, off):
+    """By which factor a rover that swings past a turn rate turns more than told, at worst: the farther the same way."""
+    onwards = told_rad_s * _change_rad_s(told_rad_s, recent_rad_s) > 0.0
+    return 1.0 + off if onwards else 1.0 - off
+
+
+@njit(cache=True, nogil=True)
 def begin_later(motions, share):
     """The same motions begun a share of the horizon later, in place; what lies beyond its end stays as it is there."""
     count, size, _ = motions.shape
@@ -418,10 +425,10 @@ def keep_within(motion, problem):
 
 
 @njit(cache=True, nogil=True)
-def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem, swings_s=0.0):
+def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem, swings_s=0.0, off=0.0):
     """The fastest speeds at these turn rates, forwards and backwards, shape (n, 2), that may be the last command.
 
-    Whether the rover turns by any of the factors ``gains``, or swings.
+    Whether the rover turns by any of the factors ``gains``, or swings while it is so far ``off`` what is known of it.
     """
     model = problem.model
     admitted = np.zeros((turns_rad_s.size, 2))
@@ -430,8 +437,9 @@ def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem, sw
             most = model.fastest_m_s if side == 0 else -model.backwards_m_s
             for share in range(TRIED, 0, -1):
                 told_m_s, turn_rad_s = most * (share / TRIED) ** 2, turns_rad_s[at]
+                swinging = swinging_gain(turn_rad_s, problem.recent_rad_s, off)
                 safe = swings_s == 0.0 or may_be_last(
-                    told_m_s, turn_rad_s, lasts_s, 1.0, margin_m, margin_s, problem, swings_s
+                    told_m_s, turn_rad_s, lasts_s, swinging, margin_m, margin_s, problem, swings_s
                 )
                 for gain in gains:
                     if not safe:

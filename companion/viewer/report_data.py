@@ -1,6 +1,6 @@
-"""What a report holds of a record: frames and tiles of the run made again, its decisions with their why, and tables.
+"""Report data: what a report holds of a record: frames and tiles of the run made again, its decisions, and tables.
 
-Nouns: report.
+Nouns: report data.
 """
 
 from __future__ import annotations

@@ -266,7 +266,9 @@ async def _run(descriptor: int) -> None:
     if first is None:
         return
     given = json.loads(first[1])
-    app = WebApp(LiveBoard(bool(given["token"])), given["host"], given["token"], given["private"])
+    app = WebApp(
+        LiveBoard(given["takes_actions"] and bool(given["token"])), given["host"], given["token"], given["private"]
+    )
     config = uvicorn.Config(
         app.routes(),
         log_level="critical",

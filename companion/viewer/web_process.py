@@ -112,8 +112,8 @@ def _is_loopback(host: str) -> bool:
 class WebProcess:
     """``begins_anew`` is set whenever a new process knows nothing yet; whoever feeds it clears it."""
 
-    def __init__(self, place: WebPlace) -> None:
-        """Raises WebError if the place cannot be listened on."""
+    def __init__(self, place: WebPlace, *, takes_actions: bool = False) -> None:
+        """``takes_actions``: what browsers ask for is heeded. Raises WebError if the place cannot be listened on."""
         self.place = place
         self.begins_anew = threading.Event()
         self.started = 0
@@ -121,6 +121,7 @@ class WebProcess:
         self.place = WebPlace(place.host, self._socket.getsockname()[1], place.token)
         self._queue: queue.Queue[tuple[bytes, bytes] | None] = queue.Queue(QUEUE)
         self._asked: deque[Json] = deque(maxlen=MOST_ACTIONS)
+        self._takes_actions = takes_actions
         self._closing = threading.Event()
         self._process: subprocess.Popen[bytes] | None = None
         self._thread = threading.Thread(target=self._keep_up, name="web", daemon=True)
@@ -187,12 +188,7 @@ class WebProcess:
         hearing.start()
         try:
             assert process.stdin is not None
-            place = self.place
-            self._write(
-                process,
-                wire.JSON,
-                json.dumps({"host": place.host, "token": place.token, "private": place.private}).encode(),
-            )
+            self._write(process, wire.JSON, json.dumps(self._first()).encode())
             self._drain()
             self.begins_anew.set()
             while (message := self._queue.get()) is not None:
@@ -210,6 +206,13 @@ class WebProcess:
                 with contextlib.suppress(OSError):
                     assert pipe is not None
                     pipe.close()
+
+    def _first(self) -> Json:
+        """How it serves."""
+        place = self.place
+        return {
+            "host": place.host, "token": place.token, "private": place.private, "takes_actions": self._takes_actions,
+        }  # fmt: skip
 
     def _write(self, process: subprocess.Popen[bytes], kind: bytes, payload: bytes) -> None:
         assert process.stdin is not None

@@ -1,8 +1,6 @@
 """The pipe between a run and its web process: whole messages of JSON or bytes, each with its length before it.
 
 Imports nothing heavy: the web process lives beside the drive on a small computer.
-
-Nouns: wire message.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ def with_token() -> Iterator[WebProcess]:
 
 
 def served(token: str) -> Iterator[WebProcess]:
-    process = WebProcess(WebPlace("127.0.0.1", 0, token))
+    process = WebProcess(WebPlace("127.0.0.1", 0, token), takes_actions=True)
     try:
         begin(process)
         yield process

@@ -1,0 +1,81 @@
+"""Debian's chromium under Selenium, for the pages that people look at."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+from selenium import webdriver
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+
+from tests.support.served import PATIENCE_S
+
+CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
+needs_browser = pytest.mark.skipif(
+    CHROMIUM is None or DRIVER is None, reason="no browser: apt-get install chromium chromium-driver"
+)
+DESKTOP, PHONE = (1280, 800), (390, 844)
+
+
+class Page:
+    """A page in a window of its own."""
+
+    def __init__(self, driver: webdriver.Chrome) -> None:
+        self.driver = driver
+
+    def open(self, address: str) -> None:
+        self.driver.get(address)
+
+    @property
+    def text(self) -> str:
+        """All that can be read."""
+        return str(self.run("return document.body.innerText"))
+
+    def run(self, script: str, *values: object) -> object:
+        return self.driver.execute_script(script, *values)
+
+    def until(self, holds: Callable[[], object], limit_s: float = PATIENCE_S) -> None:
+        end_s = time.monotonic() + limit_s
+        while not holds():
+            if time.monotonic() > end_s:
+                pytest.fail(f"never came; the page says:\n{self.text}\n{self.faults}")
+            time.sleep(0.1)
+
+    def shows(self, *texts: str) -> None:
+        """Wait until each of the texts is on the page."""
+        self.until(lambda: all(text in self.text for text in texts))
+
+    def press(self, name: str) -> None:
+        """The button with this text or label."""
+        script = (
+            "const all = [...document.querySelectorAll('button, [role=tab]')];"
+            "const one = all.find(b => b.offsetParent && (b.innerText.trim() === arguments[0] ||"
+            " b.getAttribute('aria-label') === arguments[0])); if (one) one.click(); return !!one"
+        )
+        self.until(lambda: self.run(script, name), 20.0)
+
+    @property
+    def faults(self) -> list[str]:
+        """What the console says of errors."""
+        return [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] == "SEVERE"]
+
+
+@contextmanager
+def page(size: tuple[int, int] = DESKTOP) -> Iterator[Page]:
+    options = Options()
+    options.binary_location = str(CHROMIUM)
+    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
+        options.add_argument(argument)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
+    try:
+        width, height = size
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 900}
+        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+        yield Page(driver)
+    finally:
+        driver.quit()

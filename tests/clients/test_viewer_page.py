@@ -1,0 +1,111 @@
+"""The viewer in a real browser: live beside a driving companion, after a killed web process, and as a report."""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.clients.browser import DESKTOP, PHONE, Page, needs_browser, page
+from tests.clients.program import Program, ours
+
+pytestmark = needs_browser
+
+MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+
+DRAWN = """
+const canvas = document.querySelector('canvas'), box = canvas.getContext('2d');
+const data = box.getImageData(0, 0, canvas.width, canvas.height).data, seen = new Set();
+for (let i = 0; i < data.length; i += 4 * 97) seen.add(data[i] << 16 | data[i + 1] << 8 | data[i + 2]);
+return seen.size
+"""
+"""How many colours there are on the map."""
+
+
+def address_of(program: Program) -> str:
+    return program.says(r"the run is shown at (\S+)").group(1)
+
+
+def web_process_of(program: Program) -> int | None:
+    listed = subprocess.run(["ps", "-eo", "pid,ppid,args"], capture_output=True, text=True, check=True).stdout
+    found = re.search(rf"^\s*(\d+)\s+{program.child.pid}\s.*companion\.viewer\.server", listed, re.MULTILINE)
+    return None if found is None else int(found.group(1))
+
+
+def clock_of(shown: Page) -> str:
+    return str(shown.run("return document.querySelector('.clock').innerText"))
+
+
+def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_killed(tmp_path: Path) -> None:
+    mission = MISSIONS / "rooms.toml"
+    with ours(tmp_path, "sitl", "drive", mission, "--web", "0", "--speedup", "4") as program:
+        address = address_of(program)
+        with page(DESKTOP) as desktop:
+            desktop.open(address)
+            desktop.shows("Driving to far end", "GUIDED", "Heading for far end", "companion")
+            assert int(str(desktop.run(DRAWN))) > 8
+            fits(desktop, DESKTOP)
+            killed = web_process_of(program)
+            assert killed is not None
+            os.kill(killed, signal.SIGKILL)
+            desktop.until(lambda: web_process_of(program) not in (None, killed))
+            desktop.until(lambda: "Driving to" in desktop.text)
+            before = clock_of(desktop)
+            desktop.until(lambda: clock_of(desktop) != before and "Driving to" in desktop.text)
+            assert "Heading for far end" in desktop.text and "No connection" not in desktop.text
+            assert [fault for fault in desktop.faults if "WebSocket" not in fault and "ERR_" not in fault] == []
+        with page(PHONE) as phone:
+            phone.open(address)
+            phone.shows("Driving to far end", "GUIDED")
+            assert int(str(phone.run(DRAWN))) > 8 and phone.faults == []
+            fits(phone, PHONE)
+            for name in ("Pause", "Skip target"):
+                assert name not in phone.text, "nobody may act"
+
+
+def fits(shown: Page, size: tuple[int, int]) -> None:
+    """Nothing is wider than the window."""
+    assert int(str(shown.run("return document.documentElement.scrollWidth"))) <= size[0]
+
+
+def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:
+    mission = MISSIONS / "one-obstacle.toml"
+    with ours(tmp_path, "sitl", "drive", mission, "--record", "rec") as program:
+        assert program.ended() == 0
+    with ours(tmp_path, "companion", "report", "rec", "--out", "report.html") as program:
+        assert program.ended() == 0, program.output
+    file = tmp_path / "report.html"
+    text = file.read_text(encoding="utf-8")
+    assert file.stat().st_size < 2_000_000 and not re.search(r"(src|href)=\"(?!data:)", text)
+    with page(DESKTOP) as report:
+        report.open(file.as_uri())
+        report.shows("record, simulated")
+        report.press("Tables")
+        report.shows("Targets", "reached", "Stops and waits")
+        report.press("Decisions")
+        slider = "const s = document.querySelector('input[type=range]'); s.value = +s.max * arguments[0];"
+        report.run(slider + "s.dispatchEvent(new Event('input', {bubbles: true}))", 0.7)
+        report.shows("candidate", "cost", "taken")
+        report.run("const s = document.querySelector('select'); s.value = [...s.options].at(-1).value;"
+                   "s.dispatchEvent(new Event('change', {bubbles: true}))")  # fmt: skip
+        report.press("Play or pause (Space)")
+        report.shows("Done")
+        assert report.faults == []
+
+
+@pytest.mark.thorough
+def test_records_are_laid_over_each_other(tmp_path: Path) -> None:
+    mission = MISSIONS / "one-obstacle.toml"
+    for number in range(2):
+        with ours(tmp_path, "sitl", "drive", mission, "--seed", number, "--record", f"rec{number}") as program:
+            assert program.ended() == 0
+    with ours(tmp_path, "companion", "report", "rec0", "rec1", "--out", "both.html") as program:
+        assert program.ended() == 0, program.output
+    with page(DESKTOP) as report:
+        report.open((tmp_path / "both.html").as_uri())
+        report.shows("rec1")
+        assert report.faults == []
