@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Any
 
 from companion.core.clock import stopwatch_s
+from companion.storage.files import read_at_most
 from companion.viewer import wire
 
 QUEUE = 20
@@ -33,7 +34,7 @@ CLOSE_S = 1.5
 MOST_ACTIONS = 50
 NEEDED = ("starlette", "uvicorn", "websockets")
 TOKEN_BYTES = 16
-LEAST_TOKEN = 8
+LEAST_TOKEN, MOST_TOKEN_BYTES = 8, 1000
 
 Json = dict[str, Any]
 
@@ -89,7 +90,7 @@ def _token(file: Path) -> str:
         if not file.exists():
             file.touch(mode=0o600)
             file.write_text(secrets.token_urlsafe(TOKEN_BYTES) + "\n", encoding="ascii")
-        token = file.read_text(encoding="ascii").strip()
+        token = read_at_most(file, MOST_TOKEN_BYTES).decode("ascii").strip()
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "not a text of plain letters"
         raise WebError(f"--web-token {file}: {why}") from error

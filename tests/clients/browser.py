@@ -27,6 +27,12 @@ class Page:
     def __init__(self, driver: webdriver.Chrome) -> None:
         self.driver = driver
 
+    def resize(self, size: tuple[int, int]) -> None:
+        """To a window of this size; a small one is a phone's."""
+        width, height = size
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 900}
+        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+
     def open(self, address: str) -> None:
         self.driver.get(address)
 
@@ -73,9 +79,8 @@ def page(size: tuple[int, int] = DESKTOP) -> Iterator[Page]:
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
     driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
     try:
-        width, height = size
-        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 900}
-        driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
-        yield Page(driver)
+        shown = Page(driver)
+        shown.resize(size)
+        yield shown
     finally:
         driver.quit()

@@ -223,6 +223,10 @@ OPENED_OTHERWISE = {
     "companion/cli/entry.py": "/dev/null",
     "companion/bench/measure.py": "/proc",
     "sitl/experiments/soak.py": "/proc",
+    "companion/cli/report.py": "a browser",
+    "companion/viewer/report_page.py": "the program's own files",
+    "companion/viewer/server.py": "the program's own files",
+    "sitl/experiments/experiment.py": "the program's own files",
     "sitl/scenario.py": "World.open",
 }
 

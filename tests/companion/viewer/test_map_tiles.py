@@ -59,7 +59,7 @@ def test_what_is_seen_counts_more_than_what_the_mission_says() -> None:
     assert [int(classes[0, x]) for x in (0, 1, s, 2 * s, 3 * s)] == [FREE, UNKNOWN, COSTLY, CLOSED, SEEN_OBSTACLE]
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 39.9), st.floats(0.0, 39.9), st.sampled_from([-1.0, 3.0])), max_size=30))
 def test_whoever_takes_every_message_has_the_map(changes: list[tuple[float, float, float]]) -> None:
     """Things change round the rover, and the map may forget anywhere."""

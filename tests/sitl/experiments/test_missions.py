@@ -26,6 +26,7 @@ def test_a_drive_says_who_led_it() -> None:
     assert (one.touched, one.run_into, one.refused, one.missed) == (0, 0, 0, 0) and 10.0 < one.seconds < 200.0
 
 
+@pytest.mark.thorough
 def test_a_rover_further_off_and_a_late_link_are_driven_with_and_told() -> None:
     mission = with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "lidar-360")
     usual, off, late = (drive(mission, "points", 0, guarded=False, off=o, late_s=s) for o, s in CASES)
