@@ -10,12 +10,12 @@ import typer
 from companion.cli.images import save_decision, save_motions
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture
 from companion.mapping.map_files import MapError
+from companion.recording.contacts import COLLISIONS, contacts_of
 from companion.recording.reader import Record, load_record
 from companion.recording.record_format import RecordError
 from companion.replay.explain import DecisionExplainer, explanation_lines
 from companion.replay.replay import ReplayResult
 from companion.replay.replay import replay as run_again
-from companion.viewer.report_data import COLLISIONS, contacts_of
 
 EXIT_SAME, EXIT_DIFFERENT = 0, 1
 SHOWN = 20

@@ -103,10 +103,10 @@ def run(
             files = StateFiles(state, budget)
             ends.callback(files.close)
             settings = files.settings(usable_settings(settings_file), say)
-            page = web_viewer(web, web_token)
+            page = web_viewer(web, web_token, say)
             if page is not None:
                 ends.callback(page.close)
-                say(served(page))
+                say(served(page, to_person=reader is Reader.PERSON))
             signer = files.signer(signing_key)
             source = Source(mission_file, connect, from_autopilot=from_autopilot)
             mission = source.mission(settings, signer, stop, say)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
@@ -26,17 +27,18 @@ Token = Annotated[
 ]
 
 
-def web_viewer(web: str | None, token_file: Path | None) -> LiveViewer | None:
+def web_viewer(web: str | None, token_file: Path | None, say: Callable[[str], None]) -> LiveViewer | None:
     """The viewer that was asked for; None for none. Raises WebError."""
     if web is None:
         if token_file is not None:
             raise WebError("--web-token: nothing is served; add --web PORT")
         return None
-    return LiveViewer(web_place(web, token_file))
+    return LiveViewer(web_place(web, token_file), say)
 
 
-def served(viewer: LiveViewer) -> str:
-    """Where the page is, for people."""
+def served(viewer: LiveViewer, *, to_person: bool) -> str:
+    """Where the page is. A person gets the token with it, behind a # that browsers keep; a log file does not."""
     place = viewer.web.place
+    token = f"#token={place.token}" if place.token and to_person else ""
     to_all = ", for all who can reach this address and know the token" if place.private else ""
-    return f"the run is shown at {place.url}{to_all}"
+    return f"the run is shown at {place.url}{token}{to_all}"

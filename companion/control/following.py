@@ -18,6 +18,13 @@ MOST_M_S2, MOST_RAD_S2 = 10.0, 20.0
 """Where the autopilot has no limit, or a larger one, the motors have."""
 BELIEVED_M_S2 = 2.0
 """No rover is taken to brake or gather speed better than this because its autopilot would let it."""
+GUARDED_S = 1.0
+"""A velocity that lasts no longer is ended by a guard."""
+SWINGS_S = 0.3
+"""An autopilot that is not tuned to its rover swings past a new turn rate, by so many radians for each rad/s of change:
+one that turned 2.4 times as fast as its gains were for went 0.27 and 0.4 rad too far, after changes of 1.4 rad/s."""
+SWINGING_S, RECENT_S = 1.5, 0.6
+"""It swings for so long; a turn rate is new if it differs from what was told and seen in the last moments."""
 
 
 class Following(NamedTuple):
@@ -34,15 +41,6 @@ class Following(NamedTuple):
     turn_gain: float = 1.0
     off_model: float = 0.3
     gains_most_m_s2: float = 1.3
-
-
-GUARDED_S = 1.0
-"""A velocity that lasts no longer is ended by a guard."""
-SWINGS_S = 0.3
-"""An autopilot that is not tuned to its rover swings past a new turn rate, by so many radians for each rad/s of change:
-one that turned 2.4 times as fast as its gains were for went 0.27 and 0.4 rad too far, after changes of 1.4 rad/s."""
-RECENT_S = 0.6
-"""It changes from what was told and seen in the last moments."""
 
 
 def turn_gains(follows: Following) -> tuple[float, ...]:

@@ -19,15 +19,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.control.following import RECENT_S, Following, swings_s, turn_gains
+from companion.control.following import RECENT_S, SWINGING_S, Following, swings_s, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.told import in_force
 from companion.mapping.evidence_map import EvidenceMap
 from companion.vehicle.commands import GuidedVelocity
 
 STEP_S = 0.05
-SWINGING_S = 1.5
-"""So long a rover that swings past a new turn rate turns too much."""
 ANY_S = 0.1
 """The outline is looked at so often."""
 MOST_STEPS = 1200
@@ -65,11 +63,12 @@ class Rover(NamedTuple):
 
 
 class Turning(NamedTuple):
-    """It turns by the factor ``gain`` more than told, and for a while from ``from_s`` on by so much more."""
+    """It turns by the factor ``gain`` more than told, and by ``swing_rad_s`` more between two moments."""
 
     gain: float
-    from_s: float
     swing_rad_s: float
+    from_s: float
+    until_s: float
 
 
 class Outline(NamedTuple):
@@ -105,7 +104,7 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
         off = follows.off_model if change_rad_s * setpoint.yaw_rate_rad_s > 0.0 else -follows.off_model
         variants.append((1.0 + off, swing * change_rad_s))
     for gain, swing_rad in variants:
-        turns = Turning(follows.turn_gain * gain, latest_s, swing_rad / SWINGING_S)
+        turns = Turning(follows.turn_gain * gain, swing_rad / SWINGING_S, latest_s, latest_s + SWINGING_S)
         places, stands = way_of(start, tells, ends_s, turns, _worst(follows))
         if not stands:
             return None
@@ -188,7 +187,7 @@ def way_of(start, tells, ends_s, turning, rover):
         goes_m_s, turns_rad_s = 0.0, 0.0
         if middle_s < ends_s:
             goes_m_s, turns_rad_s = tells[at, 1], turning.gain * tells[at, 2]
-            if turning.from_s <= middle_s < turning.from_s + SWINGING_S:
+            if turning.from_s <= middle_s < turning.until_s:
                 turns_rad_s += turning.swing_rad_s
         slows = speed * (goes_m_s - speed) < 0.0
         most = (rover.brakes_m_s2 if slows else rover.gains_m_s2) * STEP_S

@@ -220,8 +220,10 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem
     def may(gain: float, swings: float) -> bool:
         return bool(may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, margin_m, faster_s, worst, swings))
 
-    swinging = swinging_gain(told.turn_rad_s, worst.recent_rad_s, view.following.off_model)
-    return may(swinging, swings_s(lasts_s)) and all(may(gain, 0.0) for gain in turn_gains(view.following))
+    swings, gains = swings_s(lasts_s), turn_gains(view.following)
+    if swings > 0.0 and not may(swinging_gain(told.turn_rad_s, worst.recent_rad_s, view.following.off_model), swings):
+        return False
+    return all(may(gain, 0.0) for gain in gains)
 
 
 def _recent_rad_s(view: LocalView) -> tuple[float, float]:

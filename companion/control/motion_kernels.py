@@ -16,6 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from companion.control.following import SWINGING_S
+
 BLOCKED_S = 1e3
 """Added to the cost of a motion that touches something; more the earlier it does."""
 NO_WAY_S = 60.0
@@ -39,8 +41,6 @@ ENDLESS = 600
 NEARER_M, NEAREST_M = 0.01, -0.04
 """A rover that is too near to something may come nearer by the first, so that it gets away, but only down to the
 second: else it would come nearer with every look."""
-SWINGING_S = 1.5
-"""A rover that swings past what it is told does so for so long."""
 AWAY = 0.1
 """One whose outline lies over something must get out of it by so much for each metre it goes: it may leave, but not
 touch the next thing as deep."""
@@ -124,7 +124,7 @@ class MotionProblem(NamedTuple):
     ``pending``: shape (n, 2), the commands told that have not had their effect yet, one a step.
     ``admitted_m_s``: shape (n, 2), the fastest speeds that may be told, forwards and backwards, at n turn rates evenly
     from the fastest to the left to the fastest to the right. ``recent_rad_s``: the least and the largest turn rate of
-    the last moments, told or seen: a rover that changes from them may swing past what it is told.
+    the last moments, told or seen: a rover that changes from them may swing past what it is told, for ``swinging_s``.
     """
 
     start: Start
@@ -137,6 +137,7 @@ class MotionProblem(NamedTuple):
     horizon_s: float
     step_s: float
     recent_rad_s: tuple[float, float] = (0.0, 0.0)
+    swinging_s: float = SWINGING_S
 
 
 @njit(cache=True, nogil=True)
@@ -360,8 +361,8 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, en
     pending, step_s = problem.pending, problem.step_s
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
     early, held = pending.shape[0], int(math.ceil(lasts_s / step_s))
-    swing_rad_s = swings_s * _change_rad_s(told_rad_s, problem.recent_rad_s) / SWINGING_S
-    swinging = early + int(round(SWINGING_S / step_s))
+    swing_rad_s = swings_s * _change_rad_s(told_rad_s, problem.recent_rad_s) / problem.swinging_s
+    swinging = early + int(round(problem.swinging_s / step_s))
     least = _least_m(ground.gap_m, ground.cell_m, body, start)
     least_seen = _least_m(ground.seen_m, ground.cell_m, body, start, 0.0)
     step, spare = 0, FAR_M

@@ -12,6 +12,7 @@ import math
 
 from companion.control.braking import fastest_within_m
 from companion.control.controller import ControlCommand, Purpose
+from companion.control.following import GUARDED_S
 from companion.control.local_view import LocalView
 from companion.control.point_controller import PointController
 from companion.control.reference_path import ReferencePath
@@ -19,8 +20,6 @@ from companion.core.frames import wrap_pi_rad
 from companion.mapping.map_queries import look_along
 from companion.vehicle.commands import GuidedPosition
 
-LONG_S = 1.0
-"""Where a velocity lasts no longer, because a guard ends it, motions are as fast as positions."""
 MOST_ASIDE_RAD = math.radians(60.0)
 """A place farther aside is no place ahead: the rover would turn for it."""
 LEAST_M = 0.5
@@ -47,7 +46,7 @@ class PositionAhead:
 
     def _ahead(self, wanted_m_s: float, path: ReferencePath, view: LocalView) -> ControlCommand | None:
         guidance, pose = view.settings.guidance, view.pose
-        if guidance.velocity_lasts_s <= LONG_S or view.rolls_back:
+        if guidance.velocity_lasts_s <= GUARDED_S or view.rolls_back:
             return None
         command = self._points.follow(path, view)
         if command.purpose is not Purpose.DRIVE or not isinstance(command.setpoint, GuidedPosition):

@@ -88,12 +88,12 @@ OnCandidate = Callable[[Candidate], None]
 class DecisionExplainer(ReplayObserver):
     """Waits for one decision and keeps what led to it in ``explanation``, None until then.
 
-    ``every`` is told each decision as soon as it is made, without motions.
+    ``number``: which one; None for none. ``every`` is told each decision as soon as it is made, without motions.
     """
 
     def __init__(
         self,
-        number: int,
+        number: int | None,
         settings: Settings,
         turning_radius_m: float,
         every: Callable[[Explanation], None] | None = None,

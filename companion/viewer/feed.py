@@ -17,7 +17,7 @@ from companion.core.clock import stopwatch_s
 from companion.vehicle.state import VehicleState
 from companion.viewer import wire
 from companion.viewer.frame import frame_of, news_of, scene_of
-from companion.viewer.map_tiles import TileWatch, message_of, run_lengths_of
+from companion.viewer.map_tiles import TileWatch
 
 FRAME_S, TILES_S, SCENE_S = 0.19, 0.5, 2.0
 """So often each is told, in real time."""
@@ -69,19 +69,14 @@ class ViewerFeed:
         if self._receiver.begins_anew.is_set():
             self._receiver.begins_anew.clear()
             self._scene, self._scene_s = {}, -math.inf
-            self._tell_scene(now_s)
-            self._tell_known_tiles()
+            if self._watch is not None:
+                self._watch.tell_again()
         if self._receiver.is_full:
             return
         self._frame_s = now_s
         self._tell_scene(now_s)
         self._tell_tiles(status, now_s)
         self._tell_frame(status)
-
-    def _tell_known_tiles(self) -> None:
-        """A new process knows none of them."""
-        if self._watch is not None and self._watch.told:
-            self._receiver.put(wire.TILES, message_of(run_lengths_of(self._watch.told)))
 
     def _tell_scene(self, now_s: float) -> None:
         """If anything of it is new; looked at now and then only."""
@@ -106,14 +101,16 @@ class ViewerFeed:
 
     def _tell_tiles(self, status: Status, now_s: float) -> None:
         executor, pose = self._companion.executor, status.pose
-        if executor is None or pose is None or self._watch is None or now_s - self._tiles_s < TILES_S:
+        if executor is None or pose is None or self._watch is None or self._scene.get("map_epoch") != self._epoch:
+            return
+        if now_s - self._tiles_s < TILES_S and not self._watch.is_behind:
             return
         self._tiles_s = now_s
         seen = self._companion.vehicle.scan
         reach_m = 0.0 if seen is None else seen.scan.max_range_m
         news = self._watch.changed(executor.evidence, pose.point, reach_m)
-        if news and not self._receiver.put(wire.TILES, message_of(news)):
-            self._watch.forget(place for place, _ in news)
+        if news and not self._receiver.put(wire.TILES, wire.tile_message(news)):
+            self._watch.tell_again(place for place, _ in news)
 
     def _tell_frame(self, status: Status) -> None:
         frame = frame_of(self._companion, status)

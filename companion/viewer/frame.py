@@ -1,7 +1,7 @@
 """Frames and scenes: what a viewer shows of one moment of a run, as plain values that become JSON.
 
-``docs/viewer.md`` lists the keys. Places are [north, east] in metres of the local frame, headings radians clockwise
-from north.
+``page/model.js`` and the views beside it read them. Places are [north, east] in metres of the local frame, headings
+radians clockwise from north.
 
 Nouns: scene, frame.
 """

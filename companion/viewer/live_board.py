@@ -8,21 +8,20 @@ Nouns: live board, spectator.
 from __future__ import annotations
 
 import json
-import struct
 from collections import deque
 from collections.abc import Callable
 from typing import Any
+
+from companion.viewer.wire import Place, tile_message, tiles_in
 
 PAST_S = 600.0
 EVERY_S = 1.0
 """One frame a second is kept for those who come later, for so long."""
 NEWS_KEPT = 500
-MAGIC = b"TIL1"
 TILES_AT_ONCE = 200
 KEPT_OF_PAST = ("kind", "t", "pose", "speed", "state", "figures", "statuses")
 
 Json = dict[str, Any]
-Place = tuple[int, int]
 
 
 class Spectator:
@@ -61,7 +60,7 @@ class Spectator:
         out: list[str | bytes] = [*told]
         if board.scene is not None and self.stale:
             places = [self.stale.pop() for _ in range(min(TILES_AT_ONCE, len(self.stale)))]
-            out.append(_tile_message([(place, board.tiles[place]) for place in places if place in board.tiles]))
+            out.append(tile_message([(place, board.tiles[place]) for place in places if place in board.tiles]))
         if board.frame is not None and board.frame_count != self._frame:
             self._frame = board.frame_count
             out.append(json.dumps({**board.frame, "news": board.news_since(self._news)}))
@@ -118,14 +117,10 @@ class LiveBoard:
 
     def take_tiles(self, message: bytes) -> None:
         """Tiles of the map."""
-        at = len(MAGIC)
-        while at < len(message):
-            column, row, size = struct.unpack_from("<HHH", message, at)
-            at += 6
-            self.tiles[column, row] = message[at : at + size]
-            at += size
+        for place, runs in tiles_in(message):
+            self.tiles[place] = runs
             for spectator in self._spectators:
-                spectator.stale.add((column, row))
+                spectator.stale.add(place)
         self._wake()
 
     def _take_frame(self, frame: Json) -> None:
@@ -142,7 +137,3 @@ class LiveBoard:
     def _wake(self) -> None:
         for spectator in self._spectators:
             spectator.wake()
-
-
-def _tile_message(tiles: list[tuple[Place, bytes]]) -> bytes:
-    return MAGIC + b"".join(struct.pack("<HHH", *place, len(runs)) + runs for place, runs in tiles)

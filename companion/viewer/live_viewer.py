@@ -5,6 +5,7 @@ Nouns: live viewer.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 from companion.app import Companion, Status
@@ -16,11 +17,15 @@ from companion.viewer.web_process import WebPlace, WebProcess
 
 
 class LiveViewer:
-    """``web`` is there before the companion, so that a place that cannot be served is told first."""
+    """``web`` is there before the companion, so that a place that cannot be served is told first.
 
-    def __init__(self, place: WebPlace) -> None:
+    Whatever goes wrong in it, the drive goes on: ``say`` is told once, and the page has no more news.
+    """
+
+    def __init__(self, place: WebPlace, say: Callable[[str], None]) -> None:
         """Raises WebError."""
         self.web = WebProcess(place)
+        self._say = say
         self._feed: ViewerFeed | None = None
 
     def follow(self, companion: Companion, settings: Settings, *, simulated: bool) -> None:
@@ -37,9 +42,14 @@ class LiveViewer:
 
     def show(self, status: Status, contacts: int = 0) -> None:
         """To be called after each tick. ``contacts``: of a simulated rover."""
-        if self._feed is not None:
+        if self._feed is None:
+            return
+        try:
             self._feed.contacts = contacts
             self._feed.show(status)
+        except Exception as error:  # a picture is not worth a stop
+            self._feed = None
+            self._say(f"the page has no more news, the drive goes on: {type(error).__name__}: {error}")
 
     def close(self) -> None:
         """Tell the last moment, and end."""

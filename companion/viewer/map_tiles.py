@@ -6,9 +6,8 @@ Nouns: map tile, tile watch.
 from __future__ import annotations
 
 import math
-import struct
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,20 +15,19 @@ from numpy.typing import NDArray
 from companion.core.frames import NedPoint
 from companion.core.grid import BASE_WEIGHT, OBSTACLE
 from companion.mapping.evidence_map import EvidenceMap
+from companion.viewer.wire import Place
 
 TILE = 64
 """Cells along a side."""
 UNKNOWN, FREE, SEEN_OBSTACLE, CLOSED, COSTLY = range(5)
 """What a cell is. ``CLOSED``: by a fence, the mission or a known map; ``COSTLY``: ground that the mission calls so."""
-MAGIC = b"TIL1"
 MOST_RUN = 32
 """A run's length takes five bits of its byte, what it is made of the other three."""
-IN_TURN = 8
-"""Tiles out of the sensors' reach that are looked at each time: the mission's own, and what was forgotten."""
+AT_ONCE, IN_TURN = 40, 8
+"""Tiles out of the sensors' reach that are looked at each time: for the first time, and those that the map may have
+forgotten meanwhile."""
 
 Tile = NDArray[np.uint8]
-Place = tuple[int, int]
-"""Column and row of a tile, from the map's south-west corner."""
 
 
 def cell_classes(evidence: EvidenceMap, x0: int, y0: int, x1: int, y1: int) -> Tile:
@@ -57,57 +55,46 @@ def run_lengths(cells: Tile) -> bytes:
     return b"".join(pieces)
 
 
-def run_lengths_of(tiles: Mapping[Place, bytes]) -> Iterator[tuple[Place, bytes]]:
-    """The cells of whole tiles as runs."""
-    for place, cells in tiles.items():
-        yield place, run_lengths(np.frombuffer(cells, np.uint8))
-
-
 def cells_of(runs: bytes) -> Tile:
     """The cells of ``run_lengths``, in one row."""
     values = np.frombuffer(runs, np.uint8)
     return np.repeat(values >> 5, (values & (MOST_RUN - 1)).astype(np.intp) + 1)
 
 
-def message_of(tiles: Iterable[tuple[Place, bytes]]) -> bytes:
-    """The binary message of some tiles: column, row and length as 16-bit numbers, then the runs."""
-    return MAGIC + b"".join(struct.pack("<HHH", *place, len(runs)) + runs for place, runs in tiles)
-
-
-def tiles_in(message: bytes) -> Iterator[tuple[Place, bytes]]:
-    """The tiles of a message."""
-    at = len(MAGIC)
-    while at < len(message):
-        column, row, length = struct.unpack_from("<HHH", message, at)
-        at += 6
-        yield (column, row), message[at : at + length]
-        at += length
-
-
 class TileWatch:
-    """Knows the tiles of one map as they were last told. A tile that never held anything is not told."""
+    """Knows the tiles of one map as they were last told. A tile that never held anything is not told.
+
+    Each look takes those round the rover, some of those that nobody has looked at yet, and a few others in turn: so it
+    takes milliseconds, however large the map is.
+    """
 
     def __init__(self, evidence: EvidenceMap) -> None:
         height, width = evidence.log_odds.shape
         self._size = math.ceil(width / TILE), math.ceil(height / TILE)
         self._told: dict[Place, bytes] = {}
         """The cells of each."""
-        self._in_turn = deque(_places_with_something(evidence))
-        self._known = set(self._in_turn)
+        self._waiting: deque[Place] = deque()
+        self._in_turn: deque[Place] = deque()
+        self.tell_again()
 
     @property
-    def told(self) -> dict[Place, bytes]:
-        """The cells of each tile that has been told."""
-        return self._told
+    def is_behind(self) -> bool:
+        """Whether there are tiles that nobody has looked at yet."""
+        return bool(self._waiting)
 
-    def forget(self, places: Iterable[Place]) -> None:
-        """These were not told after all."""
-        for place in places:
+    def tell_again(self, places: Iterable[Place] | None = None) -> None:
+        """These were not told after all; None: whoever was told anything has forgotten it."""
+        columns, rows = self._size
+        everywhere = ((column, row) for row in range(rows) for column in range(columns))
+        again = list(everywhere if places is None else places)
+        for place in again:
             self._told.pop(place, None)
+        self._waiting.extend(again)
 
     def changed(self, evidence: EvidenceMap, around: NedPoint, reach_m: float) -> list[tuple[Place, bytes]]:
-        """The tiles that differ from what was told: round a place, and a few of the others in turn."""
+        """The tiles that differ from what was told, with their cells in runs."""
         places = self._places_around(evidence, around, reach_m)
+        places.update(self._waiting.popleft() for _ in range(min(AT_ONCE, len(self._waiting))))
         for _ in range(min(IN_TURN, len(self._in_turn))):
             places.add(self._in_turn[0])
             self._in_turn.rotate(-1)
@@ -117,8 +104,7 @@ class TileWatch:
             cells = tile.tobytes()
             if self._told.get(place, EMPTY) == cells:
                 continue
-            if place not in self._known:
-                self._known.add(place)
+            if place not in self._told:
                 self._in_turn.append(place)
             self._told[place] = cells
             news.append((place, run_lengths(tile)))
@@ -131,16 +117,6 @@ class TileWatch:
         first_x, last_x = (min(max(int((x + side) // TILE), 0), columns - 1) for side in (-reach, reach))
         first_y, last_y = (min(max(int((y + side) // TILE), 0), rows - 1) for side in (-reach, reach))
         return {(column, row) for column in range(first_x, last_x + 1) for row in range(first_y, last_y + 1)}
-
-
-def _places_with_something(evidence: EvidenceMap) -> list[Place]:
-    """Where the mission itself says something of the ground, or an earlier run has seen something."""
-    s = evidence.subdivisions
-    field_y, field_x = np.nonzero(evidence.base.weights > BASE_WEIGHT)
-    seen_y, seen_x = np.nonzero(evidence.log_odds)
-    corners = [(field_x * s, field_y * s), (field_x * s + s - 1, field_y * s + s - 1), (seen_x, seen_y)]
-    places = np.concatenate([np.column_stack((x // TILE, y // TILE)) for x, y in corners])
-    return [(int(column), int(row)) for column, row in np.unique(places, axis=0)]
 
 
 def _tile(evidence: EvidenceMap, place: Place) -> Tile:

@@ -14,47 +14,39 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import TypeAdapter
-from typing_extensions import TypedDict
 
 from companion.app import Companion
 from companion.core.grid import Cell
 from companion.navigation.field_step import Decision
+from companion.recording.contacts import contacts_of
 from companion.recording.reader import Record
 from companion.recording.record_format import PACKETS, STAMP
 from companion.replay.explain import Candidate, DecisionExplainer, Explanation, explanation_lines
 from companion.replay.replay import ReplayObserver, ReplayResult, replay
 from companion.safety.reasons import RunPhase
-from companion.storage.files import open_file, read_at_most
+from companion.storage.files import open_file
 from companion.viewer.frame import frame_of, news_of, scene_of
-from companion.viewer.map_tiles import TileWatch, message_of
+from companion.viewer.map_tiles import TileWatch
+from companion.viewer.wire import tile_message
 
 FRAME_S, PATH_S, TILES_S = 0.4, 1.2, 1.0
 """So often each is kept."""
 MOST_PLACES = 120
 """Of a candidate."""
 SIMULATED_UNTIL_S = 1_600_000_000.0
-COLLISIONS, MOST_BYTES = "collisions.json", 1_000_000
-"""What a simulated drive leaves in its record if the rover touched something; it knows no more of that by itself."""
+"""September 2020: simulated time begins with that year."""
 STOOD = (RunPhase.STOPPED, RunPhase.STOPPED_AND_WAITING, RunPhase.WAITING, RunPhase.WAY_BLOCKED)
 
 Json = dict[str, Any]
-Contact = TypedDict("Contact", {"time_s": float, "north_m": float, "east_m": float, "speed_m_s": float, "with": str})
-
-
-def contacts_of(directory: Path) -> list[Contact]:
-    """The contacts of a simulated drive; times are the simulator's. Raises OSError or ValueError."""
-    file = directory / COLLISIONS
-    if not file.exists():
-        return []
-    return TypeAdapter(list[Contact]).validate_json(read_at_most(file, MOST_BYTES), strict=True)
 
 
 def report_data(record: Record, others: list[Record]) -> Json:
     """Everything that the page shows. ``others``: only their tracks. Raises RecordError if a record is damaged."""
     watched = _Watched(record)
     result = replay(record, watched)
-    began_s = watched.began_s
+    contacts = _contacts(record.directory, watched.began_s, watched.start)
+    for frame in watched.frames:
+        frame["contacts"] = sum(one["t"] <= frame["t"] for one in contacts)
     day_s = _time_of_day(record)
     scene = {
         "live": False,
@@ -69,7 +61,7 @@ def report_data(record: Record, others: list[Record]) -> Json:
         "frames": watched.frames,
         "tiles": watched.tiles,
         "decisions": watched.decisions,
-        "contacts": _contacts(record.directory, began_s, watched.start),
+        "contacts": contacts,
         "tables": [watched.targets_table(), watched.sums_table(result), watched.stops_table()],
         "others": [_other(one) for one in others],
     }
@@ -100,27 +92,37 @@ def _contacts(directory: Path, began_s: float, start: tuple[float, float]) -> li
 
 def _other(record: Record) -> Json:
     """Another record's track."""
-    watched = _Watched(record, only_track=True)
-    replay(record, watched)
-    return {"name": record.directory.name, "track": watched.track}
+    track = _Track()
+    replay(record, track)
+    return {"name": record.directory.name, "track": track.places}
+
+
+class _Track(ReplayObserver):
+    """Where the rover was: time, north and east."""
+
+    def __init__(self) -> None:
+        self.places: list[tuple[float, float, float]] = []
+
+    def ticked(self, companion: Companion, time_s: float) -> None:
+        """See ``ReplayObserver``."""
+        pose = companion.status().pose
+        if pose is not None and (not self.places or time_s - self.places[-1][0] >= FRAME_S - 1e-6):
+            self.places.append((round(time_s, 2), round(pose.north_m, 2), round(pose.east_m, 2)))
 
 
 class _Watched(ReplayObserver):
     """Looks at a companion that is run again."""
 
-    def __init__(self, record: Record, *, only_track: bool = False) -> None:
+    def __init__(self, record: Record) -> None:
         self.scene: Json = {}
         self.frames: list[Json] = []
         self.tiles: list[tuple[float, str]] = []
         self.decisions: list[Json] = []
-        self.track: list[tuple[float, float, float]] = []
         self.began_s = 0.0
-        self.start = (0.0, 0.0)
-        """Where the rover was first: contacts count from there."""
+        self._start: tuple[float, float] | None = None
         self._mission = record.mission
-        self._only_track = only_track
         turning_radius_m = record.mission.rover.turning_radius_m
-        self._explainer = DecisionExplainer(0, record.settings, turning_radius_m, self._explained)
+        self._explainer = DecisionExplainer(None, record.settings, turning_radius_m, self._explained)
         self._before: Json = {}
         self._news: list[Json] = []
         self._frame_s = self._path_s = self._tiles_s = -math.inf
@@ -133,15 +135,18 @@ class _Watched(ReplayObserver):
         self._reached_s: dict[int, float] = {}
         self._statuses: list[tuple[str, str]] = []
 
+    @property
+    def start(self) -> tuple[float, float]:
+        """Where the rover was first: contacts count from there."""
+        return self._start or (0.0, 0.0)
+
     def step_begins(self, companion: Companion) -> None:
         """See ``ReplayObserver``."""
-        if not self._only_track:
-            self._explainer.step_begins(companion)
+        self._explainer.step_begins(companion)
 
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """See ``ReplayObserver``."""
-        if not self._only_track:
-            self._explainer.decided(companion, number, time_s, target, decision)
+        self._explainer.decided(companion, number, time_s, target, decision)
 
     def ticked(self, companion: Companion, time_s: float) -> None:
         """See ``ReplayObserver``."""
@@ -152,15 +157,10 @@ class _Watched(ReplayObserver):
         if time_s - self._frame_s < FRAME_S - 1e-6 and not companion.done:
             return
         self._frame_s = time_s
-        if status.pose is not None:
-            place = (round(status.pose.north_m, 2), round(status.pose.east_m, 2))
-            if not self.track:
-                self.start = place
-            self.track.append((round(time_s, 2), *place))
-        if self._only_track:
-            return
+        if self._start is None and status.pose is not None:
+            self._start = status.pose.north_m, status.pose.east_m
         frame = frame_of(companion, status)
-        frame.update({"t": round(time_s, 2), "news": self._news, "contacts": 0, "rates": {}})
+        frame.update({"t": round(time_s, 2), "news": self._news, "rates": {}})
         frame["figures"]["tick_ms"] = None  # of the replay, not of the run
         if time_s - self._path_s < PATH_S and frame["path"] and self._before.get("path"):
             frame["path"] = self._before["path"]
@@ -184,7 +184,7 @@ class _Watched(ReplayObserver):
         self._tiles_s, seen = time_s, companion.vehicle.scan
         news = self._watch.changed(executor.evidence, pose.point, 0.0 if seen is None else seen.scan.max_range_m)
         if news:
-            self.tiles.append((round(time_s, 2), base64.b64encode(message_of(news)).decode()))
+            self.tiles.append((round(time_s, 2), base64.b64encode(tile_message(news)).decode()))
 
     def _count(self, companion: Companion, doing: str, phase: RunPhase, time_s: float) -> None:
         """Distance, and how long the rover stood for which reason."""

@@ -58,9 +58,9 @@ class WebPlace:
 
     @property
     def url(self) -> str:
-        """For people. What stands behind # stays in the browser."""
+        """Without the token."""
         host = f"[{self.host}]" if ":" in self.host else self.host
-        return f"http://{host}:{self.port}/{f'#token={self.token}' if self.token else ''}"
+        return f"http://{host}:{self.port}/"
 
 
 def web_place(text: str, token_file: Path | None) -> WebPlace:

@@ -1,4 +1,4 @@
-"""The pipe between a run and its web process: whole messages of JSON or bytes, each with its length before it.
+"""Messages between a run, its web process and browsers: JSON and map tiles, each with its length before it on the pipe.
 
 Imports nothing heavy: the web process lives beside the drive on a small computer.
 """
@@ -6,6 +6,7 @@ Imports nothing heavy: the web process lives beside the drive on a small compute
 from __future__ import annotations
 
 import struct
+from collections.abc import Iterable, Iterator
 from typing import IO
 
 HEAD = struct.Struct("<cI")
@@ -29,3 +30,23 @@ def read_message(pipe: IO[bytes]) -> tuple[bytes, bytes] | None:
         raise ValueError("damaged message")
     payload = pipe.read(size)
     return None if len(payload) < size else (kind, payload)
+
+
+TILE_MAGIC, TILE_HEAD = b"TIL1", struct.Struct("<HHH")
+Place = tuple[int, int]
+"""Column and row of a tile, from the map's south-west corner."""
+
+
+def tile_message(tiles: Iterable[tuple[Place, bytes]]) -> bytes:
+    """The binary message of some tiles: column, row and length of each as 16-bit numbers, then its cells in runs."""
+    return TILE_MAGIC + b"".join(TILE_HEAD.pack(*place, len(runs)) + runs for place, runs in tiles)
+
+
+def tiles_in(message: bytes) -> Iterator[tuple[Place, bytes]]:
+    """The tiles of a message."""
+    at = len(TILE_MAGIC)
+    while at < len(message):
+        column, row, length = TILE_HEAD.unpack_from(message, at)
+        at += TILE_HEAD.size
+        yield (column, row), message[at : at + length]
+        at += length

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -74,7 +75,7 @@ def drive(
     usual = options.VIEWED_SPEEDUP if view else options.WEB_SPEEDUP if web else None
     pace = Pace(usual if speedup is None else speedup, WallClock())
     try:
-        viewer, page = Viewer(terminal()) if view else None, web_viewer(web, web_token)
+        viewer, page = Viewer(terminal()) if view else None, web_viewer(web, web_token, _warn)
         settings = usable_settings(settings_file)
         mission = mission_to_drive(mission_file, OnWorld(world, start, target, resolution_m, top_left, prior))
         mission = equipped(mission, sensors, params)
@@ -134,6 +135,10 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
     return f"{what}; {kept}"
 
 
+def _warn(text: str) -> None:
+    typer.echo(text, err=True)
+
+
 def _print_last(viewer: Viewer | None) -> None:
     if viewer is not None:
         viewer.print_last()
@@ -156,7 +161,7 @@ def _closed(page: LiveViewer | None) -> None:
 
 def _shown(run: Drive, page: LiveViewer, settings: Settings) -> Also:
     """The page, which begins to show the run."""
-    typer.echo(served(page), err=True)
+    _warn(served(page, to_person=sys.stderr.isatty()))
     page.follow(run.companion, settings, simulated=True)
     return Also(lambda status: page.show(status, len(run.simulator.collisions)), WEB_EVERY_S)
 

@@ -14,7 +14,7 @@ from companion.recording.recorder import NullRecorder
 from companion.settings.settings_file import parse_settings
 from companion.viewer import feed, wire
 from companion.viewer.feed import ViewerFeed
-from companion.viewer.map_tiles import TILE, cell_classes, cells_of, tiles_in
+from companion.viewer.map_tiles import TILE, cell_classes, cells_of
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 
@@ -40,7 +40,7 @@ class Heard:
         if self.is_full:
             return False
         if kind == wire.TILES:
-            self.tiles.update(tiles_in(payload))
+            self.tiles.update(wire.tiles_in(payload))
         else:
             message = json.loads(payload)
             (self.scenes if message["kind"] == "scene" else self.frames).append(message)

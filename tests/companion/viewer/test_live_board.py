@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from companion.viewer.live_board import NEWS_KEPT, PAST_S, TILES_AT_ONCE, LiveBoard, Spectator
-from companion.viewer.map_tiles import message_of, run_lengths, tiles_in
+from companion.viewer.map_tiles import run_lengths
+from companion.viewer.wire import tile_message, tiles_in
 
 RUNS = run_lengths(np.ones((64, 64), np.uint8))
 SCENE = {"kind": "scene", "map_epoch": 1, "mission": "yard"}
@@ -42,7 +43,7 @@ def test_who_comes_late_is_told_scene_past_map_and_the_newest_frame() -> None:
     live = board()
     for step in range(50):
         live.take(frame(0.2 * step, f"news {step}"))
-    live.take_tiles(message_of([((column, 0), RUNS) for column in range(TILES_AT_ONCE + 50)]))
+    live.take_tiles(tile_message([((column, 0), RUNS) for column in range(TILES_AT_ONCE + 50)]))
     texts, places = heard(live.join(False, lambda: None))
     assert [text["kind"] for text in texts] == ["scene", "past", "frame"] and texts[0]["may_act"] is False
     past = texts[1]["frames"]
@@ -57,7 +58,7 @@ def test_a_slow_browser_misses_frames_but_no_news_and_no_tile() -> None:
     heard(spectator)
     for step in range(30):
         live.take(frame(0.2 * step, f"news {step}"))
-        live.take_tiles(message_of([((step, 1), RUNS)]))
+        live.take_tiles(tile_message([((step, 1), RUNS)]))
     texts, places = heard(spectator)
     assert [text["kind"] for text in texts] == ["frame"] and texts[0]["t"] == pytest.approx(5.8)
     assert [one["text"] for one in texts[0]["news"]] == [f"news {step}" for step in range(30)]
@@ -68,10 +69,10 @@ def test_a_slow_browser_misses_frames_but_no_news_and_no_tile() -> None:
 def test_another_map_begins_with_its_scene() -> None:
     live = board()
     spectator = live.join(False, lambda: None)
-    live.take_tiles(message_of([((0, 0), RUNS)]))
+    live.take_tiles(tile_message([((0, 0), RUNS)]))
     heard(spectator)
     live.take({**SCENE, "map_epoch": 2})
-    live.take_tiles(message_of([((7, 7), RUNS)]))
+    live.take_tiles(tile_message([((7, 7), RUNS)]))
     texts, places = heard(spectator)
     assert texts[0]["map_epoch"] == 2 and places == [(7, 7)]
 

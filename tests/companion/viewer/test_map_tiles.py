@@ -13,19 +13,20 @@ from companion.core.grid import empty_grid
 from companion.mapping.evidence_map import EvidenceMap, forget, new_map
 from companion.settings import Settings
 from companion.viewer.map_tiles import (
+    AT_ONCE,
     CLOSED,
     COSTLY,
     FREE,
+    IN_TURN,
     SEEN_OBSTACLE,
     TILE,
     UNKNOWN,
     TileWatch,
     cell_classes,
     cells_of,
-    message_of,
     run_lengths,
-    tiles_in,
 )
+from companion.viewer.wire import tile_message, tiles_in
 
 MAPPING = Settings().mapping
 
@@ -45,7 +46,7 @@ def test_a_tile_of_one_kind_takes_a_byte_for_32_cells() -> None:
 
 @given(st.lists(st.tuples(st.tuples(st.integers(0, 65535), st.integers(0, 65535)), st.binary(max_size=50)), max_size=5))
 def test_a_message_holds_its_tiles(tiles: list[tuple[tuple[int, int], bytes]]) -> None:
-    assert list(tiles_in(message_of(tiles))) == tiles
+    assert list(tiles_in(tile_message(tiles))) == tiles
 
 
 def test_what_is_seen_counts_more_than_what_the_mission_says() -> None:
@@ -72,7 +73,7 @@ def test_whoever_takes_every_message_has_the_map(changes: list[tuple[float, floa
         held.update(watch.changed(evidence, NedPoint(north_m, east_m), 3.0))
     if changes:
         forget(evidence)
-    for _ in range(20):
+    for _ in range(30):
         held.update(watch.changed(evidence, NedPoint(0.0, 0.0), 3.0))
     height, width = evidence.log_odds.shape
     seen = np.zeros((-(-height // TILE) * TILE, -(-width // TILE) * TILE), np.uint8)
@@ -84,11 +85,12 @@ def test_whoever_takes_every_message_has_the_map(changes: list[tuple[float, floa
 def test_only_what_changed_is_told_and_what_could_not_be_told_is_told_again() -> None:
     evidence, here = new_evidence(), NedPoint(5.0, 5.0)
     watch = TileWatch(evidence)
-    assert watch.changed(evidence, here, 5.0) == []
+    while watch.is_behind:
+        assert watch.changed(evidence, here, 5.0) == []
     evidence.log_odds[10:20, 10:20] = -1.0
     first = watch.changed(evidence, here, 5.0)
     assert [place for place, _ in first] == [(0, 0)] and watch.changed(evidence, here, 5.0) == []
-    watch.forget([(0, 0)])
+    watch.tell_again([(0, 0)])
     assert watch.changed(evidence, here, 5.0) == first
 
 
@@ -96,3 +98,15 @@ def test_only_what_changed_is_told_and_what_could_not_be_told_is_told_again() ->
 def test_a_rover_off_the_map_is_no_fault(place: tuple[float, float]) -> None:
     evidence = new_evidence()
     assert TileWatch(evidence).changed(evidence, NedPoint(*place), 10.0) == []
+
+
+def test_a_look_at_a_large_map_takes_some_tiles_and_comes_to_all_of_them() -> None:
+    evidence = new_evidence(400)
+    evidence.base.weights[:] = 1.0
+    watch, counts = TileWatch(evidence), []
+    while watch.is_behind:
+        counts.append(len(watch.changed(evidence, NedPoint(5.0, 5.0), 5.0)))
+    height, width = evidence.log_odds.shape
+    assert sum(counts) == -(-height // TILE) * -(-width // TILE) and max(counts) <= AT_ONCE + IN_TURN + 9
+    watch.tell_again()
+    assert watch.is_behind and len(watch.changed(evidence, NedPoint(5.0, 5.0), 5.0)) >= AT_ONCE

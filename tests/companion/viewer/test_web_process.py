@@ -19,7 +19,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import ClientConnection, connect
 
 from companion.viewer import wire
-from companion.viewer.map_tiles import message_of, run_lengths
+from companion.viewer.map_tiles import run_lengths
 from companion.viewer.web_process import WebError, WebPlace, WebProcess, web_place
 from tests.companion.viewer.test_live_board import SCENE, frame
 
@@ -75,6 +75,13 @@ def next_of(client: ClientConnection, kind: str) -> dict:
             return told
 
 
+def newest(client: ClientConnection, until_s: float) -> float:
+    """The time of the newest frame, once one of that time has come."""
+    while (time_s := next_of(client, "frame")["t"]) < until_s - 1e-6:
+        pass
+    return time_s
+
+
 def got(process: WebProcess, path: str, host: str | None = None) -> tuple[int, str]:
     request = urllib.request.Request(f"http://127.0.0.1:{process.place.port}{path}")
     if host is not None:
@@ -93,11 +100,11 @@ def test_a_browser_gets_the_page_and_what_the_run_tells(web: WebProcess) -> None
     with looking(web) as client:
         assert next_of(client, "scene")["mission"] == "yard"
         runs = run_lengths(np.ones((64, 64), np.uint8))
-        web.put(wire.TILES, message_of([((3, 4), runs)]))
+        web.put(wire.TILES, wire.tile_message([((3, 4), runs)]))
         web.put(wire.JSON, json.dumps(frame(1.0, "hello")).encode())
         kinds = [message if isinstance(message, bytes) else json.loads(message)["kind"] for message in
                  (client.recv(WAIT_S) for _ in range(3))]  # fmt: skip
-        assert message_of([((3, 4), runs)]) in kinds and "frame" in kinds
+        assert wire.tile_message([((3, 4), runs)]) in kinds and "frame" in kinds
 
 
 def test_no_other_page_and_no_other_name_gets_in(web: WebProcess) -> None:
@@ -202,8 +209,7 @@ def test_a_browser_that_never_reads_holds_up_nobody(web: WebProcess) -> None:
         for step in range(40):
             message = json.dumps({**frame(0.2 * step), "path": [[0.0, 0.0]] * 5000}).encode()
             wait_until(lambda told=message: web.put(wire.JSON, told))
-        while next_of(client, "frame")["t"] < 0.2 * 39 - 1e-6:
-            pass
+        assert newest(client, 0.2 * 39) == pytest.approx(0.2 * 39)
     deaf.close()
 
 
@@ -213,9 +219,7 @@ def test_fifty_browsers_all_see_the_newest_moment(web: WebProcess) -> None:
         for step in range(20):
             message = json.dumps(frame(0.2 * step)).encode()
             wait_until(lambda told=message: web.put(wire.JSON, told))
-        for client in clients:
-            while next_of(client, "frame")["t"] < 0.2 * 19 - 1e-6:
-                pass
+        assert [newest(client, 0.2 * 19) for client in clients] == pytest.approx([0.2 * 19] * 50)
 
 
 def test_places_and_tokens(tmp_path: Path) -> None:
@@ -224,7 +228,9 @@ def test_places_and_tokens(tmp_path: Path) -> None:
     place = web_place("0.0.0.0:8000", file)
     assert place.private and place.token == file.read_text().strip() and len(place.token) >= 16
     assert file.stat().st_mode & 0o077 == 0 and web_place("[::1]:8000", file).token == place.token
-    assert place.url.endswith(f"#token={place.token}") and web_place("8000", None).url == "http://127.0.0.1:8000/"
+    assert (
+        web_place("8000", None).url == "http://127.0.0.1:8000/" and web_place("[::1]:1", file).url == "http://[::1]:1/"
+    )
     for text, given, says in (
         ("0.0.0.0:8000", None, "--web-token FILE"),
         ("http://localhost", None, "not a place"),
