@@ -20,6 +20,8 @@ BELIEVED_M_S2 = 2.0
 """No rover is taken to brake or gather speed better than this because its autopilot would let it."""
 GUARDED_S = 1.0
 """A velocity that lasts no longer is ended by a guard."""
+LONG_OFF = 0.1
+"""Without one a rover may turn by so much more off what is told: a small error of the turn rate grows for seconds."""
 SWINGS_S = 0.3
 """An autopilot that is not tuned to its rover swings past a new turn rate, by so many radians for each rad/s of change:
 one that turned 2.4 times as fast as its gains were for went 0.27 and 0.4 rad too far, after changes of 1.4 rad/s."""
@@ -43,9 +45,10 @@ class Following(NamedTuple):
     gains_most_m_s2: float = 1.3
 
 
-def turn_gains(follows: Following) -> tuple[float, ...]:
-    """By which factors more than told a rover may turn."""
-    return 1.0, 1.0 - follows.off_model, 1.0 + follows.off_model
+def turn_gains(follows: Following, lasts_s: float) -> tuple[float, ...]:
+    """By which factors more than told a rover may turn, where a velocity lasts so long."""
+    off = follows.off_model + (LONG_OFF if lasts_s > GUARDED_S else 0.0)
+    return 1.0 + off, 1.0 - off, 1.0
 
 
 def swings_s(lasts_s: float) -> float:

@@ -98,7 +98,7 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
     start = np.array((*_from_corner(view), view.pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s))
     ends_s = latest_s + lasts_s
     ways = []
-    variants = [(gain, 0.0) for gain in turn_gains(follows)]
+    variants = [(gain, 0.0) for gain in turn_gains(follows, lasts_s)]
     if swing := swings_s(lasts_s):
         change_rad_s = _change_rad_s(setpoint, view)
         off = follows.off_model if change_rad_s * setpoint.yaw_rate_rad_s > 0.0 else -follows.off_model

@@ -189,9 +189,9 @@ def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
     """See ``MotionProblem.admitted_m_s``: the rover may be left alone with these."""
     turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
-    follows, swings = view.following, swings_s(lasts_s)
+    gains, swings, off = turn_gains(view.following, lasts_s), swings_s(lasts_s), view.following.off_model
     admitted: NDArray[np.float64] = admitted_speeds(
-        turns_rad_s, lasts_s, turn_gains(follows), WEIGHTS.margin_m, _faster_s(view), worst, swings, follows.off_model
+        turns_rad_s, lasts_s, gains, WEIGHTS.margin_m, _faster_s(view), worst, swings, off
     )
     return admitted
 
@@ -209,7 +209,8 @@ def _faster_s(view: LocalView) -> float:
 def _least_spare_m(turn_rad_s: float, view: LocalView, worst: MotionProblem) -> float:
     """The room that is left where the rover brakes and turns as told, however much it turns."""
     lasts_s = view.settings.guidance.velocity_lasts_s
-    spares_m = [spare_m(0.0, turn_rad_s, lasts_s, gain, 0.0, 0.0, worst) for gain in turn_gains(view.following)]
+    gains = turn_gains(view.following, lasts_s)
+    spares_m = [spare_m(0.0, turn_rad_s, lasts_s, gain, 0.0, 0.0, worst, -math.inf, ENOUGH_M) for gain in gains]
     return float(min(spares_m))
 
 
@@ -220,7 +221,7 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem
     def may(gain: float, swings: float) -> bool:
         return bool(may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, margin_m, faster_s, worst, swings))
 
-    swings, gains = swings_s(lasts_s), turn_gains(view.following)
+    swings, gains = swings_s(lasts_s), turn_gains(view.following, lasts_s)
     if swings > 0.0 and not may(swinging_gain(told.turn_rad_s, worst.recent_rad_s, view.following.off_model), swings):
         return False
     return all(may(gain, 0.0) for gain in gains)

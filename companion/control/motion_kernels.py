@@ -41,6 +41,8 @@ ENDLESS = 600
 NEARER_M, NEAREST_M = 0.01, -0.04
 """A rover that is too near to something may come nearer by the first, so that it gets away, but only down to the
 second: else it would come nearer with every look."""
+BETWEEN_CELLS = 1.5
+"""Cells: a distance read between the middles of cells may be off by so much."""
 AWAY = 0.1
 """One whose outline lies over something must get out of it by so much for each metre it goes: it may leave, but not
 touch the next thing as deep."""
@@ -140,7 +142,7 @@ class MotionProblem(NamedTuple):
     swinging_s: float = SWINGING_S
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def at_place(raster, cell_m, x_m, y_m, outside):
     """A raster's value between the middles of four cells; off its edges ``outside``, or the value at the edge."""
     height, width = raster.shape
@@ -156,7 +158,7 @@ def at_place(raster, cell_m, x_m, y_m, outside):
     )
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def clearance_m(raster, cell_m, body, x_m, y_m, heading_rad, outside_m=AS_AT_EDGE):
     """Metres between the rover's outline and what a raster of distances counts from; not exact above ``ROOMY_M``."""
     # The outline lies in one circle: most places need no closer look.
@@ -178,7 +180,7 @@ def _least_m(raster, cell_m, body, start, outside_m=AS_AT_EDGE):
     return min(max(now_m - NEARER_M, NEAREST_M), now_m)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def _still_m(least_m, start, state):
     """The clearance that such a rover must keep at a place on its way."""
     if least_m >= 0.0:
@@ -186,7 +188,7 @@ def _still_m(least_m, start, state):
     return min(least_m + AWAY * math.hypot(state[0] - start.x_m, state[1] - start.y_m), 0.0)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def told_at(knots, share):
     """The command at a share (0 to 1) of the horizon."""
     last = knots.shape[0] - 1
@@ -199,16 +201,19 @@ def told_at(knots, share):
     )
 
 
-@njit(cache=True, nogil=True)
-def _told_in(step, knots, problem):
-    """The command that has its effect in a step: first those that were told before, then the motion's."""
-    early = problem.pending.shape[0]
+@njit(cache=True, nogil=True, inline="always")
+def _told_in(step, knots, pending, step_share):
+    """The command that has its effect in a step: first those that were told before, then the motion's.
+
+    ``step_share``: of the horizon.
+    """
+    early = pending.shape[0]
     if step < early:
-        return problem.pending[step, 0], problem.pending[step, 1]
-    return told_at(knots, (step - early) * problem.step_s / problem.horizon_s)
+        return pending[step, 0], pending[step, 1]
+    return told_at(knots, (step - early) * step_share)
 
 
-@njit(cache=True, nogil=True)
+@njit(cache=True, nogil=True, inline="always")
 def moved(state, told_m_s, told_rad_s, model, step_s):
     """The rover a step later: place, heading, speed, turn rate."""
     x, y, heading, speed, turn = state
@@ -227,6 +232,9 @@ def cost_s(knots, problem):
     """The cost of a motion."""
     start, ground, body, model = problem.start, problem.ground, problem.body, problem.model
     pending, weights, step_s = problem.pending, problem.weights, problem.step_s
+    # Taken out of their tuples once: in the loop that would take longer than all the rest.
+    gap_m, seen_m, cell_m, ends = ground.gap_m, ground.seen_m, ground.cell_m, ground.ends
+    togo_s, togo_cell_m, step_share = ground.togo_s, ground.togo_cell_m, step_s / problem.horizon_s
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
     early = pending.shape[0]
     steps = early + int(round(problem.horizon_s / step_s))
@@ -234,31 +242,53 @@ def cost_s(knots, problem):
     if early > 0:
         last = pending[early - 1]
         extra = weights.change * (abs(knots[0, 0] - last[0]) + abs(knots[0, 1] - last[1]))
-    least = _least_m(ground.gap_m, ground.cell_m, body, start)
-    first_s = left_s(ground, start.x_m, start.y_m)
+    least = _least_m(gap_m, cell_m, body, start)
+    first_s = left_s(togo_s, togo_cell_m, start.x_m, start.y_m)
+    between_m = BETWEEN_CELLS * cell_m
+    matters_m = max(weights.near_m, weights.margin_m + weights.margin_s * _fastest_m_s(knots, start, model)) + between_m
+    sure_m = sure_seen_m = 0.0
     for step in range(steps):
-        told_m_s, told_rad_s = _told_in(step, knots, problem)
+        told_m_s, told_rad_s = _told_in(step, knots, pending, step_share)
+        before_rad = state[2]
         state = moved(state, told_m_s, told_rad_s, model, step_s)
         x, y, heading, speed = state[0], state[1], state[2], abs(state[3])
-        room = clearance_m(ground.gap_m, ground.cell_m, body, x, y, heading)
-        if room < min(0.0, _still_m(least, start, state)):
-            return BLOCKED_S * (2.0 - step / steps) + left_s(ground, x, y)
-        margin = weights.margin_m + weights.margin_s * speed
-        if room < margin:
-            extra += weights.tight * (1.0 - room / margin) * step_s
-        if room < weights.near_m:
-            short = 1.0 - max(room, 0.0) / weights.near_m
-            extra += weights.risk * short * short * (0.3 + speed) * step_s
-        if weights.unseen > 0.0 and clearance_m(ground.seen_m, ground.cell_m, body, x, y, heading, 0.0) < 0.0:
-            extra += weights.unseen * step_s
-        left = left_s(ground, x, y)
+        # No place of the outline went farther: where there was room enough, no look is needed.
+        went_m = speed * step_s + (body.around_m - body.radius_m) * abs(heading - before_rad)
+        sure_m -= went_m
+        sure_seen_m -= went_m
+        if sure_m <= 0.0:
+            room = clearance_m(gap_m, cell_m, body, x, y, heading, AS_AT_EDGE)
+            sure_m = room - matters_m
+            if room < min(0.0, _still_m(least, start, state)):
+                return BLOCKED_S * (2.0 - step / steps) + left_s(togo_s, togo_cell_m, x, y)
+            margin = weights.margin_m + weights.margin_s * speed
+            if room < margin:
+                extra += weights.tight * (1.0 - room / margin) * step_s
+            if room < weights.near_m:
+                short = 1.0 - max(room, 0.0) / weights.near_m
+                extra += weights.risk * short * short * (0.3 + speed) * step_s
+        if sure_seen_m <= 0.0 and weights.unseen > 0.0:
+            clear_seen_m = clearance_m(seen_m, cell_m, body, x, y, heading, 0.0)
+            sure_seen_m = clear_seen_m - between_m
+            if clear_seen_m < 0.0:
+                extra += weights.unseen * step_s
+        left = left_s(togo_s, togo_cell_m, x, y)
         extra += weights.late * min(left, first_s + 1.0) * step_s
-        if ground.ends:
+        if ends:
             stops_m_s = math.sqrt(2.0 * model.decel_m_s2 * (left * model.fastest_m_s + BEYOND_M))
             extra += HASTE * max(speed - stops_m_s, 0.0) * step_s
         if left < ARRIVED_S:
             return step * step_s + extra
     return steps * step_s + extra + _after_s(state, _still_m(least, start, state), problem)
+
+
+@njit(cache=True, nogil=True)
+def _fastest_m_s(knots, start, model):
+    """No faster does the rover get on a motion."""
+    fastest = max(abs(start.speed_m_s), model.fastest_m_s)
+    for knot in range(knots.shape[0]):
+        fastest = max(fastest, abs(knots[knot, 0]))
+    return fastest
 
 
 @njit(cache=True, nogil=True)
@@ -268,49 +298,54 @@ def _after_s(state, least, problem):
     From there it must be able to brake, too. Speed counts as far as it leads on: a rover that is fast before a bend
     must brake there. Else it would rather wait, and plan again and again to arrive at the bend fast.
     """
-    ground, model, weights = problem.ground, problem.model, problem.weights
+    model, weights, body = problem.model, problem.weights, problem.body
+    ground = problem.ground
+    gap_m, cell_m, togo_s, togo_cell_m = ground.gap_m, ground.cell_m, ground.togo_s, ground.togo_cell_m
     x, y, heading, speed = state[0], state[1], state[2], state[3]
     brakes_m = speed * abs(speed) / (2.0 * model.decel_m_s2)
     # In pieces that nothing fits between.
-    pieces = min(max(int(math.ceil(abs(brakes_m) / problem.body.radius_m)), 3), MOST_PIECES)
+    pieces = min(max(int(math.ceil(abs(brakes_m) / body.radius_m)), 3), MOST_PIECES)
     for piece in range(1, pieces + 1):
         to_x = x + brakes_m * piece / pieces * math.sin(heading)
         to_y = y + brakes_m * piece / pieces * math.cos(heading)
-        if clearance_m(ground.gap_m, ground.cell_m, problem.body, to_x, to_y, heading) < min(weights.margin_m, least):
-            return BLOCKED_S + left_s(ground, x, y)
-    left = left_s(ground, x, y)
+        if clearance_m(gap_m, cell_m, body, to_x, to_y, heading, AS_AT_EDGE) < min(weights.margin_m, least):
+            return BLOCKED_S + left_s(togo_s, togo_cell_m, x, y)
+    left = left_s(togo_s, togo_cell_m, x, y)
     leads_on = 1.0
     if brakes_m > 0.0:
-        gained = left - left_s(ground, x + brakes_m * math.sin(heading), y + brakes_m * math.cos(heading))
+        gained = left - left_s(togo_s, togo_cell_m, x + brakes_m * math.sin(heading), y + brakes_m * math.cos(heading))
         leads_on = min(max(gained * model.fastest_m_s / brakes_m, 0.0), 1.0)
     lacks = model.fastest_m_s - leads_on * max(speed, 0.0)
     slow = lacks * lacks / (2.0 * model.accel_m_s2 * model.fastest_m_s)
-    turned = weights.turn * _off_course_rad(ground, x, y, heading)
+    turned = weights.turn * _off_course_rad(togo_s, togo_cell_m, x, y, heading)
     return left + min(slow + turned, left + 1.0)
 
 
+@njit(cache=True, nogil=True, inline="always")
+def left_s(togo_s, togo_cell_m, x_m, y_m):
+    """The time that is left from a place, by a raster of it."""
+    left = at_place(togo_s, togo_cell_m, x_m, y_m, NO_WAY_S)
+    return left if left < NO_WAY_S else _least_left_s(togo_s, togo_cell_m, x_m, y_m)
+
+
 @njit(cache=True, nogil=True)
-def left_s(ground, x_m, y_m):
-    """The time that is left from a place."""
-    left = at_place(ground.togo_s, ground.togo_cell_m, x_m, y_m, NO_WAY_S)
-    if left < NO_WAY_S:
-        return left
-    # Beside ground from which no way leads: the best of the cells round it.
-    height, width = ground.togo_s.shape
-    x, y = int(x_m / ground.togo_cell_m), int(y_m / ground.togo_cell_m)
+def _least_left_s(togo_s, togo_cell_m, x_m, y_m):
+    """Beside ground from which no way leads: the best of the cells round it."""
+    height, width = togo_s.shape
+    x, y = int(x_m / togo_cell_m), int(y_m / togo_cell_m)
     best = NO_WAY_S
     for row in range(max(0, y - 1), min(height, y + 2)):
         for column in range(max(0, x - 1), min(width, x + 2)):
-            best = min(best, ground.togo_s[row, column] + ARRIVED_S)
+            best = min(best, togo_s[row, column] + ARRIVED_S)
     return best
 
 
 @njit(cache=True, nogil=True)
-def _off_course_rad(ground, x_m, y_m, heading_rad):
+def _off_course_rad(togo_s, togo_cell_m, x_m, y_m, heading_rad):
     """How far the heading is from where the time that is left falls fastest; 0 where that is not known."""
-    reach = 1.5 * ground.togo_cell_m
-    east = left_s(ground, x_m + reach, y_m) - left_s(ground, x_m - reach, y_m)
-    north = left_s(ground, x_m, y_m + reach) - left_s(ground, x_m, y_m - reach)
+    reach = 1.5 * togo_cell_m
+    east = left_s(togo_s, togo_cell_m, x_m + reach, y_m) - left_s(togo_s, togo_cell_m, x_m - reach, y_m)
+    north = left_s(togo_s, togo_cell_m, x_m, y_m + reach) - left_s(togo_s, togo_cell_m, x_m, y_m - reach)
     if abs(east) + abs(north) < 1e-6 or max(abs(east), abs(north)) > 0.5 * NO_WAY_S:
         return 0.0
     off = math.atan2(-east, -north) - heading_rad
@@ -326,7 +361,7 @@ def way_of(knots, problem):
     way = np.empty((steps + 1, 2))
     way[0, 0], way[0, 1] = start.x_m, start.y_m
     for step in range(steps):
-        told_m_s, told_rad_s = _told_in(step, knots, problem)
+        told_m_s, told_rad_s = _told_in(step, knots, problem.pending, step_s / problem.horizon_s)
         state = moved(state, told_m_s, told_rad_s, problem.model, step_s)
         way[step + 1, 0], way[step + 1, 1] = state[0], state[1]
     return way
@@ -348,24 +383,30 @@ def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem
     The rover keeps ``margin_m``, and ``margin_s`` more for each m/s. ``gain``: it turns by this factor more than told.
     ``swings_s``: and by so many radians too far for each rad/s of change.
     """
-    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, 0.0, swings_s) >= 0.0
+    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, 0.0, 0.0, swings_s) >= 0.0
 
 
 @njit(cache=True, nogil=True)
-def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, enough_m=-math.inf, swings_s=0.0):
+def spare_m(
+    told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, least_m=-math.inf, most_m=FAR_M, swings_s=0.0
+):
     """How much more room than it must keep such a rover has, at the worst place; below 0 it may not be left alone.
 
-    Once it is sure to be below ``enough_m``, it is not looked at to its end.
+    Exact only between ``least_m`` and ``most_m``: where it is surely less, the rest of the way is not looked at, and
+    where it is surely more, the rover is followed without a look until it may have come nearer.
     """
     start, ground, body, model = problem.start, problem.ground, problem.body, problem.model
     pending, step_s = problem.pending, problem.step_s
+    gap_m, seen_m, cell_m = ground.gap_m, ground.seen_m, ground.cell_m
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
     early, held = pending.shape[0], int(math.ceil(lasts_s / step_s))
     swing_rad_s = swings_s * _change_rad_s(told_rad_s, problem.recent_rad_s) / problem.swinging_s
     swinging = early + int(round(problem.swinging_s / step_s))
-    least = _least_m(ground.gap_m, ground.cell_m, body, start)
-    least_seen = _least_m(ground.seen_m, ground.cell_m, body, start, 0.0)
-    step, spare = 0, FAR_M
+    still = _least_m(gap_m, cell_m, body, start)
+    still_seen = _least_m(seen_m, cell_m, body, start, 0.0)
+    fastest_m_s = max(abs(start.speed_m_s), abs(told_m_s), model.fastest_m_s)
+    roomy_m = margin_m + margin_s * fastest_m_s + most_m + BETWEEN_CELLS * cell_m
+    step, spare, sure_m = 0, FAR_M, 0.0
     while step < early + held or abs(state[3]) > 0.02 or abs(state[4]) > 0.02:
         if step > early + held + ENDLESS:
             return -FAR_M
@@ -375,14 +416,19 @@ def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, en
         elif step < early + held:
             now_m_s, now_rad_s = told_m_s, told_rad_s
         swings_rad_s = swing_rad_s if early <= step < min(swinging, early + held) else 0.0
+        before_rad = state[2]
         state = moved(state, now_m_s, gain * now_rad_s + swings_rad_s, model, step_s)
-        room_m = min(margin_m + margin_s * abs(state[3]), _still_m(least, start, state))
-        spare = min(spare, clearance_m(ground.gap_m, ground.cell_m, body, state[0], state[1], state[2]) - room_m)
-        seen_m = clearance_m(ground.seen_m, ground.cell_m, body, state[0], state[1], state[2], 0.0)
-        spare = min(spare, seen_m - min(margin_m, least_seen))
-        if spare < enough_m:
-            break
         step += 1
+        sure_m -= abs(state[3]) * step_s + (body.around_m - body.radius_m) * abs(state[2] - before_rad)
+        if sure_m > 0.0:
+            continue
+        clear_m = clearance_m(gap_m, cell_m, body, state[0], state[1], state[2], AS_AT_EDGE)
+        clear_seen_m = clearance_m(seen_m, cell_m, body, state[0], state[1], state[2], 0.0)
+        sure_m = min(clear_m, clear_seen_m) - roomy_m
+        room_m = min(margin_m + margin_s * abs(state[3]), _still_m(still, start, state))
+        spare = min(spare, clear_m - room_m, clear_seen_m - min(margin_m, still_seen))
+        if spare < least_m:
+            break
     return spare
 
 

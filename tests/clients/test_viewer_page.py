@@ -42,7 +42,7 @@ def clock_of(shown: Page) -> str:
 
 def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_killed(tmp_path: Path) -> None:
     mission = MISSIONS / "rooms.toml"
-    with ours(tmp_path, "sitl", "drive", mission, "--web", "0", "--speedup", "4") as program:
+    with ours(tmp_path, "sitl", "drive", mission, "--web", "0", "--speedup", "1") as program:
         address = address_of(program)
         with page(DESKTOP) as desktop:
             desktop.open(address)

@@ -195,7 +195,7 @@ def test_what_passes_is_free_under_the_outline_in_shapes(
     if forward_m_s == 0.0 or fault(told, at) is not None:
         return
     ways = ways_left_alone(told, at)
-    assert ways is not None and len(ways) == len(turn_gains(at.following))
+    assert ways is not None and len(ways) == len(turn_gains(at.following, at.settings.guidance.velocity_lasts_s))
     unseen = shapely.points((np.argwhere(evidence.log_odds == 0.0)[:, ::-1] + 0.5) * CELL_M)
     far = unseen[shapely.distance(unseen, shapely.Point(MIDDLE, MIDDLE)) > body.radius_m + 0.8]
     for way in ways:
@@ -258,7 +258,7 @@ def test_it_leads_where_the_planning_thinks_though_reckoned_apart(
     pending = _pending(moment, _latest(moment), ALONE_STEP_S)
     ways = ways_left_alone(GuidedVelocity(*told), moment)
     assert ways is not None
-    gains = turn_gains(moment.following)
+    gains = turn_gains(moment.following, moment.settings.guidance.velocity_lasts_s)
     for way, gain in zip(ways[: len(gains)], gains, strict=True):
         state, planned = (MIDDLE, MIDDLE, 0.0, speed_m_s, turn_rad_s), []
         for told_m_s, told_rad_s in [*pending, *[told] * 60, *[(0.0, 0.0)] * 200]:

@@ -7,6 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from companion.control.motion_kernels import (
     AS_AT_EDGE,
@@ -26,6 +28,7 @@ from companion.control.motion_kernels import (
     may_be_last,
     moved,
     next_generation,
+    spare_m,
     told_at,
 )
 from companion.mapping.cost_to_go import cost_to_go
@@ -236,3 +239,22 @@ def test_a_rover_that_touches_something_may_leave_it_but_not_touch_the_next_thin
     passed = [speed for speed in speeds_m_s if may_be_last(speed, 0.0, 3.0, 1.0, 0.03, 0.05, both)]
     assert 0.3 < max(passed) < 1.0
     assert all(may_be_last(speed, 0.0, 3.0, 1.0, 0.0, 0.0, ahead) for speed in passed)
+
+
+@given(
+    st.lists(st.tuples(st.integers(0, 95), st.integers(0, 95)), min_size=1, max_size=12),
+    st.integers(40, SIDE),
+    st.floats(-0.5, 2.0),
+    st.floats(-1.5, 1.5),
+    st.floats(-0.5, 2.0),
+    st.floats(0.0, 0.2),
+)
+def test_where_there_is_surely_room_no_look_is_needed(
+    posts: list[tuple[int, int]], unseen_from: int, told_m_s: float, turn_rad_s: float, now_m_s: float, margin_s: float
+) -> None:
+    walls = [(row, row + 3, column, column + 2) for row, column in posts]
+    ground = problem(*walls, start=Start(5.0, 2.0, 0.3, now_m_s, 0.5 * turn_rad_s), unseen_from=unseen_from)
+    exact_m = spare_m(told_m_s, turn_rad_s, 2.0, 1.3, 0.03, margin_s, ground)
+    assert may_be_last(told_m_s, turn_rad_s, 2.0, 1.3, 0.03, margin_s, ground) is (exact_m >= 0.0)
+    enough_m = spare_m(told_m_s, turn_rad_s, 2.0, 1.3, 0.03, margin_s, ground, -math.inf, 0.1)
+    assert enough_m == exact_m or min(enough_m, exact_m) >= 0.1
