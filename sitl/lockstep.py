@@ -21,6 +21,7 @@ from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
+from companion.mavlink.local_station import LocalStation
 from companion.mavlink.transport import MemoryLink
 from companion.mission.mission import Mission
 from companion.navigation.step_runner import InlineRunner
@@ -160,6 +161,8 @@ class Drive:
     """Saves the companion's state."""
     late_s: float = 0.0
     """So long each message takes over the link, each way."""
+    station: LocalStation | None = None
+    """Heard by the companion beside its link."""
 
     def __post_init__(self) -> None:
         self.report = Report(self.seed)
@@ -175,7 +178,7 @@ class Drive:
         self._link = self.simulator.connect(name="companion")
         self.clock = LockstepClock(self.simulator, self._link, far, self.late_s)
         codec = Codec(self.settings.link)
-        autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder)
+        autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder, self.station)
         self.companion = Companion(
             autopilot,
             self.clock,

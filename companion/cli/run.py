@@ -19,7 +19,7 @@ from companion.cli.live import Live, LiveConsole, Reader, levelled, reader_of
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
 from companion.cli.state import RunState, StateFiles
-from companion.cli.web import Token, Web, WebError, served, web_viewer
+from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.control.model_estimate import described
 from companion.core.clock import WallClock
 from companion.core.severity import Severity
@@ -84,6 +84,7 @@ def run(
     ] = None,
     web: Web = None,
     web_token: Token = None,
+    web_actions: Actions = False,
 ) -> None:
     """Drive MISSION.
 
@@ -103,11 +104,11 @@ def run(
             files = StateFiles(state, budget)
             ends.callback(files.close)
             settings = files.settings(usable_settings(settings_file), say)
-            page = web_viewer(web, web_token, say)
+            signer = files.signer(signing_key)
+            page = web_viewer(web, web_token, say, actions=web_actions, signer=signer)
             if page is not None:
                 ends.callback(page.close)
                 say(served(page, to_person=reader is Reader.PERSON))
-            signer = files.signer(signing_key)
             source = Source(mission_file, connect, from_autopilot=from_autopilot)
             mission = source.mission(settings, signer, stop, say)
             if mission is None:
@@ -136,7 +137,8 @@ def run(
             if place != record:
                 say(f"{record} has a record already; this one goes to {place}")
             keeping.start(budget)
-            autopilot = AutopilotLink(link, Codec(settings.link, signer=signer), settings.link, recorder)
+            codec, station = Codec(settings.link, signer=signer), None if page is None else page.station
+            autopilot = AutopilotLink(link, codec, settings.link, recorder, station)
             live = Live(console, mission.name, reader)
             rig = _Rig(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget, page)
             code = _drive(rig, seed=seed, arm=arm)

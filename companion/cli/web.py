@@ -8,10 +8,12 @@ from typing import Annotated
 
 import typer
 
+from companion.mavlink.local_station import LocalStation
+from companion.mavlink.signing import Signer
 from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.web_process import WebError, web_place
 
-__all__ = ["Token", "Web", "WebError", "served", "web_viewer"]
+__all__ = ["Actions", "Token", "Web", "WebError", "served", "web_viewer"]
 
 Web = Annotated[
     str | None,
@@ -27,13 +29,30 @@ Token = Annotated[
 ]
 
 
-def web_viewer(web: str | None, token_file: Path | None, say: Callable[[str], None]) -> LiveViewer | None:
-    """The viewer that was asked for; None for none. Raises WebError."""
+Actions = Annotated[
+    bool,
+    typer.Option(
+        "--web-actions", help="Who knows the token may also pause the rover, send it somewhere, or skip a target."
+    ),
+]
+
+
+def web_viewer(
+    web: str | None,
+    token_file: Path | None,
+    say: Callable[[str], None],
+    *,
+    actions: bool = False,
+    signer: Signer | None = None,
+) -> LiveViewer | None:
+    """The viewer that was asked for; None for none. ``signer``: of the companion that it asks. Raises WebError."""
     if web is None:
-        if token_file is not None:
-            raise WebError("--web-token: nothing is served; add --web PORT")
+        if token_file is not None or actions:
+            raise WebError(f"{'--web-actions' if actions else '--web-token'}: nothing is served; add --web PORT")
         return None
-    return LiveViewer(web_place(web, token_file), say)
+    if actions and token_file is None:
+        raise WebError("--web-actions: only who knows a token may act: name a file for it with --web-token FILE")
+    return LiveViewer(web_place(web, token_file), say, LocalStation(signer) if actions else None)
 
 
 def served(viewer: LiveViewer, *, to_person: bool) -> str:

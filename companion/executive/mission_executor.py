@@ -35,6 +35,7 @@ from companion.executive.mission_progress import (
     parked,
     returning,
     sent_to,
+    skipped,
     with_requested,
 )
 from companion.executive.return_path import Refuge, Trail, refuges
@@ -233,6 +234,11 @@ class MissionExecutor:
     def request(self, goal: ResolvedTarget) -> None:
         """Drive to a goal that a person asks for first; then the mission goes on."""
         self.progress = with_requested(self.progress, goal)
+        self.driver.leave()
+
+    def skip(self) -> None:
+        """Leave the present goal out."""
+        self.progress = skipped(self.progress)
         self.driver.leave()
 
     def park(self) -> None:

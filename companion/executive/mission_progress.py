@@ -96,6 +96,15 @@ def ended_at(progress: MissionProgress, status: TargetStatus) -> MissionProgress
     return parked(_marked(progress, status))
 
 
+def skipped(progress: MissionProgress) -> MissionProgress:
+    """Without the present goal: a requested one is dropped, a target counts as skipped unless it was reached."""
+    if progress.requested is not None:
+        return replace(progress, requested=None)
+    if progress.statuses[progress.index] is not TargetStatus.REACHED:
+        progress = _marked(progress, TargetStatus.SKIPPED)
+    return _next(replace(progress, give_up_s=None))
+
+
 def relaid(
     progress: MissionProgress,
     targets: tuple[ResolvedTarget, ...],

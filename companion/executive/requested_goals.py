@@ -19,11 +19,11 @@ from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.safety.reasons import LatchReason, Reason, Refusal
 from companion.settings.live_settings import LiveSettings
-from companion.vehicle.commands import AnswerGoal
+from companion.vehicle.commands import AnswerRequest
 from companion.vehicle.events import (
     Event,
-    GoalAnswer,
     GoalRequested,
+    RequestAnswer,
     RoverMode,
 )
 from companion.vehicle.state import VehicleState
@@ -86,15 +86,16 @@ class RequestedGoals:
         if asked.point is None:
             answer, reason = asked.fault, Reason(Refusal.MALFORMED, (asked.reason,)) if asked.reason else None
         elif run.executor is None or not run.is_driving:
-            answer, reason = GoalAnswer.NOT_NOW, Reason(Refusal.NOT_DRIVING, (run.activity,))
+            answer, reason = RequestAnswer.NOT_NOW, Reason(Refusal.NOT_DRIVING, (run.activity,))
         elif not _may_drive(vehicle):
             why = Reason(LatchReason.OTHER_MODE, (RoverMode.GUIDED.name,))
-            answer, reason = GoalAnswer.NOT_NOW, Reason(Refusal.NOT_DRIVING, (why,))
+            answer, reason = RequestAnswer.NOT_NOW, Reason(Refusal.NOT_DRIVING, (why,))
         else:
             answer, reason = self._judge(asked, vehicle, run.executor)
         if reason is not None:
             self._refuse(reason, asked.time_s)
-        run.sender.send(AnswerGoal(asked.asker, asked.form, answer), asked.time_s)
+        words = "" if reason is None else str(reason)
+        run.sender.send(AnswerRequest(asked.asker, asked.form, answer, words), asked.time_s)
 
     def _refuse(self, reason: Reason[Refusal], now_s: float) -> None:
         """Say why. A reason that was the last one's too is said again, but not at every repetition of one request."""
@@ -108,24 +109,24 @@ class RequestedGoals:
 
     def _judge(
         self, asked: GoalRequested, vehicle: VehicleState, executor: MissionExecutor
-    ) -> tuple[GoalAnswer, Reason[Refusal] | None]:
+    ) -> tuple[RequestAnswer, Reason[Refusal] | None]:
         """A place, and a rover that is driven: the answer, and the reason of a refusal."""
         pose = vehicle.pose_at(asked.time_s)
         assert asked.point is not None
         if pose is None:
-            return GoalAnswer.NOT_NOW, Reason(Refusal.NO_POSITION)
+            return RequestAnswer.NOT_NOW, Reason(Refusal.NO_POSITION)
         progress = executor.progress
         if progress.phase is MissionPhase.HOME:
-            return GoalAnswer.NOT_NOW, Reason(Refusal.RETURNING)
+            return RequestAnswer.NOT_NOW, Reason(Refusal.RETURNING)
         if progress.ended:
-            return GoalAnswer.NOT_NOW, Reason(Refusal.ENDED)
+            return RequestAnswer.NOT_NOW, Reason(Refusal.ENDED)
         place = LocalFrame(executor.layout.origin).to_ned(asked.point)
         if self._is_repeated(asked, place, executor):
             self._heard_s = asked.time_s
-            return GoalAnswer.ACCEPTED, None
+            return RequestAnswer.ACCEPTED, None
         reach_m = self._settings.current.safety.requested_goal_m
         if (reason := refusal(place, pose.point, executor.layout, reach_m)) is not None:
-            return GoalAnswer.DENIED, reason
+            return RequestAnswer.DENIED, reason
         self._last, self._heard_s = asked, asked.time_s
         self._count += 1
         name, cell = f"requested goal {self._count}", executor.evidence.base.cell_at(place)
@@ -135,7 +136,7 @@ class RequestedGoals:
         text = f"Requested goal {self._count}: {distance_m:.1f} m away, then the mission goes on"
         self._notifier.tell(text, Severity.INFO)
         executor.request(ResolvedTarget(name, place, cell, 0.0, OnBlocked.SKIP, speed_m_s))
-        return GoalAnswer.ACCEPTED, None
+        return RequestAnswer.ACCEPTED, None
 
     def _is_repeated(self, asked: GoalRequested, place: NedPoint, executor: MissionExecutor) -> bool:
         """Whether this very goal is under way, or was a moment ago."""

@@ -16,6 +16,7 @@ from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec, Packet
 from companion.mavlink.confirmation import CommandTracker, TargetReadBack
 from companion.mavlink.download import Downloads
+from companion.mavlink.local_station import LocalStation
 from companion.mavlink.rates import RateFault, RateRequester, wanted_rates
 from companion.settings import LinkSettings
 from companion.vehicle.commands import Command, Heartbeat, NamedValue, RequestMessage, TimeSync
@@ -60,12 +61,21 @@ class _NoLog:
 class AutopilotLink:
     """Polls the link, sends commands and keeps the link up.
 
-    It never waits and reads no clock: callers pass the time.
+    It never waits and reads no clock: callers pass the time. ``station``: heard beside the link, and answered.
     """
 
-    def __init__(self, link: ByteLink, codec: Codec, settings: LinkSettings, log: PacketLog | None = None) -> None:
+    def __init__(
+        self,
+        link: ByteLink,
+        codec: Codec,
+        settings: LinkSettings,
+        log: PacketLog | None = None,
+        station: LocalStation | None = None,
+    ) -> None:
         self._link = link
         self._codec = codec
+        self._station = station
+        self._component_id = settings.component_id
         self._log = log or _NoLog()
         self._rates = RateRequester(wanted_rates(settings))
         self._acks = CommandTracker()
@@ -141,7 +151,10 @@ class AutopilotLink:
     def poll(self, now_s: float) -> list[Event]:
         """The events since the last call."""
         events: list[Event] = []
-        packets = [packet for packet in self._codec.packets(self._link.read()) if self._codec.accepts(packet)]
+        heard = self._codec.packets(self._link.read())
+        if self._station is not None:
+            heard += self._station.spoken(self._codec.system_id, self._component_id)
+        packets = [packet for packet in heard if self._codec.accepts(packet)]
         self._log.heard(now_s, [packet.raw for packet in packets], self._codec.marks)
         for packet in packets:
             self._note_twin(packet, now_s)
@@ -158,6 +171,8 @@ class AutopilotLink:
         Raises EncodeError if the command cannot be encoded yet (a position in degrees without an origin).
         """
         self._write(command, now_s)
+        if self._station is not None:
+            self._station.hear(command)
         self._acks.sent(command, now_s)
         self._read_back.sent(command, now_s)
 

@@ -131,11 +131,11 @@ class Decoder:
         return self._of_others(packet, time_s) if packet.message_id in ours else []
 
     def _asked(self, packet: Packet, time_s: float) -> list[Event]:
-        """A guided target asked of this component; requests to all components or to others are not answered."""
+        """What is asked of this component; requests to all components or to others are not answered."""
         message = self._message(packet)
         if (message.target_system, message.target_component) != (self.system_id, self.component_id):
             return []
-        event = requests.target_asked(message, time_s)
+        event = requests.asked(message, time_s)
         return [] if event is None else [event]
 
     def _of_others(self, packet: Packet, time_s: float) -> list[Event]:

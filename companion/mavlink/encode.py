@@ -12,7 +12,7 @@ from companion.mavlink.requests import GUIDED_ITEM, KEEP_SPEED, answer_message
 from companion.mavlink.signing import Signer
 from companion.mavlink.statustext import chunks_of
 from companion.vehicle.commands import (
-    AnswerGoal,
+    AnswerRequest,
     Arm,
     ChangeSpeed,
     Command,
@@ -104,7 +104,7 @@ class Encoder:
                 return self._text(command)
             case RequestList() | RequestItem() | EndTransfer() | FileRequest():
                 return [self._transfer(command)]
-            case AnswerGoal():
+            case AnswerRequest():
                 return [answer_message(command)]
             case ParameterValue():
                 return [_parameter_value(command)]

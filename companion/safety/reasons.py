@@ -119,7 +119,7 @@ class EndReason(Enum):
 
 
 class Refusal(Enum):
-    """Why a place that a person asks for is not driven to."""
+    """Why what a person asks for is not done."""
 
     MALFORMED = "{}"
     """The request itself is wrong; the figure says how."""
@@ -133,6 +133,9 @@ class Refusal(Enum):
     NEAR_BORDER = "it must be {}"
     CLOSED = "in or too near a fence or a known obstacle"
     OBSTACLE_SEEN = "an obstacle was seen there"
+    NOT_PAUSED = "it was not paused by a request: set {} with ground station or transmitter"
+    LEGS_OF_AUTO = "AUTO says which target is next"
+    NOT_NEXT = "only the target after this one may be next"
 
 
 Kind_co = TypeVar("Kind_co", bound=Enum, covariant=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from companion.checkpoint.checkpointer import Checkpointer
 from companion.core.clock import Clock
 from companion.core.tick_marks import Mark
+from companion.executive.mission_requests import MissionRequests
 from companion.executive.mission_run import MissionRun, new_run
 from companion.executive.requested_goals import RequestedGoals
 from companion.mavlink.autopilot_link import AutopilotLink
@@ -74,9 +75,9 @@ def assemble(
     monitors = make_monitors(run, autopilot, live, notifier, pace, noted)
     permission = DrivePermission(run, monitors.by_precedence, live, notifier)
     operator_server = OperatorServer(run, autopilot, live, notifier, options.keep_settings)
-    requests = RequestedGoals(run, live, notifier)
+    requests = (RequestedGoals(run, live, notifier), MissionRequests(run, notifier))
     handlers: tuple[EventHandler, ...]
-    handlers = (operator_server, *monitors.by_precedence, requests, permission)
+    handlers = (operator_server, *monitors.by_precedence, *requests, permission)
     dispatcher = EventDispatcher(run, autopilot, notifier, handlers, monitors.scans, monitors.localization)
 
     limits = MissionLimits(run, monitors.fences, monitors.batteries, monitors.rivals, settings.power, outcome)

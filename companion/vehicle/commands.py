@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from companion.core.frames import NedPoint
 from companion.core.severity import Severity
-from companion.vehicle.events import Asker, GoalAnswer, PlanKind, TargetForm
+from companion.vehicle.events import Asker, PlanKind, RequestAnswer, RequestForm
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,12 +153,13 @@ class StatusText:
 
 
 @dataclass(frozen=True, slots=True)
-class AnswerGoal:
-    """The answer to a guided target asked of the companion; sent to the asker alone."""
+class AnswerRequest:
+    """The answer to a request to the companion; sent to the asker alone. ``reason``: why not; it goes as a text."""
 
     asker: Asker
-    form: TargetForm
-    answer: GoalAnswer
+    form: RequestForm
+    answer: RequestAnswer
+    reason: str = ""
 
 
 Setpoint = GuidedPosition | GuidedVelocity | GuidedHeading
@@ -180,7 +181,7 @@ Command = (
     | EndTransfer
     | FileRequest
     | StatusText
-    | AnswerGoal
+    | AnswerRequest
     | ParameterValue
     | NamedValue
 )

@@ -293,19 +293,23 @@ class ItemCurrentSeen:
     total: int | None = None
 
 
-# Guided targets asked of the companion ---------------------------------------------------------------------------
+# Requests to the companion itself --------------------------------------------------------------------------------
 
 
-class TargetForm(StrEnum):
+class RequestForm(StrEnum):
     """The message of a request, which decides the message of the answer."""
 
     COMMAND = "command"
     """DO_REPOSITION, answered with COMMAND_ACK."""
     ITEM = "item"
     """A guided mission item, answered with MISSION_ACK."""
+    PAUSE = "pause"
+    """DO_PAUSE_CONTINUE, answered with COMMAND_ACK."""
+    SKIP = "skip"
+    """DO_SET_MISSION_CURRENT, answered with COMMAND_ACK."""
 
 
-class GoalAnswer(StrEnum):
+class RequestAnswer(StrEnum):
     """The answer to a request; a text gives the reason."""
 
     ACCEPTED = "accepted"
@@ -335,11 +339,29 @@ class GoalRequested:
 
     time_s: float
     asker: Asker
-    form: TargetForm
+    form: RequestForm
     point: GeoPoint | None
     speed_m_s: float | None = None
-    fault: GoalAnswer = GoalAnswer.ACCEPTED
+    fault: RequestAnswer = RequestAnswer.ACCEPTED
     reason: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class PauseAsked:
+    """DO_PAUSE_CONTINUE to the companion itself: to stand (``pauses``), or to go on."""
+
+    time_s: float
+    asker: Asker
+    pauses: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TargetAsked:
+    """DO_SET_MISSION_CURRENT to the companion itself: ``index`` of the target that is to be next, from 0."""
+
+    time_s: float
+    asker: Asker
+    index: int
 
 
 # The companion's own parameters, asked for by ground stations ----------------------------------------------------
@@ -397,6 +419,8 @@ Event = (
     | PlanItemSeen
     | PlanChangedSeen
     | GoalRequested
+    | PauseAsked
+    | TargetAsked
     | SticksSeen
     | ParameterRequest
     | LegSeen

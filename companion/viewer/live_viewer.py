@@ -5,14 +5,18 @@ Nouns: live viewer.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
 from companion.app import Companion, Status
 from companion.core.clock import unix_time_us
+from companion.mavlink.local_station import LocalStation
 from companion.settings import Settings
 from companion.settings.versions import versions
+from companion.viewer import wire
 from companion.viewer.feed import ViewerFeed
+from companion.viewer.page_requests import PageRequests
 from companion.viewer.web_process import WebPlace, WebProcess
 
 
@@ -22,11 +26,14 @@ class LiveViewer:
     Whatever goes wrong in it, the drive goes on: ``say`` is told once, and the page has no more news.
     """
 
-    def __init__(self, place: WebPlace, say: Callable[[str], None]) -> None:
-        """Raises WebError."""
-        self.web = WebProcess(place)
+    def __init__(self, place: WebPlace, say: Callable[[str], None], station: LocalStation | None = None) -> None:
+        """``station``: asks the companion for what people ask for on the page; None: nobody may. Raises WebError."""
+        self.web = WebProcess(place, takes_actions=station is not None)
+        self.station = station
+        self._requests = None if station is None else PageRequests(station)
         self._say = say
         self._feed: ViewerFeed | None = None
+        self._companion: Companion | None = None
 
     def follow(self, companion: Companion, settings: Settings, *, simulated: bool) -> None:
         """From now on this companion is shown."""
@@ -38,18 +45,29 @@ class LiveViewer:
             "versions": versions(),
             "settings": settings.model_dump(mode="json"),
         }
-        self._feed = ViewerFeed(companion, self.web, always)
+        self._feed, self._companion = ViewerFeed(companion, self.web, always), companion
 
     def show(self, status: Status, contacts: int = 0) -> None:
         """To be called after each tick. ``contacts``: of a simulated rover."""
         if self._feed is None:
             return
         try:
+            self._pass_on()
             self._feed.contacts = contacts
             self._feed.show(status)
         except Exception as error:  # a picture is not worth a stop
             self._feed = None
             self._say(f"the page has no more news, the drive goes on: {type(error).__name__}: {error}")
+
+    def _pass_on(self) -> None:
+        """What was asked for on the page, and the answers."""
+        asked = self.web.asked()
+        if self._requests is None or self._companion is None:
+            return
+        for one in asked:
+            self._requests.take(one, self._companion)
+        for answer in self._requests.answered():
+            self.web.put(wire.JSON, json.dumps(answer).encode())
 
     def close(self) -> None:
         """Tell the last moment, and end."""

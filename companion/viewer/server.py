@@ -41,6 +41,7 @@ DENIED, TOO_MANY, SLOW, BAD = 4401, 1013, 1008, 1003
 MOST_SPECTATORS = 64
 MOST_BYTES = 2048
 """Of a message of a browser."""
+MOST_NAME = 200
 HELLO_S, SEND_S = 10.0, 20.0
 ACTIONS_A_SECOND = 5
 WRONG_TOKEN_S = 0.5
@@ -160,7 +161,8 @@ class WebApp:
             self._asked += 1
             self._asks[self._asked] = spectator
             place = [float(one) for one in asked.get("place") or ()]
-            line = {"number": self._asked, "action": asked["action"], "place": place}
+            goal = str(asked.get("goal", ""))[:MOST_NAME]
+            line = {"number": self._asked, "action": asked["action"], "place": place, "goal": goal}
             sys.stdout.write(json.dumps(line) + "\n")
             sys.stdout.flush()
 

@@ -12,11 +12,12 @@ from rich.console import Console
 
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
-from companion.cli.web import Token, Web, WebError, served, web_viewer
+from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
 from companion.mapping.map_files import MapError
+from companion.mavlink.local_station import LocalStation
 from companion.mission.mission import Mission, MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
@@ -62,6 +63,7 @@ def drive(
     view: options.View = False,
     web: Web = None,
     web_token: Token = None,
+    web_actions: Actions = False,
 ) -> None:
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
@@ -75,7 +77,7 @@ def drive(
     usual = options.VIEWED_SPEEDUP if view else options.WEB_SPEEDUP if web else None
     pace = Pace(usual if speedup is None else speedup, WallClock())
     try:
-        viewer, page = Viewer(terminal()) if view else None, web_viewer(web, web_token, _warn)
+        viewer, page = _viewer(view), web_viewer(web, web_token, _warn, actions=web_actions)
         settings = usable_settings(settings_file)
         mission = mission_to_drive(mission_file, OnWorld(world, start, target, resolution_m, top_left, prior))
         mission = equipped(mission, sensors, params)
@@ -89,7 +91,9 @@ def drive(
         wanted.check((*files.values(), *mission.files))
         with console.status("loading the planner ..."):
             _say_if_compiling(settings, mission)
-            run = Drive(mission, scenario, settings, seed, recorder, time_limit_s)
+            run = Drive(
+                mission, scenario, settings, seed, recorder, time_limit_s, station=page.station if page else None
+            )
         also = Also() if page is None else _shown(run, page, settings)
         if viewer is None:
             report = run_with_progress(run, console, pace, also)
@@ -115,6 +119,14 @@ def drive(
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     raise typer.Exit(report.exit_code)
+
+
+def _viewer(view: bool) -> Viewer | None:
+    return Viewer(terminal()) if view else None
+
+
+def _station(page: LiveViewer | None) -> LocalStation | None:
+    return None if page is None else page.station
 
 
 def _file(sensors: str | None) -> Path | None:

@@ -42,7 +42,7 @@ class Also:
 
 
 class Unattended:
-    """Ends a run that waits for a person, for in lock-step there is none (but those of a plan of faults)."""
+    """Ends a run that waits for a person: in lock-step there is none but those of a plan of faults, or at a page."""
 
     def __init__(self, run: Drive, say: Callable[[str], None]) -> None:
         self._run = run
@@ -52,7 +52,7 @@ class Unattended:
 
     def look(self, status: Status) -> None:
         """To be called often."""
-        if not status.activity.needs_person:
+        if not status.activity.needs_person or self._run.station is not None:
             self._since_s = None
             return
         self._since_s = status.time_s if self._since_s is None else self._since_s

@@ -55,7 +55,9 @@ export class Actions {
   }
 
   act(action, place) {
-    const message = place ? { kind: "act", action, place } : { kind: "act", action };
+    // The goal that is shown now: by the time this arrives it may be another one.
+    const goal = this.model.frame?.goal?.name ?? "";
+    const message = place ? { kind: "act", action, place } : { kind: "act", action, goal };
     if (!this.send(message)) {
       this.say("error", "Not sent: no connection");
       return;

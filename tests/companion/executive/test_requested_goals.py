@@ -13,14 +13,14 @@ from companion.executive.mission_progress import MissionPhase
 from companion.executive.requested_goals import MOST_A_SECOND, REFUSED_AGAIN_S, RequestedGoals, refusal
 from companion.mission.bounds import Bounds
 from companion.safety.reasons import Reason, Refusal
-from companion.vehicle.commands import AnswerGoal
+from companion.vehicle.commands import AnswerRequest
 from companion.vehicle.events import (
     Asker,
     EkfStatusSeen,
-    GoalAnswer,
     GoalRequested,
+    RequestAnswer,
+    RequestForm,
     RoverMode,
-    TargetForm,
 )
 from tests.companion.safety.test_mode_latch import PLACE
 from tests.support.desk import Desk
@@ -39,20 +39,20 @@ class Asked(Desk):
             self.begin()
         self.stand(0.0, 0.0)
 
-    def ask(self, place: NedPoint | None = NEAR, speed_m_s: float | None = None, **fault: Any) -> GoalAnswer:
+    def ask(self, place: NedPoint | None = NEAR, speed_m_s: float | None = None, **fault: Any) -> RequestAnswer:
         point = None if place is None else LocalFrame(PLACE).to_geo(place)
-        asked = GoalRequested(self.now_s, ASKER, TargetForm.COMMAND, point, speed_m_s, **fault)
+        asked = GoalRequested(self.now_s, ASKER, RequestForm.COMMAND, point, speed_m_s, **fault)
         self.requests.take(asked, self.run.vehicle)
-        answers = [command for command in self.autopilot.taken() if isinstance(command, AnswerGoal)]
+        answers = [command for command in self.autopilot.taken() if isinstance(command, AnswerRequest)]
         return answers[-1].answer
 
 
 def test_an_accepted_place_is_driven_with_no_more_than_the_missions_speed(tmp_path: Path) -> None:
     asked = Asked(tmp_path)
-    assert asked.ask(speed_m_s=9.0) is GoalAnswer.ACCEPTED
+    assert asked.ask(speed_m_s=9.0) is RequestAnswer.ACCEPTED
     goal = asked.executor.progress.requested
     assert goal is not None and goal.point.distance_m(NEAR) < 0.02 and goal.speed_m_s == 2.0
-    assert asked.ask(speed_m_s=9.0) is GoalAnswer.ACCEPTED, "a repetition"
+    assert asked.ask(speed_m_s=9.0) is RequestAnswer.ACCEPTED, "a repetition"
     assert asked.executor.progress.requested == goal and len(asked.notices.told) == 1
 
 
@@ -68,7 +68,7 @@ def test_a_place_is_judged_by_what_is_known(tmp_path: Path, place: NedPoint, kin
     asked = Asked(tmp_path)
     found = refusal(place, NedPoint(0.0, 0.0), asked.executor.layout, 500.0)
     assert (None if found is None else found.kind) is kind
-    assert asked.ask(place) is (GoalAnswer.ACCEPTED if kind is None else GoalAnswer.DENIED)
+    assert asked.ask(place) is (RequestAnswer.ACCEPTED if kind is None else RequestAnswer.DENIED)
 
 
 class _Fence(Bounds):
@@ -108,26 +108,26 @@ def test_known_and_seen_obstacles_refuse(tmp_path: Path) -> None:
 
 def test_only_a_rover_that_is_driven_takes_requests(tmp_path: Path) -> None:
     waiting = Asked(tmp_path, begun=False)
-    assert waiting.ask() is GoalAnswer.NOT_NOW and "not driving (connecting)" in waiting.notices.texts[-1]
+    assert waiting.ask() is RequestAnswer.NOT_NOW and "not driving (connecting)" in waiting.notices.texts[-1]
     driven = Asked(tmp_path)
     driven.stand(0.0, 0.0, mode=RoverMode.HOLD)
-    assert driven.ask() is GoalAnswer.NOT_NOW and "mode is not GUIDED" in driven.notices.texts[-1]
+    assert driven.ask() is RequestAnswer.NOT_NOW and "mode is not GUIDED" in driven.notices.texts[-1]
     driven.stand(0.0, 0.0, armed=False)
-    assert driven.ask() is GoalAnswer.NOT_NOW
+    assert driven.ask() is RequestAnswer.NOT_NOW
     driven.run.vehicle = replace(driven.stand(0.0, 0.0), position=None)
-    assert driven.ask() is GoalAnswer.NOT_NOW and driven.notices.texts[-1].endswith("no position")
+    assert driven.ask() is RequestAnswer.NOT_NOW and driven.notices.texts[-1].endswith("no position")
 
 
 @pytest.mark.parametrize("phase", [MissionPhase.HOME, MissionPhase.DONE])
 def test_on_the_way_back_and_after_the_end_nothing_is_accepted(tmp_path: Path, phase: MissionPhase) -> None:
     asked = Asked(tmp_path)
     asked.executor.progress = replace(asked.executor.progress, phase=phase)
-    assert asked.ask() is GoalAnswer.NOT_NOW
+    assert asked.ask() is RequestAnswer.NOT_NOW
 
 
 def test_a_request_that_is_wrong_itself_is_answered_with_its_fault(tmp_path: Path) -> None:
     asked = Asked(tmp_path)
-    assert asked.ask(None, fault=GoalAnswer.BAD_VALUE, reason="no place") is GoalAnswer.BAD_VALUE
+    assert asked.ask(None, fault=RequestAnswer.BAD_VALUE, reason="no place") is RequestAnswer.BAD_VALUE
     assert asked.notices.texts == ["Requested goal refused: no place"]
 
 

@@ -12,8 +12,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.mavlink.codec import Codec
 from companion.settings import LinkSettings
-from companion.vehicle.commands import AnswerGoal
-from companion.vehicle.events import Asker, GoalAnswer, GoalRequested, TargetForm
+from companion.vehicle.commands import AnswerRequest
+from companion.vehicle.events import Asker, GoalRequested, RequestAnswer, RequestForm
 
 PLACE = (531_325_000, 231_688_000)
 NAN = math.nan
@@ -52,7 +52,7 @@ def test_whole_numbers_are_taken_as_they_are(message: Any) -> None:
     event = asked(message)
     assert event.point is not None and event.asker == Asker(*GROUND)
     assert (event.point.lat_deg, event.point.lon_deg) == (53.1325, 23.1688)
-    assert event.fault is GoalAnswer.ACCEPTED
+    assert event.fault is RequestAnswer.ACCEPTED
 
 
 @pytest.mark.parametrize("message", [
@@ -74,17 +74,17 @@ def test_a_speed_is_taken_where_one_is_given(p1: float, speed_m_s: float | None)
 @pytest.mark.parametrize(
     ("message", "fault"),
     [
-        (reposition(frame=1), GoalAnswer.BAD_FRAME),
-        (item(frame=8), GoalAnswer.BAD_FRAME),
-        (reposition(-2.0), GoalAnswer.BAD_VALUE),
-        (reposition(math.inf), GoalAnswer.BAD_VALUE),
-        (reposition(place=(0, 0)), GoalAnswer.BAD_VALUE),
-        (reposition(place=(2**31 - 1, 2**31 - 1)), GoalAnswer.BAD_VALUE),
-        (item(command=21), GoalAnswer.UNSUPPORTED),
-        (item(mission_type=1), GoalAnswer.UNSUPPORTED),
+        (reposition(frame=1), RequestAnswer.BAD_FRAME),
+        (item(frame=8), RequestAnswer.BAD_FRAME),
+        (reposition(-2.0), RequestAnswer.BAD_VALUE),
+        (reposition(math.inf), RequestAnswer.BAD_VALUE),
+        (reposition(place=(0, 0)), RequestAnswer.BAD_VALUE),
+        (reposition(place=(2**31 - 1, 2**31 - 1)), RequestAnswer.BAD_VALUE),
+        (item(command=21), RequestAnswer.UNSUPPORTED),
+        (item(mission_type=1), RequestAnswer.UNSUPPORTED),
     ],
 )
-def test_what_cannot_be_driven_to_says_why(message: Any, fault: GoalAnswer) -> None:
+def test_what_cannot_be_driven_to_says_why(message: Any, fault: RequestAnswer) -> None:
     event = asked(message)
     assert event.point is None and event.fault is fault and event.reason
 
@@ -109,17 +109,17 @@ def test_whatever_stands_in_a_request_is_a_place_or_a_reason(
     old = mavlink.MAVLink_mission_item_message(1, 191, 0, frame, 16, current, 0, *[0.0] * 4, lat, lon, 0.0)
     for message in (long, old):
         for event in heard(message):
-            assert (event.point is None) == bool(event.reason) == (event.fault is not GoalAnswer.ACCEPTED)
+            assert (event.point is None) == bool(event.reason) == (event.fault is not RequestAnswer.ACCEPTED)
             assert event.point is None or (abs(event.point.lat_deg) <= 90.0 and abs(event.point.lon_deg) <= 180.0)
 
 
-@pytest.mark.parametrize("answer", GoalAnswer)
-def test_the_asker_is_answered_in_the_form_in_which_he_asked(answer: GoalAnswer) -> None:
+@pytest.mark.parametrize("answer", RequestAnswer)
+def test_the_asker_is_answered_in_the_form_in_which_he_asked(answer: RequestAnswer) -> None:
     codec = Codec(LinkSettings())
-    for form, kind in ((TargetForm.COMMAND, "COMMAND_ACK"), (TargetForm.ITEM, "MISSION_ACK")):
-        raw = codec.encode(AnswerGoal(Asker(254, 7), form, answer))
+    for form, kind in ((RequestForm.COMMAND, "COMMAND_ACK"), (RequestForm.ITEM, "MISSION_ACK")):
+        raw = codec.encode(AnswerRequest(Asker(254, 7), form, answer))
         (message,) = mavlink.MAVLink(None).parse_buffer(raw)
         assert message.get_type() == kind and (message.target_system, message.target_component) == (254, 7)
-        result = message.result if form is TargetForm.COMMAND else message.type
-        assert (result == 0) == (answer is GoalAnswer.ACCEPTED)
-        assert form is TargetForm.ITEM or message.command == 192
+        result = message.result if form is RequestForm.COMMAND else message.type
+        assert (result == 0) == (answer is RequestAnswer.ACCEPTED)
+        assert form is RequestForm.ITEM or message.command == 192

@@ -14,7 +14,7 @@ from companion.executive.mission_run import LocatedScan
 from companion.operator.notifications import News
 from companion.supervision.event_dispatcher import EventDispatcher
 from companion.vehicle.commands import (
-    AnswerGoal,
+    AnswerRequest,
     ParameterValue,
 )
 from companion.vehicle.events import (
@@ -31,7 +31,7 @@ from tests.support.whole import Whole
 def test_ground_stations_are_answered_and_the_autopilots_warnings_shown(whole: Whole) -> None:
     answers = whole.tick(ParameterAsked(100.0, "CMP_STALE", -1), TextSeen(100.0, 3, "Bad battery"))
     assert [answer.name for answer in answers if isinstance(answer, ParameterValue)] == ["CMP_STALE"]
-    assert not any(isinstance(answer, AnswerGoal) for answer in answers)
+    assert not any(isinstance(answer, AnswerRequest) for answer in answers)
     assert whole.companion.status().news == (News(Severity.ERROR, "autopilot: Bad battery", own=False),)
     whole.tick()
     assert whole.companion.status().news == ()

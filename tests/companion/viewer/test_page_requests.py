@@ -1,0 +1,87 @@
+"""What people ask for on the page of a drive: it goes a ground station's way, and the record of it can be replayed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from companion.mavlink.local_station import LocalStation
+from companion.mission.load import load_mission
+from companion.recording.reader import load_record
+from companion.recording.recorder import Recorder
+from companion.replay.replay import replay
+from companion.settings.settings_file import parse_settings
+from companion.viewer import page_requests
+from companion.viewer.page_requests import NOT_DRIVING, OTHER_GOAL, PageRequests
+from sitl.lockstep import Drive
+from sitl.scenario import scenario_from_mission
+from tests.companion.viewer.test_feed import MISSION
+
+
+class Page:
+    """Somebody at the page of a drive."""
+
+    def __init__(self, folder: Path) -> None:
+        mission, settings = load_mission(MISSION), parse_settings({}, "test")
+        station = LocalStation()
+        self.requests = PageRequests(station)
+        self.recorder = Recorder(folder, mission, settings, 3, arm=True)
+        scenario = scenario_from_mission(mission)
+        self.run = Drive(mission, scenario, settings, 3, self.recorder, 300.0, station=station)
+        self.number = 0
+
+    def ticks(self, seconds: float) -> None:
+        end_s = self.run.simulator.time_s + seconds
+        while self.run.simulator.time_s < end_s and not self.run.companion.done:
+            self.run.companion.tick()
+
+    def drives(self) -> None:
+        while self.run.companion.vehicle.speed_m_s < 0.5:
+            self.ticks(0.5)
+
+    def ask(self, action: str, **more: object) -> str:
+        """What was answered: nothing if it was accepted."""
+        self.number += 1
+        self.requests.take({"number": self.number, "action": action, **more}, self.run.companion)
+        self.ticks(0.3)
+        (answer,) = self.requests.answered()
+        assert answer["number"] == self.number and answer["action"] == action
+        assert answer["ok"] is (answer["text"] == "")
+        return str(answer["text"])
+
+
+def test_pause_go_on_send_and_skip_and_the_record_is_replayed(tmp_path: Path) -> None:
+    page = Page(tmp_path / "record")
+    assert page.ask("skip", goal="far end") == page.ask("goto", place=[1.0, 1.0]) == NOT_DRIVING
+    page.drives()
+    companion = page.run.companion
+    assert page.ask("pause") == ""
+    page.ticks(3.0)
+    heartbeat = companion.vehicle.heartbeat
+    assert heartbeat is not None and heartbeat.mode == 4 and companion.vehicle.speed_m_s < 0.1
+    assert page.ask("goto", place=[5.0, 1.0]).startswith("not driving")
+    assert page.ask("resume") == ""
+    page.drives()
+    assert page.ask("goto", place=[9000.0, 0.0]).endswith("farther than 300 m")
+    assert page.ask("goto", place=[3.0, 3.0]) == ""
+    assert page.ask("skip", goal="another") == OTHER_GOAL
+    assert companion.executor is not None and page.ask("skip", goal="requested goal 1") == ""
+    goal = companion.executor.progress.goal.name
+    assert page.ask("skip", goal=goal) == ""
+    page.ticks(30.0)
+    assert companion.done and [str(status) for _, status in companion.statuses()] == ["skipped"]
+    companion.close()
+    page.recorder.close()
+    result = replay(load_record(page.recorder.directory))
+    assert not result.differences and result.ticks > 100
+
+
+def test_what_nobody_answers_is_told_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = Page(tmp_path / "record")
+    page.requests.take({"number": 7, "action": "pause"}, page.run.companion)
+    assert page.requests.answered() == []
+    monkeypatch.setattr(page_requests, "NO_ANSWER_S", -1.0)
+    (answer,) = page.requests.answered()
+    assert answer["number"] == 7 and not answer["ok"] and "did not answer" in answer["text"]
+    page.recorder.close()
