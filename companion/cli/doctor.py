@@ -64,10 +64,12 @@ def doctor(
         link.close()
         files.close()
     findings = [*diagnose(seen), *kernels(cold=not kernels_warm(settings))]
+    estimate = last_estimate(state or default_directory(os.environ))
     if as_json:
-        typer.echo(json.dumps({"heard": _summary(seen), "findings": [asdict(one) for one in findings]}, indent=2))
+        found = [asdict(one) for one in findings]
+        typer.echo(json.dumps({"heard": _summary(seen), "followed": _followed(estimate), "findings": found}, indent=2))
     else:
-        _show(seen, findings, last_estimate(state or default_directory(os.environ)))
+        _show(seen, findings, estimate)
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
@@ -84,6 +86,14 @@ def _summary(seen: Survey) -> dict[str, object]:
         "parameters": dict(seen.parameters),
         "sensors": [asdict(one) for one in seen.sources],
     }
+
+
+def _followed(estimate: ModelEstimate | None) -> dict[str, float] | None:
+    """How the rover followed velocities in the last run; None if that is not known."""
+    if estimate is None or estimate.known <= 0.0:
+        return None
+    figures = {name: round(value, 4) for name, value in estimate.figures._asdict().items()}
+    return {"known": round(estimate.known, 3), **figures}
 
 
 def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None) -> None:

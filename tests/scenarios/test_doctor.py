@@ -16,6 +16,8 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
+from companion.control.following import Following
+from companion.control.model_estimate import ModelEstimate
 from companion.diagnosis.checks import PARAMETERS, diagnose
 from companion.diagnosis.finding import Level
 from companion.mavlink.byte_link import MemoryLink
@@ -318,9 +320,19 @@ def test_a_rover_that_is_not_believed_has_been_heard(
 
 def test_nobody_there(tmp_path: Path) -> None:
     url = f"udpin:127.0.0.1:{free_port()}"
-    answer = CliRunner().invoke(app, ["doctor", "--connect", url, "--seconds", "1"])
+    answer = CliRunner().invoke(app, ["doctor", "--connect", url, "--seconds", "1", "--state", str(tmp_path)])
     assert answer.exit_code == 4
     assert "Nothing is heard" in answer.output
+
+
+def test_how_the_rover_followed_in_the_last_run_is_among_the_figures(monkeypatch: pytest.MonkeyPatch) -> None:
+    estimate: ModelEstimate | None = ModelEstimate(Following(), Following(turn_gain=1.25), 60.0, 60.0, 60.0)
+    monkeypatch.setattr("companion.cli.doctor.last_estimate", lambda directory: estimate)
+    ask = ["doctor", "--connect", f"udpin:127.0.0.1:{free_port()}", "--seconds", "1", "--json"]
+    followed = json.loads(CliRunner().invoke(app, ask).output)["followed"]
+    assert (followed["known"], followed["turn_gain"], followed["dead_s"]) == (1.0, 1.25, 0.3)
+    estimate = ModelEstimate(Following(), Following())
+    assert json.loads(CliRunner().invoke(app, ask).output)["followed"] is None
 
 
 @pytest.mark.parametrize("warm", [True, False])
