@@ -46,6 +46,7 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
     acting = ("--web-token", token, "--web-actions")
     with ours(tmp_path, "sitl", "drive", mission, "--web", "0", *acting, "--speedup", "1") as program:
         address = address_of(program)
+        program.says("Heading for far end")
         with page(DESKTOP) as desktop:
             desktop.open(f"{address}#token={token.read_text(encoding='ascii').strip()}")
             desktop.shows("Driving to far end", "GUIDED", "Heading for far end", "companion")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import threading
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from companion.mission.load import load_mission
+from companion.mission.mission import HomePoint
 from companion.recording.recorder import NullRecorder
 from companion.settings.settings_file import parse_settings
 from companion.viewer import feed, wire
@@ -19,6 +21,8 @@ from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 
 MISSION = Path(__file__).resolve().parents[3] / "missions" / "one-obstacle.toml"
+NEAR_M = 8.0
+"""So far away is the target: a drive of seconds."""
 KEYS = {
     "kind", "t", "pose", "speed", "turn", "mode", "armed", "drives", "line", "why", "state", "statuses", "goal", "path",
     "motion", "setpoint", "rays", "movers", "figures", "battery", "gps", "decision", "guard", "news", "rates",
@@ -48,7 +52,9 @@ class Heard:
 
 
 def new_drive(controller: str = "motion-ga") -> Drive:
-    mission = load_mission(MISSION)
+    whole = load_mission(MISSION)
+    near = replace(whole.targets[0], place=HomePoint(0.0, NEAR_M))
+    mission = replace(whole, targets=(near,))
     settings = parse_settings({"guidance": {"controller": controller}}, "test")
     return Drive(mission, scenario_from_mission(mission), settings, 3, NullRecorder(), 300.0)
 
