@@ -22,11 +22,6 @@ GUARDED_S = 1.0
 """A velocity that lasts no longer is ended by a guard."""
 LONG_OFF = 0.1
 """Without one a rover may turn by so much more off what is told: a small error of the turn rate grows for seconds."""
-SWINGS_S = 0.3
-"""An autopilot that is not tuned to its rover swings past a new turn rate, by so many radians for each rad/s of change:
-one that turned 2.4 times as fast as its gains were for went 0.27 and 0.4 rad too far, after changes of 1.4 rad/s."""
-SWINGING_S, RECENT_S = 1.5, 0.6
-"""It swings for so long; a turn rate is new if it differs from what was told and seen in the last moments."""
 
 
 class Following(NamedTuple):
@@ -49,11 +44,6 @@ def turn_gains(follows: Following, lasts_s: float) -> tuple[float, ...]:
     """By which factors more than told a rover may turn, where a velocity lasts so long."""
     off = follows.off_model + (LONG_OFF if lasts_s > GUARDED_S else 0.0)
     return 1.0 + off, 1.0 - off, 1.0
-
-
-def swings_s(lasts_s: float) -> float:
-    """How far it may swing where a velocity lasts so long: a guard ends that before it shows."""
-    return SWINGS_S if lasts_s > GUARDED_S else 0.0
 
 
 AS_SHIPPED = Following()

@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from companion.control.following import RECENT_S, SWINGING_S, Following, swings_s, turn_gains
+from companion.control.following import Following, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.told import in_force
 from companion.mapping.evidence_map import EvidenceMap
@@ -62,15 +62,6 @@ class Rover(NamedTuple):
     turns_rad_s2: float
 
 
-class Turning(NamedTuple):
-    """It turns by the factor ``gain`` more than told, and by ``swing_rad_s`` more between two moments."""
-
-    gain: float
-    swing_rad_s: float
-    from_s: float
-    until_s: float
-
-
 class Outline(NamedTuple):
     """How far it reaches ahead, back and to either side; a circle reaches as far everywhere."""
 
@@ -98,14 +89,8 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
     start = np.array((*_from_corner(view), view.pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s))
     ends_s = latest_s + lasts_s
     ways = []
-    variants = [(gain, 0.0) for gain in turn_gains(follows, lasts_s)]
-    if swing := swings_s(lasts_s):
-        change_rad_s = _change_rad_s(setpoint, view)
-        off = follows.off_model if change_rad_s * setpoint.yaw_rate_rad_s > 0.0 else -follows.off_model
-        variants.append((1.0 + off, swing * change_rad_s))
-    for gain, swing_rad in variants:
-        turns = Turning(follows.turn_gain * gain, swing_rad / SWINGING_S, latest_s, latest_s + SWINGING_S)
-        places, stands = way_of(start, tells, ends_s, turns, _worst(follows))
+    for gain in turn_gains(follows, lasts_s):
+        places, stands = way_of(start, tells, ends_s, follows.turn_gain * gain, _worst(follows))
         if not stands:
             return None
         if setpoint.forward_m_s * view.forward_m_s < 0.0:
@@ -114,13 +99,6 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
             places = places[min(turned[0] if len(turned) else len(places), len(places) - 2) :]
         ways.append(places)
     return ways
-
-
-def _change_rad_s(setpoint: GuidedVelocity, view: LocalView) -> float:
-    """By how much its turn rate differs from those of the last moments, at most, with its sign."""
-    now_s = view.pose.time_s - view.following.dead_s
-    lately = [one.turn_rad_s for one in view.lately if now_s - one.time_s < RECENT_S]
-    return max((setpoint.yaw_rate_rad_s - one for one in (view.yaw_rate_rad_s, *lately)), key=abs)
 
 
 def first_met(places: Places, view: LocalView) -> Met:
@@ -170,7 +148,7 @@ def _tells(setpoint: GuidedVelocity, view: LocalView, latest_s: float) -> NDArra
 
 
 @njit(cache=True, nogil=True)
-def way_of(start, tells, ends_s, turning, rover):
+def way_of(start, tells, ends_s, turn_gain, rover):
     """The way of a rover that does what ``tells`` and then brakes, and whether it comes to stand.
 
     ``start``: north, east, heading, forward speed, turn rate.
@@ -186,9 +164,7 @@ def way_of(start, tells, ends_s, turning, rover):
             at += 1
         goes_m_s, turns_rad_s = 0.0, 0.0
         if middle_s < ends_s:
-            goes_m_s, turns_rad_s = tells[at, 1], turning.gain * tells[at, 2]
-            if turning.from_s <= middle_s < turning.until_s:
-                turns_rad_s += turning.swing_rad_s
+            goes_m_s, turns_rad_s = tells[at, 1], turn_gain * tells[at, 2]
         slows = speed * (goes_m_s - speed) < 0.0
         most = (rover.brakes_m_s2 if slows else rover.gains_m_s2) * STEP_S
         most_turn = rover.turns_rad_s2 * STEP_S

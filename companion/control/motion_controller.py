@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.following import GUARDED_S, RECENT_S, Following, swings_s, turn_gains
+from companion.control.following import GUARDED_S, Following, turn_gains
 from companion.control.local_view import LocalView
 from companion.control.motion_ground import NEAR_M, Window, look_round
 from companion.control.motion_kernels import (
@@ -28,7 +28,6 @@ from companion.control.motion_kernels import (
     admitted_speeds,
     may_be_last,
     spare_m,
-    swinging_gain,
     way_of,
 )
 from companion.control.motion_planners import Found, MotionPlanner
@@ -136,7 +135,6 @@ class MotionController:
             model=worst_model(model, view.following),
             pending=_pending(view, _latest(view), ALONE_STEP_S),
             step_s=ALONE_STEP_S,
-            recent_rad_s=_recent_rad_s(view),
         )
         problem = problem._replace(admitted_m_s=_admitted(view, worst))
         if view.speed_m_s < STANDS_M_S and not _leads_on(problem):
@@ -189,9 +187,9 @@ def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:
     """See ``MotionProblem.admitted_m_s``: the rover may be left alone with these."""
     turns_rad_s = np.linspace(-1.0, 1.0, TURNS) * worst.model.turn_fastest_rad_s
     lasts_s = view.settings.guidance.velocity_lasts_s
-    gains, swings, off = turn_gains(view.following, lasts_s), swings_s(lasts_s), view.following.off_model
+    gains = turn_gains(view.following, lasts_s)
     admitted: NDArray[np.float64] = admitted_speeds(
-        turns_rad_s, lasts_s, gains, WEIGHTS.margin_m, _faster_s(view), worst, swings, off
+        turns_rad_s, lasts_s, gains, WEIGHTS.margin_m, _faster_s(view), worst
     )
     return admitted
 
@@ -218,20 +216,10 @@ def _may_be_left_alone(told: ToldVelocity, view: LocalView, worst: MotionProblem
     """Whether this may be the last command, however the rover turns."""
     lasts_s, margin_m, faster_s = view.settings.guidance.velocity_lasts_s, WEIGHTS.margin_m, _faster_s(view)
 
-    def may(gain: float, swings: float) -> bool:
-        return bool(may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, margin_m, faster_s, worst, swings))
+    def may(gain: float) -> bool:
+        return bool(may_be_last(told.speed_m_s, told.turn_rad_s, lasts_s, gain, margin_m, faster_s, worst))
 
-    swings, gains = swings_s(lasts_s), turn_gains(view.following, lasts_s)
-    if swings > 0.0 and not may(swinging_gain(told.turn_rad_s, worst.recent_rad_s, view.following.off_model), swings):
-        return False
-    return all(may(gain, 0.0) for gain in gains)
-
-
-def _recent_rad_s(view: LocalView) -> tuple[float, float]:
-    """The least and the largest turn rate of the last moments, told or seen."""
-    since_s = view.pose.time_s - view.following.dead_s - RECENT_S
-    turns_rad_s = [view.yaw_rate_rad_s, *(one.turn_rad_s for one in view.lately if one.time_s > since_s)]
-    return min(turns_rad_s), max(turns_rad_s)
+    return all(may(gain) for gain in turn_gains(view.following, lasts_s))
 
 
 def _latest(view: LocalView) -> int:

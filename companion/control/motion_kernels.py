@@ -16,8 +16,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from companion.control.following import SWINGING_S
-
 BLOCKED_S = 1e3
 """Added to the cost of a motion that touches something; more the earlier it does."""
 NO_WAY_S = 60.0
@@ -125,8 +123,7 @@ class MotionProblem(NamedTuple):
 
     ``pending``: shape (n, 2), the commands told that have not had their effect yet, one a step.
     ``admitted_m_s``: shape (n, 2), the fastest speeds that may be told, forwards and backwards, at n turn rates evenly
-    from the fastest to the left to the fastest to the right. ``recent_rad_s``: the least and the largest turn rate of
-    the last moments, told or seen: a rover that changes from them may swing past what it is told, for ``swinging_s``.
+    from the fastest to the left to the fastest to the right.
     """
 
     start: Start
@@ -138,8 +135,6 @@ class MotionProblem(NamedTuple):
     admitted_m_s: Any
     horizon_s: float
     step_s: float
-    recent_rad_s: tuple[float, float] = (0.0, 0.0)
-    swinging_s: float = SWINGING_S
 
 
 @njit(cache=True, nogil=True, inline="always")
@@ -377,19 +372,16 @@ def costs_s(motions, problem):
 
 
 @njit(cache=True, nogil=True)
-def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, swings_s=0.0):
+def may_be_last(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem):
     """Whether a command may be the last: held so long, then braked, it leads over ground that is free and seen.
 
     The rover keeps ``margin_m``, and ``margin_s`` more for each m/s. ``gain``: it turns by this factor more than told.
-    ``swings_s``: and by so many radians too far for each rad/s of change.
     """
-    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, 0.0, 0.0, swings_s) >= 0.0
+    return spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, 0.0, 0.0) >= 0.0
 
 
 @njit(cache=True, nogil=True)
-def spare_m(
-    told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, least_m=-math.inf, most_m=FAR_M, swings_s=0.0
-):
+def spare_m(told_m_s, told_rad_s, lasts_s, gain, margin_m, margin_s, problem, least_m=-math.inf, most_m=FAR_M):
     """How much more room than it must keep such a rover has, at the worst place; below 0 it may not be left alone.
 
     Exact only between ``least_m`` and ``most_m``: where it is surely less, the rest of the way is not looked at, and
@@ -400,8 +392,6 @@ def spare_m(
     gap_m, seen_m, cell_m = ground.gap_m, ground.seen_m, ground.cell_m
     state = (start.x_m, start.y_m, start.heading_rad, start.speed_m_s, start.turn_rad_s)
     early, held = pending.shape[0], int(math.ceil(lasts_s / step_s))
-    swing_rad_s = swings_s * _change_rad_s(told_rad_s, problem.recent_rad_s) / problem.swinging_s
-    swinging = early + int(round(problem.swinging_s / step_s))
     still = _least_m(gap_m, cell_m, body, start)
     still_seen = _least_m(seen_m, cell_m, body, start, 0.0)
     fastest_m_s = max(abs(start.speed_m_s), abs(told_m_s), model.fastest_m_s)
@@ -415,9 +405,8 @@ def spare_m(
             now_m_s, now_rad_s = pending[step, 0], pending[step, 1]
         elif step < early + held:
             now_m_s, now_rad_s = told_m_s, told_rad_s
-        swings_rad_s = swing_rad_s if early <= step < min(swinging, early + held) else 0.0
         before_rad = state[2]
-        state = moved(state, now_m_s, gain * now_rad_s + swings_rad_s, model, step_s)
+        state = moved(state, now_m_s, gain * now_rad_s, model, step_s)
         step += 1
         sure_m -= abs(state[3]) * step_s + (body.around_m - body.radius_m) * abs(state[2] - before_rad)
         if sure_m > 0.0:
@@ -430,20 +419,6 @@ def spare_m(
         if spare < least_m:
             break
     return spare
-
-
-@njit(cache=True, nogil=True)
-def _change_rad_s(told_rad_s, recent_rad_s):
-    """By how much a turn rate differs from what was lately, at most, with its sign."""
-    up, down = told_rad_s - recent_rad_s[0], told_rad_s - recent_rad_s[1]
-    return up if abs(up) >= abs(down) else down
-
-
-@njit(cache=True, nogil=True)
-def swinging_gain(told_rad_s, recent_rad_s, off):
-    """By which factor a rover that swings past a turn rate turns more than told, at worst: the farther the same way."""
-    onwards = told_rad_s * _change_rad_s(told_rad_s, recent_rad_s) > 0.0
-    return 1.0 + off if onwards else 1.0 - off
 
 
 @njit(cache=True, nogil=True)
@@ -472,10 +447,10 @@ def keep_within(motion, problem):
 
 
 @njit(cache=True, nogil=True)
-def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem, swings_s=0.0, off=0.0):
+def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem):
     """The fastest speeds at these turn rates, forwards and backwards, shape (n, 2), that may be the last command.
 
-    Whether the rover turns by any of the factors ``gains``, or swings while it is so far ``off`` what is known of it.
+    Whether the rover turns by any of the factors ``gains``.
     """
     model = problem.model
     admitted = np.zeros((turns_rad_s.size, 2))
@@ -483,15 +458,11 @@ def admitted_speeds(turns_rad_s, lasts_s, gains, margin_m, margin_s, problem, sw
         for side in range(2):
             most = model.fastest_m_s if side == 0 else -model.backwards_m_s
             for share in range(TRIED, 0, -1):
-                told_m_s, turn_rad_s = most * (share / TRIED) ** 2, turns_rad_s[at]
-                swinging = swinging_gain(turn_rad_s, problem.recent_rad_s, off)
-                safe = swings_s == 0.0 or may_be_last(
-                    told_m_s, turn_rad_s, lasts_s, swinging, margin_m, margin_s, problem, swings_s
-                )
+                told_m_s, safe = most * (share / TRIED) ** 2, True
                 for gain in gains:
+                    safe = may_be_last(told_m_s, turns_rad_s[at], lasts_s, gain, margin_m, margin_s, problem)
                     if not safe:
                         break
-                    safe = may_be_last(told_m_s, turn_rad_s, lasts_s, gain, margin_m, margin_s, problem)
                 if safe:
                     admitted[at, side] = abs(told_m_s)
                     break

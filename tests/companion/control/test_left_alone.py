@@ -259,12 +259,12 @@ def test_it_leads_where_the_planning_thinks_though_reckoned_apart(
     ways = ways_left_alone(GuidedVelocity(*told), moment)
     assert ways is not None
     gains = turn_gains(moment.following, moment.settings.guidance.velocity_lasts_s)
-    for way, gain in zip(ways[: len(gains)], gains, strict=True):
+    for way, gain in zip(ways, gains, strict=True):
         state, planned = (MIDDLE, MIDDLE, 0.0, speed_m_s, turn_rad_s), []
         for told_m_s, told_rad_s in [*pending, *[told] * 60, *[(0.0, 0.0)] * 200]:
             state = moved(state, told_m_s, gain * told_rad_s, model, ALONE_STEP_S)
             planned.append((state[1], state[0]))
-        assert np.hypot(*(way[-1, :2] - planned[-1])) < 0.055
+        assert np.hypot(*(way[-1, :2] - planned[-1])) < 0.07
 
 
 def test_a_rover_over_something_may_leave_it_but_not_touch_the_next_thing_as_deep() -> None:
@@ -280,19 +280,15 @@ def test_a_rover_over_something_may_leave_it_but_not_touch_the_next_thing_as_dee
         assert ways is not None and {first_met(way, at) for way in ways} == {met}
 
 
-def test_without_a_guard_the_rover_may_swing_past_a_new_turn_rate() -> None:
-    """Told to go straight after a turn of 1 rad/s to the left it may turn by 0.3 rad to the right."""
-    before = (ToldVelocity(-0.3, 0.5, -1.0),)
-    for lasts_s, swung_rad in ((0.3, 0.0), (3.0, 0.3)):
+def test_without_a_guard_the_rover_may_turn_still_more_and_less_than_told() -> None:
+    for lasts_s, off in ((0.3, 0.3), (3.0, 0.4)):
         guidance = SETTINGS.guidance.model_copy(update={"velocity_lasts_s": lasts_s})
-        at = replace(
-            view(open_ground(), 0.5), settings=SETTINGS.model_copy(update={"guidance": guidance}), lately=before
-        )
-        at = replace(at, following=at.following._replace(turn_acceleration_rad_s2=20.0))
-        ways = ways_left_alone(GuidedVelocity(0.5, 0.0), at)
+        at = replace(view(open_ground(), 0.5), settings=SETTINGS.model_copy(update={"guidance": guidance}))
+        ways = ways_left_alone(GuidedVelocity(0.5, 0.5), at)
         assert ways is not None
-        without = max(way[-1, 2] for way in ways[:3])
-        assert max(way[-1, 2] for way in ways) - without == pytest.approx(swung_rad, abs=0.03)
+        least_rad, told_rad, most_rad = sorted(float(way[-1, 2]) for way in ways)
+        assert most_rad / told_rad == pytest.approx(1.0 + off, abs=0.05)
+        assert least_rad / told_rad == pytest.approx(1.0 - off, abs=0.05)
 
 
 def test_just_after_a_position_the_rover_still_drives_on() -> None:
