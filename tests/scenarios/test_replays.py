@@ -27,28 +27,13 @@ from companion.recording.reader import Record, load_record
 from companion.recording.record_format import CHECKED_TICK, packed_tick, run_sum, unpacked_ticks
 from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
-from companion.settings import Settings
 from sitl.cli.commands import app as sitl_app
-from sitl.faults.fault_file import load_faults
-from sitl.lockstep import Drive
-from sitl.scenario import scenario_from_mission, with_faults
-from tests.support.records import unclosed, with_meta
+from tests.support.records import recorded, unclosed, with_meta
 from tests.support.rig import Rig, kept_in, yard
 from tests.support.served import finished, process
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
-START_US = 1_800_000_000_000_000
-"""15 January 2027, 8:00 UTC."""
 FILES = ("link.tlog", "rounds.bin", "decisions.jsonl")
-
-
-def recorded(folder: Path, mission: Mission, faults: str | None = None, limit_s: float = 200.0) -> Path:
-    """A drive in lock-step with a record."""
-    plan = load_faults(MISSIONS / "faults" / f"{faults}.toml") if faults else None
-    recorder = Recorder(folder, mission, Settings(), 0, arm=True, start_us=START_US)
-    Drive(mission, with_faults(scenario_from_mission(mission), plan), Settings(), 0, recorder, limit_s).run()
-    recorder.close()
-    return folder
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,152 @@
+"""What is made of a record: tables, messages for other programs, films. The same record gives the same bytes."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import json
+import sys
+from collections import defaultdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from typer.testing import CliRunner
+
+from companion.cli.commands import app
+from companion.core.frames import GeoPoint, LocalFrame
+from companion.recording.reader import load_record
+from tests.support.records import START_US, recorded
+from tests.support.rig import yard
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("yard")
+    return recorded(folder / "record", yard(folder))
+
+
+@pytest.fixture(scope="module")
+def made(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a record in all forms."""
+    return made_of(record, tmp_path_factory.mktemp("made"))
+
+
+def made_of(record: Path, folder: Path) -> Path:
+    forms = ["--csv", folder / "csv", "--mcap", folder / "r.mcap", "--out", folder / "r.html"]
+    result = CliRunner().invoke(app, ["report", str(record), *map(str, forms)])
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def rows_of(file: Path) -> list[dict[str, str]]:
+    with file.open(encoding="utf-8", newline="") as opened:
+        return list(csv.DictReader(opened))
+
+
+def test_the_same_record_gives_the_same_bytes(record: Path, made: Path, tmp_path: Path) -> None:
+    again = made_of(record, tmp_path)
+    names = sorted(file.relative_to(made) for file in made.rglob("*") if file.is_file())
+    assert len(names) >= 5
+    assert [name for name in names if (made / name).read_bytes() != (again / name).read_bytes()] == []
+
+
+def test_tables_have_every_decision_pose_and_setpoint(record: Path, made: Path) -> None:
+    loaded = load_record(record)
+    decided = [json.loads(line) for line in loaded.decisions]
+    decisions = rows_of(made / "csv" / "decisions.csv")
+    assert [row["number"] for row in decisions] == [str(number) for number in range(1, len(decided) + 1)]
+    for row, one in zip(decisions, decided, strict=True):
+        assert float(row["time_s"]) == pytest.approx(one["time_s"], abs=1e-3)
+        assert (row["action"], row["reason"], row["path_fields"]) == (
+            one["action"],
+            one["reason"],
+            str(len(one["path"])),
+        )
+    assert {row["planner"] for row in decisions if row["searches"]} == {"hybrid"}
+    poses = rows_of(made / "csv" / "pose.csv")
+    assert len(poses) > 300 and [float(row["time_s"]) for row in poses] == sorted(float(row["time_s"]) for row in poses)
+    last, first = poses[-1], next(row for row in poses if row["latitude_deg"])
+    assert last["time_utc"].startswith("2027-01-15T08:") and (first["mode"], last["mode"]) == ("MANUAL", "GUIDED")
+    places = [GeoPoint(float(row["latitude_deg"]), float(row["longitude_deg"])) for row in (first, last)]
+    moved = LocalFrame(places[0]).to_ned(places[1])
+    assert moved.east_m == pytest.approx(float(last["east_m"]) - float(first["east_m"]), abs=0.01)
+    setpoints = rows_of(made / "csv" / "setpoints.csv")
+    said = [raw for tick in loaded.ticks() for raw in tick.said]
+    told = [raw for raw in said if raw[7:10] == bytes((84, 0, 0))]  # SET_POSITION_TARGET_LOCAL_NED
+    assert sum(row["kind"] != "speed" for row in setpoints) == len(told) > 10
+    assert {row["kind"] for row in setpoints} >= {"position", "speed", "velocity"}
+
+
+REQUIRED = {
+    "foxglove.FrameTransform": "timestamp parent_frame_id child_frame_id translation rotation",
+    "foxglove.PoseInFrame": "timestamp frame_id pose",
+    "foxglove.LocationFix": "timestamp frame_id latitude longitude altitude position_covariance "
+    "position_covariance_type",
+    "foxglove.LaserScan": "timestamp frame_id pose start_angle end_angle ranges intensities",
+    "foxglove.Grid": "timestamp frame_id pose column_count cell_size row_stride cell_stride fields data",
+    "foxglove.SceneUpdate": "deletions entities",
+    "foxglove.Log": "timestamp level message name file line",
+}
+"""As Foxglove's documentation lists them."""
+
+
+def fits(value: Any, schema: dict[str, Any]) -> bool:
+    """Whether a value is as its schema says, with all its fields and no others."""
+    match schema["type"]:
+        case "object":
+            fields = schema.get("properties")
+            return isinstance(value, dict) and (
+                fields is None
+                or (value.keys() == fields.keys() and all(fits(value[key], fields[key]) for key in fields))
+            )
+        case "array":
+            return isinstance(value, list) and all(fits(one, schema["items"]) for one in value)
+        case kind:
+            types = {"number": (int, float), "integer": int, "string": str, "boolean": bool}
+            return isinstance(value, types[kind])
+
+
+def test_messages_are_read_back_as_their_schemas_say(record: Path, made: Path) -> None:
+    found: dict[str, list[tuple[int, dict[str, Any]]]] = defaultdict(list)
+    schemas: dict[str, dict[str, Any]] = {}
+    with (made / "r.mcap").open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            assert schema is not None and (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            value = json.loads(message.data)
+            found[channel.topic].append((message.log_time, value))
+            schemas[schema.name] = json.loads(schema.data)
+            if schema.name in REQUIRED:
+                assert value.keys() == set(REQUIRED[schema.name].split())
+            assert fits(value, schemas[schema.name]), value
+    assert schemas.keys() > REQUIRED.keys()
+    poses = rows_of(made / "csv" / "pose.csv")
+    assert len(found["/pose"]) == len(found["/tf"]) == len(found["/state"]) == len(poses)
+    at_ns, last = found["/pose"][-1]
+    assert last["pose"]["position"]["x"] == pytest.approx(float(poses[-1]["east_m"]), abs=0.002)
+    assert at_ns == pytest.approx(1000 * START_US + 1e9 * (float(poses[-1]["time_s"]) - 0.05), abs=2e6)
+    assert len(found["/decision"]) == len(load_record(record).decisions)
+    assert any(one["message"] == "Reached gate" and one["name"] == "companion" for _, one in found["/log"])
+    assert max(max(one["ranges"]) for _, one in found["/scan"]) > 3.0
+    ground = found["/map"][-1][1]
+    rows = len(base64.b64decode(ground["data"])) / ground["row_stride"]
+    assert rows == int(rows) > 20 and ground["column_count"] > 20
+    assert found["/path"][0][1]["entities"][0]["lines"][0]["points"]
+    assert [one["entities"][0]["texts"][0]["text"] for _, one in found["/targets"]] == ["gate"]
+
+
+def test_without_the_extra_one_line_says_how_to_install_it(
+    record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mcap", None)
+    result = CliRunner().invoke(app, ["report", str(record), "--mcap", str(tmp_path / "r.mcap")])
+    assert (result.exit_code, result.output) == (2, "--mcap: mcap is not installed; install rover-companion[mcap]\n")
+    assert not (tmp_path / "r.mcap").exists()
+
+
+def test_a_record_is_never_written_over(record: Path) -> None:
+    before = (record / "link.tlog").read_bytes()
+    result = CliRunner().invoke(app, ["report", str(record), "--mcap", str(record / "link.tlog")])
+    assert result.exit_code == 2 and "is another file of this command" in result.output
+    assert (record / "link.tlog").read_bytes() == before
