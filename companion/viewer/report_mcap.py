@@ -23,14 +23,13 @@ from companion.replay.replay import ReplayObserver
 from companion.viewer import foxglove
 from companion.viewer.foxglove_schemas import SCHEMAS
 from companion.viewer.frame import mode_name, news_of
-from companion.viewer.map_tiles import cell_classes
+from companion.viewer.map_colours import CELL_COLOURS
+from companion.viewer.map_tiles import UNKNOWN, cell_classes
 
 MAP_S, PATH_S = 2.0, 0.5
 """So often each is written, if it has changed."""
-COLOURS = np.array(
-    [(0, 0, 0, 0), (214, 226, 206, 255), (40, 44, 52, 255), (196, 110, 100, 255), (232, 214, 160, 255)], np.uint8
-)
-"""By what a cell is: unknown, free, obstacle, closed, costly."""
+SEEN, UNSEEN = 255, 0
+"""Opacity."""
 TOPICS = {
     "/tf": "FrameTransform",
     "/pose": "PoseInFrame",
@@ -166,9 +165,11 @@ class McapReport(ReplayObserver):
         self._map = cells.tobytes()
         rows, columns = (np.flatnonzero(cells.any(axis=axis)) for axis in (1, 0))
         kept = cells[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
+        opacity = np.where(kept == UNKNOWN, UNSEEN, SEEN).astype(np.uint8)
+        colours = np.dstack((CELL_COLOURS[kept], opacity))
         corner, cell_m = evidence.base.south_west, evidence.evidence_m
         south_west = NedPoint(corner.north_m + rows[0] * cell_m, corner.east_m + columns[0] * cell_m)
-        self._put("/map", time_s, foxglove.grid(at_us, south_west, cell_m, COLOURS[kept]))
+        self._put("/map", time_s, foxglove.grid(at_us, south_west, cell_m, colours))
 
     def _at_us(self, time_s: float) -> int:
         """Microseconds since 1970; the format has no time before that."""

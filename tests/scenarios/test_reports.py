@@ -5,19 +5,22 @@ from __future__ import annotations
 import base64
 import csv
 import json
+import shutil
 import sys
-from collections import defaultdict
+from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any
 
 import pytest
 from mcap.reader import make_reader
+from PIL import Image
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
-from tests.support.records import START_US, recorded
+from companion.viewer.film_picture import REACHED, ROVER, TRACK
+from tests.support.records import START_US, recorded, write_record
 from tests.support.rig import yard
 
 
@@ -34,7 +37,16 @@ def made(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def made_of(record: Path, folder: Path) -> Path:
-    forms = ["--csv", folder / "csv", "--mcap", folder / "r.mcap", "--out", folder / "r.html"]
+    forms = [
+        "--csv",
+        folder / "csv",
+        "--mcap",
+        folder / "r.mcap",
+        "--out",
+        folder / "r.html",
+        "--gif",
+        folder / "r.gif",
+    ]
     result = CliRunner().invoke(app, ["report", str(record), *map(str, forms)])
     assert result.exit_code == 0, result.output
     return folder
@@ -143,6 +155,59 @@ def test_without_the_extra_one_line_says_how_to_install_it(
     result = CliRunner().invoke(app, ["report", str(record), "--mcap", str(tmp_path / "r.mcap")])
     assert (result.exit_code, result.output) == (2, "--mcap: mcap is not installed; install rover-companion[mcap]\n")
     assert not (tmp_path / "r.mcap").exists()
+
+
+def test_a_film_shows_the_drive_from_its_beginning_to_its_end(made: Path) -> None:
+    with Image.open(made / "r.gif") as film:
+        assert film.format == "GIF" and 20 < film.n_frames <= 300 and film.info["loop"] == 0
+        assert max(film.size) < 700 and (made / "r.gif").stat().st_size < 1_000_000
+        pictures = []
+        for number in (0, film.n_frames - 1):
+            film.seek(number)
+            pictures.append(film.convert("RGB"))
+    first, last = (Counter(one.get_flattened_data()) for one in pictures)
+    white, black = ((255, 255, 255), (18, 24, 30))
+    assert near(last, white) > 1.1 * near(first, white), "more ground is known"
+    assert near(last, black) > near(first, black), "and more of what stands there"
+    assert near(last, TRACK) > 200 > near(first, TRACK)
+    assert near(last, ROVER) > 20 and near(last, REACHED) > 20
+
+
+def near(found: Counter[tuple[int, ...]], colour: tuple[int, int, int]) -> int:
+    """How many pixels have about this colour."""
+    return sum(count for one, count in found.items() if all(abs(a - b) < 12 for a, b in zip(one, colour, strict=True)))
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
+def test_the_film_is_made_by_ffmpeg_too(record: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["report", str(record), "--mp4", str(tmp_path / "r.mp4")])
+    assert result.exit_code == 0 and result.output.startswith(f"film: {tmp_path / 'r.mp4'} (")
+    data = (tmp_path / "r.mp4").read_bytes()
+    assert data[4:8] == b"ftyp" and b"avc1" in data and 10_000 < len(data) < 1_000_000
+    assert not (record / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("script", "says"),
+    [
+        (None, "--mp4: ffmpeg is not installed; install it (apt-get install ffmpeg), or use --gif"),
+        ("#!/bin/sh\necho Unknown encoder libx264 >&2\nexit 8\n", "ffmpeg gave up: Unknown encoder libx264; use --gif"),
+    ],
+)
+def test_an_ffmpeg_that_is_missing_or_gives_up_is_one_line(
+    record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str | None, says: str
+) -> None:
+    if script is not None:
+        (tmp_path / "ffmpeg").write_text(script)
+        (tmp_path / "ffmpeg").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    result = CliRunner().invoke(app, ["report", str(record), "--mp4", str(tmp_path / "r.mp4")])
+    assert result.exit_code == 2 and result.output.endswith(f"{says}\n") and result.output.count("\n") == 1
+
+
+def test_there_is_no_film_of_a_mission_that_had_not_begun(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["report", str(write_record(tmp_path)), "--gif", str(tmp_path / "r.gif")])
+    assert (result.exit_code, result.output.count("\n")) == (2, 1) and "the mission had not begun" in result.output
 
 
 def test_a_record_is_never_written_over(record: Path) -> None:
