@@ -20,7 +20,7 @@ from companion.recording.record_clock import record_clock
 from companion.recording.record_format import RecordError
 from companion.replay.replay import Observers, ReplayObserver, replay
 from companion.viewer.report_csv import FILES, CsvReport
-from companion.viewer.report_data import ReportWatch, as_json, counted, joined, run_of
+from companion.viewer.report_data import ReportWatch, as_json, counted, joined, named, run_of
 from companion.viewer.report_film import Film, FilmError, check_ffmpeg, write_gif, write_mp4
 from companion.viewer.report_mcap import McapError, McapReport, check_mcap
 from companion.viewer.report_page import report_page
@@ -129,7 +129,7 @@ def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
             stack.callback(messages.close)
             observers.append(messages)
         result = replay(first, Observers(observers))
-    runs = [run_of(first, tally, result), *(counted(one) for one in records[1:])]
+    runs = named([run_of(first, tally, result), *(counted(one) for one in records[1:])])
     if forms.csv is not None:
         typer.echo(f"tables: {forms.csv} ({', '.join(FILES)})")
     if forms.mcap is not None:

@@ -8,6 +8,8 @@ from __future__ import annotations
 import base64
 import json
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +42,8 @@ def report_data(record: Record, others: list[Record]) -> Json:
     """Everything that the page shows. ``others``: their tracks and figures. Raises RecordError if one is damaged."""
     watched, tally = ReportWatch(record), RunTally()
     result = replay(record, Observers((watched, tally)))
-    return joined(record, watched, run_of(record, tally, result), [counted(one) for one in others])
+    first, *more = named([run_of(record, tally, result), *(counted(one) for one in others)])
+    return joined(record, watched, first, more)
 
 
 def counted(record: Record) -> Run:
@@ -53,7 +56,17 @@ def run_of(record: Record, tally: RunTally, result: ReplayResult) -> Run:
     """The run for tables. Only a simulator knows contacts."""
     found = _contacts(record.directory)
     known = found or record_clock(record).simulated
-    return Run(record.directory.resolve().name, tally, result, len(found) if known else None)
+    return Run(str(record.directory), tally, result, len(found) if known else None)
+
+
+def named(runs: Sequence[Run]) -> list[Run]:
+    """Runs by the last part of their names, where that is enough to tell them apart."""
+    short = [Path(run.name).resolve().name for run in runs]
+    return (
+        [replace(run, name=name) for run, name in zip(runs, short, strict=True)]
+        if len(set(short)) == len(short)
+        else [*runs]
+    )
 
 
 def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) -> Json:

@@ -12,7 +12,7 @@ from typing import Any
 from companion.replay.replay import ReplayResult
 from companion.viewer.run_tally import RunTally, Spell
 
-NOT_KNOWN = "-"
+NOT_KNOWN, NBSP = "-", "\N{NO-BREAK SPACE}"
 Json = dict[str, Any]
 
 
@@ -48,15 +48,15 @@ def _comparable(runs: Sequence[Run]) -> list[tuple[str, int, list[float | None]]
     """Rows of figures with their decimals."""
     tallies = [run.tally for run in runs]
     return [
-        ("time, s", 1, [one.seconds for one in tallies]),
-        ("driven, m", 1, [one.driven_m for one in tallies]),
+        (f"time,{NBSP}s", 1, [one.seconds for one in tallies]),
+        (f"driven,{NBSP}m", 1, [one.driven_m for one in tallies]),
         ("targets reached", 0, [one.reached for one in tallies]),
         ("stops", 0, [one.stops for one in tallies]),
-        ("stopped, s", 1, [one.stopped_s for one in tallies]),
+        (f"stopped,{NBSP}s", 1, [one.stopped_s for one in tallies]),
         ("decisions", 0, [one.decisions for one in tallies]),
         ("searches", 0, [one.searches for one in tallies]),
         ("contacts", 0, [run.contacts for run in runs]),
-        ("energy, Wh", 2, [one.energy.energy_wh for one in tallies]),
+        (f"energy,{NBSP}Wh", 2, [one.energy.energy_wh for one in tallies]),
     ]
 
 
@@ -77,7 +77,7 @@ def _targets(tally: RunTally) -> Json:
         [leg.name, leg.status, *(_number(value, 1) for value in (leg.reached_s, leg.driven_m, leg.straight_m))]
         for leg in tally.legs
     ]
-    return {"title": "Targets", "head": ["target", "status", "reached at s", "driven m", "straight m"], "rows": rows}
+    return {"title": "Targets", "head": ["target", "status", "at s", "driven m", "straight m"], "rows": rows}
 
 
 def _figures(run: Run) -> Json:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import csv
+import gzip
 import json
+import re
 import shutil
 import sys
 from collections import Counter, defaultdict
@@ -14,12 +16,14 @@ from typing import Any
 import pytest
 from mcap.reader import make_reader
 from PIL import Image
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
+from companion.viewer.report_data import counted, report_data
 from tests.support.records import START_US, recorded, write_record
 from tests.support.rig import yard
 
@@ -208,6 +212,57 @@ def test_an_ffmpeg_that_is_missing_or_gives_up_is_one_line(
 def test_there_is_no_film_of_a_mission_that_had_not_begun(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["report", str(write_record(tmp_path)), "--gif", str(tmp_path / "r.gif")])
     assert (result.exit_code, result.output.count("\n")) == (2, 1) and "the mission had not begun" in result.output
+
+
+SILENT = """
+[[fault]]
+kind = "sensor_silent"
+since = "driving"
+start_s = 3.0
+duration_s = 1.6
+"""
+
+
+def test_several_records_are_compared_in_figures(record: Path, tmp_path: Path) -> None:
+    (tmp_path / "silent.toml").write_text(SILENT)
+    other = recorded(tmp_path / "other", yard(tmp_path), tmp_path / "silent.toml")
+    result = CliRunner().invoke(app, ["report", str(record), str(other), "--out", str(tmp_path / "r.html")])
+    assert result.exit_code == 0, result.output
+    table = {line[:15].strip().replace("\xa0", " "): line[15:].split() for line in result.output.splitlines()[1:]}
+    assert table[""] == ["record", "other"]
+    assert table["stops"] == ["0", "1", "(+1)"] and table["targets reached"] == ["1", "1", "(±0)"]
+    longer_s = float(table["time, s"][1]) - float(table["time, s"][0])
+    assert longer_s > 0.5 and table["time, s"][2] == f"({longer_s:+.1f})"
+    assert table["contacts"] == ["-", "-"], "the clock is not a simulator's: nobody knows of contacts"
+    data = data_in(tmp_path / "r.html")
+    assert [one["name"] for one in data["others"]] == ["other"] and data["tables"][0]["title"] == "Differences"
+    alone = load_record(other)
+    tables = {one["title"]: one["rows"] for one in report_data(alone, [])["tables"]}
+    assert [row[:2] for row in tables["Watchdogs"]] == [["range data ahead silent for over 1 s", "1"]]
+    assert ["stopped: range data ahead silent for over 1 s", "1"] in [row[:2] for row in tables["Stops and waits"]]
+    name, status, reached_s, driven_m, straight_m = tables["Targets"][0]
+    assert (name, status) == ("gate", "reached") and 12.0 < float(straight_m) < float(driven_m) < 20.0
+    assert 45.0 < float(reached_s) < 70.0
+
+
+def data_in(file: Path) -> dict[str, Any]:
+    found = re.search(r'id="record" type="application/octet-stream">([^<]+)<', file.read_text(encoding="utf-8"))
+    assert found is not None
+    data: dict[str, Any] = json.loads(gzip.decompress(base64.b64decode(found[1])))
+    return data
+
+
+def test_the_energy_is_what_the_autopilot_says_it_was(record: Path) -> None:
+    energy = counted(load_record(record)).tally.energy
+    consumed = [
+        (message.current_consumed / 1000.0, message.energy_consumed / 36.0)
+        for tick in load_record(record).ticks()
+        for raw in tick.heard
+        if isinstance(message := mavlink.MAVLink(None).decode(bytearray(raw)), mavlink.MAVLink_battery_status_message)
+    ]
+    charge_ah, energy_wh = consumed[-1]
+    assert energy.charge_ah == pytest.approx(charge_ah, rel=0.05) and charge_ah > 0.05
+    assert energy.energy_wh == pytest.approx(energy_wh, rel=0.05)
 
 
 def test_a_record_is_never_written_over(record: Path) -> None:

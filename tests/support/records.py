@@ -36,9 +36,10 @@ Change = Callable[[Path], None]
 """Changes a record."""
 
 
-def recorded(folder: Path, mission: Mission, faults: str | None = None, limit_s: float = 200.0) -> Path:
-    """A drive in lock-step with a record."""
-    plan = load_faults(MISSIONS / "faults" / f"{faults}.toml") if faults else None
+def recorded(folder: Path, mission: Mission, faults: str | Path | None = None, limit_s: float = 200.0) -> Path:
+    """A drive in lock-step with a record. ``faults``: a shipped plan by its name, or a file."""
+    file = MISSIONS / "faults" / f"{faults}.toml" if isinstance(faults, str) else faults
+    plan = None if file is None else load_faults(file)
     recorder = Recorder(folder, mission, Settings(), 0, arm=True, start_us=START_US)
     Drive(mission, with_faults(scenario_from_mission(mission), plan), Settings(), 0, recorder, limit_s).run()
     recorder.close()
