@@ -23,7 +23,8 @@ from companion.cli.commands import app
 from companion.core.frames import GeoPoint, LocalFrame
 from companion.recording.reader import load_record
 from companion.viewer.film_picture import REACHED, ROVER, TRACK
-from companion.viewer.report_data import counted, report_data
+from companion.viewer.report_data import counted
+from companion.viewer.report_tables import tables_of
 from tests.support.records import START_US, recorded, write_record
 from tests.support.rig import yard
 
@@ -236,8 +237,7 @@ def test_several_records_are_compared_in_figures(record: Path, tmp_path: Path) -
     assert table["contacts"] == ["-", "-"], "the clock is not a simulator's: nobody knows of contacts"
     data = data_in(tmp_path / "r.html")
     assert [one["name"] for one in data["others"]] == ["other"] and data["tables"][0]["title"] == "Differences"
-    alone = load_record(other)
-    tables = {one["title"]: one["rows"] for one in report_data(alone, [])["tables"]}
+    tables = {one["title"]: one["rows"] for one in tables_of(counted(load_record(other)))}
     assert [row[:2] for row in tables["Watchdogs"]] == [["range data ahead silent for over 1 s", "1"]]
     assert ["stopped: range data ahead silent for over 1 s", "1"] in [row[:2] for row in tables["Stops and waits"]]
     name, status, reached_s, driven_m, straight_m = tables["Targets"][0]
@@ -265,8 +265,21 @@ def test_the_energy_is_what_the_autopilot_says_it_was(record: Path) -> None:
     assert energy.energy_wh == pytest.approx(energy_wh, rel=0.05)
 
 
-def test_a_record_is_never_written_over(record: Path) -> None:
-    before = (record / "link.tlog").read_bytes()
-    result = CliRunner().invoke(app, ["report", str(record), "--mcap", str(record / "link.tlog")])
-    assert result.exit_code == 2 and "is another file of this command" in result.output
-    assert (record / "link.tlog").read_bytes() == before
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--mcap", "{record}/link.tlog"], "is another file of this command"),
+        (["--gif", "{folder}/x", "--mcap", "{folder}/x"], "is another file of this command"),
+        (["--csv", "{record}/meta.json"], "cannot be written"),
+        (["--gif", "{folder}/x.gif", "--open"], "--open shows the HTML file: name it with --out as well"),
+    ],
+)
+def test_what_cannot_be_written_is_one_line_and_no_record_is_harmed(
+    record: Path, tmp_path: Path, options: list[str], says: str
+) -> None:
+    before = {file: file.read_bytes() for file in record.rglob("*") if file.is_file()}
+    given = [one.format(record=record, folder=tmp_path) for one in options]
+    result = CliRunner().invoke(app, ["report", str(record), *given])
+    assert (result.exit_code, result.output.count("\n")) == (2, 1) and says in result.output
+    assert {file: file.read_bytes() for file in record.rglob("*") if file.is_file()} == before
+    assert list(tmp_path.iterdir()) == []
