@@ -1,7 +1,8 @@
-"""``rover-companion replay``: runs a recorded companion again and compares; explains a decision with ``--why``."""
+"""``rover-companion replay``: runs a recorded companion again and compares; lists decisions, explains one."""
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -12,7 +13,9 @@ from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, picture
 from companion.mapping.map_files import MapError
 from companion.recording.contacts import COLLISIONS, contacts_of
 from companion.recording.reader import Record, load_record
+from companion.recording.record_clock import record_clock
 from companion.recording.record_format import RecordError
+from companion.replay.decision_list import DecisionLister, decision_at, list_lines
 from companion.replay.explain import DecisionExplainer, explanation_lines
 from companion.replay.replay import ReplayResult
 from companion.replay.replay import replay as run_again
@@ -24,10 +27,18 @@ SHOWN = 20
 def replay(
     directory: Annotated[Path, typer.Argument(metavar="DIR", help="What run or drive wrote with --record.")],
     why: Annotated[
-        int | None, typer.Option(min=1, metavar="STEP", help="Show why this decision was made; the first is 1.")
+        str | None,
+        typer.Option(
+            metavar="MOMENT",
+            help="Show why a decision was made: its number (66), or the one in force so many seconds after the start "
+            "(83.5s) or at a time of day (14:03:22).",
+        ),
     ] = None,
+    show_list: Annotated[
+        bool, typer.Option("--list", help="List all decisions, and what happened between them.")
+    ] = False,
     image: Annotated[
-        Path | None, typer.Option(help="With --why: where the picture goes; default: why-STEP.png in DIR.")
+        Path | None, typer.Option(help="With --why: where the picture goes; default: why-NUMBER.png in DIR.")
     ] = None,
 ) -> None:
     """Run the decisions of a record again and print the differences.
@@ -38,16 +49,14 @@ def replay(
         record = load_record(directory)
         if image is not None and why is None:
             raise OutputError("--image goes with --why: it shows one decision")
-        explainer = None
-        if why is not None:
-            if why > len(record.decisions):
-                raise RecordError(f"{directory}: there is no decision {why}, the last one is {len(record.decisions)}")
-            image = image or directory / f"why-{why}.png"
-            picture(image)
-            explainer = DecisionExplainer(why, record.settings, record.mission.rover.turning_radius_m)
-        result = run_again(record, explainer)
-        if explainer is not None and image is not None:
-            _explain(explainer, image)
+        if show_list and why is not None:
+            raise OutputError("--list and --why do not go together: list the decisions, then ask for one")
+        if show_list:
+            result = _listed(record)
+        elif why is not None:
+            result = _explained(record, why, image)
+        else:
+            result = run_again(record)
     except (RecordError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -55,6 +64,29 @@ def replay(
     for line in _collisions(directory):
         typer.echo(line)
     raise typer.Exit(EXIT_DIFFERENT if result.differences else EXIT_SAME)
+
+
+def _listed(record: Record) -> ReplayResult:
+    """Replay, and print the list of decisions."""
+    clock, lister = record_clock(record), DecisionLister()
+    result = run_again(record, lister)
+    with contextlib.suppress(OSError, ValueError):  # a file that cannot be read is told after the list
+        lister.add_contacts(contacts_of(record.directory), clock)
+    typer.echo(f"{record.directory}: {clock.described}")
+    for line in list_lines(lister.listed, clock):
+        typer.echo(line)
+    return result
+
+
+def _explained(record: Record, why: str, image: Path | None) -> ReplayResult:
+    """Replay, and explain the decision that was asked for."""
+    number = decision_at(record, record_clock(record), why)
+    image = image or record.directory / f"why-{number}.png"
+    picture(image)
+    explainer = DecisionExplainer(number, record.settings, record.mission.rover.turning_radius_m)
+    result = run_again(record, explainer)
+    _explain(explainer, image)
+    return result
 
 
 def _explain(explainer: DecisionExplainer, image: Path) -> None:

@@ -1,49 +1,170 @@
-"""``rover-companion report``: a record as one HTML file, to look at and to pass on."""
+"""``rover-companion report``: a record as one HTML file, and in other forms: CSV, MCAP, a film."""
 
 from __future__ import annotations
 
 import webbrowser
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from rich.console import Console
+from rich.table import Table
 
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, writable, written
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, writable, written
 from companion.mapping.map_files import MapError
-from companion.recording.reader import load_record
+from companion.recording.reader import Record, files_of, load_record
+from companion.recording.record_clock import record_clock
 from companion.recording.record_format import RecordError
-from companion.viewer.report_data import as_json, report_data
+from companion.replay.replay import Observers, ReplayObserver, replay
+from companion.viewer.report_csv import FILES, CsvReport
+from companion.viewer.report_data import ReportWatch, as_json, counted, joined, named, run_of
+from companion.viewer.report_film import Film, FilmError, check_ffmpeg, write_gif, write_mp4
+from companion.viewer.report_mcap import McapError, McapReport, check_mcap
 from companion.viewer.report_page import report_page
+from companion.viewer.report_tables import Run, differences
+from companion.viewer.run_tally import RunTally
 
 NAME = "report.html"
+
+
+@dataclass(frozen=True, slots=True)
+class Forms:
+    """Where each form of a report goes; None for those that are not wanted."""
+
+    page: Path | None
+    csv: Path | None
+    mcap: Path | None
+    gif: Path | None
+    mp4: Path | None
+
+    @property
+    def files(self) -> list[Path]:
+        """Every file that will be written."""
+        tables = [] if self.csv is None else [self.csv / name for name in FILES]
+        return [one for one in (self.page, self.mcap, self.gif, self.mp4, *tables) if one is not None]
 
 
 def report(
     directories: Annotated[
         list[Path],
-        typer.Argument(metavar="DIR...", help="Records; the tracks of further ones are laid over the first."),
+        typer.Argument(metavar="DIR...", help="Records; further ones are compared with the first."),
     ],
     out: Annotated[
-        Path | None, typer.Option(help="Where the report goes; default: report.html in the first DIR.")
+        Path | None,
+        typer.Option(
+            help="Where the HTML file goes; default: report.html in the first DIR, none if another form is asked for."
+        ),
     ] = None,
-    show: Annotated[bool, typer.Option("--open", help="Open it in the browser.")] = False,
+    csv: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help=f"Write tables of the first DIR: {', '.join(FILES)}.")
+    ] = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="Write the first DIR for Foxglove and Lichtblick (needs rover-companion\\[mcap])."
+        ),
+    ] = None,
+    gif: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Write the drive of the first DIR as a short film, animated GIF."),
+    ] = None,
+    mp4: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The same film as MP4 (needs the program ffmpeg).")
+    ] = None,
+    show: Annotated[bool, typer.Option("--open", help="Open the HTML file in the browser.")] = False,
 ) -> None:
     """Write a record as one HTML file: the drive at any moment, every decision with its why, tables.
 
-    It needs no network and nothing else. Exit code 2: not to be read or written.
+    It needs no network and nothing else. Several records are compared, in the file and here. Exit code 2: not to be
+    read or written.
     """
     try:
         records = [load_record(directory) for directory in directories]
-        file = out or directories[0] / NAME
-        writable(file)
+        page = out if out or csv or mcap or gif or mp4 else directories[0] / NAME
+        if show and page is None:
+            raise OutputError("--open shows the HTML file: name it with --out as well")
+        forms = Forms(page, csv, mcap, gif, mp4)
+        _check(records, forms)
         for note in (note for record in records for note in record.notes):
             typer.echo(note, err=True)
-        data = as_json(report_data(records[0], records[1:]))
-        with written(file):
-            file.write_text(report_page(records[0].mission.name, data), encoding="utf-8")
-    except (RecordError, MapError, OutputError) as error:
+        runs = _made(records, forms)
+    except (RecordError, MapError, McapError, FilmError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    typer.echo(f"report: {file} ({file.stat().st_size / 1e6:.1f} MB)")
-    if show:
-        webbrowser.open(file.resolve().as_uri())
+    if len(runs) > 1:
+        _compare(runs)
+    if show and page is not None:
+        webbrowser.open(page.resolve().as_uri())
+
+
+def _check(records: Sequence[Record], forms: Forms) -> None:
+    """All that can be wrong with the outputs, before the work. Raises OutputError, McapError or FilmError."""
+    for file in forms.files:
+        writable(file)
+    apart(forms.files, [file for record in records for file in files_of(record)])
+    if forms.mcap is not None:
+        check_mcap()
+    if forms.mp4 is not None:
+        check_ffmpeg()
+
+
+def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
+    """Run the first record again, and write what was asked for; then the others, to compare."""
+    first = records[0]
+    clock, tally = record_clock(first), RunTally()
+    watched = None if (forms.page or forms.gif or forms.mp4) is None else ReportWatch(first)
+    observers: list[ReplayObserver] = [tally, *([] if watched is None else [watched])]
+    with ExitStack() as stack:
+        if forms.csv is not None:
+            stack.enter_context(written(forms.csv))
+            tables = CsvReport(forms.csv, clock)
+            stack.callback(tables.close)
+            observers.append(tables)
+        if forms.mcap is not None:
+            stack.enter_context(written(forms.mcap))
+            messages = McapReport(forms.mcap, clock)
+            stack.callback(messages.close)
+            observers.append(messages)
+        result = replay(first, Observers(observers))
+    runs = named([run_of(first, tally, result), *(counted(one) for one in records[1:])])
+    if forms.csv is not None:
+        typer.echo(f"tables: {forms.csv} ({', '.join(FILES)})")
+    if forms.mcap is not None:
+        _tell("messages", forms.mcap)
+    if watched is not None:
+        _write(first, joined(first, watched, runs[0], runs[1:]), forms)
+    return runs
+
+
+def _write(record: Record, data: dict[str, Any], forms: Forms) -> None:
+    """The forms that are made of the report's data."""
+    if forms.gif is not None:
+        with written(forms.gif):
+            write_gif(Film(data), forms.gif)
+        _tell("film", forms.gif)
+    if forms.mp4 is not None:
+        with written(forms.mp4):
+            write_mp4(Film(data), forms.mp4)
+        _tell("film", forms.mp4)
+    if forms.page is not None:
+        with written(forms.page):
+            forms.page.write_text(report_page(record.mission.name, as_json(data)), encoding="utf-8")
+        _tell("report", forms.page)
+
+
+def _tell(what: str, file: Path) -> None:
+    typer.echo(f"{what}: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+
+
+def _compare(runs: list[Run]) -> None:
+    """The differences on the terminal."""
+    found = differences(runs)
+    table = Table(box=None, pad_edge=False)
+    for number, name in enumerate(found["head"]):
+        table.add_column(name.replace("[", "\\["), justify="right" if number else "left", overflow="fold")
+    for row in found["rows"]:
+        table.add_row(*row)
+    Console().print(table, highlight=False)

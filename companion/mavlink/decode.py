@@ -343,17 +343,22 @@ def _battery_status(message: Any, time_s: float) -> BatterySeen:
     """BATTERY_STATUS. Without cell voltages ArduPilot sends the whole voltage as the first cell, split above 65 V."""
     cells_mv = [cell for cell in message.voltages if cell != NO_CELL_MV] + list(message.voltages_ext)
     volts = sum(cells_mv) / 1000.0
-    return _battery(time_s, message.id, volts, message.battery_remaining, message.charge_state)
+    current_ca = message.current_battery
+    return _battery(time_s, message.id, volts, message.battery_remaining, message.charge_state, current_ca)
 
 
 def _sys_status(message: Any, time_s: float) -> BatterySeen:
     """SYS_STATUS: a summary of the first battery."""
     volts = 0.0 if message.voltage_battery == NO_CELL_MV else message.voltage_battery / 1000.0
-    return _battery(time_s, OF_SYS_STATUS, volts, message.battery_remaining, 0)
+    return _battery(time_s, OF_SYS_STATUS, volts, message.battery_remaining, 0, message.current_battery)
 
 
-def _battery(time_s: float, number: int, volts: float, percent: int, charge_state: int) -> BatterySeen:
-    """0 V is no reading. Without a voltage 0 % is none either: a vehicle without a battery monitor may send it."""
+def _battery(time_s: float, number: int, volts: float, percent: int, charge_state: int, current_ca: int) -> BatterySeen:
+    """0 V is no reading. Without a voltage 0 % is none either: a vehicle without a battery monitor may send it.
+
+    ``current_ca``: hundredths of an ampere; -1 is no reading.
+    """
     known_v = volts if volts > 0.0 else None
     unknown = not 0 <= percent <= 100 or (percent == 0 and known_v is None)
-    return BatterySeen(time_s, number, known_v, None if unknown else percent, charge_state)
+    amperes = None if current_ca < 0 else current_ca / 100.0
+    return BatterySeen(time_s, number, known_v, None if unknown else percent, charge_state, amperes)

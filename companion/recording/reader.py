@@ -88,6 +88,12 @@ class Record:
                 yield RecordedTick(entry, packets[: entry.heard], packets[entry.heard :])
 
 
+def files_of(record: Record) -> list[Path]:
+    """The files that make up a record; whoever writes over one has lost it."""
+    names = (META, PACKETS, TICKS, DECISIONS, *(entry.name for entry in record.meta.inputs))
+    return [record.directory / name for name in names]
+
+
 def load_record(directory: Path) -> Record:
     """Read and check a record. Raises RecordError: one line with the place, the reason and the remedy."""
     meta = _meta(directory)

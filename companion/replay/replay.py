@@ -9,7 +9,7 @@ Nouns: replay.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 
 from companion.app import Companion
@@ -55,7 +55,12 @@ class RecordPlayer:
     description = "record"
     problem = ""
 
-    def __init__(self, record: Record, on_decision: Callable[[int, float, str, Decision], None]) -> None:
+    def __init__(
+        self,
+        record: Record,
+        on_decision: Callable[[int, float, str, Decision], None],
+        on_said: Callable[[bytes], None] = lambda raw: None,
+    ) -> None:
         self.result = ReplayResult()
         self.signatures = Recorded()
         self._record = record
@@ -66,6 +71,7 @@ class RecordPlayer:
         self._unread: list[bytes] = []
         self._said: list[bytes] = []
         self._on_decision = on_decision
+        self._on_said = on_said
 
     @property
     def entry(self) -> TickEntry:
@@ -132,6 +138,7 @@ class RecordPlayer:
     def said(self, time_s: float, raw: bytes) -> None:
         """Compared when the tick is over."""
         self._said.append(raw)
+        self._on_said(raw)
 
     def begin(self, time_s: float, mark: Mark) -> None:
         """It is in the record."""
@@ -218,14 +225,49 @@ class ReplayObserver:
     def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
         """A decision was made. ``number`` counts from 1, ``time_s`` from the beginning of the run."""
 
+    def said(self, companion: Companion, time_s: float, raw: bytes) -> None:
+        """The companion sends a packet. ``time_s``: since the beginning of the run."""
+
     def ticked(self, companion: Companion, time_s: float) -> None:
         """A tick is over. ``time_s``: since the beginning of the run."""
+
+
+class Observers(ReplayObserver):
+    """Several observers of one replay, told in their order."""
+
+    def __init__(self, observers: Iterable[ReplayObserver]) -> None:
+        self._observers = tuple(observers)
+
+    def step_begins(self, companion: Companion) -> None:
+        """See ``ReplayObserver``."""
+        for one in self._observers:
+            one.step_begins(companion)
+
+    def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
+        """See ``ReplayObserver``."""
+        for one in self._observers:
+            one.decided(companion, number, time_s, target, decision)
+
+    def said(self, companion: Companion, time_s: float, raw: bytes) -> None:
+        """See ``ReplayObserver``."""
+        for one in self._observers:
+            one.said(companion, time_s, raw)
+
+    def ticked(self, companion: Companion, time_s: float) -> None:
+        """See ``ReplayObserver``."""
+        for one in self._observers:
+            one.ticked(companion, time_s)
 
 
 def replay(record: Record, observer: ReplayObserver | None = None) -> ReplayResult:
     """Run the companion of a record again. Raises RecordError if the record is damaged."""
     notified = observer or ReplayObserver()
-    player = RecordPlayer(record, lambda *decided: notified.decided(companion, *decided))
+
+    def said(raw: bytes) -> None:
+        if player.result.companion is not None:
+            notified.said(player.result.companion, player.result.seconds, raw)
+
+    player = RecordPlayer(record, lambda *decided: notified.decided(companion, *decided), said)
     runner = ReplayStepRunner(player, lambda: notified.step_begins(companion))
     player.advance()
     link = record.settings.link

@@ -210,6 +210,7 @@ class BatterySeen:
     """A battery, by BATTERY_STATUS; by SYS_STATUS, with ``number`` -1. None: unknown.
 
     ``charge_state``: MAV_BATTERY_CHARGE_STATE, the autopilot's own judgement (0 undefined, 1 ok, 2 low, 3 critical).
+    ``amperes``: the current drawn from it.
     """
 
     time_s: float
@@ -217,6 +218,7 @@ class BatterySeen:
     volts: float | None
     percent: int | None
     charge_state: int = 0
+    amperes: float | None = None
 
 
 # Lists stored in the autopilot (MAVLink's mission protocol) ------------------------------------------------------

@@ -193,11 +193,18 @@ def _mode(vehicle: VehicleState, run: MissionRun) -> Json:
     if heartbeat is None:
         return {"mode": None, "armed": None, "drives": "nobody"}
     named = heartbeat.mode in RoverMode.__members__.values()
-    mode = RoverMode(heartbeat.mode).name if named else f"mode {heartbeat.mode}"
     drives = DRIVES[RoverMode(heartbeat.mode)] if named else "pilot"
     if run.latch.control is Control.COMPANION and vehicle.is_ours:
         drives = "companion"
-    return {"mode": mode, "armed": heartbeat.armed, "drives": drives if heartbeat.armed else "nobody"}
+    return {"mode": mode_name(vehicle), "armed": heartbeat.armed, "drives": drives if heartbeat.armed else "nobody"}
+
+
+def mode_name(vehicle: VehicleState) -> str | None:
+    """The flight mode by its name, or its number where it has none here; None before the first heartbeat."""
+    if vehicle.heartbeat is None:
+        return None
+    mode = vehicle.heartbeat.mode
+    return RoverMode(mode).name if mode in RoverMode.__members__.values() else f"mode {mode}"
 
 
 def _path(executor: MissionExecutor | None) -> list[list[float]]:

@@ -32,13 +32,15 @@ class Spectator:
         self.wake = wake
         self._board = board
         self._answers: deque[Json] = deque(maxlen=20)
-        self.begin()
+        self._news = 0
+        self.begin(forgets=True)
 
-    def begin(self) -> None:
-        """Everything is to be told, again."""
+    def begin(self, *, forgets: bool) -> None:
+        """Everything is to be told, again. ``forgets``: the page knows no news, or will forget them with this scene."""
         self._scene = self._past = True
         self.stale = set(self._board.tiles)
-        self._news = self._board.news_count
+        if forgets:
+            self._news = 0
         self._frame = -1
 
     def answer(self, answer: Json) -> None:
@@ -55,7 +57,7 @@ class Spectator:
             if self._past:
                 self._past = False
                 told.append(json.dumps({"kind": "past", "frames": list(board.past)}))
-                self._news = board.news_count
+                self._news = max(self._news, board.past_news_count)
         told += [json.dumps(self._answers.popleft()) for _ in range(len(self._answers))]
         out: list[str | bytes] = [*told]
         if board.scene is not None and self.stale:
@@ -88,6 +90,11 @@ class LiveBoard:
         """How many look on."""
         return len(self._spectators)
 
+    @property
+    def past_news_count(self) -> int:
+        """How many news ``past`` tells: the newest may still wait for its next frame."""
+        return self.news_count - len(self._past_news)
+
     def join(self, may_act: bool, wake: Callable[[], None]) -> Spectator:
         """One more."""
         spectator = Spectator(self, may_act, wake)
@@ -106,11 +113,12 @@ class LiveBoard:
     def take(self, message: Json) -> None:
         """A scene or a frame of the run."""
         if message["kind"] == "scene":
-            if self.scene is not None and self.scene["map_epoch"] != message["map_epoch"]:
+            another = self.scene is not None and self.scene["map_epoch"] != message["map_epoch"]
+            if another:
                 self.tiles.clear()
             self.scene = message
             for spectator in self._spectators:
-                spectator.begin()
+                spectator.begin(forgets=another)
         else:
             self._take_frame(message)
         self._wake()

@@ -8,7 +8,8 @@ from __future__ import annotations
 import base64
 import json
 import math
-from collections import Counter, defaultdict
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,40 +19,74 @@ from numpy.typing import NDArray
 from companion.app import Companion
 from companion.core.grid import Cell
 from companion.navigation.field_step import Decision
-from companion.recording.contacts import contacts_of
+from companion.recording.contacts import Contact, contacts_of
 from companion.recording.reader import Record
-from companion.recording.record_format import PACKETS, STAMP
+from companion.recording.record_clock import record_clock
 from companion.replay.explain import Candidate, DecisionExplainer, Explanation, explanation_lines
-from companion.replay.replay import ReplayObserver, ReplayResult, replay
-from companion.safety.reasons import RunPhase
-from companion.storage.files import open_file
+from companion.replay.replay import Observers, ReplayObserver, ReplayResult, replay
 from companion.viewer.frame import frame_of, news_of, scene_of
 from companion.viewer.map_tiles import TileWatch
+from companion.viewer.report_tables import Run, differences, tables_of
+from companion.viewer.run_tally import RunTally
 from companion.viewer.wire import tile_message
 
 FRAME_S, PATH_S, TILES_S = 0.4, 1.2, 1.0
 """So often each is kept."""
 MOST_PLACES = 120
 """Of a candidate."""
-SIMULATED_UNTIL_S = 1_600_000_000.0
-"""September 2020: simulated time begins with that year."""
-STOOD = (RunPhase.STOPPED, RunPhase.STOPPED_AND_WAITING, RunPhase.WAITING, RunPhase.WAY_BLOCKED)
 
 Json = dict[str, Any]
 
 
 def report_data(record: Record, others: list[Record]) -> Json:
-    """Everything that the page shows. ``others``: only their tracks. Raises RecordError if a record is damaged."""
-    watched = _Watched(record)
-    result = replay(record, watched)
-    contacts = _contacts(record.directory, watched.began_s, watched.start)
+    """Everything that the page shows. ``others``: their tracks and figures. Raises RecordError if one is damaged."""
+    watched, tally = ReportWatch(record), RunTally()
+    result = replay(record, Observers((watched, tally)))
+    first, *more = named([run_of(record, tally, result), *(counted(one) for one in others)])
+    return joined(record, watched, first, more)
+
+
+def counted(record: Record) -> Run:
+    """A run, made again only to count. Raises RecordError."""
+    tally = RunTally()
+    return run_of(record, tally, replay(record, tally))
+
+
+def run_of(record: Record, tally: RunTally, result: ReplayResult) -> Run:
+    """The run for tables. Only a simulator knows contacts."""
+    found = _contacts(record.directory)
+    known = found or record_clock(record).simulated
+    return Run(str(record.directory), tally, result, len(found) if known else None)
+
+
+def named(runs: Sequence[Run]) -> list[Run]:
+    """Runs by the last part of their names, where that is enough to tell them apart."""
+    short = [Path(run.name).resolve().name for run in runs]
+    return (
+        [replace(run, name=name) for run, name in zip(runs, short, strict=True)]
+        if len(set(short)) == len(short)
+        else [*runs]
+    )
+
+
+def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) -> Json:
+    """The parts of a report, put together."""
+    contacts = [
+        {
+            "t": round(one["time_s"] - watched.began_s, 2),
+            "place": [one["north_m"] + watched.start[0], one["east_m"] + watched.start[1]],
+            "speed": one["speed_m_s"],
+            "what": one["with"],
+        }
+        for one in _contacts(record.directory)
+    ]
     for frame in watched.frames:
         frame["contacts"] = sum(one["t"] <= frame["t"] for one in contacts)
-    day_s = _time_of_day(record)
+    clock = record_clock(record)
     scene = {
         "live": False,
-        "simulated": day_s is None,
-        "began_unix_s": day_s,
+        "simulated": clock.simulated,
+        "began_unix_s": None if clock.simulated else round(1e-6 * clock.began_us, 1),
         "may_act": False,
         "versions": dict(record.meta.versions),
         "settings": dict(record.meta.settings),
@@ -62,56 +97,20 @@ def report_data(record: Record, others: list[Record]) -> Json:
         "tiles": watched.tiles,
         "decisions": watched.decisions,
         "contacts": contacts,
-        "tables": [watched.targets_table(), watched.sums_table(result), watched.stops_table()],
-        "others": [_other(one) for one in others],
+        "tables": [*([differences([run, *others])] if others else []), *tables_of(run)],
+        "others": [{"name": one.name, "track": one.tally.track} for one in others],
     }
 
 
-def _time_of_day(record: Record) -> float | None:
-    """When the run began, in seconds since 1970; None if its time was simulated, which begins with the year 2020."""
-    with open_file(record.directory / PACKETS) as file:
-        began_s = 1e-6 * int.from_bytes(file.read(STAMP.size), "big")
-    return round(began_s, 1) if began_s > SIMULATED_UNTIL_S else None
-
-
-def _contacts(directory: Path, began_s: float, start: tuple[float, float]) -> list[Json]:
+def _contacts(directory: Path) -> list[Contact]:
     try:
-        found = contacts_of(directory)
+        return contacts_of(directory)
     except (OSError, ValueError):
         return []  # ``replay`` says what is wrong with it
-    return [
-        {
-            "t": round(one["time_s"] - began_s, 2),
-            "place": [one["north_m"] + start[0], one["east_m"] + start[1]],
-            "speed": one["speed_m_s"],
-            "what": one["with"],
-        }
-        for one in found
-    ]
 
 
-def _other(record: Record) -> Json:
-    """Another record's track."""
-    track = _Track()
-    replay(record, track)
-    return {"name": record.directory.name, "track": track.places}
-
-
-class _Track(ReplayObserver):
-    """Where the rover was: time, north and east."""
-
-    def __init__(self) -> None:
-        self.places: list[tuple[float, float, float]] = []
-
-    def ticked(self, companion: Companion, time_s: float) -> None:
-        """See ``ReplayObserver``."""
-        pose = companion.status().pose
-        if pose is not None and (not self.places or time_s - self.places[-1][0] >= FRAME_S - 1e-6):
-            self.places.append((round(time_s, 2), round(pose.north_m, 2), round(pose.east_m, 2)))
-
-
-class _Watched(ReplayObserver):
-    """Looks at a companion that is run again."""
+class ReportWatch(ReplayObserver):
+    """Looks at a companion that is run again, and keeps frames, tiles and decisions."""
 
     def __init__(self, record: Record) -> None:
         self.scene: Json = {}
@@ -128,12 +127,6 @@ class _Watched(ReplayObserver):
         self._frame_s = self._path_s = self._tiles_s = -math.inf
         self._watch: TileWatch | None = None
         self._evidence: object = None
-        self._stood_s: defaultdict[str, float] = defaultdict(float)
-        self._stops: Counter[str] = Counter()
-        self._doing, self._last_s = "", 0.0
-        self._driven_m, self._moving_s = 0.0, 0.0
-        self._reached_s: dict[int, float] = {}
-        self._statuses: list[tuple[str, str]] = []
 
     @property
     def start(self) -> tuple[float, float]:
@@ -153,7 +146,6 @@ class _Watched(ReplayObserver):
         status = companion.status()
         self.began_s = status.time_s - time_s
         self._news += [{**one, "t": round(time_s, 2)} for one in news_of(status)]
-        self._count(companion, str(status.activity), status.activity.phase, time_s)
         if time_s - self._frame_s < FRAME_S - 1e-6 and not companion.done:
             return
         self._frame_s = time_s
@@ -161,7 +153,7 @@ class _Watched(ReplayObserver):
             self._start = status.pose.north_m, status.pose.east_m
         frame = frame_of(companion, status)
         frame.update({"t": round(time_s, 2), "news": self._news, "rates": {}})
-        frame["figures"]["tick_ms"] = None  # of the replay, not of the run
+        frame["figures"].update(tick_ms=None, planning_ms=None)  # of the replay, not of the run
         if time_s - self._path_s < PATH_S and frame["path"] and self._before.get("path"):
             frame["path"] = self._before["path"]
         else:
@@ -186,22 +178,6 @@ class _Watched(ReplayObserver):
         if news:
             self.tiles.append((round(time_s, 2), base64.b64encode(tile_message(news)).decode()))
 
-    def _count(self, companion: Companion, doing: str, phase: RunPhase, time_s: float) -> None:
-        """Distance, and how long the rover stood for which reason."""
-        step_s, self._last_s = time_s - self._last_s, time_s
-        speed_m_s = companion.vehicle.speed_m_s
-        if speed_m_s > 0.05:
-            self._driven_m += speed_m_s * step_s
-            self._moving_s += step_s
-        if phase in STOOD:
-            self._stood_s[doing] += step_s
-            self._stops[doing] += doing != self._doing
-        self._doing = doing
-        self._statuses = [(name, str(status)) for name, status in companion.statuses()]
-        for number, (_, status) in enumerate(self._statuses):
-            if status == "reached":
-                self._reached_s.setdefault(number, time_s)
-
     def _explained(self, why: Explanation) -> None:
         decision = why.decision
         self.decisions.append(
@@ -216,34 +192,6 @@ class _Watched(ReplayObserver):
                 "candidates": [_candidate(one, why) for one in why.candidates],
             }
         )
-
-    def targets_table(self) -> Json:
-        """What became of each target, and when."""
-        rows = [
-            [name, status, f"{self._reached_s[number]:.1f}" if number in self._reached_s else ""]
-            for number, (name, status) in enumerate(self._statuses)
-        ]
-        return {"title": "Targets", "head": ["target", "status", "reached at s"], "rows": rows}
-
-    def sums_table(self, result: ReplayResult) -> Json:
-        """The whole run in figures."""
-        mean = self._driven_m / self._moving_s if self._moving_s else 0.0
-        rows = [
-            ["time", f"{result.seconds:.1f} s"],
-            ["driven", f"{self._driven_m:.1f} m"],
-            ["mean speed while moving", f"{mean:.2f} m/s"],
-            ["decisions", f"{result.decisions}"],
-            ["packets heard", f"{result.heard}"],
-            ["packets sent", f"{result.said}"],
-            ["differences of the replay", f"{len(result.differences) or 'none'}"],
-        ]
-        return {"title": "The run", "head": ["", ""], "rows": rows}
-
-    def stops_table(self) -> Json:
-        """How long the rover stood, by reason."""
-        longest = sorted(self._stood_s.items(), key=lambda one: -one[1])
-        rows = [[doing, f"{self._stops[doing]}", f"{stood_s:.1f}"] for doing, stood_s in longest]
-        return {"title": "Stops and waits", "head": ["reason", "times", "seconds"], "rows": rows}
 
 
 def _candidate(candidate: Candidate, why: Explanation) -> Json:

@@ -27,26 +27,13 @@ from companion.recording.reader import Record, load_record
 from companion.recording.record_format import CHECKED_TICK, packed_tick, run_sum, unpacked_ticks
 from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
-from companion.settings import Settings
 from sitl.cli.commands import app as sitl_app
-from sitl.faults.fault_file import load_faults
-from sitl.lockstep import Drive
-from sitl.scenario import scenario_from_mission, with_faults
-from tests.support.records import unclosed, with_meta
+from tests.support.records import recorded, unclosed, with_meta
 from tests.support.rig import Rig, kept_in, yard
 from tests.support.served import finished, process
 
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 FILES = ("link.tlog", "rounds.bin", "decisions.jsonl")
-
-
-def recorded(folder: Path, mission: Mission, faults: str | None = None, limit_s: float = 200.0) -> Path:
-    """A drive in lock-step with a record."""
-    plan = load_faults(MISSIONS / "faults" / f"{faults}.toml") if faults else None
-    recorder = Recorder(folder, mission, Settings(), 0, arm=True)
-    Drive(mission, with_faults(scenario_from_mission(mission), plan), Settings(), 0, recorder, limit_s).run()
-    recorder.close()
-    return folder
 
 
 @pytest.fixture(scope="module")
@@ -260,6 +247,52 @@ def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
     assert {(214, 60, 50), (40, 110, 200), (150, 120, 90), FREE_COLOUR} <= colours
     late = CliRunner().invoke(app, ["replay", str(record), "--why", "100000"])
     assert late.exit_code == 2 and "the last one is" in late.output
+
+
+def test_decisions_are_listed_so_that_one_can_be_chosen(copy: Path) -> None:
+    contact = {"time_s": 55.0, "north_m": 0.0, "east_m": 4.0, "speed_m_s": 0.5, "with": "a post"}
+    (copy / "collisions.json").write_text(json.dumps([contact]))
+    result = CliRunner().invoke(app, ["replay", str(copy), "--list"])
+    assert result.exit_code == 0, result.output
+    lines = result.output.splitlines()
+    assert "UTC" in lines[0] and "2027-01-15 07:59:59.950Z" in lines[0], "the first packet comes a tick later"
+    assert lines[1].split()[:3] == ["no.", "time", "of"]
+    made = [json.loads(line) for line in load_record(copy).decisions]
+    rows = [line.split() for line in lines if line[:5].strip().isdigit()]
+    assert [int(row[0]) for row in rows] == list(range(1, len(made) + 1))
+    assert [float(row[2]) for row in rows] == [pytest.approx(one["time_s"], abs=0.006) for one in made]
+    assert all(one["reason"] in line for one, line in zip(made, (" ".join(row) for row in rows), strict=True))
+    assert any("hybrid searched (thorough)" in line for line in lines)
+    at_s = [float(line[18:28]) for line in lines if line[7:9] == "08"]
+    assert at_s == sorted(at_s)
+    assert sum("contact with a post at 0.5 m/s" in line for line in lines) == 1
+    assert any(line.endswith("- Reached gate") for line in lines) and lines[-2] == "differences: none"
+
+
+def test_why_takes_a_moment_and_shows_the_decision_in_force(record: Path, tmp_path: Path) -> None:
+    listed = CliRunner().invoke(app, ["replay", str(record), "--list"]).output.splitlines()
+    number, of_day, after_s = next(line.split()[:3] for line in listed if line.split()[:1] == ["7"])
+    for moment in (f"{after_s}s", of_day):
+        asked = ["replay", str(record), "--why", moment, "--image", str(tmp_path / "why.png")]
+        result = CliRunner().invoke(app, asked)
+        assert result.exit_code == 0 and result.output.startswith(f"decision {number} at {after_s} s")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--why", "0"], "there is no decision 0, the last one is"),
+        (["--why", "14:99"], "give the number of a decision (66), seconds since the start (83.5s) or a time of day"),
+        (["--why", "9999s"], "it lasts"),
+        (["--why", "23:00:00"], "--list shows all decisions"),
+        (["--why", "1s"], "no decision had been made at 1s: the first was made after"),
+        (["--why", "1", "--list"], "--list and --why do not go together"),
+        (["--image", "x.png"], "--image goes with --why"),
+    ],
+)
+def test_a_moment_that_is_none_is_one_line(record: Path, options: list[str], says: str) -> None:
+    result = CliRunner().invoke(app, ["replay", str(record), *options])
+    assert result.exit_code == 2 and says in result.output and len(result.output.splitlines()) == 1
 
 
 def test_why_shows_the_motions_that_were_judged(tmp_path: Path) -> None:

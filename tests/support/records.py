@@ -9,13 +9,20 @@ from pathlib import Path
 
 from companion.core.grid import Cell
 from companion.core.tick_marks import Mark
+from companion.mission.mission import Mission
 from companion.navigation.field_step import Action, Decision, DecisionReason, Part, SearchKind
 from companion.planning.problem import Path as FieldPath
 from companion.recording.recorder import Recorder
 from companion.settings import Settings
+from sitl.faults.fault_file import load_faults
+from sitl.lockstep import Drive
+from sitl.scenario import scenario_from_mission, with_faults
 from tests.support.mavlink_vehicle import Station
 from tests.support.rig import yard
 
+MISSIONS = Path(__file__).resolve().parents[2] / "missions"
+START_US = 1_800_000_000_000_000
+"""15 January 2027, 8:00 UTC."""
 TICKS = 200
 DECISION = Decision(
     action=Action.FOLLOW,
@@ -27,6 +34,16 @@ DECISION = Decision(
 )
 Change = Callable[[Path], None]
 """Changes a record."""
+
+
+def recorded(folder: Path, mission: Mission, faults: str | Path | None = None, limit_s: float = 200.0) -> Path:
+    """A drive in lock-step with a record. ``faults``: a shipped plan by its name, or a file."""
+    file = MISSIONS / "faults" / f"{faults}.toml" if isinstance(faults, str) else faults
+    plan = None if file is None else load_faults(file)
+    recorder = Recorder(folder, mission, Settings(), 0, arm=True, start_us=START_US)
+    Drive(mission, with_faults(scenario_from_mission(mission), plan), Settings(), 0, recorder, limit_s).run()
+    recorder.close()
+    return folder
 
 
 def write_record(folder: Path) -> Path:

@@ -13,8 +13,10 @@ const STEPS_S = [5, 10, 30, 60, 120, 300, 600, 1800, 3600, 7200, 18000];
 export class Charts {
   /** `jump(t)`, of a report, goes to a time that is clicked. */
   constructor(place, model, jump) {
-    Object.assign(this, { place, model, jump, version: -1, last: 0, stale: false });
-    this.parts = KINDS.map((kind, index) => this.part(kind, index));
+    Object.assign(this, { place, model, jump, version: -1, last: 0, later: 0, stale: false });
+    const all = KINDS.map((kind, index) => this.part(kind, index));
+    // A record is whole: what it never tells gets no chart.
+    this.parts = jump ? all.filter(({ index }) => model.figures.values[index].some((value) => value !== null)) : all;
     place.append(...this.parts.map((part) => part.node));
     new ResizeObserver(() => this.resize()).observe(place);
     theme.listeners.add(() => this.parts.forEach((part) => part.plot?.redraw(false, true)));
@@ -114,8 +116,14 @@ export class Charts {
 
   /** Shows what is new, when it is time to. */
   show(now = performance.now()) {
-    if (now - this.last < EVERY_MS || !this.seen) return;
-    this.last = now;
+    if (!this.seen) return;
+    if (now - this.last < EVERY_MS) {
+      // The last of several moments must not be left out.
+      this.later ||= setTimeout(() => this.show(), EVERY_MS);
+      return;
+    }
+    clearTimeout(this.later);
+    [this.last, this.later] = [now, 0];
     if (this.model.figures.version === this.version) {
       for (const part of this.parts) part.plot?.redraw(false, true);
     } else this.fill();

@@ -2,7 +2,8 @@
 
 import { make } from "viewer/dom.js";
 
-const NUMBER = /^([-−+]?\d[\d.,\s]*%?|–|)$/;
+/** A number, perhaps with how far it is from another in brackets; or a sign for none. */
+const NUMBER = /^([-−+]?\d[\d.,\s]*%?( \([-−+±]\d[\d.]*\))?|[-–]|)$/;
 
 /** All tables, then what the run was made with. */
 export function buildTables(record) {
@@ -31,7 +32,8 @@ export function buildTables(record) {
 
 function table(head, rows) {
   const numeric = head.map((_, i) => rows.every((row) => NUMBER.test(String(row[i] ?? "–"))));
-  const cell = (value, i) => make("td", { class: numeric[i] ? "right" : null }, String(value ?? "–"));
+  const shown = (value) => (value === "-" ? "–" : String(value ?? "–"));
+  const cell = (value, i) => make("td", { class: numeric[i] ? "right" : null }, shown(value));
   return make(
     "div",
     { class: "scroll" },

@@ -109,6 +109,16 @@ def test_what_is_known_of_the_battery(
     assert codec.decode(rover.pack(long), 1.0) == [BatterySeen(1.0, 2, volts, percent, 3)]
 
 
+@pytest.mark.parametrize(("current_ca", "amperes"), [(1234, 12.34), (0, 0.0), (-1, None)])
+def test_the_current_that_is_drawn_from_the_battery(current_ca: int, amperes: float | None) -> None:
+    codec, rover = listening()
+    short = mavlink.MAVLink_sys_status_message(0, 0, 0, 0, 12600, current_ca, 87, *[0] * 6)
+    long = mavlink.MAVLink_battery_status_message(0, 0, 0, 32767, [12600, *[65535] * 9], current_ca, -1, -1, 87)
+    for raw in (rover.pack(short), rover.pack(long)):
+        (seen,) = (one for one in codec.decode(raw, 1.0) if isinstance(one, BatterySeen))
+        assert seen.amperes == amperes
+
+
 def test_a_battery_told_in_cells_or_in_pieces_has_their_sum() -> None:
     codec, rover = listening()
     cells = [4100, 4000, 3900, *[65535] * 7]

@@ -33,6 +33,11 @@ def heard(spectator: Spectator) -> tuple[list[dict], list[tuple[int, int]]]:
     return texts, places
 
 
+def texts_of(frames: list[dict]) -> list[str]:
+    """The news that they tell."""
+    return [news["text"] for one in frames for news in one["news"]]
+
+
 def board(takes_actions: bool = False) -> LiveBoard:
     made = LiveBoard(takes_actions)
     made.take(SCENE)
@@ -48,7 +53,7 @@ def test_who_comes_late_is_told_scene_past_map_and_the_newest_frame() -> None:
     assert [text["kind"] for text in texts] == ["scene", "past", "frame"] and texts[0]["may_act"] is False
     past = texts[1]["frames"]
     assert [one["t"] for one in past] == [float(second) for second in range(10)] and "path" not in past[0]
-    assert sum(len(one["news"]) for one in past) == 46 and texts[2]["t"] == 9.8
+    assert texts_of([*past, texts[2]]) == [f"news {step}" for step in range(50)] and texts[2]["t"] == 9.8
     assert sorted(places) == [(column, 0) for column in range(TILES_AT_ONCE + 50)]
 
 
@@ -75,6 +80,21 @@ def test_another_map_begins_with_its_scene() -> None:
     live.take_tiles(tile_message([((7, 7), RUNS)]))
     texts, places = heard(spectator)
     assert texts[0]["map_epoch"] == 2 and places == [(7, 7)]
+
+
+def test_news_that_come_with_another_map_are_told_once() -> None:
+    live = board()
+    spectator = live.join(False, lambda: None)
+    live.take(frame(10.0, "waiting"))
+    heard(spectator)
+    live.take({**SCENE, "map_epoch": 2})
+    live.take(frame(10.2, "heading for the gate"))
+    (_, past, newest), _ = heard(spectator)
+    assert texts_of([*past["frames"], newest]) == ["waiting", "heading for the gate"], "the page forgot the first"
+    live.take({**SCENE, "map_epoch": 2, "home": [0.0, 0.0]})
+    live.take(frame(10.4, "on the way"))
+    texts, _ = heard(spectator)
+    assert texts_of(texts[-1:]) == ["on the way"], "the page still knows what it was told"
 
 
 def test_nothing_grows_without_bound() -> None:

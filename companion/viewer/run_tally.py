@@ -1,0 +1,142 @@
+"""The run tally: what is counted of a run while it is made again, for tables and to compare runs.
+
+Nouns: run tally.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import dataclass, field
+
+from companion.app import Companion
+from companion.core.frames import NedPoint
+from companion.navigation.field_step import Decision
+from companion.replay.replay import ReplayObserver
+from companion.safety.reasons import Doubt, RunPhase
+from companion.viewer.energy import EnergyMeter
+
+MOVES_M_S = 0.05
+"""A slower rover stands."""
+STOPPED = (RunPhase.STOPPED, RunPhase.STOPPED_AND_WAITING, RunPhase.WAY_BLOCKED)
+STOOD = (*STOPPED, RunPhase.WAITING)
+TRACK_S = 0.4
+
+
+@dataclass
+class Spell:
+    """How often something was so, for how long in all, and when for the first time."""
+
+    times: int = 0
+    seconds: float = 0.0
+    first_s: float = 0.0
+
+
+@dataclass
+class Leg:
+    """The way to one target. ``reached_s`` is None until then; ``straight_m``: from where the leg began."""
+
+    name: str
+    status: str
+    reached_s: float | None = None
+    driven_m: float | None = None
+    straight_m: float | None = None
+
+
+@dataclass
+class _Spells:
+    """Spells by their names; only one lasts at a time."""
+
+    found: dict[str, Spell] = field(default_factory=lambda: defaultdict(Spell))
+    lasting: str = ""
+
+    def note(self, name: str, time_s: float, step_s: float) -> None:
+        """What is so now; empty for nothing."""
+        if name:
+            spell = self.found[name]
+            if name != self.lasting:
+                spell.first_s = spell.first_s if spell.times else time_s
+                spell.times += 1
+            spell.seconds += step_s
+        self.lasting = name
+
+
+class RunTally(ReplayObserver):
+    """Counts during a replay."""
+
+    def __init__(self) -> None:
+        self.seconds = 0.0
+        self.driven_m = self.backwards_m = self.moving_s = 0.0
+        self.decisions = self.searches = 0
+        self.stops = 0
+        self.stopped_s = 0.0
+        self.legs: list[Leg] = []
+        self.energy = EnergyMeter()
+        self.track: list[tuple[float, float, float]] = []
+        """Time, north and east."""
+        self._stood, self._doubted = _Spells(), _Spells()
+        self._stopped = False
+        self._leg_from_m = 0.0
+        self._leg_from: NedPoint | None = None
+
+    @property
+    def stood(self) -> dict[str, Spell]:
+        """Stops and waits, by their reasons."""
+        return self._stood.found
+
+    @property
+    def watchdogs(self) -> dict[str, Spell]:
+        """Doubts that kept the rover from moving."""
+        return self._doubted.found
+
+    @property
+    def reached(self) -> int:
+        """Targets reached."""
+        return sum(leg.status == "reached" for leg in self.legs)
+
+    def decided(self, companion: Companion, number: int, time_s: float, target: str, decision: Decision) -> None:
+        """See ``ReplayObserver``."""
+        self.decisions += 1
+        self.searches += len(decision.searches)
+
+    def ticked(self, companion: Companion, time_s: float) -> None:
+        """See ``ReplayObserver``."""
+        step_s, self.seconds = time_s - self.seconds, time_s
+        vehicle = companion.vehicle
+        if vehicle.speed_m_s > MOVES_M_S:
+            self.driven_m += vehicle.speed_m_s * step_s
+            self.moving_s += step_s
+            self.backwards_m += max(-vehicle.forward_m_s, 0.0) * step_s
+        self.energy.take(vehicle.battery)
+        self._note_stop(companion, time_s, step_s)
+        pose = companion.status().pose
+        if pose is not None and (not self.track or time_s - self.track[-1][0] >= TRACK_S - 1e-6):
+            self.track.append((round(time_s, 2), round(pose.north_m, 2), round(pose.east_m, 2)))
+        self._note_legs(companion, time_s, None if pose is None else pose.point)
+
+    def _note_stop(self, companion: Companion, time_s: float, step_s: float) -> None:
+        run = companion.mission_run
+        activity = run.activity
+        # What is awaited may change while the rover stands for one reason: that is one stop.
+        name = str(activity) if activity.phase is not RunPhase.STOPPED_AND_WAITING else f"stopped: {activity.reason}"
+        self._stood.note(name if activity.phase in STOOD else "", time_s, step_s)
+        doubt = None if run.stop is None else run.stop.reason
+        self._doubted.note(str(doubt) if doubt is not None and isinstance(doubt.kind, Doubt) else "", time_s, step_s)
+        stopped = activity.phase in STOPPED
+        self.stops += stopped and not self._stopped
+        self.stopped_s += step_s if stopped else 0.0
+        self._stopped = stopped
+
+    def _note_legs(self, companion: Companion, time_s: float, point: NedPoint | None) -> None:
+        """What has become of the targets. A leg begins where the rover is first led, or where a target was reached."""
+        if self._leg_from is None and companion.mission_run.is_driving:
+            self._leg_from, self._leg_from_m = point, self.driven_m
+        statuses = companion.statuses()
+        if len(self.legs) != len(statuses):
+            self.legs = [Leg(name, str(status)) for name, status in statuses]
+        for leg, (_, status) in zip(self.legs, statuses, strict=True):
+            leg.status = str(status)
+            if leg.status == "reached" and leg.reached_s is None:
+                leg.reached_s, leg.driven_m = time_s, self.driven_m - self._leg_from_m
+                if point is not None and self._leg_from is not None:
+                    leg.straight_m = self._leg_from.distance_m(point)
+                self._leg_from, self._leg_from_m = point, self.driven_m

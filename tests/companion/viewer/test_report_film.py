@@ -1,0 +1,55 @@
+"""Films are short, however long the drive was."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from companion.viewer.film_picture import SIDE_PIXELS, section_of
+from companion.viewer.report_film import MOST_PICTURES, Film, FilmError
+
+GROUND = {"south_m": -50.0, "west_m": -50.0, "cell_m": 0.25, "columns": 400, "rows": 400, "tile": 64}
+SCENE: dict[str, Any] = {
+    "map": GROUND,
+    "targets": [{"name": "a very long name that must stay within the picture", "place": [0.0, 30.0]}],
+    "borders": [],
+    "rover": {"outline": [[0.3, 0.2], [-0.3, 0.2], [-0.3, -0.2], [0.3, -0.2]]},
+}
+
+
+def film(count: int) -> Film:
+    """Waits for a tenth of its frames, then drives east."""
+    first = {"speed": 0.0, "path": [], "statuses": ["pending"], "movers": [], "line": "waiting", "state": "waiting"}
+    frames = [{**first, "t": 0.0, "pose": [0.0, 0.0, 1.57]}]
+    frames += [{"t": 0.4 * number, "pose": [0.0, 30.0 * number / count, 1.57]} for number in range(1, count)]
+    frames[count // 10].update(state="driving", line="driving to " + "far " * 50)
+    return Film({"scene": SCENE, "frames": frames, "tiles": [], "contacts": []})
+
+
+@pytest.mark.parametrize(("count", "shown"), [(20, 20), (100, 95), (50_000, MOST_PICTURES)])
+def test_a_film_begins_when_the_rover_is_driven_and_has_few_pictures(count: int, shown: int) -> None:
+    moments = film(count).moments()
+    assert len(moments) == shown
+    assert moments[0]["t"] == pytest.approx(max(0.0, 0.4 * (count // 10) - 2.0), abs=0.41)
+    assert moments[-1]["t"] == pytest.approx(0.4 * (count - 1))
+
+
+def test_every_picture_has_the_same_even_size() -> None:
+    made = film(12)
+    pictures = list(made.pictures())
+    assert {one.size for one in pictures} == {made.size} and len(pictures) == 12
+    assert made.size[0] == SIDE_PIXELS and made.size[1] % 2 == 0
+
+
+@pytest.mark.parametrize("places", [[(0.0, 0.0)], [(0.0, 0.0), (90.0, 1.0)], [(-300.0, 5.0), (10.0, 400.0)]])
+def test_any_drive_fits_into_the_picture(places: list[tuple[float, float]]) -> None:
+    section = section_of(SCENE, places)
+    assert 200 <= min(section.width, section.height) <= max(section.width, section.height) <= SIDE_PIXELS + 2
+    for north, east in places:
+        assert section.x0 < (east + 50.0) / 0.25 < section.x1 and section.y0 < (north + 50.0) / 0.25 < section.y1
+
+
+def test_without_a_map_there_is_no_film() -> None:
+    with pytest.raises(FilmError, match="the mission had not begun"):
+        Film({"scene": {}, "frames": [{"pose": None, "t": 0.0}], "tiles": [], "contacts": []})

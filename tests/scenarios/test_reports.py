@@ -1,0 +1,285 @@
+"""What is made of a record: tables, messages for other programs, films. The same record gives the same bytes."""
+
+from __future__ import annotations
+
+import base64
+import csv
+import gzip
+import json
+import re
+import shutil
+import sys
+from collections import Counter, defaultdict
+from pathlib import Path
+from typing import Any
+
+import pytest
+from mcap.reader import make_reader
+from PIL import Image
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from typer.testing import CliRunner
+
+from companion.cli.commands import app
+from companion.core.frames import GeoPoint, LocalFrame
+from companion.recording.reader import load_record
+from companion.viewer.film_picture import REACHED, ROVER, TRACK
+from companion.viewer.report_data import counted
+from companion.viewer.report_tables import tables_of
+from tests.support.records import START_US, recorded, write_record
+from tests.support.rig import yard
+
+
+@pytest.fixture(scope="module")
+def record(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("yard")
+    return recorded(folder / "record", yard(folder))
+
+
+@pytest.fixture(scope="module")
+def made(record: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a record in all forms."""
+    return made_of(record, tmp_path_factory.mktemp("made"))
+
+
+def made_of(record: Path, folder: Path) -> Path:
+    forms = [
+        "--csv",
+        folder / "csv",
+        "--mcap",
+        folder / "r.mcap",
+        "--out",
+        folder / "r.html",
+        "--gif",
+        folder / "r.gif",
+    ]
+    result = CliRunner().invoke(app, ["report", str(record), *map(str, forms)])
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def rows_of(file: Path) -> list[dict[str, str]]:
+    with file.open(encoding="utf-8", newline="") as opened:
+        return list(csv.DictReader(opened))
+
+
+def test_the_same_record_gives_the_same_bytes(record: Path, made: Path, tmp_path: Path) -> None:
+    again = made_of(record, tmp_path)
+    names = sorted(file.relative_to(made) for file in made.rglob("*") if file.is_file())
+    assert len(names) >= 5
+    assert [name for name in names if (made / name).read_bytes() != (again / name).read_bytes()] == []
+
+
+def test_tables_have_every_decision_pose_and_setpoint(record: Path, made: Path) -> None:
+    loaded = load_record(record)
+    decided = [json.loads(line) for line in loaded.decisions]
+    decisions = rows_of(made / "csv" / "decisions.csv")
+    assert [row["number"] for row in decisions] == [str(number) for number in range(1, len(decided) + 1)]
+    for row, one in zip(decisions, decided, strict=True):
+        assert float(row["time_s"]) == pytest.approx(one["time_s"], abs=1e-3)
+        assert (row["action"], row["reason"], row["path_fields"]) == (
+            one["action"],
+            one["reason"],
+            str(len(one["path"])),
+        )
+    assert {row["planner"] for row in decisions if row["searches"]} == {"hybrid"}
+    poses = rows_of(made / "csv" / "pose.csv")
+    assert len(poses) > 300 and [float(row["time_s"]) for row in poses] == sorted(float(row["time_s"]) for row in poses)
+    last, first = poses[-1], next(row for row in poses if row["latitude_deg"])
+    assert last["time_utc"].startswith("2027-01-15T08:") and (first["mode"], last["mode"]) == ("MANUAL", "GUIDED")
+    places = [GeoPoint(float(row["latitude_deg"]), float(row["longitude_deg"])) for row in (first, last)]
+    moved = LocalFrame(places[0]).to_ned(places[1])
+    assert moved.east_m == pytest.approx(float(last["east_m"]) - float(first["east_m"]), abs=0.01)
+    setpoints = rows_of(made / "csv" / "setpoints.csv")
+    said = [raw for tick in loaded.ticks() for raw in tick.said]
+    told = [raw for raw in said if raw[7:10] == bytes((84, 0, 0))]  # SET_POSITION_TARGET_LOCAL_NED
+    assert sum(row["kind"] != "speed" for row in setpoints) == len(told) > 10
+    assert {row["kind"] for row in setpoints} >= {"position", "speed", "velocity"}
+
+
+REQUIRED = {
+    "foxglove.FrameTransform": "timestamp parent_frame_id child_frame_id translation rotation",
+    "foxglove.PoseInFrame": "timestamp frame_id pose",
+    "foxglove.LocationFix": "timestamp frame_id latitude longitude altitude position_covariance "
+    "position_covariance_type",
+    "foxglove.LaserScan": "timestamp frame_id pose start_angle end_angle ranges intensities",
+    "foxglove.Grid": "timestamp frame_id pose column_count cell_size row_stride cell_stride fields data",
+    "foxglove.SceneUpdate": "deletions entities",
+    "foxglove.Log": "timestamp level message name file line",
+}
+"""As Foxglove's documentation lists them."""
+
+
+def fits(value: Any, schema: dict[str, Any]) -> bool:
+    """Whether a value is as its schema says, with all its fields and no others."""
+    match schema["type"]:
+        case "object":
+            fields = schema.get("properties")
+            return isinstance(value, dict) and (
+                fields is None
+                or (value.keys() == fields.keys() and all(fits(value[key], fields[key]) for key in fields))
+            )
+        case "array":
+            return isinstance(value, list) and all(fits(one, schema["items"]) for one in value)
+        case kind:
+            types = {"number": (int, float), "integer": int, "string": str, "boolean": bool}
+            return isinstance(value, types[kind])
+
+
+def test_messages_are_read_back_as_their_schemas_say(record: Path, made: Path) -> None:
+    found: dict[str, list[tuple[int, dict[str, Any]]]] = defaultdict(list)
+    schemas: dict[str, dict[str, Any]] = {}
+    with (made / "r.mcap").open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            assert schema is not None and (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+            value = json.loads(message.data)
+            found[channel.topic].append((message.log_time, value))
+            schemas[schema.name] = json.loads(schema.data)
+            if schema.name in REQUIRED:
+                assert value.keys() == set(REQUIRED[schema.name].split())
+            assert fits(value, schemas[schema.name]), value
+    assert schemas.keys() > REQUIRED.keys()
+    poses = rows_of(made / "csv" / "pose.csv")
+    assert len(found["/pose"]) == len(found["/tf"]) == len(found["/state"]) == len(poses)
+    at_ns, last = found["/pose"][-1]
+    assert last["pose"]["position"]["x"] == pytest.approx(float(poses[-1]["east_m"]), abs=0.002)
+    assert at_ns == pytest.approx(1000 * START_US + 1e9 * (float(poses[-1]["time_s"]) - 0.05), abs=2e6)
+    assert len(found["/decision"]) == len(load_record(record).decisions)
+    assert any(one["message"] == "Reached gate" and one["name"] == "companion" for _, one in found["/log"])
+    assert max(max(one["ranges"]) for _, one in found["/scan"]) > 3.0
+    ground = found["/map"][-1][1]
+    rows = len(base64.b64decode(ground["data"])) / ground["row_stride"]
+    assert rows == int(rows) > 20 and ground["column_count"] > 20
+    assert found["/path"][0][1]["entities"][0]["lines"][0]["points"]
+    assert [one["entities"][0]["texts"][0]["text"] for _, one in found["/targets"]] == ["gate"]
+
+
+def test_without_the_extra_one_line_says_how_to_install_it(
+    record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "mcap", None)
+    result = CliRunner().invoke(app, ["report", str(record), "--mcap", str(tmp_path / "r.mcap")])
+    assert (result.exit_code, result.output) == (2, "--mcap: mcap is not installed; install rover-companion[mcap]\n")
+    assert not (tmp_path / "r.mcap").exists()
+
+
+def test_a_film_shows_the_drive_from_its_beginning_to_its_end(made: Path) -> None:
+    with Image.open(made / "r.gif") as film:
+        assert film.format == "GIF" and 20 < film.n_frames <= 300 and film.info["loop"] == 0
+        assert max(film.size) < 700 and (made / "r.gif").stat().st_size < 1_000_000
+        pictures = []
+        for number in (0, film.n_frames - 1):
+            film.seek(number)
+            pictures.append(film.convert("RGB"))
+    first, last = (Counter(one.get_flattened_data()) for one in pictures)
+    white, black = ((255, 255, 255), (18, 24, 30))
+    assert near(last, white) > 1.1 * near(first, white), "more ground is known"
+    assert near(last, black) > near(first, black), "and more of what stands there"
+    assert near(last, TRACK) > 200 > near(first, TRACK)
+    assert near(last, ROVER) > 20 and near(last, REACHED) > 20
+
+
+def near(found: Counter[tuple[int, ...]], colour: tuple[int, int, int]) -> int:
+    """How many pixels have about this colour."""
+    return sum(count for one, count in found.items() if all(abs(a - b) < 12 for a, b in zip(one, colour, strict=True)))
+
+
+@pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
+def test_the_film_is_made_by_ffmpeg_too(record: Path, tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["report", str(record), "--mp4", str(tmp_path / "r.mp4")])
+    assert result.exit_code == 0 and result.output.startswith(f"film: {tmp_path / 'r.mp4'} (")
+    data = (tmp_path / "r.mp4").read_bytes()
+    assert data[4:8] == b"ftyp" and b"avc1" in data and 10_000 < len(data) < 1_000_000
+    assert not (record / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("script", "says"),
+    [
+        (None, "--mp4: ffmpeg is not installed; install it (apt-get install ffmpeg), or use --gif"),
+        ("#!/bin/sh\necho Unknown encoder libx264 >&2\nexit 8\n", "ffmpeg gave up: Unknown encoder libx264; use --gif"),
+    ],
+)
+def test_an_ffmpeg_that_is_missing_or_gives_up_is_one_line(
+    record: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str | None, says: str
+) -> None:
+    if script is not None:
+        (tmp_path / "ffmpeg").write_text(script)
+        (tmp_path / "ffmpeg").chmod(0o755)
+    monkeypatch.setenv("PATH", str(tmp_path))
+    result = CliRunner().invoke(app, ["report", str(record), "--mp4", str(tmp_path / "r.mp4")])
+    assert result.exit_code == 2 and result.output.endswith(f"{says}\n") and result.output.count("\n") == 1
+
+
+def test_there_is_no_film_of_a_mission_that_had_not_begun(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["report", str(write_record(tmp_path)), "--gif", str(tmp_path / "r.gif")])
+    assert (result.exit_code, result.output.count("\n")) == (2, 1) and "the mission had not begun" in result.output
+
+
+SILENT = """
+[[fault]]
+kind = "sensor_silent"
+since = "driving"
+start_s = 3.0
+duration_s = 1.6
+"""
+
+
+def test_several_records_are_compared_in_figures(record: Path, tmp_path: Path) -> None:
+    (tmp_path / "silent.toml").write_text(SILENT)
+    other = recorded(tmp_path / "other", yard(tmp_path), tmp_path / "silent.toml")
+    result = CliRunner().invoke(app, ["report", str(record), str(other), "--out", str(tmp_path / "r.html")])
+    assert result.exit_code == 0, result.output
+    table = {line[:15].strip().replace("\xa0", " "): line[15:].split() for line in result.output.splitlines()[1:]}
+    assert table[""] == ["record", "other"]
+    assert table["stops"] == ["0", "1", "(+1)"] and table["targets reached"] == ["1", "1", "(±0)"]
+    longer_s = float(table["time, s"][1]) - float(table["time, s"][0])
+    assert longer_s > 0.5 and table["time, s"][2] == f"({longer_s:+.1f})"
+    assert table["contacts"] == ["-", "-"], "the clock is not a simulator's: nobody knows of contacts"
+    data = data_in(tmp_path / "r.html")
+    assert [one["name"] for one in data["others"]] == ["other"] and data["tables"][0]["title"] == "Differences"
+    tables = {one["title"]: one["rows"] for one in tables_of(counted(load_record(other)))}
+    assert [row[:2] for row in tables["Watchdogs"]] == [["range data ahead silent for over 1 s", "1"]]
+    assert ["stopped: range data ahead silent for over 1 s", "1"] in [row[:2] for row in tables["Stops and waits"]]
+    name, status, reached_s, driven_m, straight_m = tables["Targets"][0]
+    assert (name, status) == ("gate", "reached") and 12.0 < float(straight_m) < float(driven_m) < 20.0
+    assert 45.0 < float(reached_s) < 70.0
+
+
+def data_in(file: Path) -> dict[str, Any]:
+    found = re.search(r'id="record" type="application/octet-stream">([^<]+)<', file.read_text(encoding="utf-8"))
+    assert found is not None
+    data: dict[str, Any] = json.loads(gzip.decompress(base64.b64decode(found[1])))
+    return data
+
+
+def test_the_energy_is_what_the_autopilot_says_it_was(record: Path) -> None:
+    energy = counted(load_record(record)).tally.energy
+    consumed = [
+        (message.current_consumed / 1000.0, message.energy_consumed / 36.0)
+        for tick in load_record(record).ticks()
+        for raw in tick.heard
+        if isinstance(message := mavlink.MAVLink(None).decode(bytearray(raw)), mavlink.MAVLink_battery_status_message)
+    ]
+    charge_ah, energy_wh = consumed[-1]
+    assert energy.charge_ah == pytest.approx(charge_ah, rel=0.05) and charge_ah > 0.05
+    assert energy.energy_wh == pytest.approx(energy_wh, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--mcap", "{record}/link.tlog"], "is another file of this command"),
+        (["--gif", "{folder}/x", "--mcap", "{folder}/x"], "is another file of this command"),
+        (["--csv", "{record}/meta.json"], "cannot be written"),
+        (["--gif", "{folder}/x.gif", "--open"], "--open shows the HTML file: name it with --out as well"),
+    ],
+)
+def test_what_cannot_be_written_is_one_line_and_no_record_is_harmed(
+    record: Path, tmp_path: Path, options: list[str], says: str
+) -> None:
+    before = {file: file.read_bytes() for file in record.rglob("*") if file.is_file()}
+    given = [one.format(record=record, folder=tmp_path) for one in options]
+    result = CliRunner().invoke(app, ["report", str(record), *given])
+    assert (result.exit_code, result.output.count("\n")) == (2, 1) and says in result.output
+    assert {file: file.read_bytes() for file in record.rglob("*") if file.is_file()} == before
+    assert list(tmp_path.iterdir()) == []
