@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.text import Text
 from PIL import Image
 from typer.testing import CliRunner
 
@@ -38,6 +39,9 @@ def test_the_ground_fills_the_page(tmp_path: Path, size: tuple[float, float]) ->
     figure.axes.imshow([[[10, 200, 10]]], extent=figure.ground)
     figure.key("red", "something with a long name that says what it is, and how much of it there is: a lot " * 2)
     figure.save(tmp_path / "a.png", "Title")
+    assert (figure.axes.get_xlabel(), figure.axes.get_ylabel()) == ("east, m", "north, m")
+    scale = next(text for text in figure.axes.findobj(Text) if text.get_text() in ("2 m", "5 m", "10 m", "20 m"))
+    assert float(scale.get_text().split()[0]) > 0.05 * figure.ground.width_m
     pixels = np.array(Image.open(tmp_path / "a.png").convert("RGB"))
     assert pixels.shape[1] >= 900
     green = (pixels == (10, 200, 10)).all(axis=2)
