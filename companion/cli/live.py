@@ -98,6 +98,14 @@ class Live:
         except OSError:
             self._broken = True
 
+    def tell(self, text: str, severity: Severity) -> None:
+        """A line from elsewhere."""
+        if not self._broken:
+            try:
+                self._print(text, severity)
+            except OSError:
+                self._broken = True
+
     def _show(self, status: Status) -> None:
         for news in status.news:
             self._print(news.text, news.severity)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -16,6 +17,7 @@ from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.live import Live, LiveConsole, Reader, levelled, reader_of
+from companion.cli.live_view import LiveView, View, painter_for
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
 from companion.cli.state import RunState, StateFiles
@@ -84,6 +86,7 @@ def run(
     ] = None,
     web: Web = None,
     web_token: Token = None,
+    view: View = False,
 ) -> None:
     """Drive MISSION.
 
@@ -97,13 +100,20 @@ def run(
     def say(text: str) -> None:
         console.print(levelled(text, Severity.INFO, reader), soft_wrap=True, markup=False, highlight=False)
 
+    live: Live | LiveView | None = None
+
+    def warn(text: str) -> None:
+        """Of a problem beside the drive, perhaps while the picture is on the terminal."""
+        live.tell(text, Severity.WARNING) if live is not None else say(text)
+
     try:
         with _StopSignals() as stop, contextlib.ExitStack() as ends:
             budget = ShutdownBudget()
             files = StateFiles(state, budget)
             ends.callback(files.close)
             settings = files.settings(usable_settings(settings_file), say)
-            page = web_viewer(web, web_token, say)
+            painter = painter_for(view=view, say=say)
+            page = web_viewer(web, web_token, warn)
             if page is not None:
                 ends.callback(page.close)
                 say(served(page, to_person=reader is Reader.PERSON))
@@ -127,17 +137,13 @@ def run(
             )
             link = source.link()
             with console.status("loading the planner ..."):
-                if not kernels_warm(settings, mission.rover.turning_radius_m):
-                    say(COMPILING)
-                    warm_up(settings, mission.rover.turning_radius_m)
-                settle()
+                _load_planner(settings, mission, say)
             link.read()  # drop what has piled up meanwhile
-            place = recorder.directory if isinstance(recorder, Recorder) else None
-            if place != record:
-                say(f"{record} has a record already; this one goes to {place}")
+            place = _told_place(recorder, record, say)
             keeping.start(budget)
             autopilot = AutopilotLink(link, Codec(settings.link, signer=signer), settings.link, recorder)
-            live = Live(console, mission.name, reader)
+            lines = Live(console, mission.name, reader)
+            live = lines if painter is None else LiveView(painter, lines, mission.name)
             rig = _Rig(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget, page)
             code = _drive(rig, seed=seed, arm=arm)
     except BAD_INPUT as error:
@@ -146,6 +152,21 @@ def run(
     if stop.asked:
         raise SystemExit(EXIT_STOPPED)  # it has reported that itself
     raise typer.Exit(code)
+
+
+def _told_place(recorder: Recorder | NullRecorder, asked: Path | None, say: Callable[[str], None]) -> Path | None:
+    """The folder of the record, which is told if it is another one than was asked for."""
+    place = recorder.directory if isinstance(recorder, Recorder) else None
+    if place != asked:
+        say(f"{asked} has a record already; this one goes to {place}")
+    return place
+
+
+def _load_planner(settings: Settings, mission: Mission, say: Callable[[str], None]) -> None:
+    if not kernels_warm(settings, mission.rover.turning_radius_m):
+        say(COMPILING)
+        warm_up(settings, mission.rover.turning_radius_m)
+    settle()
 
 
 @dataclass(frozen=True, slots=True)
@@ -160,7 +181,7 @@ class _Rig:
     place: Path | None
     keeping: RunState
     files: StateFiles
-    live: Live
+    live: Live | LiveView
     stop: _StopSignals
     budget: ShutdownBudget
     page: LiveViewer | None
@@ -186,6 +207,8 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
 
     if rig.page is not None:
         rig.page.follow(companion, rig.settings, simulated=False)
+    if isinstance(rig.live, LiveView):
+        rig.live.follow(companion)
 
     def show(status: Status) -> None:
         rig.live.show(status)
@@ -194,18 +217,18 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
             rig.page.show(status)
 
     service.ready()
-    try:
-        with rig.live:
+    with rig.live:  # which may wait for the terminal at its end: the rover is stopped first
+        try:
             companion.run(show)
-        if not rig.stop.asked:
-            rig.budget.extend(UNHURRIED_S)
-    finally:
-        service.stopping()
-        companion.close()
-        rig.keeping.close()
-        runner.close()
-        rig.link.close()
-        rig.recorder.close()
+            if not rig.stop.asked:
+                rig.budget.extend(UNHURRIED_S)
+        finally:
+            service.stopping()
+            companion.close()
+            rig.keeping.close()
+            runner.close()
+            rig.link.close()
+            rig.recorder.close()
     return _ended(companion, rig)
 
 
