@@ -25,7 +25,7 @@ from companion.viewer.live_viewer import LiveViewer
 from companion.viewer.terminal.painter import Painter, ViewError, terminal
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_turning_on_the_spot
-from sitl.cli.drive_outputs import Outputs, outputs, print_summary, write_collisions
+from sitl.cli.drive_outputs import outputs, print_summary, write_collisions
 from sitl.cli.drive_progress import Also, Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.faults.fault_file import FaultFileError
@@ -108,7 +108,7 @@ def drive(
         _closed(page)
     recorder.close()
     print_summary(report, console)
-    _print_last(painter, wanted)
+    _print_last(painter, wanted.lines + isinstance(recorder, Recorder))
     try:
         wanted.write(run, recorder, console)
     except OutputError as error:
@@ -139,9 +139,9 @@ def _warn(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def _print_last(painter: Painter | None, wanted: Outputs) -> None:
+def _print_last(painter: Painter | None, rows_below: int) -> None:
     if painter is not None:
-        painter.print_last(rows_below=wanted.lines)
+        painter.print_last(rows_below)
 
 
 def _note(scenario: Scenario) -> None:

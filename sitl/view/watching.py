@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from companion.viewer.terminal.facts import Fact, Section
+from companion.viewer.terminal.facts import NAME_COLUMNS, Fact, Section
 from companion.viewer.terminal.screen import View
 from companion.viewer.terminal.sketch import Disc, Kind, Layer, Place, PlaceState, Sketch, compass_word
 from sitl.autopilot.control.records import LEG, WAYPOINT
@@ -164,8 +164,11 @@ class Watching:
         rates = self._rates.update(self.simulator.time_s, counts)
         facts = [Fact("nobody is connected", "")] if not rates else []
         for name, (heard, sent) in rates.items():
-            facts.append(Fact(name, "", minor=True))
-            facts.append(Fact("", f"in {heard:.0f}/s, out {sent:.0f}/s", minor=True))
+            told = f"in {heard:.0f}/s, out {sent:.0f}/s"
+            if len(name) < NAME_COLUMNS:
+                facts.append(Fact(name, told, minor=True))
+            else:
+                facts += [Fact(name, "", minor=True), Fact("", told, minor=True)]
         return Section("Links", tuple(facts))
 
 

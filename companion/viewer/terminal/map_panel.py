@@ -99,8 +99,10 @@ def map_lines(sketch: Sketch, viewport: Viewport, dots: Dots, *, colour: bool) -
         pairs = zip(dots[row].tolist(), dots[row + 1].tolist(), strict=True)
         characters = [_character(Kind(upper), Kind(lower), colour=colour) for upper, lower in pairs]
         for column, (sign, style) in marks.get(row // 2, {}).items():
-            # A mark keeps the background of its dot, unless its style has its own.
-            ground = "" if " on " in style or not colour else f" on {LOOKS[Kind(int(dots[row, column]))].colour}"
+            # A mark keeps the background of its dot, unless that is a line's, or its style has its own.
+            kind = Kind(int(dots[row, column]))
+            behind = LOOKS[Kind.NOTHING if kind in (Kind.TRACK, Kind.PATH) else kind].colour
+            ground = "" if " on " in style or not colour else f" on {behind}"
             characters[column] = (sign, style + ground)
         line = Text(no_wrap=True, overflow="crop")
         for style, run in groupby(characters, itemgetter(1)):
