@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable
 from types import TracebackType
@@ -11,9 +10,10 @@ from typing import Annotated
 import typer
 
 from companion.app import Companion, Status
-from companion.cli.live import Live
+from companion.cli.live import STDERR, STDOUT, Live
 from companion.core.clock import stopwatch_s
 from companion.core.severity import Severity
+from companion.storage.unbuffered import let_go, shared_with
 from companion.viewer.terminal.painter import Painter, ViewError, terminal
 from companion.viewer.terminal.run_view import RunView
 
@@ -63,9 +63,13 @@ class LiveView:
         if self._in_lines:
             self._lines.__exit__(kind, error, trace)
         elif self._painter.stuck:
-            _let_go_of_terminals()
+            let_go(shared_with(STDERR, (STDOUT,)))
         elif kind is None and not self._painter.problem:
             self._painter.print_last()
+
+    def unhurried(self, seconds: float) -> None:
+        """As in ``Live``, if lines have taken over; the picture is not waited for."""
+        self._lines.unhurried(seconds)
 
     def tell(self, text: str, severity: Severity) -> None:
         """A line from elsewhere."""
@@ -92,11 +96,3 @@ class LiveView:
             self._lines.__enter__()
             self._lines.tell(f"--view: nothing is drawn any more, the drive goes on: {problem}", Severity.WARNING)
             self._lines.show(status)
-
-
-def _let_go_of_terminals() -> None:
-    nowhere = os.open(os.devnull, os.O_WRONLY)
-    for descriptor in (1, 2):
-        if os.isatty(descriptor):
-            os.dup2(nowhere, descriptor)
-    os.close(nowhere)

@@ -16,7 +16,7 @@ import typer
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
-from companion.cli.live import Live, LiveConsole, Reader, levelled, reader_of
+from companion.cli.live import STDERR, Live, Reader, error_console, levelled, reader_of
 from companion.cli.live_view import LiveView, View, painter_for
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
@@ -42,7 +42,6 @@ from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
 from companion.viewer.live_viewer import LiveViewer
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-STDERR = 2
 BAD_INPUT = (
     SettingsError,
     MissionError,
@@ -55,7 +54,7 @@ BAD_INPUT = (
     WebError,
 )
 UNHURRIED_S = 10.0
-"""A run that ends by itself waits this long for a slow disk."""
+"""A run that ends by itself waits this long for a slow disk, and for who reads its output."""
 EXIT_REACHED, EXIT_MISSED, EXIT_STOPPED = 0, 3, 130
 
 
@@ -93,7 +92,7 @@ def run(
     Exit code 0: every target reached; 3: a target missed; 2: bad input; 1: error in the program; 130: stopped by a
     signal.
     """
-    console = LiveConsole(stderr=True)
+    console = error_console()
 
     reader = reader_of(STDERR, os.environ)
 
@@ -222,6 +221,7 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
             companion.run(show)
             if not rig.stop.asked:
                 rig.budget.extend(UNHURRIED_S)
+                rig.live.unhurried(UNHURRIED_S)
         finally:
             service.stopping()
             companion.close()

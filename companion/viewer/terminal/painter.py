@@ -8,7 +8,6 @@ Nouns: painter.
 from __future__ import annotations
 
 import contextlib
-import io
 import math
 import os
 import signal
@@ -19,6 +18,7 @@ from typing import TextIO, cast
 
 from rich.console import Console
 
+from companion.storage.unbuffered import UnbufferedOutput
 from companion.viewer.terminal.screen import View, render
 
 VIEWS_HZ = 5.0
@@ -35,34 +35,12 @@ class ViewError(Exception):
     """There is no usable terminal; the text is one line."""
 
 
-class _Unbuffered(io.TextIOBase):
-    """Text straight to a descriptor. A thread that is stuck in it holds no lock that others need."""
-
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
-
-    def fileno(self) -> int:
-        """The descriptor."""
-        return self._descriptor
-
-    def isatty(self) -> bool:
-        """Whether it is a terminal."""
-        return os.isatty(self._descriptor)
-
-    def write(self, text: str) -> int:
-        """Write all of it. Raises OSError."""
-        data = text.encode("utf-8", "replace")
-        while data:
-            data = data[os.write(self._descriptor, data) :]
-        return len(text)
-
-
 def terminal(stream: TextIO) -> Console:
     """The terminal that a stream leads to. Raises ViewError if there is none to draw on."""
     if not stream.isatty():
         name = NAMES.get(stream.fileno() if _has_descriptor(stream) else 1, "this output")
         raise ViewError(f"--view: {name} is not a terminal; run this in a terminal, or leave the option out")
-    console = Console(file=cast(TextIO, _Unbuffered(stream.fileno())))
+    console = Console(file=cast(TextIO, UnbufferedOutput(stream.fileno())))
     if console.is_dumb_terminal:
         raise ViewError("--view: this terminal cannot move its cursor (TERM=dumb); set TERM, or leave the option out")
     return console
