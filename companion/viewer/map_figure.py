@@ -108,7 +108,7 @@ class MapFigure:
         columns = _columns(labels, width_in)
         lines = sum(1 + label.count("\n") for label in labels) if columns == 1 else math.ceil(len(labels) / columns)
         title = textwrap.fill(title, int(width_in / TEXT_IN) - 6)
-        beside_in = 0.55 + LINE_IN * (lines + 1 + title.count("\n"))
+        beside_in = 0.75 + LINE_IN * (lines + 1 + title.count("\n"))
         self._figure.set_size_inches(width_in, (width_in - 0.7) / ratio + beside_in)
         axes.set_xlim(ground.west_m, ground.east_m)
         axes.set_ylim(ground.south_m, ground.north_m)
