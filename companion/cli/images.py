@@ -1,4 +1,4 @@
-"""Images of plans (``plan --image``) and of decisions (``replay --why``), north up."""
+"""Images of plans (``plan --image``) and of decisions (``replay --why``), north up, in metres of the map's frame."""
 
 from __future__ import annotations
 
@@ -7,73 +7,50 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, ImageDraw, ImageFont
 
-from companion.cli.inputs import OutputError, written
+from companion.cli.inputs import written
 from companion.control.motion_controller import MotionChoice
 from companion.control.motion_kernels import BLOCKED_S, MotionGround, MotionProblem, way_of
+from companion.core.frames import NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.planning.problem import Path as GridPath
 from companion.replay.explain import Candidate, Explanation, cost_text
+from companion.viewer.map_figure import Extent, MapFigure, Places, corners_of, extent_of, framed
 
-SIDE_PIXELS = 1000
-"""Small maps are enlarged, by a whole factor, to about this many pixels on the longer side."""
+Colour = tuple[int, int, int]
 
 OBSTACLE_COLOUR = (40, 44, 52)
-PATH_COLOUR, CURVE_COLOUR = (214, 60, 50), (40, 110, 200)
+PATH_COLOUR, CURVE_COLOUR, TIGHT_COLOUR = (214, 60, 50), (40, 110, 200), (170, 0, 170)
 START_COLOUR, TARGET_COLOUR = (30, 150, 80), (240, 140, 20)
 
 
-def save_plan(file: Path, grid: Grid, start: Cell, target: Cell, path: GridPath | None) -> None:
-    """Write an image of a path; the suffix decides the format. Raises OutputError."""
-    picture = draw_plan(grid, start, target, path)
-    with written(file):
-        picture.save(file)
+def save_plan(
+    file: Path, grid: Grid, ends: tuple[Cell, Cell], path: GridPath | None, tight: Places, title: str
+) -> None:
+    """Write an image of a path from one end to the other; the suffix decides the format. Raises OutputError.
 
-
-def draw_plan(grid: Grid, start: Cell, target: Cell, path: GridPath | None) -> Image.Image:
-    """The map in greys (darker is costlier), path red, its curve blue, start green, target orange; a legend below."""
-    scale = max(1, SIDE_PIXELS // max(grid.width, grid.height))
-    shade = (250.0 - 130.0 * np.clip(grid.weights, 0.0, 1.0)).astype(np.uint8)
-    pixels = np.repeat(shade[:, :, None], 3, axis=2)
-    pixels[grid.weights >= OBSTACLE] = OBSTACLE_COLOUR
-    picture = Image.fromarray(np.ascontiguousarray(pixels[::-1]))
-    picture = picture.resize((grid.width * scale, grid.height * scale), Image.Resampling.NEAREST)
-    pen = ImageDraw.Draw(picture)
-
-    def at(x: float, y: float) -> tuple[float, float]:
-        """The pixel in the middle of a place in fields."""
-        return (x + 0.5) * scale - 0.5, (grid.height - 0.5 - y) * scale - 0.5
-
-    thick = max(1, scale // 4)
-    if path is not None and len(path.cells) > 1:
-        pen.line([at(cell.x, cell.y) for cell in path.cells], PATH_COLOUR, thick, "curve")
-    if path is not None and path.curve is not None:
-        pen.line([at(x, y) for x, y in path.curve.tolist()], CURVE_COLOUR, max(1, thick // 2), "curve")
-    radius = max(SIDE_PIXELS / 200.0, scale * 0.6)
-    for cell, colour in ((start, START_COLOUR), (target, TARGET_COLOUR)):
-        x, y = at(cell.x, cell.y)
-        pen.ellipse((x - radius, y - radius, x + radius, y + radius), colour)
-    return _with_legend(picture, path)
-
-
-def _with_legend(picture: Image.Image, path: GridPath | None) -> Image.Image:
-    """The picture with a strip below that says what the colours mean."""
-    entries = [("start", START_COLOUR), ("target", TARGET_COLOUR), ("obstacle", OBSTACLE_COLOUR)]
+    The map in greys (darker is costlier), framed on the path. ``tight``: places in fields, shape (n, 2), where the
+    rover could not follow it.
+    """
+    start, target = (np.array([(end.x, end.y)], np.float64) for end in ends)
+    cells = np.empty((0, 2)) if path is None else path.cell_array.astype(np.float64)
+    lines = (start, target, cells, tight, *([] if path is None or path.curve is None else [path.curve]))
+    figure = MapFigure(framed(*(grid.places_of(line) for line in lines)))
+    _show(figure, _shaded(grid), extent_of(grid))
+    for colour, label in ((START_COLOUR, "start"), (TARGET_COLOUR, "target"), (OBSTACLE_COLOUR, "obstacle")):
+        figure.key(_rgb(colour), label)
     if path is not None:
-        entries.append(("path, field by field", PATH_COLOUR))
+        _line(figure, grid.places_of(cells), PATH_COLOUR, 4.0)
+        figure.key(_rgb(PATH_COLOUR), "path, field by field")
         if path.curve is not None:
-            entries.append(("its smooth curve", CURVE_COLOUR))
-    size = max(picture.width // 60, 10)
-    font = ImageFont.load_default(size)
-    page = Image.new("RGB", (picture.width, picture.height + 2 * size), "white")
-    page.paste(picture)
-    pen, x, y = ImageDraw.Draw(page), size // 2, picture.height + size // 2
-    for name, colour in entries:
-        pen.rectangle((x, y, x + size, y + size), colour)
-        pen.text((x + 1.5 * size, y + size / 2), name, (20, 20, 20), font, anchor="lm")
-        x += int(2.5 * size + pen.textlength(name, font))
-    return page
+            _line(figure, grid.places_of(path.curve), CURVE_COLOUR, 2.0)
+            figure.key(_rgb(CURVE_COLOUR), "its smooth curve")
+    for end, colour in ((start, START_COLOUR), (target, TARGET_COLOUR)):
+        _dots(figure, grid.places_of(end), colour)
+    if len(tight):
+        _rings(figure, grid.places_of(tight), f"bends more sharply than the rover turns ({len(tight)})")
+    with written(file):
+        figure.save(file, title)
 
 
 UNSEEN_TINT = np.array([0.86, 0.9, 1.0])
@@ -82,84 +59,43 @@ FREE_COLOUR = (185, 185, 185)
 """Of fields with the base weight."""
 TAKEN_COLOUR, PAST_COLOUR = (214, 60, 50), (150, 120, 90)
 CANDIDATE_COLOURS = ((40, 110, 200), (130, 60, 170), (20, 140, 140), (120, 200, 40), (240, 90, 190))
-Line = NDArray[np.float64]
-Entry = tuple[str, tuple[int, int, int]]
+ROVER_SHARE = 40.0
+"""The rover's triangle is as long as one of so many parts of the longer side, or as a field."""
 
 
 def save_decision(file: Path, why: Explanation) -> None:
-    """Write an image of a decision; the suffix decides the format. Raises OutputError."""
-    try:
-        draw_decision(why).save(file)
-    except OSError as error:
-        raise OutputError(f"{file}: cannot be written: {error.strerror or error}") from error
+    """Write an image of a decision; the suffix decides the format. Raises OutputError.
 
-
-def draw_decision(why: Explanation) -> Image.Image:
-    """The searched weights in greys (darker is costlier), bluish where unseen; over them candidates and decision."""
-    grid = why.weighed
-    scale = max(1, SIDE_PIXELS // max(grid.width, grid.height))
-    picture = _ground(why, scale)
-    pen = ImageDraw.Draw(picture)
-    thick = max(2, scale // 4)
-
-    def line(places: Line, colour: tuple[int, int, int], width: int) -> None:
-        if len(places) > 1:
-            at = [((x + 0.5) * scale - 0.5, (grid.height - 0.5 - y) * scale - 0.5) for x, y in places.tolist()]
-            pen.line(at, colour, width, "curve")
-
-    entries: list[Entry] = [("past path", PAST_COLOUR), ("target", TARGET_COLOUR), ("obstacle", OBSTACLE_COLOUR)]
-    entries.append(("seen free (darker is costlier)", FREE_COLOUR))
-    entries.append(("not seen yet (darker is costlier)", UNSEEN_COLOUR))
-    line(np.array(why.state.past, np.float64), PAST_COLOUR, thick)
-    # The chosen path is drawn below the candidates and wider, so that both can be seen.
-    taken = np.array(why.decision.path, np.float64).reshape(-1, 2)
-    line(taken, TAKEN_COLOUR, 3 * thick)
-    entries.append((f"taken: {why.decision.action}, part {why.decision.part}, {why.decision.reason}", TAKEN_COLOUR))
-    for number, candidate in enumerate(why.candidates):
-        colour = CANDIDATE_COLOURS[number % len(CANDIDATE_COLOURS)]
-        line(_places(candidate), colour, thick)
-        entries.append((f"{candidate.name}: {cost_text(candidate)}; {candidate.note}", colour))
-    goal = why.state.target
-    _dot(pen, ((goal.x + 0.5) * scale, (grid.height - 0.5 - goal.y) * scale), scale, TARGET_COLOUR)
-    _rover(pen, why, scale)
-    entries.append(("rover", START_COLOUR))
-    title = f"decision {why.number} at {why.time_s:.2f} s, heading for {why.target}"
-    return _page(picture, title, entries)
-
-
-def _ground(why: Explanation, scale: int) -> Image.Image:
-    weights = why.weighed.weights
-    shade = 250.0 - 130.0 * np.clip(weights, 0.0, 1.0)
-    pixels = np.repeat(shade[:, :, None], 3, axis=2)
-    pixels[~why.known] *= UNSEEN_TINT
-    pixels[weights >= OBSTACLE] = OBSTACLE_COLOUR
-    picture = Image.fromarray(np.ascontiguousarray(pixels.astype(np.uint8)[::-1]))
-    return picture.resize((weights.shape[1] * scale, weights.shape[0] * scale), Image.Resampling.NEAREST)
-
-
-def _places(candidate: Candidate) -> Line:
-    if candidate.path is None:
-        return np.empty((0, 2))
-    curve = candidate.path.curve
-    return candidate.path.cell_array.astype(np.float64) if curve is None else curve
-
-
-def _dot(pen: ImageDraw.ImageDraw, at: tuple[float, float], scale: int, colour: tuple[int, int, int]) -> None:
-    radius = max(SIDE_PIXELS / 200.0, scale * 0.6)
-    pen.ellipse((at[0] - radius, at[1] - radius, at[0] + radius, at[1] + radius), colour)
-
-
-def _rover(pen: ImageDraw.ImageDraw, why: Explanation, scale: int) -> None:
-    """A triangle that points along the rover's heading."""
-    grid, pose = why.weighed, why.pose
-    column, row = grid.in_fields(pose.point)
-    x, y = (column + 0.5) * scale, (grid.height - row - 0.5) * scale
-    size = max(SIDE_PIXELS / 80.0, 1.2 * scale)
-    corners = [(size, 0.0), (0.7 * size, 2.5), (0.7 * size, -2.5)]
-    pen.polygon(
-        [(x + r * math.sin(pose.heading_rad + turn), y - r * math.cos(pose.heading_rad + turn)) for r, turn in corners],
-        START_COLOUR,
+    The searched weights in greys (darker is costlier), bluish where unseen; over them candidates and decision. Framed
+    on what was seen and considered.
+    """
+    grid, decision = why.weighed, why.decision
+    past, taken = (
+        grid.places_of(np.array(cells, np.float64).reshape(-1, 2)) for cells in (why.state.past, decision.path)
     )
+    candidates = [grid.places_of(_places(one)) for one in why.candidates]
+    target, rover = grid.places_of(np.array([why.state.target], np.float64)), _row(why.pose.point)
+    seen = corners_of(why.known, extent_of(grid))
+    figure = MapFigure(framed(seen, past, taken, *candidates, target, rover))
+    _show(figure, _shaded(grid, ~why.known), extent_of(grid))
+    figure.key(_rgb(START_COLOUR), "rover")
+    figure.key(_rgb(TARGET_COLOUR), "target")
+    figure.key(_rgb(PAST_COLOUR), "past path")
+    figure.key(_rgb(OBSTACLE_COLOUR), "obstacle")
+    figure.key(_rgb(FREE_COLOUR), "seen free (darker is costlier)")
+    figure.key(_rgb(UNSEEN_COLOUR), "not seen yet (darker is costlier)")
+    _line(figure, past, PAST_COLOUR, 3.0)
+    # The chosen path is drawn below the candidates and wider, so that both can be seen.
+    _line(figure, taken, TAKEN_COLOUR, 8.0)
+    figure.key(_rgb(TAKEN_COLOUR), f"taken: {decision.action}, part {decision.part}, {decision.reason}")
+    for number, (candidate, line) in enumerate(zip(why.candidates, candidates, strict=True)):
+        colour = CANDIDATE_COLOURS[number % len(CANDIDATE_COLOURS)]
+        _line(figure, line, colour, 2.5)
+        figure.key(_rgb(colour), f"{candidate.name}: {cost_text(candidate)}; {candidate.note}")
+    _dots(figure, target, TARGET_COLOUR)
+    _rover(figure, why)
+    with written(file):
+        figure.save(file, f"decision {why.number} at {why.time_s:.2f} s, heading for {why.target}")
 
 
 MOTIONS_M = 6.0
@@ -168,83 +104,120 @@ TOUCHING_COLOUR, CHEAP_COLOUR, DEAR_COLOUR = (235, 160, 155), (40, 110, 200), (1
 
 
 def save_motions(file: Path, choice: MotionChoice, title: str) -> None:
-    """Write an image of the motions that were judged; the suffix decides the format. Raises OutputError."""
-    try:
-        draw_motions(choice, title).save(file)
-    except OSError as error:
-        raise OutputError(f"{file}: cannot be written: {error.strerror or error}") from error
+    """Write an image of the motions that were judged; the suffix decides the format. Raises OutputError.
 
+    The ground round the rover; the motions from dear to cheap, those that touch something below; the chosen one.
+    """
+    problem, costs_s, corner = choice.problem, choice.found.costs_s, choice.corner
+    at = NedPoint(corner.north_m + problem.start.y_m, corner.east_m + problem.start.x_m)
+    figure = MapFigure(
+        Extent(at.east_m - MOTIONS_M, at.east_m + MOTIONS_M, at.north_m - MOTIONS_M, at.north_m + MOTIONS_M)
+    )
+    _show_round(figure, problem.ground, corner)
 
-def draw_motions(choice: MotionChoice, title: str) -> Image.Image:
-    """The ground round the rover; the motions from dear to cheap, those that touch something below; the chosen one."""
-    problem, costs_s = choice.problem, choice.found.costs_s
-    ground, start = problem.ground, problem.start
-    scale = SIDE_PIXELS / (2.0 * MOTIONS_M)
-    picture = _round(ground, start.x_m, start.y_m)
-    pen = ImageDraw.Draw(picture)
-
-    def line(motion: Line, colour: tuple[int, int, int], width: int) -> None:
-        way = way_of(motion, problem) - (start.x_m, start.y_m)
-        pen.line([(SIDE_PIXELS / 2 + x * scale, SIDE_PIXELS / 2 - y * scale) for x, y in way.tolist()], colour, width)
+    def line(motion: NDArray[np.float64], colour: Colour, width: float) -> None:
+        _line(figure, _row(corner) + way_of(motion, problem)[:, ::-1], colour, width)
 
     order = np.argsort(costs_s)[::-1]
     free = order[costs_s[order] < BLOCKED_S]
     for one in order[costs_s[order] >= BLOCKED_S]:
-        line(choice.found.judged[one], TOUCHING_COLOUR, 2)
+        line(choice.found.judged[one], TOUCHING_COLOUR, 1.2)
     for share, one in zip(np.linspace(0.0, 1.0, len(free)), free, strict=True):
         dear, cheap = np.array(DEAR_COLOUR), np.array(CHEAP_COLOUR)
         red, green, blue = (dear + share**3 * (cheap - dear)).astype(int).tolist()
-        line(choice.found.judged[one], (red, green, blue), 3)
-    line(choice.found.motion, TAKEN_COLOUR, 7)
-    _body(pen, problem, scale)
-    entries: list[Entry] = [(f"chosen: cost {choice.found.cost_s:.2f} s", TAKEN_COLOUR), ("cheap", CHEAP_COLOUR)]
-    entries += [("dear", DEAR_COLOUR), ("touches something", TOUCHING_COLOUR), ("rover", START_COLOUR)]
-    entries += [("obstacle", OBSTACLE_COLOUR), ("not seen yet, or off the ground looked at", UNSEEN_COLOUR)]
-    return _page(picture, f"{title}: {2.0 * MOTIONS_M:g} m, {len(order)} motions of {problem.horizon_s:g} s", entries)
+        line(choice.found.judged[one], (red, green, blue), 1.8)
+    line(choice.found.motion, TAKEN_COLOUR, 4.5)
+    _body(figure, problem, at)
+    figure.key(_rgb(TAKEN_COLOUR), f"chosen: cost {choice.found.cost_s:.2f} s")
+    for colour, label in ((CHEAP_COLOUR, "cheap"), (DEAR_COLOUR, "dear"), (TOUCHING_COLOUR, "touches something")):
+        figure.key(_rgb(colour), label)
+    for colour, label in ((START_COLOUR, "rover"), (OBSTACLE_COLOUR, "obstacle")):
+        figure.key(_rgb(colour), label)
+    figure.key(_rgb(UNSEEN_COLOUR), "not seen yet, or off the ground looked at")
+    with written(file):
+        figure.save(file, f"{title}: {len(order)} motions of {problem.horizon_s:g} s")
 
 
-def _round(ground: MotionGround, x_m: float, y_m: float) -> Image.Image:
-    """The ground round a place, north up: obstacles, unseen, free."""
+def _rgb(colour: Colour) -> tuple[float, float, float]:
+    return colour[0] / 255.0, colour[1] / 255.0, colour[2] / 255.0
+
+
+def _row(point: NedPoint) -> Places:
+    return np.array([(point.north_m, point.east_m)])
+
+
+def _show(figure: MapFigure, pixels: NDArray[np.uint8], where: Extent) -> None:
+    """A picture of ground, its first row in the south."""
+    figure.axes.imshow(pixels, origin="lower", extent=where, interpolation="nearest")
+
+
+def _line(figure: MapFigure, places: Places, colour: Colour, width: float) -> None:
+    figure.axes.plot(places[:, 1], places[:, 0], color=_rgb(colour), linewidth=width, solid_joinstyle="round")
+
+
+def _dots(figure: MapFigure, places: Places, colour: Colour) -> None:
+    figure.axes.plot(places[:, 1], places[:, 0], "o", color=_rgb(colour), markersize=10, zorder=5)
+
+
+def _rings(figure: MapFigure, places: Places, label: str) -> None:
+    axes, colour = figure.axes, _rgb(TIGHT_COLOUR)
+    axes.plot(
+        places[:, 1], places[:, 0], "o", color=colour, fillstyle="none", markersize=16, markeredgewidth=2.5,
+        zorder=6, label=label,
+    )  # fmt: skip
+
+
+def _shaded(grid: Grid, unseen: NDArray[np.bool_] | None = None) -> NDArray[np.uint8]:
+    """Weights as greys, the first row in the south."""
+    shade = 250.0 - 130.0 * np.clip(grid.weights, 0.0, 1.0)
+    pixels = np.repeat(shade[:, :, None], 3, axis=2)
+    if unseen is not None:
+        pixels[unseen] *= UNSEEN_TINT
+    pixels[grid.weights >= OBSTACLE] = OBSTACLE_COLOUR
+    return pixels.astype(np.uint8)
+
+
+def _places(candidate: Candidate) -> NDArray[np.float64]:
+    if candidate.path is None:
+        return np.empty((0, 2))
+    curve = candidate.path.curve
+    return candidate.path.cell_array.astype(np.float64) if curve is None else curve
+
+
+def _rover(figure: MapFigure, why: Explanation) -> None:
+    """A triangle that points along the rover's heading."""
+    from matplotlib.patches import Polygon
+
+    point, heading_rad = why.pose.point, why.pose.heading_rad
+    size_m = max(max(figure.ground.width_m, figure.ground.height_m) / ROVER_SHARE, why.weighed.resolution_m)
+    corners = [(size_m, 0.0), (0.7 * size_m, 2.5), (0.7 * size_m, -2.5)]
+    places = [
+        (point.east_m + far_m * math.sin(heading_rad + turn), point.north_m + far_m * math.cos(heading_rad + turn))
+        for far_m, turn in corners
+    ]
+    figure.axes.add_patch(Polygon(places, facecolor=_rgb(START_COLOUR), zorder=6))
+
+
+def _show_round(figure: MapFigure, ground: MotionGround, corner: NedPoint) -> None:
+    """The ground round a place: obstacles, unseen, free."""
     height, width = ground.gap_m.shape
-    side = np.linspace(-MOTIONS_M, MOTIONS_M, SIDE_PIXELS, endpoint=False) + MOTIONS_M / SIDE_PIXELS
-    columns = np.floor((x_m + side) / ground.cell_m).astype(int)
-    rows = np.floor((y_m + side[::-1]) / ground.cell_m).astype(int)
-    inside = ((rows >= 0) & (rows < height))[:, None] & ((columns >= 0) & (columns < width))[None, :]
-    at = np.ix_(np.clip(rows, 0, height - 1), np.clip(columns, 0, width - 1))
-    pixels = np.full((SIDE_PIXELS, SIDE_PIXELS, 3), 250, np.uint8)
-    pixels[(ground.seen_m[at] <= 0.0) | ~inside] = UNSEEN_COLOUR
-    pixels[(ground.gap_m[at] <= 0.0) & inside] = OBSTACLE_COLOUR
-    return Image.fromarray(pixels)
+    pixels = np.full((height, width, 3), 250, np.uint8)
+    pixels[ground.seen_m <= 0.0] = UNSEEN_COLOUR
+    pixels[ground.gap_m <= 0.0] = OBSTACLE_COLOUR
+    figure.axes.set_facecolor(_rgb(UNSEEN_COLOUR))
+    east_m, north_m = corner.east_m + width * ground.cell_m, corner.north_m + height * ground.cell_m
+    _show(figure, pixels, Extent(corner.east_m, east_m, corner.north_m, north_m))
 
 
-def _body(pen: ImageDraw.ImageDraw, problem: MotionProblem, scale: float) -> None:
+def _body(figure: MapFigure, problem: MotionProblem, at: NedPoint) -> None:
     """The discs that cover the rover's outline, and where it points."""
+    from matplotlib.patches import Circle
+
     body, heading_rad = problem.body, problem.start.heading_rad
-    radius = body.radius_m * scale
+    ahead = np.array((math.cos(heading_rad), math.sin(heading_rad)))
     for ahead_m in body.ahead_m.tolist():
-        x = SIDE_PIXELS / 2 + ahead_m * math.sin(heading_rad) * scale
-        y = SIDE_PIXELS / 2 - ahead_m * math.cos(heading_rad) * scale
-        pen.ellipse((x - radius, y - radius, x + radius, y + radius), None, START_COLOUR, 3)
-    nose = body.around_m * scale
-    tip = (SIDE_PIXELS / 2 + nose * math.sin(heading_rad), SIDE_PIXELS / 2 - nose * math.cos(heading_rad))
-    pen.line([(SIDE_PIXELS / 2, SIDE_PIXELS / 2), tip], START_COLOUR, 5)
-
-
-def _page(picture: Image.Image, title: str, entries: list[Entry]) -> Image.Image:
-    """The image with a title above and a legend below."""
-    size = max(SIDE_PIXELS // 65, 12)
-    font = ImageFont.load_default(size)
-    height = picture.height + int(1.5 * size) * (len(entries) + 1) + size
-    width = max(
-        picture.width, *(int(font.getlength(text)) + 4 * size for text in (title, *(name for name, _ in entries)))
-    )
-    page = Image.new("RGB", (width, height), "white")
-    pen = ImageDraw.Draw(page)
-    pen.text((size, size), title, (20, 20, 20), font, anchor="lm")
-    page.paste(picture, (0, 2 * size))
-    y = picture.height + 2 * size + size // 2
-    for name, colour in entries:
-        pen.rectangle((size, y, 2 * size, y + size), colour)
-        pen.text((2.5 * size, y + size / 2), name, (20, 20, 20), font, anchor="lm")
-        y += int(1.5 * size)
-    return page
+        north_m, east_m = _row(at)[0] + ahead_m * ahead
+        disc = Circle((east_m, north_m), body.radius_m, fill=False, edgecolor=_rgb(START_COLOUR), linewidth=2.5)
+        disc.set_zorder(6)
+        figure.axes.add_patch(disc)
+    _line(figure, _row(at) + np.outer((0.0, body.around_m), ahead), START_COLOUR, 3.5)

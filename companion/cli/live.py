@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
-from collections.abc import Mapping
+import sys
+from collections.abc import Callable, Mapping
 from enum import Enum
+from functools import partial
 from types import TracebackType
+from typing import TextIO, cast
 
 from rich.console import Console
 from rich.markup import escape
@@ -14,6 +16,10 @@ from rich.status import Status as Spinner
 
 from companion.app import Status
 from companion.core.severity import Severity
+from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
+from companion.storage.unbuffered import UnbufferedOutput, let_go, shared_with
+
+STDOUT, STDERR = 1, 2
 
 LEVELS = {Severity.WARNING: "warning", Severity.NOTICE: "notice", Severity.INFO: "info", Severity.DEBUG: "debug"}
 """Words for log files; all that is worse is an error."""
@@ -50,6 +56,8 @@ def levelled(text: str, severity: Severity, reader: Reader) -> str:
 
 
 UPDATE_S = 0.25
+MOST_WAITING = 200
+"""So many outputs wait for a slow reader; more are left out."""
 
 
 class LiveConsole(Console):
@@ -58,13 +66,23 @@ class LiveConsole(Console):
     def on_broken_pipe(self) -> None:
         """Called when the reader has gone. rich would end the program; here the rover drives on."""
         self.quiet = True
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, self.file.fileno())
-        os.close(nowhere)
+        let_go([self.file.fileno()])
+
+
+def error_console() -> LiveConsole:
+    """A console on standard error that shares no buffer with others, where that is possible."""
+    try:
+        descriptor = sys.stderr.fileno()
+    except (OSError, ValueError):  # something else stands in for it
+        return LiveConsole(stderr=True)
+    return LiveConsole(file=cast(TextIO, UnbufferedOutput(descriptor)))
 
 
 class Live:
-    """A context manager that shows the companion's status; call ``show`` after every tick."""
+    """A context manager that shows the companion's status; call ``show`` after every tick.
+
+    A thread prints: a reader that takes nothing (Ctrl-S, an ssh that hangs) does not hold up the drive.
+    """
 
     def __init__(self, console: Console, name: str, reader: Reader = Reader.PERSON) -> None:
         self._console = console
@@ -74,41 +92,69 @@ class Live:
         self._shown = ""
         self._updated_s = -UPDATE_S
         self._broken = False
+        self._budget = ShutdownBudget()
+        self._worker = BackgroundWorker("lines", self._budget)
+        self._put = self._done = self._left_out = 0
+        self._streams = (sys.stdout, sys.stderr)
+
+    def unhurried(self, seconds: float) -> None:
+        """The end may wait so much longer for the reader."""
+        self._budget.extend(seconds)
 
     def __enter__(self) -> Live:
         """Start the changing line."""
         if self._spinner is not None:
-            self._spinner.start()
+            self._later(self._spinner.start)
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Restore the terminal."""
+        """Restore the terminal. If nobody reads it any more, what is still said is dropped: no one waits for it."""
         if self._spinner is not None:
-            with contextlib.suppress(OSError):
-                self._spinner.stop()
+            self._put_now(self._spinner.stop, 0)
+        if not self._worker.close():
+            sys.stdout, sys.stderr = self._streams  # the changing line had taken their places
+            let_go(shared_with(STDERR, (STDOUT,)))
 
     def show(self, status: Status) -> None:
-        """Show what is new. A lost terminal or a full disk does not end the run."""
-        if self._broken:
-            return
-        try:
-            self._show(status)
-        except OSError:
-            self._broken = True
-
-    def _show(self, status: Status) -> None:
+        """Show what is new; never waits. A lost terminal or a full disk does not end the run."""
         for news in status.news:
-            self._print(news.text, news.severity)
+            self.tell(news.text, news.severity)
         if self._spinner is None:
             line = f"{status.doing}{f': {status.target}' if status.target else ''}"
             if line != self._shown:
                 self._shown = line
-                self._print(line, Severity.INFO)
+                self.tell(line, Severity.INFO)
         elif status.time_s - self._updated_s >= UPDATE_S:
             self._updated_s = status.time_s
-            self._spinner.update(_line(status))
+            self._later(partial(self._spinner.update, _line(status)))
+
+    def tell(self, text: str, severity: Severity) -> None:
+        """One line; never waits."""
+        self._later(partial(self._print, text, severity))
+
+    def _later(self, act: Callable[[], None]) -> None:
+        """To be done in the thread, unless too much waits already."""
+        if self._put - self._done >= MOST_WAITING:
+            self._left_out += 1
+            return
+        left_out, self._left_out = self._left_out, 0
+        self._put_now(act, left_out)
+
+    def _put_now(self, act: Callable[[], None], left_out: int) -> None:
+        self._put += 1
+        self._worker.put(partial(self._do, act, left_out))
+
+    def _do(self, act: Callable[[], None], left_out: int) -> None:
+        try:
+            if left_out and not self._broken:
+                self._print(f"{left_out} outputs left out: nobody read them", Severity.WARNING)
+            if not self._broken:
+                act()
+        except Exception:  # a line is not worth a stop
+            self._broken = True
+        self._done += 1
 
     def _print(self, text: str, severity: Severity) -> None:
         line = levelled(f"{self._name}: {text}", severity, self._reader)

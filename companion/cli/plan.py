@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
+from companion.cli.bends import tightest_radius, too_tight
 from companion.cli.images import save_plan
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, picture, usable_settings
 from companion.core.clock import stopwatch_s
@@ -59,6 +60,12 @@ class Answer:
     kinematics: KinematicConstraints
     settings: Settings
 
+    @property
+    def tight(self) -> NDArray[np.float64]:
+        """Places in fields, shape (n, 2), where the line to drive bends more sharply than the rover turns."""
+        path = self.result.path
+        return np.empty((0, 2)) if path is None else too_tight(line_of(path), self.kinematics.turning_radius_fields)
+
     def place(self, cell: Cell) -> tuple[int, int]:
         """A field in the coordinates that the user chose."""
         return flipped(cell, self.grid.height, self.top_left)
@@ -82,16 +89,6 @@ def length_of(line: NDArray[np.float64]) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
-def tightest_radius(line: NDArray[np.float64]) -> float:
-    """The radius of a line's sharpest bend (mean of the two steps there / change of direction); inf if straight."""
-    steps = np.diff(line, axis=0)
-    lengths = np.hypot(*steps.T)
-    steps, lengths = steps[lengths > 0.0], lengths[lengths > 0.0]
-    turns = np.abs(np.diff(np.unwrap(np.arctan2(steps[:, 1], steps[:, 0]))))
-    bends = turns > 1e-9
-    return float((0.5 * (lengths[1:] + lengths[:-1])[bends] / turns[bends]).min()) if bends.any() else np.inf
-
-
 def bearing_of(line: NDArray[np.float64]) -> float:
     """The direction in which a line starts: 0 along +x, growing towards +y."""
     x, y = next(step for step in line - line[0] if step.any())
@@ -112,6 +109,7 @@ def as_text(answer: Answer) -> str:
             "curve_length_fields": None if curve is None else length_of(curve),
             "curve_length_m": None if curve is None else length_of(curve) * answer.grid.resolution_m,
             "sharpest_bend_m": _bend_m(answer, path) if path else None,
+            "too_tight_bends": len(answer.tight),
             "time_s": answer.seconds,
             "epochs": result.epochs,
             "evaluations": result.evaluations,
@@ -152,16 +150,20 @@ def _lengths(answer: Answer, path: GridPath) -> dict[str, str]:
     bend_m = _bend_m(answer, path)
     radius_m = answer.kinematics.turning_radius_fields * resolution_m
     if radius_m > 0.0:
-        # The line is sampled, so its radius is only exact to some per cent.
-        fits = bend_m is None or bend_m >= 0.95 * radius_m
-        bend = "none" if bend_m is None else f"{bend_m:.2f} m radius"
-        rows["sharpest bend"] = bend if fits else f"{bend}: too tight, the rover would manoeuvre there"
+        rows["sharpest bend"] = "none" if bend_m is None else f"{bend_m:.2f} m radius"
+        rows["too tight"] = _too_tight(len(answer.tight))
     heading_rad = answer.kinematics.heading_rad
     if heading_rad is not None and len(line) > 1:
         off_deg = math.degrees(abs(math.remainder(bearing_of(line) - heading_rad, 2.0 * math.pi)))
         ahead = off_deg <= AHEAD_DEG
         rows["sets out"] = "ahead" if ahead else f"{off_deg:.0f} deg off its heading: the rover would manoeuvre first"
     return rows
+
+
+def _too_tight(bends: int) -> str:
+    if not bends:
+        return "no bend: the rover can follow the line"
+    return f"{bends} bend{'s' * (bends != 1)}: the rover would manoeuvre there"
 
 
 def _bend_m(answer: Answer, path: GridPath) -> float | None:
@@ -217,7 +219,8 @@ def plan(
         picture(image)
         answer = search(grid, problem, name, settings, seed, top_left)
         if image is not None:
-            save_plan(image, grid, problem.start, problem.target, answer.result.path)
+            title = f"{map_file.name}, planned by {answer.result.planner}: {STATUS_WORDS[answer.result.status]}"
+            save_plan(image, grid, (problem.start, problem.target), answer.result.path, answer.tight, title)
     except (SettingsError, MapError, PlaceError, TurningError, UnknownPlannerError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import signal
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -15,7 +16,8 @@ import typer
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
-from companion.cli.live import Live, LiveConsole, Reader, levelled, reader_of
+from companion.cli.live import STDERR, Live, Reader, error_console, levelled, reader_of
+from companion.cli.live_view import LiveView, View, painter_for
 from companion.cli.service import Service
 from companion.cli.source import Source, Stoppable, refuse_arming
 from companion.cli.state import RunState, StateFiles
@@ -40,7 +42,6 @@ from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
 from companion.viewer.live_viewer import LiveViewer
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-STDERR = 2
 BAD_INPUT = (
     SettingsError,
     MissionError,
@@ -53,7 +54,7 @@ BAD_INPUT = (
     WebError,
 )
 UNHURRIED_S = 10.0
-"""A run that ends by itself waits this long for a slow disk."""
+"""A run that ends by itself waits this long for a slow disk, and for who reads its output."""
 EXIT_REACHED, EXIT_MISSED, EXIT_STOPPED = 0, 3, 130
 
 
@@ -85,18 +86,25 @@ def run(
     web: Web = None,
     web_token: Token = None,
     web_actions: Actions = False,
+    view: View = False,
 ) -> None:
     """Drive MISSION.
 
     Exit code 0: every target reached; 3: a target missed; 2: bad input; 1: error in the program; 130: stopped by a
     signal.
     """
-    console = LiveConsole(stderr=True)
+    console = error_console()
 
     reader = reader_of(STDERR, os.environ)
 
     def say(text: str) -> None:
         console.print(levelled(text, Severity.INFO, reader), soft_wrap=True, markup=False, highlight=False)
+
+    live: Live | LiveView | None = None
+
+    def warn(text: str) -> None:
+        """Of a problem beside the drive, perhaps while the picture is on the terminal."""
+        live.tell(text, Severity.WARNING) if live is not None else say(text)
 
     try:
         with _StopSignals() as stop, contextlib.ExitStack() as ends:
@@ -105,7 +113,8 @@ def run(
             ends.callback(files.close)
             settings = files.settings(usable_settings(settings_file), say)
             signer = files.signer(signing_key)
-            page = web_viewer(web, web_token, say, actions=web_actions, signer=signer)
+            painter = painter_for(view=view, say=say)
+            page = web_viewer(web, web_token, warn, actions=web_actions, signer=signer)
             if page is not None:
                 ends.callback(page.close)
                 say(served(page, to_person=reader is Reader.PERSON))
@@ -128,18 +137,14 @@ def run(
             )
             link = source.link()
             with console.status("loading the planner ..."):
-                if not kernels_warm(settings, mission.rover.turning_radius_m):
-                    say(COMPILING)
-                    warm_up(settings, mission.rover.turning_radius_m)
-                settle()
+                _load_planner(settings, mission, say)
             link.read()  # drop what has piled up meanwhile
-            place = recorder.directory if isinstance(recorder, Recorder) else None
-            if place != record:
-                say(f"{record} has a record already; this one goes to {place}")
+            place = _told_place(recorder, record, say)
             keeping.start(budget)
             codec, station = Codec(settings.link, signer=signer), None if page is None else page.station
             autopilot = AutopilotLink(link, codec, settings.link, recorder, station)
-            live = Live(console, mission.name, reader)
+            lines = Live(console, mission.name, reader)
+            live = lines if painter is None else LiveView(painter, lines, mission.name)
             rig = _Rig(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget, page)
             code = _drive(rig, seed=seed, arm=arm)
     except BAD_INPUT as error:
@@ -148,6 +153,21 @@ def run(
     if stop.asked:
         raise SystemExit(EXIT_STOPPED)  # it has reported that itself
     raise typer.Exit(code)
+
+
+def _told_place(recorder: Recorder | NullRecorder, asked: Path | None, say: Callable[[str], None]) -> Path | None:
+    """The folder of the record, which is told if it is another one than was asked for."""
+    place = recorder.directory if isinstance(recorder, Recorder) else None
+    if place != asked:
+        say(f"{asked} has a record already; this one goes to {place}")
+    return place
+
+
+def _load_planner(settings: Settings, mission: Mission, say: Callable[[str], None]) -> None:
+    if not kernels_warm(settings, mission.rover.turning_radius_m):
+        say(COMPILING)
+        warm_up(settings, mission.rover.turning_radius_m)
+    settle()
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,7 +182,7 @@ class _Rig:
     place: Path | None
     keeping: RunState
     files: StateFiles
-    live: Live
+    live: Live | LiveView
     stop: _StopSignals
     budget: ShutdownBudget
     page: LiveViewer | None
@@ -188,6 +208,8 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
 
     if rig.page is not None:
         rig.page.follow(companion, rig.settings, simulated=False)
+    if isinstance(rig.live, LiveView):
+        rig.live.follow(companion)
 
     def show(status: Status) -> None:
         rig.live.show(status)
@@ -196,18 +218,19 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
             rig.page.show(status)
 
     service.ready()
-    try:
-        with rig.live:
+    with rig.live:  # which may wait for the terminal at its end: the rover is stopped first
+        try:
             companion.run(show)
-        if not rig.stop.asked:
-            rig.budget.extend(UNHURRIED_S)
-    finally:
-        service.stopping()
-        companion.close()
-        rig.keeping.close()
-        runner.close()
-        rig.link.close()
-        rig.recorder.close()
+            if not rig.stop.asked:
+                rig.budget.extend(UNHURRIED_S)
+                rig.live.unhurried(UNHURRIED_S)
+        finally:
+            service.stopping()
+            companion.close()
+            rig.keeping.close()
+            runner.close()
+            rig.link.close()
+            rig.recorder.close()
     return _ended(companion, rig)
 
 

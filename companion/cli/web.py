@@ -17,7 +17,9 @@ __all__ = ["Actions", "Token", "Web", "WebError", "served", "web_viewer"]
 
 Web = Annotated[
     str | None,
-    typer.Option("--web", metavar="[HOST:]PORT", help="Serve a page that shows the run (needs rover-companion\\[web])."),
+    typer.Option(
+        "--web", metavar="[HOST:]PORT", help="Serve a page that shows the run (needs rover-companion\\[web])."
+    ),
 ]
 Token = Annotated[
     Path | None,

@@ -9,20 +9,18 @@ from __future__ import annotations
 
 import json
 import math
-from collections import deque
 from typing import Any, Protocol
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
-from companion.vehicle.state import VehicleState
 from companion.viewer import wire
+from companion.viewer.arrivals import Arrivals
 from companion.viewer.frame import frame_of, news_of, scene_of
 from companion.viewer.map_tiles import TileWatch
 
 FRAME_S, TILES_S, SCENE_S = 0.19, 0.5, 2.0
 """So often each is told, in real time."""
 NEWS_KEPT = 200
-RATE_S = 2.0
 
 Json = dict[str, Any]
 
@@ -55,7 +53,7 @@ class ViewerFeed:
         self._scene: Json = {}
         self._frame_s = self._tiles_s = self._scene_s = -math.inf
         self._news: list[Json] = []
-        self._rates = _Rates()
+        self._rates = Arrivals()
         self.contacts = 0
         """Of a simulated rover; whoever knows them writes them here."""
 
@@ -122,28 +120,3 @@ class ViewerFeed:
 
     def _put(self, message: Json) -> bool:
         return self._receiver.put(wire.JSON, json.dumps(message, allow_nan=False).encode())
-
-
-class _Rates:
-    """How many positions and range readings come a second, of those that a tick can see."""
-
-    def __init__(self) -> None:
-        self._arrived: dict[str, deque[float]] = {"position": deque(), "range": deque()}
-
-    def note(self, vehicle: VehicleState) -> None:
-        """Once a tick."""
-        for name, seen in (("position", vehicle.position), ("range", vehicle.scan)):
-            times_s = self._arrived[name]
-            if seen is not None and (not times_s or seen.time_s != times_s[-1]):
-                times_s.append(seen.time_s)
-
-    def at(self, vehicle: VehicleState, now_s: float) -> Json:
-        """As of now, over the last seconds."""
-        for times_s in self._arrived.values():
-            while times_s and not 0.0 <= now_s - times_s[0] <= RATE_S:
-                times_s.popleft()
-        heartbeat = vehicle.heartbeat
-        return {
-            **{name: round(len(times_s) / RATE_S, 1) for name, times_s in self._arrived.items()},
-            "heartbeat_age_s": None if heartbeat is None else round(max(now_s - heartbeat.time_s, 0.0), 1),
-        }

@@ -100,8 +100,8 @@ def frame_of(companion: Companion, status: Status) -> Json:
         "pose": None if pose is None else [*_place(pose.point), round(pose.heading_rad, 4)],
         "speed": round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
-        **_mode(vehicle, run),
-        **_doing(status),
+        **mode_of(vehicle, run),
+        **doing_of(status),
         "statuses": [str(one) for _, one in run.statuses()],
         "goal": None if goal is None else {"name": goal.name, "place": _place(goal.point)},
         "path": _path(executor),
@@ -178,7 +178,7 @@ def _map(executor: MissionExecutor) -> Json:
     }
 
 
-def _doing(status: Status) -> Json:
+def doing_of(status: Status) -> Json:
     """One large line, and what is awaited where it says why the rover stands."""
     activity, line, why = status.activity, status.doing, ""
     if activity.phase is RunPhase.DRIVING and status.target:
@@ -188,7 +188,8 @@ def _doing(status: Status) -> Json:
     return {"line": line, "why": why, "state": STATES[activity.phase]}
 
 
-def _mode(vehicle: VehicleState, run: MissionRun) -> Json:
+def mode_of(vehicle: VehicleState, run: MissionRun) -> Json:
+    """The mode, whether it is armed, and who drives."""
     heartbeat = vehicle.heartbeat
     if heartbeat is None:
         return {"mode": None, "armed": None, "drives": "nobody"}

@@ -23,12 +23,12 @@ from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings, SettingsError
 from companion.viewer.live_viewer import LiveViewer
+from companion.viewer.terminal.painter import Painter, ViewError, terminal
 from sitl.cli import drive_options as options
 from sitl.cli.drive_mission import OnWorld, mission_to_drive, refuse_blind, refuse_turning_on_the_spot
 from sitl.cli.drive_outputs import outputs, print_summary, write_collisions
 from sitl.cli.drive_progress import Also, Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
-from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.faults.fault_file import FaultFileError
 from sitl.lockstep import Drive
 from sitl.scenario import Scenario, ScenarioError, equipped, simulated
@@ -77,7 +77,7 @@ def drive(
     usual = options.VIEWED_SPEEDUP if view else options.WEB_SPEEDUP if web else None
     pace = Pace(usual if speedup is None else speedup, WallClock())
     try:
-        viewer, page = _viewer(view), web_viewer(web, web_token, _warn, actions=web_actions)
+        painter, page = _painter(view), web_viewer(web, web_token, _warn, actions=web_actions)
         settings = usable_settings(settings_file)
         mission = mission_to_drive(mission_file, OnWorld(world, start, target, resolution_m, top_left, prior))
         mission = equipped(mission, sensors, params)
@@ -95,10 +95,10 @@ def drive(
                 mission, scenario, settings, seed, recorder, time_limit_s, station=page.station if page else None
             )
         also = Also() if page is None else _shown(run, page, settings)
-        if viewer is None:
+        if painter is None:
             report = run_with_progress(run, console, pace, also)
         else:
-            report = run_with_view(run, viewer, _paced(run, pace), also)
+            report = run_with_view(run, painter, _paced(run, pace), also)
     except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -112,7 +112,7 @@ def drive(
         _closed(page)
     recorder.close()
     print_summary(report, console)
-    _print_last(viewer)
+    _print_last(painter, wanted.lines + isinstance(recorder, Recorder))
     try:
         wanted.write(run, recorder, console)
     except OutputError as error:
@@ -121,8 +121,8 @@ def drive(
     raise typer.Exit(report.exit_code)
 
 
-def _viewer(view: bool) -> Viewer | None:
-    return Viewer(terminal()) if view else None
+def _painter(view: bool) -> Painter | None:
+    return Painter(terminal(sys.stdout)) if view else None
 
 
 def _station(page: LiveViewer | None) -> LocalStation | None:
@@ -151,9 +151,9 @@ def _warn(text: str) -> None:
     typer.echo(text, err=True)
 
 
-def _print_last(viewer: Viewer | None) -> None:
-    if viewer is not None:
-        viewer.print_last()
+def _print_last(painter: Painter | None, rows_below: int) -> None:
+    if painter is not None:
+        painter.print_last(rows_below)
 
 
 def _note(scenario: Scenario) -> None:

@@ -30,6 +30,11 @@ class Outputs:
     map_stem: Path | None = None
     json_file: Path | None = None
 
+    @property
+    def lines(self) -> int:
+        """So many lines tell at the end where the files are, but for the record's."""
+        return sum(file is not None for file in (self.image, self.map_stem, self.json_file))
+
     def check(self, inputs: Iterable[Path | None]) -> None:
         """Check before the drive that all can be written, over no input and no other output. Raises OutputError."""
         maps = [] if self.map_stem is None else [Path(f"{self.map_stem}{end}") for end in (".yaml", ".pgm")]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import FrameType
@@ -16,7 +17,7 @@ from companion.core.clock import WallClock
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
-from sitl.cli.viewer import Viewer, ViewError, terminal
+from companion.viewer.terminal.painter import Painter, ViewError, terminal
 from sitl.faults.fault_file import FaultFileError
 from sitl.network import FORMS, Endpoint, ListenError, open_endpoint
 from sitl.network.event_log import EventLog
@@ -52,7 +53,7 @@ def serve(
     clock = WallClock()
     endpoints: list[Endpoint] = []
     try:
-        console = terminal() if view else None
+        console = terminal(sys.stdout) if view else None
         name, scenario = _scenario(mission_file, sensors, params, faults)
         # Compile everything before clients connect and time starts.
         with Console(stderr=True).status("starting ..."):
@@ -115,13 +116,14 @@ def _viewed(console: Console | None, watching: Watching, clock: WallClock) -> It
     if console is None:
         yield lambda: None
         return
-    with Viewer(console) as viewer:
+    with Painter(console) as painter:
 
         def observe() -> None:
             now_s = clock.now_s()
             watching.note()
-            if viewer.is_due(now_s):
-                viewer.show(watching.view(now_s))
+            if painter.is_due(now_s):
+                view = watching.view(now_s)
+                painter.show(lambda: view)
 
         yield observe
 

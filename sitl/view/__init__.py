@@ -1,1 +1,1 @@
-"""Views of a simulation: on the terminal and as a picture file."""
+"""Views of a simulation: what the terminal shows of the true world, and a picture file."""

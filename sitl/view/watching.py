@@ -1,4 +1,4 @@
-"""Collects from a running simulator what ``--view`` shows: scene, track, rates of links, events."""
+"""Collects from a running simulator what ``--view`` shows: sketch, track, rates of links, events."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from companion.viewer.terminal.facts import NAME_COLUMNS, Fact, Section
+from companion.viewer.terminal.screen import View
+from companion.viewer.terminal.sketch import Disc, Kind, Layer, Place, PlaceState, Sketch, compass_word
 from sitl.autopilot.control.records import LEG, WAYPOINT
 from sitl.autopilot.vehicle import Vehicle
 from sitl.simulator import Simulator
-from sitl.view.sketch import Disc, Kind, Layer, Place, PlaceState, Scene
-from sitl.view.view import Fact, Section, View
 from sitl.world.world import World
 
 TRACK_STEP_M = 0.2
@@ -87,15 +88,15 @@ class Watching:
     def view(self, now_s: float) -> View:
         """The view of this moment; ``now_s``: real seconds."""
         sections = (self.vehicle_section(now_s), self.links_section())
-        return View(self.title, self.scene(), sections, tuple(self.events))
+        return View(self.title, self.sketch(), sections, tuple(self.events))
 
-    def scene(self) -> Scene:
-        """The true scene: world, rover and track."""
+    def sketch(self) -> Sketch:
+        """The true world, rover and track."""
         simulator, truth = self.simulator, self.simulator.truth
         self.note()
         world = simulator.world
         start = Place("start", simulator.start.north_m, simulator.start.east_m, PlaceState.START)
-        return Scene(
+        return Sketch(
             layers=world_layers(world, simulator.time_s),
             rover=Disc(truth.north_m, truth.east_m, simulator.outline.reach_m),
             heading_rad=truth.heading_rad,
@@ -145,10 +146,14 @@ class Watching:
             Fact("mode", f"{vehicle.mode.name}, {'armed' if vehicle.armed else 'disarmed'}"),
             Fact("time", f"{simulator.time_s:.0f} s, {times:.1f} times"),
             Fact("speed", f"{truth.speed_m_s:.2f} m/s"),
-            Fact("heading", f"{math.degrees(truth.heading_rad) % 360.0:.0f}° {arrow_word(truth.heading_rad)}"),
-            Fact("position", f"N {north_m:.1f}, E {east_m:.1f} m"),
+            Fact(
+                "heading",
+                f"{math.degrees(truth.heading_rad) % 360.0:.0f}° {compass_word(truth.heading_rad)}",
+                minor=True,
+            ),
+            Fact("position", f"N {north_m:.1f}, E {east_m:.1f} m", minor=True),
             *_health(simulator),
-            Fact("driven", f"{simulator.driven_m:.0f} m"),
+            Fact("driven", f"{simulator.driven_m:.0f} m", minor=True),
             Fact("collisions", _collisions(simulator), alarm=len(simulator.collisions) > 0),
         )
         return Section("Rover", facts)
@@ -159,8 +164,11 @@ class Watching:
         rates = self._rates.update(self.simulator.time_s, counts)
         facts = [Fact("nobody is connected", "")] if not rates else []
         for name, (heard, sent) in rates.items():
-            facts.append(Fact(name, ""))
-            facts.append(Fact("", f"in {heard:.0f}/s, out {sent:.0f}/s"))
+            told = f"in {heard:.0f}/s, out {sent:.0f}/s"
+            if len(name) < NAME_COLUMNS:
+                facts.append(Fact(name, told, minor=True))
+            else:
+                facts += [Fact(name, "", minor=True), Fact("", told, minor=True)]
         return Section("Links", tuple(facts))
 
 
@@ -178,20 +186,12 @@ def _health(simulator: Simulator) -> tuple[Fact, ...]:
     fix = vehicle.has_home and vehicle.ekf.gps_has_fix
     position = "position known" if vehicle.has_position else "no position"
     facts = [
-        Fact("GPS", "3D fix" if fix else "no fix", alarm=not fix),
-        Fact("EKF", position, alarm=not vehicle.has_position),
+        Fact("GPS", "3D fix" if fix else "no fix", alarm=not fix, minor=True),
+        Fact("EKF", position, alarm=not vehicle.has_position, minor=True),
     ]
     if int(vehicle.parameters["BATT_MONITOR"]) != 0:
         facts.append(Fact("battery", f"{vehicle.volts():.1f} V, {vehicle.battery_percent()} %"))
     return tuple(facts)
-
-
-WORDS = ("N", "NE", "E", "SE", "S", "SW", "W", "NW")
-
-
-def arrow_word(heading_rad: float) -> str:
-    """The nearest of the eight compass points."""
-    return WORDS[round(heading_rad / (math.pi / 4.0)) % 8]
 
 
 def world_layers(world: World, time_s: float, standing: Kind = Kind.WALL) -> tuple[Layer, ...]:

@@ -14,15 +14,15 @@ from rich.console import Console
 from companion.app import Status
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
+from companion.viewer.terminal.painter import MakeView, Painter
+from companion.viewer.terminal.screen import View
+from companion.viewer.terminal.sketch import Kind
 from sitl.cli.drive_view import DriveView
-from sitl.cli.viewer import Viewer
 from sitl.faults.plan import FaultPlan, PilotTakesOver, Reboot
-from sitl.lockstep import Drive
+from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import scenario_from_mission, with_faults
 from sitl.view.picture import save_picture
-from sitl.view.sketch import Kind
-from sitl.view.view import View
-from tests.sitl.view.test_view import screen
+from tests.companion.viewer.terminal.test_screen import screen
 from tests.support.rig import yard
 
 GATE_M = (7.5, 15.5)
@@ -30,7 +30,7 @@ GATE_M = (7.5, 15.5)
 PLAN = FaultPlan((PilotTakesOver(3.0, 5.0, "driving", mode="HOLD"), Reboot(9.0, 12.0, "driving")))
 
 
-class Kept(Viewer):
+class Kept(Painter):
     """Draws nothing and keeps what was to be drawn."""
 
     def __init__(self) -> None:
@@ -40,8 +40,8 @@ class Kept(Viewer):
     def is_due(self, now_s: float) -> bool:
         return True
 
-    def show(self, view: View) -> None:
-        self.views.append(view)
+    def show(self, make: MakeView) -> None:
+        self.views.append(make())
 
 
 @dataclass
@@ -64,8 +64,7 @@ def driven(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
         statuses.append(status)
         shown.observe(status)
 
-    run.run(observe)
-    shown.finish()
+    shown.finish(run.run(observe))
     assert any("EKF origin moved" in text for text in run.companion.outcome.said)
     yield Driven(run, viewer.views, statuses)
 
@@ -75,10 +74,10 @@ def test_targets_and_walls_stay_where_they_are_when_the_autopilot_counts_from_el
     assert origin is not None and driven.run.mission.targets
     moved_m = [there - here for there, here in zip(start.place_of(origin), (start.north_m, start.east_m), strict=True)]
     assert max(map(abs, moved_m)) > 2.0
-    for view in (view for view in driven.views if len(view.scene.places) > 1):
-        gate = view.scene.places[-1]
+    for view in (view for view in driven.views if len(view.sketch.places) > 1):
+        gate = view.sketch.places[-1]
         assert (gate.north_m, gate.east_m) == pytest.approx(GATE_M, abs=0.1)
-        seen = next(layer for layer in view.scene.layers if layer.kind is Kind.SEEN)
+        seen = next(layer for layer in view.sketch.layers if layer.kind is Kind.SEEN)
         # Its fields are the mission's own, layout from the new origin: they lie elsewhere by less than a field.
         assert (seen.south_m, seen.west_m) == pytest.approx((0.0, 0.0), abs=1.0)
 
@@ -111,13 +110,21 @@ def test_the_news_tell_all_that_the_companion_said(driven: Driven) -> None:
     assert [text for text in told if text in said] == said
 
 
-@pytest.mark.parametrize(("columns", "rows"), [(80, 40), (140, 30)])
-def test_what_is_waited_for_can_be_read(driven: Driven, columns: int, rows: int) -> None:
-    status = driven.statuses[-1]
+@pytest.mark.parametrize(("columns", "rows"), [(60, 16), (80, 24), (140, 40)])
+def test_what_is_waited_for_and_the_newest_news_can_be_read(driven: Driven, columns: int, rows: int) -> None:
+    status, view = driven.statuses[-1], driven.views[-2]
     assert len(status.doing) > 44
-    lines = screen(driven.views[-1], columns, rows)
+    lines = screen(view, columns, rows)
+    assert len(lines) == rows
+    below = [line.strip() for line in lines[max(n for n, line in enumerate(lines) if line.startswith("╰")) + 1 :]]
+    assert " ".join(" ".join(below).split()).startswith(status.doing)
+    assert view.events[-1] in " ".join(below)
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(30, 8), (60, 16), (80, 24), (140, 40)])
+def test_the_outcome_stands_under_the_last_picture(driven: Driven, columns: int, rows: int) -> None:
+    assert driven.run.report.outcome is DriveOutcome.TIME_LIMIT
+    lines = screen(driven.views[-1], columns, rows, news=False)
     assert len(lines) <= rows
-    panel = [line.rsplit("│", 2)[1] for line in lines if line.count("│") > 2]
-    first = next(number for number, line in enumerate(panel) if line.strip().startswith("doing"))
-    words = " ".join(" ".join(line.strip().removeprefix("doing") for line in panel[first:]).split())
-    assert words.startswith(status.doing)
+    text = " ".join(" ".join(lines[-3:]).split())
+    assert "outcome: time limit, 0 of 1 targets reached" in text.replace("…", "")

@@ -5,9 +5,16 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from companion.cli.bends import tightest_radius, too_tight
 from companion.cli.commands import app
-from companion.cli.images import CURVE_COLOUR, OBSTACLE_COLOUR, PATH_COLOUR, START_COLOUR, TARGET_COLOUR
-from companion.cli.plan import tightest_radius
+from companion.cli.images import (
+    CURVE_COLOUR,
+    OBSTACLE_COLOUR,
+    PATH_COLOUR,
+    START_COLOUR,
+    TARGET_COLOUR,
+    TIGHT_COLOUR,
+)
 
 MAP = """type octile
 height 6
@@ -173,15 +180,47 @@ def test_the_picture_is_north_up_and_shows_map_path_and_ends(map_file, tmp_path)
     file = tmp_path / "path.png"
     result = run(map_file, "--start", "0,0", "--target", "7,5", "--image", file, "--planner", "bspline-ga", "--seed", 1)
     assert result.exit_code == 0, result.output
-    pixels = np.array(Image.open(file))
-    height, width, _ = pixels.shape
-    scale = width // 8
-    assert width == 8 * scale > 700 and height > 6 * scale, "and a legend below"
+    pixels = np.array(Image.open(file).convert("RGB"))
 
-    def at(x, y):
-        return tuple(pixels[6 * scale - int((y + 0.5) * scale), int((x + 0.5) * scale)])
+    def middle(colour):
+        """Row and column of the middle of the largest spots of this colour, the legend's left out."""
+        rows, columns = np.nonzero((pixels[: int(0.85 * len(pixels))] == colour).all(axis=2))
+        assert len(rows) > 50
+        return rows.mean(), columns.mean()
 
-    assert at(0, 0) == START_COLOUR and at(7, 5) == TARGET_COLOUR
-    assert at(3, 2) == OBSTACLE_COLOUR and at(6, 0) not in (OBSTACLE_COLOUR, PATH_COLOUR)
+    (south, west), (north, east) = middle(START_COLOUR), middle(TARGET_COLOUR)
+    field = (east - west) / 7.0
+    assert field > 50 and (south - north) / 5.0 == pytest.approx(field, rel=0.02)
+    row, column = middle(OBSTACLE_COLOUR)  # fields 3, 0 to 3, 2, less where the curve passes
+    assert (column - west) / field == pytest.approx(3.0, abs=0.1) and (south - row) / field == pytest.approx(
+        1.0, abs=0.1
+    )
     for colour in (PATH_COLOUR, CURVE_COLOUR):
-        assert (pixels == colour).all(axis=2).sum() > 50
+        middle(colour)
+    assert f"picture: {file}" in result.stdout
+
+
+def test_where_the_rover_cannot_follow_is_marked_and_counted(tmp_path):
+    ends = ("missions/maps/rooms.png", "--start", "0,24", "--target", "98,24")
+
+    def marks(radius_m):
+        file = tmp_path / f"{radius_m}.png"
+        result = run(*ends, "--turning-radius-m", radius_m, "--image", file)
+        bends = shown(result.output)["too tight"].split()[0]
+        pixels = np.array(Image.open(file).convert("RGB"))
+        return bends, int((pixels == TIGHT_COLOUR).all(axis=2).sum())
+
+    assert marks("0.1") == ("no", 0)
+    bends, marked = marks("3")
+    assert int(bends) > 5 and marked > 100 * int(bends) / 3
+
+
+def test_a_bend_that_is_too_tight_is_counted_once_at_its_sharpest():
+    right = np.concatenate([np.column_stack((np.arange(10.0), np.zeros(10))), [[9.0, 1.0], [9.0, 2.0]]])
+    assert too_tight(right, 3.0).tolist() == [[9.0, 0.0]]
+    assert too_tight(right, 0.5).shape == too_tight(right[:5], 3.0).shape == (0, 2)
+    angles = np.linspace(0.0, 3.0, 40)
+    circle = 2.0 * np.column_stack((np.cos(angles), np.sin(angles)))
+    assert len(too_tight(circle, 3.0)) == 1 and len(too_tight(circle, 2.0)) == 0
+    doubled = np.repeat(right, 2, axis=0)
+    assert too_tight(doubled, 3.0).tolist() == [[9.0, 0.0]]

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import io
+import threading
 
+import pytest
 from rich.console import Console
 
-from companion.cli.live import Live
+from companion.cli import live as live_module
+from companion.cli.live import MOST_WAITING, Live
 from companion.core.severity import Severity
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -15,7 +18,9 @@ from companion.mavlink.transport import MemoryLink
 from companion.operator.notifications import FAULT_AFTER_S, SAID_KEPT, News, Notifier, Status
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, WaitReason
 from companion.settings import LinkSettings
+from companion.storage.unbuffered import shared_with
 from tests.support.notices import HandClock
+from tests.support.served import wait_until
 from tests.support.tlog import messages
 
 SLOW = RateFault(32, 10.0, 1.0)
@@ -90,10 +95,9 @@ def test_on_a_terminal_one_line_changes_and_news_stay() -> None:
     with Live(Console(file=out, force_terminal=True, width=100), "Yard") as live:
         live.show(status(DRIVING, "Heading for gate", target="gate", time_s=1.0))
         live.show(status(DRIVING, target="[b]", time_s=2.0))
-        assert live._spinner is not None
-        shown = live._spinner.renderable.text
+        spinner = live._spinner
     assert "Yard: Heading for gate" in out.getvalue()
-    assert str(shown) == "driving  [b] [1/2]  steps 7"
+    assert spinner is not None and str(spinner.renderable.text) == "driving  [b] [1/2]  steps 7"
 
 
 class FullDisk(io.StringIO):
@@ -103,6 +107,44 @@ class FullDisk(io.StringIO):
         if self.getvalue():
             raise OSError(28, "No space left on device")
         return super().write(text)
+
+
+class Stuck(io.StringIO):
+    """Takes nothing until it is let go."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.going = threading.Event()
+
+    def write(self, text: str) -> int:
+        self.going.wait(30.0)
+        return super().write(text)
+
+
+@pytest.mark.parametrize("is_terminal", [False, True])
+def test_an_output_that_takes_nothing_holds_up_nothing(monkeypatch: pytest.MonkeyPatch, is_terminal: bool) -> None:
+    out, dropped = Stuck(), []
+    monkeypatch.setattr(live_module, "let_go", dropped.append)
+    with Live(Console(file=out, force_terminal=is_terminal), "Yard") as live:
+        live.unhurried(-0.4)
+        for tick in range(2 * MOST_WAITING):
+            live.show(status(DRIVING, f"news {tick}", target="gate", time_s=float(tick)))
+        assert out.getvalue() == "" and dropped == []
+    assert dropped == [shared_with(2, (1,))]
+    out.going.set()
+    live._worker._thread.join(10.0)
+
+
+def test_what_a_slow_output_has_missed_is_told() -> None:
+    out = Stuck()
+    with Live(Console(file=out), "Yard") as live:
+        for tick in range(2 * MOST_WAITING):
+            live.show(status(DRIVING, f"news {tick}"))
+        out.going.set()
+        wait_until(lambda: f"news {MOST_WAITING - 2}" in out.getvalue())
+        live.show(status(DRIVING, "the newest"))
+    told = out.getvalue().splitlines()
+    assert told[-1] == "Yard: the newest" and "outputs left out" in told[-2]
 
 
 def test_a_full_disk_ends_the_show_and_not_the_run() -> None:

@@ -219,7 +219,7 @@ OPENED_OTHERWISE = {
     "companion/mapping/map_files.py": "a picture that reading.py has opened",
     "companion/cli/kernel_cache.py": "the program's own files",
     "companion/vehicle/guard.py": "the program's own file",
-    "companion/cli/live.py": "/dev/null",
+    "companion/storage/unbuffered.py": "/dev/null",
     "companion/cli/entry.py": "/dev/null",
     "companion/bench/measure.py": "/proc",
     "sitl/experiments/soak.py": "/proc",
