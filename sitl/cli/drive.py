@@ -173,7 +173,7 @@ def _closed(page: LiveViewer | None) -> None:
 
 def _shown(run: Drive, page: LiveViewer, settings: Settings) -> Also:
     """The page, which begins to show the run."""
-    _warn(served(page, to_person=sys.stderr.isatty()))
+    _warn(served(page.web.place, to_person=sys.stderr.isatty()))
     page.follow(run.companion, settings, simulated=True)
     return Also(lambda status: page.show(status, len(run.simulator.collisions)), WEB_EVERY_S)
 

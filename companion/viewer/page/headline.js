@@ -46,6 +46,7 @@ export class Headline {
 }
 
 function badge(scene) {
+  if (scene.truth) return "live, simulator";
   return [scene.live ? "live" : "record", scene.simulated ? "simulated" : ""].filter(Boolean).join(", ");
 }
 

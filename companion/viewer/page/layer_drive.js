@@ -5,6 +5,8 @@ import { placed } from "viewer/geometry.js";
 /** The rover is never drawn smaller than this, however far away the map is seen from. */
 const SMALLEST_ROVER_PX = 26;
 const OLD_RAYS_S = 1;
+/** Rays all round have no first and no last one. */
+const FULL_TURN = 2 * Math.PI - 0.01;
 
 /** Sensor rays: a faint area and a dot where something was seen. Old ones would lie. */
 export function drawRays(pen, frame) {
@@ -19,7 +21,7 @@ export function drawRays(pen, frame) {
   );
   context.fillStyle = colours.ray;
   context.beginPath();
-  context.moveTo(...from);
+  if (rays.step * rays.m.length < FULL_TURN) context.moveTo(...from);
   ends.forEach((end) => context.lineTo(...(end ? camera.toScreen(...end) : from)));
   context.closePath();
   context.fill();

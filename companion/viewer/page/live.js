@@ -84,12 +84,17 @@ class LivePage {
   }
 
   refresh() {
-    const { viewer, headline } = this.parts;
+    const { viewer, headline, legend } = this.parts;
     const { scene, frame } = this.model;
     const trouble = this.trouble();
     this.charts.stale = trouble !== "" || (frame !== null && this.silentFor() > STALE_MS);
     viewer.classList.toggle("stale", this.charts.stale);
+    if (viewer.classList.contains("truth") !== (scene?.truth === true)) {
+      viewer.classList.toggle("truth");
+      this.charts.resize(); // there are fewer of them, or more
+    }
     headline.show(scene, frame, trouble);
+    legend.show(scene);
     this.panel.show();
     this.charts.show();
     this.actions.show(scene?.may_act === true, this.link?.open === true);

@@ -83,7 +83,7 @@ export class MapView {
     if (scene?.home) places.push(scene.home);
     places.push(...(scene?.targets ?? []).slice(0, MOST_INTEREST).map((target) => target.place));
     places.push(...(track.bounds() ?? []));
-    if (places.length < 2 && map.shape) {
+    if (map.shape && (scene?.truth || places.length < 2)) {
       const { south_m: south, west_m: west, cell_m: cell, rows, columns } = map.shape;
       places.push([south, west], [south + rows * cell, west + columns * cell]);
     }

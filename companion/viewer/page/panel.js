@@ -1,7 +1,7 @@
 // The panel beside the map: large numbers, targets, news, facts.
 
 import { make, setAttribute, setText } from "viewer/dom.js";
-import { facts, readouts } from "viewer/facts.js";
+import { facts, readouts, trueFacts } from "viewer/facts.js";
 import { distance } from "viewer/geometry.js";
 import { setIcon } from "viewer/icons.js";
 import { kindOf } from "viewer/layer_marks.js";
@@ -32,9 +32,9 @@ export class Panel {
   }
 
   show() {
-    const { frame } = this.model;
+    const { frame, scene } = this.model;
     readouts(frame).forEach(([name, value, unit], i) => this.numbers[i].set(name, value, unit));
-    this.showFacts(facts(frame));
+    this.showFacts(scene?.truth ? trueFacts(frame) : facts(frame));
     this.showTargets();
     this.news.show();
   }
@@ -47,6 +47,7 @@ export class Panel {
       setAttribute(this.rows[i].row, "data-level", level);
       setIcon(this.rows[i].sign, level ?? "good");
     });
+    while (this.rows.length > list.length) this.rows.pop().row.remove(); // a link that has gone
   }
 
   addFact() {
