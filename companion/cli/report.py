@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +11,7 @@ import typer
 
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, writable, written
 from companion.mapping.map_files import MapError
-from companion.recording.reader import load_record
+from companion.recording.reader import Record, load_record
 from companion.recording.record_format import RecordError
 from companion.viewer.report_data import as_json, report_data
 from companion.viewer.report_page import report_page
@@ -38,12 +39,21 @@ def report(
         writable(file)
         for note in (note for record in records for note in record.notes):
             typer.echo(note, err=True)
-        data = as_json(report_data(records[0], records[1:]))
-        with written(file):
-            file.write_text(report_page(records[0].mission.name, data), encoding="utf-8")
+        line = write_report(records, file)
     except (RecordError, MapError, OutputError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    typer.echo(f"report: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+    typer.echo(line)
     if show:
         webbrowser.open(file.resolve().as_uri())
+
+
+def write_report(records: Sequence[Record], file: Path) -> str:
+    """Write the report of a record, with the tracks of the others; a line for people says where it is.
+
+    Raises RecordError, MapError, OutputError.
+    """
+    data = as_json(report_data(records[0], list(records[1:])))
+    with written(file):
+        file.write_text(report_page(records[0].mission.name, data), encoding="utf-8")
+        return f"report: {file} ({file.stat().st_size / 1e6:.1f} MB)"
