@@ -114,7 +114,16 @@ export class Charts {
 
   /** Shows what is new, when it is time to. */
   show(now = performance.now()) {
-    if (now - this.last < EVERY_MS || !this.seen) return;
+    if (!this.seen) return;
+    const wait = EVERY_MS - (now - this.last);
+    if (wait > 0) {
+      // What was shown last must be what stays, also if nothing more comes.
+      this.later ??= setTimeout(() => {
+        this.later = null;
+        this.show();
+      }, wait);
+      return;
+    }
     this.last = now;
     if (this.model.figures.version === this.version) {
       for (const part of this.parts) part.plot?.redraw(false, true);

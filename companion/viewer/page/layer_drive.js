@@ -69,12 +69,23 @@ function drawSetpoint(pen, { setpoint, pose }) {
   }
 }
 
+const moverRadius = (pen, mover) => Math.max(7, mover.radius_m * pen.camera.scale);
+
+/** No name of a place is written where something moves. */
+export function claimMovers(pen, frame) {
+  for (const mover of frame.movers ?? []) {
+    const [x, y] = pen.camera.toScreen(...mover.place);
+    const radius = moverRadius(pen, mover) + 3;
+    pen.taken.push([x - radius, y - radius, 2 * radius, 2 * radius]);
+  }
+}
+
 /** Moving things: a circle, and an arrow to where they are in two seconds. */
 export function drawMovers(pen, frame) {
   const { context, camera, colours } = pen;
   for (const mover of frame.movers ?? []) {
     const [x, y] = camera.toScreen(...mover.place);
-    const radius = Math.max(7, mover.radius_m * camera.scale);
+    const radius = moverRadius(pen, mover);
     pen.disc(x, y, radius + 2, colours.halo);
     pen.disc(x, y, radius, null, colours.mover, 3);
     const [vn, ve] = mover.velocity ?? [0, 0];

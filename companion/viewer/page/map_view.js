@@ -1,7 +1,7 @@
 // The map on a canvas. It draws in the browser's next picture, and only when somebody said that something has changed.
 
 import { theme } from "viewer/colours.js";
-import { drawAhead, drawMovers, drawRays, drawRover } from "viewer/layer_drive.js";
+import { claimMovers, drawAhead, drawMovers, drawRays, drawRover } from "viewer/layer_drive.js";
 import { drawFrame } from "viewer/layer_frame.js";
 import { drawBorders, drawGround } from "viewer/layer_ground.js";
 import { drawMarks, drawPointers } from "viewer/layer_marks.js";
@@ -59,6 +59,7 @@ export class MapView {
     // These take their room first, so no name covers them.
     pen.taken.push([8, 12, 48, 48]);
     if (frame?.pose) pen.taken.push([...camera.toScreen(frame.pose[0], frame.pose[1]).map((at) => at - 16), 32, 32]);
+    if (frame) claimMovers(pen, frame);
     for (const layer of this.below) layer(pen);
     camera.world(context);
     model.track.draw(context, camera, theme.colours, model.until);
