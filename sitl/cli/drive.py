@@ -10,6 +10,7 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
+from companion.app import Status
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
@@ -30,6 +31,7 @@ from sitl.cli.drive_view import run_with_view
 from sitl.cli.viewer import Viewer, ViewError, terminal
 from sitl.faults.fault_file import FaultFileError
 from sitl.lockstep import Drive
+from sitl.network.collision_log import CollisionLog
 from sitl.scenario import Scenario, ScenarioError, equipped, simulated
 
 BAD_INPUT = (
@@ -176,7 +178,14 @@ def _shown(run: Drive, page: LiveViewer, settings: Settings) -> Also:
     """The page, which begins to show the run."""
     _warn(served(page.web.place, to_person=sys.stderr.isatty()))
     page.follow(run.companion, settings, simulated=True)
-    return Also(lambda status: page.show(status, len(run.simulator.collisions)), WEB_EVERY_S)
+    log, start = CollisionLog(page.warn, WallClock().now_s), run.scenario.start
+
+    def show(status: Status) -> None:
+        collisions = run.simulator.collisions
+        log.look(collisions, start)
+        page.show(status, [touched.from_start(start) for touched in collisions])
+
+    return Also(show, WEB_EVERY_S)
 
 
 def _paced(run: Drive, pace: Pace) -> Callable[[float], None]:

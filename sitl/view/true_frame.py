@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from companion.viewer.feed import TOUCHED_KEPT
 from companion.viewer.frame import FORMAT
 from companion.viewer.map_tiles import TILE
 from sitl.autopilot.control.records import LEG, WAYPOINT
@@ -99,6 +100,7 @@ def frame_of(simulator: Simulator, heard: Sequence[str], rates: Rates, how: str)
         "guard": None,
         "driven_m": round(simulator.driven_m, 1),
         "contacts": len(simulator.collisions),
+        "touched": [one.from_start(simulator.start) for one in simulator.collisions[-TOUCHED_KEPT:]],
         "rates": {
             "links": [
                 {"name": name, "heard": name in heard, "in": round(told, 1), "out": round(said, 1)}

@@ -14,6 +14,7 @@ from typing import Any
 
 from companion.viewer import wire
 from companion.viewer.feed import FRAME_S, NEWS_KEPT, SCENE_S, Receiver
+from companion.viewer.frame import told
 from sitl.simulator import Simulator
 from sitl.view.true_frame import frame_of, scene_of
 from sitl.view.true_map import TrueMap
@@ -48,8 +49,7 @@ class WebFeed:
 
     def tell(self, line: str, level: str = "info") -> None:
         """One more of the news."""
-        news = {"t": round(self._simulator.time_s, 2), "level": level, "text": line, "own": True}
-        self._news = [*self._news, news][-NEWS_KEPT:]
+        self._news = [*self._news, told(self._simulator.time_s, level, line)][-NEWS_KEPT:]
 
     def show(self, now_s: float) -> None:
         """To be called in each round. ``now_s``: real seconds."""

@@ -1,6 +1,6 @@
 // The facts of the panel: what each is called, what it says, and when it is a warning.
 
-import { distance, length } from "viewer/geometry.js";
+import { distance, wayLeft } from "viewer/geometry.js";
 import { heading, lasting, metres, number, turning, UNKNOWN } from "viewer/words.js";
 
 const OLD_HEARTBEAT_S = 3;
@@ -11,7 +11,7 @@ const LOW_PERCENT = 20;
 /** The three large numbers: [name, value, unit]. */
 export function readouts(frame) {
   const goal = frame?.goal;
-  const rest = frame?.path?.length && frame.pose ? length([frame.pose, ...frame.path]) : NaN;
+  const rest = wayLeft(frame);
   const far = Number.isFinite(rest) ? rest : distance(frame?.pose, goal?.place);
   return [
     ["speed", number(Math.abs(frame?.speed ?? NaN)), "m/s"],

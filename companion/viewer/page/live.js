@@ -8,6 +8,7 @@ import { listen, listenKeys } from "viewer/gestures.js";
 import { Link } from "viewer/link.js";
 import { MapView } from "viewer/map_view.js";
 import { Model } from "viewer/model.js";
+import { drawContacts } from "viewer/overlays.js";
 import { Panel } from "viewer/panel.js";
 import { buildShell, watchEdges } from "viewer/shell.js";
 import { askToken, findToken } from "viewer/token.js";
@@ -24,6 +25,7 @@ class LivePage {
     this.parts = buildShell(root, this.camera);
     const { canvas, bar, charts, panel, viewer } = this.parts;
     this.view = new MapView(canvas, this.model, this.camera);
+    this.view.above.push((pen) => drawContacts(pen, this.model.frame?.touched ?? []));
     this.panel = new Panel(this.model, { go: (place) => this.camera.centre(place) });
     panel.append(this.panel.node);
     this.charts = new Charts(charts, this.model);

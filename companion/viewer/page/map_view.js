@@ -9,6 +9,7 @@ import { Pen } from "viewer/pen.js";
 
 const SHARPEST = 2; // more canvas pixels than this for one of the page cost time and show nothing
 const MOST_INTEREST = 400;
+const USUAL_SIGHT_M = 8;
 
 export class MapView {
   constructor(canvas, model, camera) {
@@ -74,6 +75,14 @@ export class MapView {
     drawFrame(pen, model);
   }
 
+  /** As far as the sensor sees; without it the rover alone would fill the map. */
+  sight() {
+    const { pose, rays } = this.model.frame ?? {};
+    if (!pose) return [];
+    const far = rays?.max_m ?? USUAL_SIGHT_M;
+    return [-far, far].map((off) => [pose[0] + off, pose[1] + off]);
+  }
+
   /** The places that "fit" keeps in view. */
   interest() {
     const { scene, frame, track, map } = this.model;
@@ -88,6 +97,7 @@ export class MapView {
       const { south_m: south, west_m: west, cell_m: cell, rows, columns } = map.shape;
       places.push([south, west], [south + rows * cell, west + columns * cell]);
     }
+    if (!scene?.home && !map.shape) places.push(...this.sight());
     return places;
   }
 }

@@ -75,7 +75,8 @@ export class Panel {
       setText(row.status, now ? "going there" : status);
       setText(row.far, frame?.pose ? metres(distance(frame.pose, target.place)) : "");
     });
-    setText(this.targetsHead, targets.length ? `Targets, ${reached} of ${scene.targets.length} reached` : "No targets");
+    const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;
+    setText(this.targetsHead, targets.length ? known : unplaced(frame?.statuses?.length ?? 0));
   }
 
   buildTargets(targets, key) {
@@ -96,6 +97,11 @@ export class Panel {
     });
     this.targets.replaceChildren(...this.targetRows.map((row) => row.node));
   }
+}
+
+// Before the rover knows where it is, nobody knows where the targets are.
+function unplaced(count) {
+  return count ? `${count} ${count === 1 ? "target" : "targets"}, not on the map yet` : "No targets";
 }
 
 function readout() {

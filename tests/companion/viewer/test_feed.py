@@ -22,7 +22,7 @@ MISSION = Path(__file__).resolve().parents[3] / "missions" / "one-obstacle.toml"
 KEYS = {
     "kind", "t", "pose", "speed", "turn", "mode", "armed", "drives", "line", "why", "state", "statuses", "goal", "path",
     "motion", "setpoint", "rays", "movers", "figures", "battery", "gps", "decision", "guard", "news", "rates",
-    "contacts",
+    "contacts", "touched",
 }  # fmt: skip
 
 
@@ -108,9 +108,15 @@ def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_
             heard.scenes.clear()
             heard.tiles.clear()
             heard.begins_anew.set()
+            watched.warn("collision 1")
+            watched.touched = [(1.0, 2.0)]
         watched.show(status)
 
     run.run(look, 0.2)
     said = [one["text"] for frame in heard.frames for one in frame["news"]]
     assert any(text.startswith("Companion:") for text in said), "it was said before anybody listened"
+    assert "collision 1" in said and (heard.frames[-1]["contacts"], heard.frames[-1]["touched"]) == (
+        1,
+        [[1.0, 2.0]],
+    )
     assert len(heard.scenes) >= 1 and len(heard.tiles) > 3
