@@ -47,8 +47,9 @@ def test_who_comes_late_is_told_scene_past_map_and_the_newest_frame() -> None:
     texts, places = heard(live.join(False, lambda: None))
     assert [text["kind"] for text in texts] == ["scene", "past", "frame"] and texts[0]["may_act"] is False
     past = texts[1]["frames"]
-    assert [one["t"] for one in past] == [float(second) for second in range(10)] and "path" not in past[0]
-    assert sum(len(one["news"]) for one in past) == 46 and texts[2]["t"] == 9.8
+    assert [one["t"] for one in past] == [*(float(second) for second in range(10)), 9.8] and "path" not in past[0]
+    told = [one["text"] for each in past for one in each["news"]]
+    assert told == [f"news {step}" for step in range(50)] and texts[2]["t"] == 9.8 and texts[2]["news"] == []
     assert sorted(places) == [(column, 0) for column in range(TILES_AT_ONCE + 50)]
 
 
@@ -64,6 +65,23 @@ def test_a_slow_browser_misses_frames_but_no_news_and_no_tile() -> None:
     assert [one["text"] for one in texts[0]["news"]] == [f"news {step}" for step in range(30)]
     assert sorted(places) == [(step, 1) for step in range(30)]
     assert heard(spectator) == ([], [])
+
+
+def test_a_scene_that_changes_costs_no_news() -> None:
+    live = board()
+    spectator = live.join(False, lambda: None)
+    live.take(frame(0.0, "one"))
+    heard(spectator)
+    live.take(frame(0.4, "two"))
+    live.take({**SCENE, "targets": ["gate"]})
+    live.take(frame(0.6, "three"))
+    texts, _ = heard(spectator)
+    assert [text["kind"] for text in texts] == ["scene", "frame"]
+    assert [one["text"] for one in texts[1]["news"]] == ["two", "three"]
+    live.take({**SCENE, "map_epoch": 2})
+    live.take(frame(0.8, "four"))
+    texts, _ = heard(spectator)
+    assert [one["text"] for text in texts[1]["frames"] for one in text["news"]] == ["one", "two", "three", "four"]
 
 
 def test_another_map_begins_with_its_scene() -> None:
