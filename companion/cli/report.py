@@ -150,13 +150,32 @@ def _write(record: Record, data: dict[str, Any], forms: Forms) -> None:
             write_mp4(Film(data), forms.mp4)
         _tell("film", forms.mp4)
     if forms.page is not None:
-        with written(forms.page):
-            forms.page.write_text(report_page(record.mission.name, as_json(data)), encoding="utf-8")
-        _tell("report", forms.page)
+        typer.echo(_page_written(record, data, forms.page))
+
+
+def write_report(record: Record, file: Path) -> str:
+    """Write the report of a record; a line for people says where it is.
+
+    Raises RecordError, MapError, OutputError.
+    """
+    tally, watched = RunTally(), ReportWatch(record)
+    result = replay(record, Observers([tally, watched]))
+    run = named([run_of(record, tally, result)])[0]
+    return _page_written(record, joined(record, watched, run, []), file)
+
+
+def _page_written(record: Record, data: dict[str, Any], file: Path) -> str:
+    with written(file):
+        file.write_text(report_page(record.mission.name, as_json(data)), encoding="utf-8")
+    return _line("report", file)
 
 
 def _tell(what: str, file: Path) -> None:
-    typer.echo(f"{what}: {file} ({file.stat().st_size / 1e6:.1f} MB)")
+    typer.echo(_line(what, file))
+
+
+def _line(what: str, file: Path) -> str:
+    return f"{what}: {file} ({file.stat().st_size / 1e6:.1f} MB)"
 
 
 def _compare(runs: list[Run]) -> None:

@@ -117,7 +117,7 @@ def run(
             page = web_viewer(web, web_token, warn, actions=web_actions, signer=signer)
             if page is not None:
                 ends.callback(page.close)
-                say(served(page, to_person=reader is Reader.PERSON))
+                say(served(page.web.place, to_person=reader is Reader.PERSON))
             source = Source(mission_file, connect, from_autopilot=from_autopilot)
             mission = source.mission(settings, signer, stop, say)
             if mission is None:

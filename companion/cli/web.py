@@ -11,9 +11,9 @@ import typer
 from companion.mavlink.local_station import LocalStation
 from companion.mavlink.signing import Signer
 from companion.viewer.live_viewer import LiveViewer
-from companion.viewer.web_process import WebError, web_place
+from companion.viewer.web_process import WebError, WebPlace, web_place
 
-__all__ = ["Actions", "Token", "Web", "WebError", "served", "web_viewer"]
+__all__ = ["Actions", "Token", "Web", "WebError", "asked_place", "served", "web_viewer"]
 
 Web = Annotated[
     str | None,
@@ -39,6 +39,15 @@ Actions = Annotated[
 ]
 
 
+def asked_place(web: str | None, token_file: Path | None) -> WebPlace | None:
+    """Where a page was asked for; None for none. Raises WebError."""
+    if web is None:
+        if token_file is not None:
+            raise WebError("--web-token: nothing is served; add --web PORT")
+        return None
+    return web_place(web, token_file)
+
+
 def web_viewer(
     web: str | None,
     token_file: Path | None,
@@ -48,18 +57,16 @@ def web_viewer(
     signer: Signer | None = None,
 ) -> LiveViewer | None:
     """The viewer that was asked for; None for none. ``signer``: of the companion that it asks. Raises WebError."""
-    if web is None:
-        if token_file is not None or actions:
-            raise WebError(f"{'--web-actions' if actions else '--web-token'}: nothing is served; add --web PORT")
-        return None
+    if actions and web is None:
+        raise WebError("--web-actions: nothing is served; add --web PORT")
     if actions and token_file is None:
         raise WebError("--web-actions: only who knows a token may act: name a file for it with --web-token FILE")
-    return LiveViewer(web_place(web, token_file), say, LocalStation(signer) if actions else None)
+    place = asked_place(web, token_file)
+    return None if place is None else LiveViewer(place, say, LocalStation(signer) if actions else None)
 
 
-def served(viewer: LiveViewer, *, to_person: bool) -> str:
+def served(place: WebPlace, *, to_person: bool) -> str:
     """Where the page is. A person gets the token with it, behind a # that browsers keep; a log file does not."""
-    place = viewer.web.place
     token = f"#token={place.token}" if place.token and to_person else ""
     to_all = ", for all who can reach this address and know the token" if place.private else ""
     return f"the run is shown at {place.url}{token}{to_all}"

@@ -42,8 +42,6 @@ class MissionRequests:
         self._run = run
         self._notifier = notifier
         self._asked_s = self._left_s = -math.inf
-        self._paused = False
-        """The present HOLD was asked for here."""
         self._times_s: deque[float] = deque([-math.inf] * MOST_A_SECOND, maxlen=MOST_A_SECOND)
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
@@ -61,9 +59,9 @@ class MissionRequests:
 
     def _note_mode(self, seen: HeartbeatSeen) -> None:
         if seen.mode != RoverMode.HOLD:
-            self._paused = False
+            self._run.paused = False
         elif 0.0 <= seen.time_s - self._asked_s <= ARRIVES_S:
-            self._paused = True
+            self._run.paused = True
 
     def _is_heard(self, now_s: float) -> bool:
         """Whether there are not too many."""
@@ -87,7 +85,7 @@ class MissionRequests:
         own = vehicle.own_mode
         if vehicle.is_ours or now_s - self._left_s < AGAIN_S:
             return None
-        if not self._paused:
+        if not self._run.paused:
             return Reason(Refusal.NOT_PAUSED, (own.name,))
         self._left_s = now_s
         self._notifier.tell(f"Going on as requested: {own.name}", Severity.WARNING)

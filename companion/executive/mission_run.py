@@ -76,7 +76,8 @@ class MissionRun:
     """What all parts of the companion share of a run.
 
     Each attribute has one writer: the event dispatcher writes ``vehicle`` (after an error, the shutdown), the drive
-    permission ``latch`` and ``stop``, arming ``awaited``, the shutdown ``end``. ``activity`` follows from them.
+    permission ``latch`` and ``stop``, arming ``awaited``, the shutdown ``end``, the mission requests ``paused``.
+    ``activity`` follows from them.
     """
 
     def __init__(
@@ -101,6 +102,8 @@ class MissionRun:
         """Why the rover was not to be driven in the last tick; None if it was."""
         self.end: Reason[EndReason] | None = None
         """Why the run ends; None while it goes on."""
+        self.paused = False
+        """The autopilot's present HOLD was asked for as a pause."""
         self.setpoint_check = SetpointCheck(notifier)
         self._drag = DragWatch()
         self._told: ControlCommand | None = None

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 from companion.app import Companion, Status
 from companion.core.clock import stopwatch_s
 from companion.viewer import wire
 from companion.viewer.arrivals import Arrivals
-from companion.viewer.frame import frame_of, news_of, scene_of
+from companion.viewer.frame import frame_of, news_of, scene_of, told
 from companion.viewer.map_tiles import TileWatch
 
 FRAME_S, TILES_S, SCENE_S = 0.19, 0.5, 2.0
 """So often each is told, in real time."""
-NEWS_KEPT = 200
+NEWS_KEPT, TOUCHED_KEPT = 200, 50
 
 Json = dict[str, Any]
 
@@ -54,8 +55,12 @@ class ViewerFeed:
         self._frame_s = self._tiles_s = self._scene_s = -math.inf
         self._news: list[Json] = []
         self._rates = Arrivals()
-        self.contacts = 0
-        """Of a simulated rover; whoever knows them writes them here."""
+        self.touched: Sequence[Sequence[float]] = ()
+        """Where a simulated rover touched something, north and east; whoever knows it writes it here."""
+
+    def warn(self, text: str) -> None:
+        """Something bad that the companion does not know of."""
+        self._news.append(told(self._companion.status().time_s, "error", text))
 
     def show(self, status: Status) -> None:
         """To be called after each tick."""
@@ -114,7 +119,7 @@ class ViewerFeed:
         frame = frame_of(self._companion, status)
         frame["news"] = self._news
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
-        frame["contacts"] = self.contacts
+        frame["contacts"], frame["touched"] = len(self.touched), list(self.touched[-TOUCHED_KEPT:])
         if self._put(frame):
             self._news = []
 

@@ -29,6 +29,7 @@ from companion.executive.mission_run import MissionRun
 from companion.mapping.map_queries import clearance_m
 from companion.mission.bounds import Bound
 from companion.mission.mission import Mission
+from companion.navigation.field_step import Part
 from companion.safety.mode_latch import Control
 from companion.safety.reasons import RunPhase
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
@@ -56,6 +57,7 @@ STATES = {
 }
 LEVELS = {Severity.WARNING: "warning", Severity.NOTICE: "notice", Severity.INFO: "info", Severity.DEBUG: "info"}
 """Whatever is worse is an error."""
+AUTOPILOT = "autopilot: "
 DRIVES = {
     RoverMode.MANUAL: "pilot",
     RoverMode.HOLD: "nobody",
@@ -101,7 +103,7 @@ def frame_of(companion: Companion, status: Status) -> Json:
         "speed": round(vehicle.forward_m_s, 3),
         "turn": 0.0 if vehicle.attitude is None else round(vehicle.attitude.yaw_rate_rad_s, 3),
         **mode_of(vehicle, run),
-        **doing_of(status),
+        **doing_of(companion, status),
         "statuses": [str(one) for _, one in run.statuses()],
         "goal": None if goal is None else {"name": goal.name, "place": _place(goal.point)},
         "path": _path(executor),
@@ -120,10 +122,12 @@ def frame_of(companion: Companion, status: Status) -> Json:
 
 def news_of(status: Status) -> list[Json]:
     """The texts of this tick."""
-    return [
-        {"t": round(status.time_s, 2), "level": LEVELS.get(one.severity, "error"), "text": one.text, "own": one.own}
-        for one in status.news
-    ]
+    return [told(status.time_s, LEVELS.get(one.severity, "error"), one.text, own=one.own) for one in status.news]
+
+
+def told(time_s: float, level: str, text: str, *, own: bool = True) -> Json:
+    """One of the news. ``own``: it is not the autopilot that says it, whose name the page puts before it."""
+    return {"t": round(time_s, 2), "level": level, "text": text if own else text.removeprefix(AUTOPILOT), "own": own}
 
 
 def _place(point: NedPoint) -> list[float]:
@@ -178,11 +182,16 @@ def _map(executor: MissionExecutor) -> Json:
     }
 
 
-def doing_of(status: Status) -> Json:
-    """One large line, and what is awaited where it says why the rover stands."""
+def doing_of(companion: Companion, status: Status) -> Json:
+    """One large line; then what is awaited where it says why the rover stands, or why it drives back."""
     activity, line, why = status.activity, status.doing, ""
     if activity.phase is RunPhase.DRIVING and status.target:
-        line = f"driving to {status.target}"
+        line, broken_off = f"driving to {status.target}", companion.outcome.broken_off
+        why = "" if broken_off is None else str(broken_off)
+        if not why and status.decision is not None and status.decision.part is Part.RETURN:
+            why = "going back to find another way"
+    elif activity.phase is RunPhase.STOPPED_AND_WAITING and companion.mission_run.paused:
+        line, why = "paused on request", "waiting for a request to go on"
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
         line, why = f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
     return {"line": line, "why": why, "state": STATES[activity.phase]}

@@ -20,6 +20,8 @@ EVERY_S = 1.0
 NEWS_KEPT = 500
 TILES_AT_ONCE = 200
 KEPT_OF_PAST = ("kind", "t", "pose", "speed", "state", "figures", "statuses")
+RUN_KEYS = ("map_epoch", "began_unix_s", "map")
+"""Where one of these differs in a scene, a page forgets the map, and mostly everything that it has heard before."""
 
 Json = dict[str, Any]
 
@@ -32,16 +34,18 @@ class Spectator:
         self.wake = wake
         self._board = board
         self._answers: deque[Json] = deque(maxlen=20)
-        self._news = 0
-        self.begin(forgets=True)
+        self.begin()
 
-    def begin(self, *, forgets: bool) -> None:
-        """Everything is to be told, again. ``forgets``: the page knows no news, or will forget them with this scene."""
+    def begin(self) -> None:
+        """Everything is to be told, again."""
         self._scene = self._past = True
         self.stale = set(self._board.tiles)
-        if forgets:
-            self._news = 0
+        self._news = self._board.news_count
         self._frame = -1
+
+    def tell_scene(self) -> None:
+        """The scene is to be told, again."""
+        self._scene = True
 
     def answer(self, answer: Json) -> None:
         """Something for this one alone."""
@@ -56,8 +60,8 @@ class Spectator:
             told.append(json.dumps({**board.scene, "may_act": self.may_act and board.takes_actions}))
             if self._past:
                 self._past = False
-                told.append(json.dumps({"kind": "past", "frames": list(board.past)}))
-                self._news = max(self._news, board.past_news_count)
+                told.append(json.dumps({"kind": "past", "frames": board.past_frames}))
+                self._news = board.news_count
         told += [json.dumps(self._answers.popleft()) for _ in range(len(self._answers))]
         out: list[str | bytes] = [*told]
         if board.scene is not None and self.stale:
@@ -90,11 +94,6 @@ class LiveBoard:
         """How many look on."""
         return len(self._spectators)
 
-    @property
-    def past_news_count(self) -> int:
-        """How many news ``past`` tells: the newest may still wait for its next frame."""
-        return self.news_count - len(self._past_news)
-
     def join(self, may_act: bool, wake: Callable[[], None]) -> Spectator:
         """One more."""
         spectator = Spectator(self, may_act, wake)
@@ -110,15 +109,25 @@ class LiveBoard:
         missed = min(self.news_count - count, len(self._news))
         return list(self._news)[len(self._news) - missed :] if missed > 0 else []
 
+    @property
+    def past_frames(self) -> list[Json]:
+        """One frame a second, and at the end the newest one if there have been news since the last of them."""
+        if self.frame is None or not self._past_news:
+            return list(self.past)
+        return [*self.past, self._kept(self.frame)]
+
     def take(self, message: Json) -> None:
         """A scene or a frame of the run."""
         if message["kind"] == "scene":
-            another = self.scene is not None and self.scene["map_epoch"] != message["map_epoch"]
-            if another:
+            anew = self.scene is None or any(self.scene.get(key) != message.get(key) for key in RUN_KEYS)
+            if anew and self.scene is not None:
                 self.tiles.clear()
             self.scene = message
             for spectator in self._spectators:
-                spectator.begin(forgets=another)
+                if anew:
+                    spectator.begin()
+                else:
+                    spectator.tell_scene()
         else:
             self._take_frame(message)
         self._wake()
@@ -139,8 +148,12 @@ class LiveBoard:
         self._past_news += news
         if not 0.0 <= frame["t"] - self._past_s < EVERY_S:
             self._past_s = frame["t"]
-            self.past.append({**{key: frame[key] for key in KEPT_OF_PAST}, "news": self._past_news[-NEWS_KEPT:]})
+            self.past.append(self._kept(frame))
             self._past_news = []
+
+    def _kept(self, frame: Json) -> Json:
+        """What is kept of it, with the news since the last that was kept."""
+        return {**{key: frame[key] for key in KEPT_OF_PAST}, "news": self._past_news[-NEWS_KEPT:]}
 
     def _wake(self) -> None:
         for spectator in self._spectators:

@@ -6,7 +6,7 @@ Nouns: live viewer.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from companion.app import Companion, Status
@@ -47,13 +47,18 @@ class LiveViewer:
         }
         self._feed, self._companion = ViewerFeed(companion, self.web, always), companion
 
-    def show(self, status: Status, contacts: int = 0) -> None:
-        """To be called after each tick. ``contacts``: of a simulated rover."""
+    def warn(self, text: str) -> None:
+        """Something bad that the companion does not know of."""
+        if self._feed is not None:
+            self._feed.warn(text)
+
+    def show(self, status: Status, touched: Sequence[Sequence[float]] = ()) -> None:
+        """To be called after each tick. ``touched``: where a simulated rover touched something, north and east."""
         if self._feed is None:
             return
         try:
             self._pass_on()
-            self._feed.contacts = contacts
+            self._feed.touched = touched
             self._feed.show(status)
         except Exception as error:  # a picture is not worth a stop
             self._feed = None

@@ -10,6 +10,7 @@ from pathlib import Path
 import typer
 from rich.console import Console
 
+from companion.app import Status
 from companion.cli.entry import StoppedError
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
@@ -17,7 +18,6 @@ from companion.core.clock import WallClock
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
 from companion.mapping.map_files import MapError
-from companion.mavlink.local_station import LocalStation
 from companion.mission.mission import Mission, MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
@@ -31,6 +31,7 @@ from sitl.cli.drive_progress import Also, Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.faults.fault_file import FaultFileError
 from sitl.lockstep import Drive
+from sitl.network.collision_log import CollisionLog
 from sitl.scenario import Scenario, ScenarioError, equipped, simulated
 
 BAD_INPUT = (
@@ -42,10 +43,12 @@ RECORD_START_US = 1_577_836_800_000_000
 
 
 def drive(
+    context: typer.Context,
     mission_file: options.MissionFile = None,
     seed: options.Seed = 0,
     settings_file: options.SettingsFile = None,
     record: options.Record = None,
+    report_file: options.ReportFile = None,
     image: options.Image = None,
     map_stem: options.MapStem = None,
     json_file: options.JsonFile = None,
@@ -70,7 +73,7 @@ def drive(
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
     4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person ends after a minute.
     """
-    console, wanted = Console(), outputs(image, map_stem, json_file)
+    console, wanted = Console(), outputs(image, map_stem, json_file, report_file, record)
     recorder: Recorder | NullRecorder = NullRecorder()
     run: Drive | None = None
     page: LiveViewer | None = None
@@ -86,9 +89,10 @@ def drive(
         refuse_turning_on_the_spot(mission, scenario)
         _note(scenario)
         files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
-        if record is not None:
-            recorder = Recorder(record, mission, settings, seed, arm=True, files=files, start_us=RECORD_START_US)
         wanted.check((*files.values(), *mission.files))
+        folder = context.with_resource(wanted.record_folder())
+        if folder is not None:
+            recorder = Recorder(folder, mission, settings, seed, arm=True, files=files, start_us=RECORD_START_US)
         with console.status("loading the planner ..."):
             _say_if_compiling(settings, mission)
             run = Drive(
@@ -100,14 +104,13 @@ def drive(
         else:
             report = run_with_view(run, painter, _paced(run, pace), also)
     except BAD_INPUT as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(EXIT_BAD_INPUT) from error
+        raise _refused(error) from error
     except KeyboardInterrupt:
         recorder.close()
         if run is not None and isinstance(recorder, Recorder):
             with contextlib.suppress(OutputError):  # the program ends with what it can say
                 write_collisions(run, recorder)
-        raise StoppedError(_stopped(run, recorder)) from None
+        raise StoppedError(_stopped(run, recorder if record else NullRecorder())) from None
     finally:
         _closed(page)
     recorder.close()
@@ -116,8 +119,7 @@ def drive(
     try:
         wanted.write(run, recorder, console)
     except OutputError as error:
-        typer.echo(str(error), err=True)
-        raise typer.Exit(EXIT_BAD_INPUT) from error
+        raise _refused(error) from error
     raise typer.Exit(report.exit_code)
 
 
@@ -125,8 +127,9 @@ def _painter(view: bool) -> Painter | None:
     return Painter(terminal(sys.stdout)) if view else None
 
 
-def _station(page: LiveViewer | None) -> LocalStation | None:
-    return None if page is None else page.station
+def _refused(error: Exception) -> typer.Exit:
+    _warn(str(error))
+    return typer.Exit(EXIT_BAD_INPUT)
 
 
 def _file(sensors: str | None) -> Path | None:
@@ -173,9 +176,16 @@ def _closed(page: LiveViewer | None) -> None:
 
 def _shown(run: Drive, page: LiveViewer, settings: Settings) -> Also:
     """The page, which begins to show the run."""
-    _warn(served(page, to_person=sys.stderr.isatty()))
+    _warn(served(page.web.place, to_person=sys.stderr.isatty()))
     page.follow(run.companion, settings, simulated=True)
-    return Also(lambda status: page.show(status, len(run.simulator.collisions)), WEB_EVERY_S)
+    log, start = CollisionLog(page.warn, WallClock().now_s), run.scenario.start
+
+    def show(status: Status) -> None:
+        collisions = run.simulator.collisions
+        log.look(collisions, start)
+        page.show(status, [touched.from_start(start) for touched in collisions])
+
+    return Also(show, WEB_EVERY_S)
 
 
 def _paced(run: Drive, pace: Pace) -> Callable[[float], None]:

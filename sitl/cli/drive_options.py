@@ -18,6 +18,10 @@ MissionFile = Annotated[
 Seed = Annotated[int, typer.Option(min=0, help="For planner and simulator: the same seed gives the same run.")]
 SettingsFile = Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")]
 Record = Annotated[Path | None, typer.Option(help="Directory for the record of this run.")]
+ReportFile = Annotated[
+    Path | None,
+    typer.Option("--report", metavar="FILE", help="Write the drive as one HTML file, to look at afterwards."),
+]
 Image = Annotated[Path | None, typer.Option(help="Write a picture (.png, .jpg) of map and track.")]
 MapStem = Annotated[
     Path | None, typer.Option("--map", metavar="STEM", help="Write the companion's map as STEM.yaml and STEM.pgm.")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -12,7 +14,10 @@ from rich.console import Console
 from rich.table import Table
 
 from companion.cli.inputs import OutputError, apart, picture, writable, written
+from companion.cli.report import write_report
 from companion.mapping.map_files import MapError
+from companion.recording.reader import load_record
+from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings.versions import made_with
 from sitl.lockstep import Drive, Report
@@ -24,11 +29,13 @@ CONTACTS_SHOWN = 3
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """The files to write; ``map_stem``: name of two files, without their suffixes."""
+    """The files to write; ``map_stem``: name of two files, without their suffixes; ``record``: a folder."""
 
     image: Path | None = None
     map_stem: Path | None = None
     json_file: Path | None = None
+    report: Path | None = None
+    record: Path | None = None
 
     @property
     def lines(self) -> int:
@@ -38,10 +45,25 @@ class Outputs:
     def check(self, inputs: Iterable[Path | None]) -> None:
         """Check before the drive that all can be written, over no input and no other output. Raises OutputError."""
         maps = [] if self.map_stem is None else [Path(f"{self.map_stem}{end}") for end in (".yaml", ".pgm")]
-        apart((self.image, self.json_file, *maps), inputs)
+        apart((self.image, self.json_file, self.report, *maps, self.record), inputs)
         picture(self.image)
         writable(self.json_file)
+        writable(self.report)
         writable(self.map_stem, ".yaml")
+
+    @contextmanager
+    def record_folder(self) -> Iterator[Path | None]:
+        """Where the drive is recorded; for a report alone a folder beside it that is deleted in the end. None: nowhere.
+
+        Raises OutputError.
+        """
+        if self.record is not None or self.report is None:
+            yield self.record
+            return
+        with written(self.report.parent):
+            folder = tempfile.TemporaryDirectory(prefix=".record-", dir=self.report.parent, ignore_cleanup_errors=True)
+        with folder as path:
+            yield Path(path)
 
     def write(self, run: Drive, recorder: Recorder | NullRecorder, console: Console) -> None:
         """Write the files, complete the record with its map, and print where they are.
@@ -49,10 +71,12 @@ class Outputs:
         All are written even if one fails; then raises OutputError.
         """
         problems = []
-        for write in (partial(_end_record, recorder), self._write_image, self._write_map, self._write_figures):
+        report = partial(self._write_report, recorder, console)
+        end = partial(self._end_record, recorder)
+        for write in (end, self._write_image, self._write_map, self._write_figures, report):
             try:
                 line = write(run)
-            except (OutputError, MapError) as error:
+            except (OutputError, MapError, RecordError) as error:
                 problems.append(str(error))
             else:
                 if line:
@@ -73,6 +97,23 @@ class Outputs:
         if not run.companion.save_map(self.map_stem):
             return "map:     none, the mission did not begin"
         return f"map:     {self.map_stem}.yaml"
+
+    def _end_record(self, recorder: Recorder | NullRecorder, run: Drive) -> str:
+        if not isinstance(recorder, Recorder):
+            return ""
+        if recorder.problem:
+            return recorder.problem  # a record that ends early does not change the result of the run
+        run.companion.save_map(recorder.directory / "map")
+        write_collisions(run, recorder)
+        return "" if self.record is None else f"record:  {recorder.directory}"
+
+    def _write_report(self, recorder: Recorder | NullRecorder, console: Console, run: Drive) -> str:
+        """Of the record as it lies there now."""
+        if self.report is None or not isinstance(recorder, Recorder):
+            return ""
+        with console.status("writing the report ..."):
+            line = write_report(load_record(recorder.directory), self.report)
+        return line.replace("report:", "report: ", 1)
 
     def _write_figures(self, run: Drive) -> str:
         if self.json_file is None:
@@ -95,16 +136,6 @@ def _contacts_text(report: Report) -> str:
     return "\n".join(lines)
 
 
-def _end_record(recorder: Recorder | NullRecorder, run: Drive) -> str:
-    if not isinstance(recorder, Recorder):
-        return ""
-    if recorder.problem:
-        return recorder.problem  # a record that ends early does not change the result of the run
-    run.companion.save_map(recorder.directory / "map")
-    write_collisions(run, recorder)
-    return f"record:  {recorder.directory}"
-
-
 def write_collisions(run: Drive, recorder: Recorder) -> None:
     """The file of a record that lists all contacts, if there are any. Raises OutputError."""
     contacts = run.contacts
@@ -114,10 +145,17 @@ def write_collisions(run: Drive, recorder: Recorder) -> None:
             file.write_text(json.dumps(contacts, indent=2) + "\n", encoding="utf-8")
 
 
-def outputs(image: Path | None, map_stem: Path | None, json_file: Path | None) -> Outputs:
+def outputs(
+    image: Path | None,
+    map_stem: Path | None,
+    json_file: Path | None,
+    report: Path | None = None,
+    record: Path | None = None,
+) -> Outputs:
     """The files of the options; a map may be named with one of its two suffixes."""
     bare = map_stem and map_stem.suffix in (".yaml", ".pgm")
-    return Outputs(image, map_stem.with_suffix("") if map_stem and bare else map_stem, json_file)
+    stem = map_stem.with_suffix("") if map_stem and bare else map_stem
+    return Outputs(image, stem, json_file, report, record)
 
 
 def print_summary(report: Report, console: Console) -> None:

@@ -13,20 +13,26 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
+from companion.cli.web import Token, Web, WebError, asked_place, served
 from companion.core.clock import WallClock
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.viewer.terminal.painter import Painter, ViewError, terminal
+from companion.viewer.web_process import WebProcess
 from sitl.faults.fault_file import FaultFileError
 from sitl.network import FORMS, Endpoint, ListenError, open_endpoint
 from sitl.network.event_log import EventLog
 from sitl.network.server import serve as run_server
 from sitl.scenario import Scenario, ScenarioError, equipped, simulated
+from sitl.simulator import Simulator
 from sitl.view.watching import Watching
+from sitl.view.web_feed import WebFeed
 
 DEFAULT_LISTEN = ["udpout:127.0.0.1:14550", "tcp:127.0.0.1:5760"]
+HOW_TO_CONNECT = "a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760"
 BAD_INPUT = 2
+BAD_INPUTS = (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ViewError, WebError)
 
 
 def serve(
@@ -45,46 +51,85 @@ def serve(
     params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
     faults: Annotated[Path | None, typer.Option(help="TOML file with a fault plan.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Show map, rover and rates on this terminal.")] = False,
+    web: Web = None,
+    web_token: Token = None,
 ) -> None:
     """Simulate the rover of MISSION in real time for whoever connects; ends with Ctrl-C.
 
     One line is printed for each client that connects or disconnects, and for each collision.
     """
     clock = WallClock()
-    endpoints: list[Endpoint] = []
-    try:
-        console = terminal(sys.stdout) if view else None
-        name, scenario = _scenario(mission_file, sensors, params, faults)
-        # Compile everything before clients connect and time starts.
-        with Console(stderr=True).status("starting ..."):
-            scenario.simulator(seed).rehearse()
-        simulator = scenario.simulator(seed)
-        watching = Watching(name, simulator)
-        tell = watching.tell if view else say
-        log = EventLog() if quiet else EventLog(tell, clock.now_s)
-        for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
-            endpoints.append(open_endpoint(url, simulator, log, serial_port))
-    except (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ViewError) as error:
-        for endpoint in endpoints:
-            endpoint.close()
-        typer.echo(str(error), err=True)
-        raise typer.Exit(BAD_INPUT) from error
-    if not quiet:
+    with contextlib.ExitStack() as ends:
+        try:
+            console = terminal(sys.stdout) if view else None
+            place = asked_place(web, web_token)
+            name, scenario = _scenario(mission_file, sensors, params, faults)
+            page = None if place is None else WebProcess(place)
+            if page is not None:
+                ends.callback(page.close)
+            # Compile everything before clients connect and time starts.
+            with Console(stderr=True).status("starting ..."):
+                scenario.simulator(seed).rehearse()
+            simulator = scenario.simulator(seed)
+            watching = Watching(name, simulator)
+            told = Told([] if quiet else [watching.tell if view else say])
+            feed = None if page is None else _fed(simulator, page, name, listen, told)
+            log = EventLog(told.tell, clock.now_s, told.warn)
+            endpoints: list[Endpoint] = []
+            for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
+                endpoints.append(open_endpoint(url, simulator, log, serial_port))
+                ends.callback(endpoints[-1].close)
+        except BAD_INPUTS as error:
+            typer.echo(str(error), err=True)
+            raise typer.Exit(BAD_INPUT) from error
         for url in listen or DEFAULT_LISTEN:
-            tell(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
+            told.tell(f"sending to {url}" if url.startswith("udpout") else f"listening on {url}")
         if not listen:
-            tell("a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760")
-    stop = stop_signals()
-    try:
-        with _viewed(console, watching, clock) as observe:
+            told.tell(HOW_TO_CONNECT)
+        if page is not None:
+            typer.echo(served(page.place, to_person=sys.stderr.isatty()), err=True)
+        stop = stop_signals()
+        with _viewed(console, watching, clock) as draw:
+
+            def observe() -> None:
+                draw()
+                if feed is not None:
+                    feed.show(clock.now_s())
+
             run_server(simulator, endpoints, clock.now_s, speedup, lambda: not stop, log, observe)
-    finally:
-        for endpoint in endpoints:
-            endpoint.close()
-    log.end(simulator)
+        log.end(simulator)
     if not quiet:
         touched = len(simulator.collisions)
         say(f"stopped after {simulator.time_s:.0f} s of the rover's time and {touched} collision{'s' * (touched != 1)}")
+
+
+class Told:
+    """Who is told of events: the terminal or a log file, and the page."""
+
+    def __init__(self, hearers: list[Callable[[str], None]]) -> None:
+        self.hearers = hearers
+        self.feed: WebFeed | None = None
+
+    def tell(self, line: str) -> None:
+        """Something has happened."""
+        self._pass_on(line, "info")
+
+    def warn(self, line: str) -> None:
+        """A collision."""
+        self._pass_on(line, "error")
+
+    def _pass_on(self, line: str, level: str) -> None:
+        for hear in self.hearers:
+            hear(line)
+        if self.feed is not None:
+            self.feed.tell(line, level)
+
+
+def _fed(simulator: Simulator, page: WebProcess, name: str, listen: list[str] | None, told: Told) -> WebFeed:
+    """The feed of the page, which is told of events from now on."""
+    how = f"it listens on {', '.join(listen)}" if listen else HOW_TO_CONNECT
+    told.feed = WebFeed(simulator, page, name, how, lambda line: typer.echo(line, err=True))
+    return told.feed
 
 
 def _scenario(

@@ -12,15 +12,21 @@ SILENT_S = 5.0
 
 
 class EventLog:
-    """Reports each event in one line to ``tell`` (by default nowhere); ``now_s`` reads real seconds."""
+    """Reports each event in one line to ``tell`` (by default nowhere); ``now_s`` reads real seconds.
+
+    ``warn``: is told of collisions; by default ``tell``.
+    """
 
     def __init__(
-        self, tell: Callable[[str], None] = lambda line: None, now_s: Callable[[], float] = lambda: 0.0
+        self,
+        tell: Callable[[str], None] = lambda line: None,
+        now_s: Callable[[], float] = lambda: 0.0,
+        warn: Callable[[str], None] | None = None,
     ) -> None:
         self._tell = tell
         self._now_s = now_s
         self._heard_s: dict[tuple[str, str], float] = {}
-        self._collisions = CollisionLog(tell, now_s)
+        self._collisions = CollisionLog(warn or tell, now_s)
 
     def connected(self, client: str, url: str) -> None:
         """A client has connected."""

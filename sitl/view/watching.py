@@ -15,7 +15,6 @@ from companion.viewer.terminal.facts import NAME_COLUMNS, Fact, Section
 from companion.viewer.terminal.screen import View
 from companion.viewer.terminal.sketch import Disc, Kind, Layer, Place, PlaceState, Sketch, compass_word
 from sitl.autopilot.control.records import LEG, WAYPOINT
-from sitl.autopilot.vehicle import Vehicle
 from sitl.simulator import Simulator
 from sitl.world.world import World
 
@@ -46,21 +45,21 @@ class Rates:
         return rates
 
 
-class _AutopilotState:
+class AutopilotState:
     """The autopilot at a moment: which boot it is, its mode, and whether it is armed."""
 
-    def __init__(self, vehicle: Vehicle, boots: int, is_off: bool) -> None:
-        self._boots = boots
-        self._is_off = is_off
-        self._mode = vehicle.mode.name
-        self._armed = "armed" if vehicle.armed else "disarmed"
+    def __init__(self, simulator: Simulator) -> None:
+        self._boots = simulator.boots
+        self.is_off = simulator.is_off
+        self._mode = simulator.vehicle.mode.name
+        self._armed = "armed" if simulator.vehicle.armed else "disarmed"
 
-    def events_since(self, was: _AutopilotState) -> Iterator[str]:
+    def events_since(self, was: AutopilotState) -> Iterator[str]:
         """What has changed, one line each."""
-        if self._is_off:
-            if not was._is_off:
+        if self.is_off:
+            if not was.is_off:
                 yield "the autopilot has lost power"
-        elif was._is_off or was._boots != self._boots:
+        elif was.is_off or was._boots != self._boots:
             yield f"the autopilot has booted: {self._mode}, {self._armed}"
         else:
             if self._mode != was._mode:
@@ -79,7 +78,7 @@ class Watching:
     _track: array[float] = field(default_factory=lambda: array("d"))
     _rates: Rates = field(default_factory=Rates)
     _began: tuple[float, float] | None = None
-    _was: _AutopilotState | None = None
+    _was: AutopilotState | None = None
 
     def tell(self, line: str) -> None:
         """Add an event."""
@@ -115,7 +114,7 @@ class Watching:
         """Record the track, and changes of mode, arming and power; to be called often."""
         self._note_track()
         simulator = self.simulator
-        was, now = self._was, _AutopilotState(simulator.vehicle, simulator.boots, simulator.is_off)
+        was, now = self._was, AutopilotState(simulator)
         self._was = now
         for line in now.events_since(was) if was else ():
             self.tell(f"{simulator.time_s:.0f} s: {line}")

@@ -87,16 +87,21 @@ class Collision:
     def told(self, start: SimStart) -> str:
         """The rover's own speed, what was touched, when, and where from the rover's start, like LOCAL_POSITION_NED."""
         # Zero is added so that there is no minus before a rounded zero.
-        north_m, east_m = (round(v, 1) + 0.0 for v in (self.north_m - start.north_m, self.east_m - start.east_m))
+        north_m, east_m = (round(v, 1) + 0.0 for v in self.from_start(start))
         where = f"north {north_m:.1f} m, east {east_m:.1f} m of its start"
         return f"the rover, driving {self.speed_m_s:.1f} m/s, touched {self.what} at {self.time_s:.1f} s, {where}"
 
+    def from_start(self, start: SimStart) -> tuple[float, float]:
+        """Where the rover was, metres north and east of its start."""
+        return self.north_m - start.north_m, self.east_m - start.east_m
+
     def as_json(self, start: SimStart) -> dict[str, float | str]:
         """The same, with metres from the rover's start."""
+        north_m, east_m = self.from_start(start)
         return {
             "time_s": round(self.time_s, 2),
-            "north_m": round(self.north_m - start.north_m, 3) + 0.0,
-            "east_m": round(self.east_m - start.east_m, 3) + 0.0,
+            "north_m": round(north_m, 3) + 0.0,
+            "east_m": round(east_m, 3) + 0.0,
             "speed_m_s": round(self.speed_m_s, 3),
             "with": self.what,
         }

@@ -12,6 +12,7 @@ import pytest
 
 from tests.clients.browser import DESKTOP, PHONE, Page, needs_browser, page
 from tests.clients.program import Program, ours
+from tests.sitl.network.test_server import free_port
 
 pytestmark = needs_browser
 
@@ -78,6 +79,20 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
 def fits(shown: Page, size: tuple[int, int]) -> None:
     """Nothing is wider than the window."""
     assert int(str(shown.run("return document.documentElement.scrollWidth"))) <= size[0]
+
+
+def test_the_simulator_alone_is_shown_as_such(tmp_path: Path) -> None:
+    serve = ("serve", MISSIONS / "depot.toml", "--web", "0", "--listen", f"tcp:127.0.0.1:{free_port()}")
+    with ours(tmp_path, "sitl", *serve) as program, page(DESKTOP) as shown:
+        shown.open(address_of(program))
+        shown.shows("Simulator: waiting for somebody to connect", "Depot", "live, simulator", "listening on tcp:")
+        assert "Targets" not in shown.text and "Decision" not in shown.text
+        assert int(str(shown.run(DRAWN))) > 8
+        shown.press("What the signs mean (L)")
+        shown.shows("open door")
+        shown.resize(PHONE)
+        fits(shown, PHONE)
+        assert shown.faults == []
 
 
 def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:

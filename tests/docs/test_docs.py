@@ -264,8 +264,10 @@ def test_every_table_of_hazards_has_its_five_columns_and_names_a_test() -> None:
         assert re.search(r"`(test_|tests/)", row[4]), f"{row[0]}: no test"
 
 
-def test_the_picture_is_small() -> None:
-    assert 10_000 < (ROOT / "docs" / "images" / "rooms.png").stat().st_size < 200_000
+@pytest.mark.parametrize("name", ["rooms", "live-page", "report"])
+def test_the_pictures_of_the_readme_are_small(name: str) -> None:
+    file = ROOT / "docs" / "images" / f"{name}.png"
+    assert 10_000 < file.stat().st_size < 200_000 and file.name in (ROOT / "README.md").read_text(encoding="utf-8")
 
 
 def test_the_service_is_one_that_systemd_takes_and_the_program_understands(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 
 from companion.cli.commands import app as companion
 from sitl.cli.commands import app
+from tests.support.reports import report_data_in
 
 WORLD = """
 size_m = [30.0, 20.0]
@@ -46,6 +47,8 @@ def test_in_lines_table_figures_record_and_picture(tmp_path: Path, monkeypatch: 
         "run",
         "--image",
         "glass.png",
+        "--report",
+        "glass.html",
     ]
     result = CliRunner().invoke(app, command, env={"COLUMNS": "160"})
     assert result.exit_code == 4
@@ -54,6 +57,8 @@ def test_in_lines_table_figures_record_and_picture(tmp_path: Path, monkeypatch: 
     assert contact["east_m"] == pytest.approx(14.0 - 5.5 - 0.15 - 0.35, abs=0.1)
     assert contact["north_m"] == pytest.approx(0.0, abs=0.3)
     assert json.loads(Path("run/collisions.json").read_text()) == [contact]
+    (starred,) = report_data_in(Path("glass.html"))["contacts"]
+    assert starred["what"] == "an obstacle" and starred["speed"] == contact["speed_m_s"]
     replayed = CliRunner().invoke(companion, ["replay", "run"])
     told = f"collision at {contact['time_s']} s of the simulation: an obstacle, {contact['speed_m_s']} m/s"
     assert replayed.exit_code == 0 and told in replayed.output

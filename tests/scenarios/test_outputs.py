@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from companion.recording.recorder import unused
 from sitl.cli.commands import app
+from tests.support.reports import report_data_in
 
 YARD = "[grid]\nsize = [20, 20]\nhome = [3, 3]\n[sitl]\nsensors = 'lidar-360'\n[[target]]\nfield = [6, 3]\n"
 FULL = "cannot be written: No space left on device; choose another place"
@@ -44,12 +45,25 @@ def test_a_full_disk_is_one_line(mission: Path, command: list[str]) -> None:
     assert (result.exit_code, result.stderr) == (2, f"/dev/full: {FULL}\n")
 
 
-@pytest.mark.parametrize("option", ["--json", "--map", "--write-params"])
+@pytest.mark.parametrize("option", ["--json", "--map", "--report", "--write-params"])
 @pytest.mark.parametrize("path", ["/", ".", ".."])
 def test_a_path_that_names_no_file_is_one_line(mission: Path, option: str, path: str) -> None:
     command = "physics" if option == "--write-params" else "drive"
     result = CliRunner().invoke(app, [command, str(mission), option, path])
     assert (result.exit_code, result.stderr) == (2, f"{path}: is a folder, not a file; add a file's name\n")
+
+
+def test_a_report_needs_no_record_and_leaves_none(mission: Path, tmp_path: Path) -> None:
+    report = tmp_path / "new" / "run.html"
+    result = CliRunner().invoke(app, ["drive", str(mission), "--report", str(report)], env={"COLUMNS": "200"})
+    assert result.exit_code == 0 and f"report:  {report} (0." in result.stdout and "record:" not in result.stdout
+    assert [file.name for file in report.parent.iterdir()] == ["run.html"]
+    told = report_data_in(report)
+    assert told["frames"][-1]["state"] == "ended" and told["decisions"] and told["contacts"] == []
+    for other, says in (("--record", "another file"), ("--json", "another file")):
+        bad = CliRunner().invoke(app, ["drive", str(mission), "--report", str(report), other, str(report)])
+        assert bad.exit_code == 2 and says in bad.stderr and bad.stderr.count("\n") == 1 and bad.stdout == ""
+    assert report_data_in(report) == told, "it is as it was"
 
 
 def test_a_standard_output_that_is_full_is_one_line(mission: Path) -> None:

@@ -1,5 +1,6 @@
 """``rover-sitl serve`` as a process of its own."""
 
+import json
 import signal
 import socket
 import time
@@ -7,7 +8,10 @@ from pathlib import Path
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from typer.testing import CliRunner
+from websockets.sync.client import connect
 
+from sitl.cli.commands import app
 from tests.sitl.network.test_server import free_port
 from tests.support.served import PATIENCE_S, finished, process, wait_until
 
@@ -51,3 +55,32 @@ def can_connect(port: int) -> bool:
     except OSError:
         return False
     return True
+
+
+def test_a_page_shows_the_simulator_and_ends_with_it(tmp_path: Path) -> None:
+    mission = Path(__file__).resolve().parents[2] / "missions" / "depot.toml"
+    listen = f"tcp:127.0.0.1:{free_port()}"
+    with process("sitl", "serve", mission, "--listen", listen, "--web", 0) as child:
+        address = child.stderr.readline().removeprefix("the run is shown at ").strip()
+        with connect(f"ws{address.removeprefix('http')}ws", open_timeout=PATIENCE_S) as client:
+            client.send('{"kind": "hello"}')
+            told = [json.loads(one) for one in (client.recv(PATIENCE_S) for _ in range(4)) if isinstance(one, str)]
+        scene, frame = told[0], next(one for one in told if one["kind"] == "frame")
+        assert scene["mission"] == "Depot" and scene["truth"] is True and scene["may_act"] is False
+        assert frame["line"] == "simulator: waiting for somebody to connect" and listen in frame["why"]
+        assert [mover["name"] for mover in frame["movers"]] == ["forklift"]
+        child.send_signal(signal.SIGTERM)
+        assert child.wait(timeout=PATIENCE_S) == 0
+
+
+def test_a_page_that_cannot_be_served_is_told_before_anything_else(tmp_path: Path) -> None:
+    mission = Path(__file__).resolve().parents[2] / "missions" / "open.toml"
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        place = f"127.0.0.1:{taken.getsockname()[1]}"
+        for options, says in (
+            (["--web", place], f"--web {place}: Address already in use; choose another one"),
+            (["--web", "0.0.0.0:0"], "name a file for it with --web-token FILE"),
+            (["--web-token", tmp_path / "token"], "add --web PORT"),
+        ):
+            result = CliRunner().invoke(app, ["serve", str(mission), *map(str, options)])
+            assert result.exit_code == 2 and says in result.stderr and result.stderr.count("\n") == 1

@@ -117,13 +117,16 @@ export class Charts {
   /** Shows what is new, when it is time to. */
   show(now = performance.now()) {
     if (!this.seen) return;
-    if (now - this.last < EVERY_MS) {
-      // The last of several moments must not be left out.
-      this.later ||= setTimeout(() => this.show(), EVERY_MS);
+    const wait = EVERY_MS - (now - this.last);
+    if (wait > 0) {
+      // What was shown last must be what stays, also if nothing more comes.
+      this.later ??= setTimeout(() => {
+        this.later = null;
+        this.show();
+      }, wait);
       return;
     }
-    clearTimeout(this.later);
-    [this.last, this.later] = [now, 0];
+    this.last = now;
     if (this.model.figures.version === this.version) {
       for (const part of this.parts) part.plot?.redraw(false, true);
     } else this.fill();

@@ -116,18 +116,29 @@ export class Decisions {
   draw(pen) {
     const candidates = this.shown?.candidates ?? [];
     const order = candidates.map((_, i) => i).sort((a, b) => candidates[a].taken - candidates[b].taken);
-    for (const i of order) {
-      const { cells, curve, taken, cost } = candidates[i];
-      const line = curve ?? cells ?? [];
-      const strong = taken || i === this.hovered;
-      const colour = pen.colours.others[i % pen.colours.others.length];
-      pen.line(line, { colour, width: strong ? 6 : 2.5, dash: taken ? [] : [7, 5], casing: strong ? 4 : 2 });
-      if (!line.length) continue;
-      const [x, y] = pen.camera.toScreen(...line[Math.min(line.length - 1, Math.ceil(line.length * 0.6))]);
-      const text = `${letter(i)} ${Number.isFinite(cost) ? number(cost, 1) : "–"}${taken ? " taken" : ""}`;
-      pen.label(text, x, y, 9, { size: strong ? 15 : 13, weight: strong ? 800 : 650, colour });
-    }
+    for (const i of order) this.drawLine(pen, candidates[i], i);
+    for (const i of order.reverse()) this.drawCost(pen, candidates[i], i); // the one taken has the first choice
   }
+
+  drawLine(pen, { cells, curve, taken }, i) {
+    const strong = taken || i === this.hovered;
+    const [width, casing] = strong ? [6, 4] : [2.5, 2];
+    pen.line(curve ?? cells ?? [], { colour: colourOf(pen, i), width, dash: taken ? [] : [7, 5], casing });
+  }
+
+  drawCost(pen, { cells, curve, taken, cost }, i) {
+    const line = curve ?? cells ?? [];
+    if (!line.length) return;
+    const strong = taken || i === this.hovered;
+    const [x, y] = pen.camera.toScreen(...line[Math.min(line.length - 1, Math.ceil(line.length * 0.6))]);
+    const text = `${letter(i)} ${Number.isFinite(cost) ? number(cost, 1) : "–"}${taken ? " taken" : ""}`;
+    const [size, weight] = strong ? [15, 800] : [13, 650];
+    pen.label(text, x, y, 9, { size, weight, colour: colourOf(pen, i) });
+  }
+}
+
+function colourOf(pen, index) {
+  return pen.colours.others[index % pen.colours.others.length];
 }
 
 function letter(index) {

@@ -1,6 +1,6 @@
 // The facts of the panel: what each is called, what it says, and when it is a warning.
 
-import { distance, length } from "viewer/geometry.js";
+import { distance, wayLeft } from "viewer/geometry.js";
 import { heading, lasting, metres, number, turning, UNKNOWN } from "viewer/words.js";
 
 const OLD_HEARTBEAT_S = 3;
@@ -11,7 +11,7 @@ const LOW_PERCENT = 20;
 /** The three large numbers: [name, value, unit]. */
 export function readouts(frame) {
   const goal = frame?.goal;
-  const rest = frame?.path?.length && frame.pose ? length([frame.pose, ...frame.path]) : NaN;
+  const rest = wayLeft(frame);
   const far = Number.isFinite(rest) ? rest : distance(frame?.pose, goal?.place);
   return [
     ["speed", number(Math.abs(frame?.speed ?? NaN)), "m/s"],
@@ -37,13 +37,49 @@ export function facts(frame) {
     ["Link", linkOf(rates, figures), heartbeatLevel(rates.heartbeat_age_s)],
     ["Position", rateOf(rates.position), rateLevel(rates.position)],
     ["Range sensor", rateOf(rates.range), rateLevel(rates.range)],
-    ["GPS", gpsOf(frame.gps), frame.gps && /no|none|1d|2d/i.test(frame.gps.fix ?? "no") ? "warning" : null],
-    ["Battery", batteryOf(frame.battery), frame.battery?.percent < LOW_PERCENT ? "warning" : null],
+    ["GPS", gpsOf(frame.gps), gpsLevel(frame.gps)],
+    ["Battery", batteryOf(frame.battery), batteryLevel(frame.battery)],
     ["Guard", { true: "on guard", false: "none heard" }[frame.guard] ?? "not asked", null],
     ["Contacts", frame.contacts ?? UNKNOWN, frame.contacts > 0 ? "error" : null],
     ["Decision", frame.decision ?? UNKNOWN, null],
     ["Tick", Number.isFinite(figures.tick_ms) ? `${number(figures.tick_ms)} ms` : UNKNOWN, null],
   ];
+}
+
+/** The same of a simulator, which knows its rover but neither goals nor decisions; and who is connected. */
+export function trueFacts(frame) {
+  if (!frame) return [];
+  const links = frame.rates?.links ?? [];
+  return [
+    ["Driven by", frame.drives ?? UNKNOWN, null],
+    ["Armed", yesNo(frame.armed), null],
+    ["Heads for", goalOf(frame), null],
+    ["Heading", frame.pose ? `${heading(frame.pose[2])}, ${turning(frame.turn ?? 0)}` : UNKNOWN, null],
+    ["Driven", metres(frame.driven_m), null],
+    ["Clearance", clearanceOf(frame.figures?.clearance_m), null],
+    ["GPS", gpsOf(frame.gps), gpsLevel(frame.gps)],
+    ["Battery", batteryOf(frame.battery), batteryLevel(frame.battery)],
+    ["Contacts", frame.contacts ?? UNKNOWN, frame.contacts > 0 ? "error" : null],
+    ...links.map((link) => [link.name, packetsOf(link), link.heard ? null : "warning"]),
+  ];
+}
+
+function packetsOf(link) {
+  const out = `${number(link.out, 0)}/s out`;
+  return link.heard ? `${number(link.in, 0)}/s in, ${out}` : `nobody heard, ${out}`;
+}
+
+/** Farther than five metres it is not looked for. */
+function clearanceOf(clear) {
+  return clear >= 5 ? "5 m or more" : `${number(clear, 2)} m`;
+}
+
+function gpsLevel(gps) {
+  return gps && /no|none|1d|2d/i.test(gps.fix ?? "no") ? "warning" : null;
+}
+
+function batteryLevel(battery) {
+  return battery?.percent < LOW_PERCENT ? "warning" : null;
 }
 
 function yesNo(value) {

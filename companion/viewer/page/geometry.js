@@ -36,3 +36,13 @@ export function between(a, b, share) {
   const turn = Math.atan2(Math.sin(b - a), Math.cos(b - a));
   return a + turn * share;
 }
+
+/** A path that ends farther from the goal leads somewhere else first: back, to look for another way. */
+const AT_GOAL_M = 3;
+
+/** Metres along the path that are left to the goal; NaN without a path that leads there. */
+export function wayLeft(frame) {
+  const { pose, path, goal } = frame ?? {};
+  if (!pose || !goal || !path?.length || distance(path.at(-1), goal.place) > AT_GOAL_M) return NaN;
+  return length([pose, ...path]);
+}

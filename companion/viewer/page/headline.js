@@ -2,7 +2,7 @@
 
 import { make, setAttribute, setText } from "viewer/dom.js";
 import { setIcon } from "viewer/icons.js";
-import { distance, length } from "viewer/geometry.js";
+import { distance, wayLeft } from "viewer/geometry.js";
 import { clock, metres, number, sentence } from "viewer/words.js";
 
 const SIGNS = new Set(["driving", "waiting", "stopped", "ended", "connecting"]);
@@ -32,7 +32,7 @@ export class Headline {
   show(scene, frame, trouble = "") {
     const state = trouble ? "offline" : SIGNS.has(frame?.state) ? frame.state : "connecting";
     setAttribute(this.node, "data-state", state);
-    setIcon(this.sign, state);
+    setIcon(this.sign, state === "ended" && reached(frame) < frame.statuses?.length ? "error" : state);
     setText(this.line, trouble || sentence(frame?.line) || "Connecting");
     setText(this.spoken, trouble ? trouble.replace(/ since.*/, "") : (frame?.line ?? ""));
     setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
@@ -46,6 +46,7 @@ export class Headline {
 }
 
 function badge(scene) {
+  if (scene.truth) return "live, simulator";
   return [scene.live ? "live" : "record", scene.simulated ? "simulated" : ""].filter(Boolean).join(", ");
 }
 
@@ -53,12 +54,17 @@ function lastKnown(frame) {
   return frame?.line ? `Last known: ${frame.line}` : "";
 }
 
-// While driving the second line says how far it still is; when standing it says why.
+function reached({ statuses = [] }) {
+  return statuses.filter((status) => status === "reached").length;
+}
+
+// While driving the second line says how far it still is; when standing it says why; in the end, what it came to.
 function reason(frame, state) {
   if (!frame) return "";
   if (frame.why) return sentence(frame.why);
+  if (state === "ended" && frame.statuses?.length) return `${reached(frame)} of ${frame.statuses.length} targets reached`;
   if (state !== "driving" || !frame.goal || !frame.pose) return "";
-  const rest = frame.path?.length ? length([frame.pose, ...frame.path]) : NaN;
+  const rest = wayLeft(frame);
   const way = Number.isFinite(rest)
     ? `${metres(rest)} to go`
     : `${metres(distance(frame.pose, frame.goal.place))} away`;

@@ -5,6 +5,8 @@ import { placed } from "viewer/geometry.js";
 /** The rover is never drawn smaller than this, however far away the map is seen from. */
 const SMALLEST_ROVER_PX = 26;
 const OLD_RAYS_S = 1;
+/** Rays all round have no first and no last one. */
+const FULL_TURN = 2 * Math.PI - 0.01;
 
 /** Sensor rays: a faint area and a dot where something was seen. Old ones would lie. */
 export function drawRays(pen, frame) {
@@ -19,7 +21,7 @@ export function drawRays(pen, frame) {
   );
   context.fillStyle = colours.ray;
   context.beginPath();
-  context.moveTo(...from);
+  if (rays.step * rays.m.length < FULL_TURN) context.moveTo(...from);
   ends.forEach((end) => context.lineTo(...(end ? camera.toScreen(...end) : from)));
   context.closePath();
   context.fill();
@@ -67,12 +69,23 @@ function drawSetpoint(pen, { setpoint, pose }) {
   }
 }
 
+const moverRadius = (pen, mover) => Math.max(7, mover.radius_m * pen.camera.scale);
+
+/** No name of a place is written where something moves. */
+export function claimMovers(pen, frame) {
+  for (const mover of frame.movers ?? []) {
+    const [x, y] = pen.camera.toScreen(...mover.place);
+    const radius = moverRadius(pen, mover) + 3;
+    pen.taken.push([x - radius, y - radius, 2 * radius, 2 * radius]);
+  }
+}
+
 /** Moving things: a circle, and an arrow to where they are in two seconds. */
 export function drawMovers(pen, frame) {
   const { context, camera, colours } = pen;
   for (const mover of frame.movers ?? []) {
     const [x, y] = camera.toScreen(...mover.place);
-    const radius = Math.max(7, mover.radius_m * camera.scale);
+    const radius = moverRadius(pen, mover);
     pen.disc(x, y, radius + 2, colours.halo);
     pen.disc(x, y, radius, null, colours.mover, 3);
     const [vn, ve] = mover.velocity ?? [0, 0];

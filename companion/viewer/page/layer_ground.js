@@ -5,7 +5,8 @@ const GRID_PX = 90;
 /** Cells, and above them a faint grid: on unknown ground it is all that shows that the map moves. */
 export function drawGround(pen, model) {
   const { context, camera, colours } = pen;
-  context.fillStyle = colours.unknown;
+  // A simulator knows its whole world: what lies outside is open ground.
+  context.fillStyle = model.scene?.truth ? colours.free : colours.unknown;
   context.fillRect(0, 0, camera.width, camera.height);
   camera.world(context);
   model.map.draw(context, camera, colours);

@@ -23,11 +23,26 @@ const LINES = [
   ["done", "target reached"],
   ["failed", "target not reached"],
 ];
+/** What a simulator shows: its own world, in which nothing is unknown and nobody plans. */
+const TRUE_AREAS = [
+  ["free", "free ground"],
+  ["obstacle", "obstacle, shut door"],
+  ["closed", "open door"],
+  ["costly", "slippery or rough ground"],
+];
+const TRUE_LINES = [
+  ["rover", "rover; its tip shows where it heads"],
+  ["track", "way driven, by speed"],
+  ["ray", "what the sensor reaches"],
+  ["fence", "fence of the autopilot; strokes on the closed side"],
+  ["mover", "moving thing, with where it will be in 2 s"],
+  ["goal", "where the autopilot drives to"],
+];
 const KEYS = "Keys: + − zoom, 0 all, F follow, N north or heading up, T light or dark, L legend";
 
 export class Legend {
   constructor(more = "") {
-    const row = (name, text) => make("li", {}, make("span", { class: `swatch ${name}` }), text);
+    this.rows = make("ul");
     this.node = make(
       "div",
       { class: "legend", hidden: true, role: "dialog", "aria-label": "What the signs mean" },
@@ -37,9 +52,22 @@ export class Legend {
         icon("close"),
       ),
       make("h2", {}, "What the map shows"),
-      make("ul", {}, ...AREAS.map((area) => row(...area)), ...LINES.map((line) => row(...line))),
+      this.rows,
       (this.keys = make("p", { class: "keys" }, KEYS + more)),
     );
+    this.fill(AREAS, LINES);
+  }
+
+  fill(areas, lines) {
+    const row = ([name, text]) => make("li", {}, make("span", { class: `swatch ${name}` }), text);
+    this.rows.replaceChildren(...areas.map(row), ...lines.map(row));
+  }
+
+  /** Says what is on the map of a companion, or on that of a simulator. */
+  show(scene) {
+    if (!scene || this.truth === scene.truth) return;
+    this.truth = scene.truth;
+    this.fill(...(scene.truth ? [TRUE_AREAS, TRUE_LINES] : [AREAS, LINES]));
   }
 
   /** Adds keys that only one of the pages has. */

@@ -8,6 +8,7 @@ import { listen, listenKeys } from "viewer/gestures.js";
 import { Link } from "viewer/link.js";
 import { MapView } from "viewer/map_view.js";
 import { Model } from "viewer/model.js";
+import { drawContacts } from "viewer/overlays.js";
 import { Panel } from "viewer/panel.js";
 import { buildShell, watchEdges } from "viewer/shell.js";
 import { askToken, findToken } from "viewer/token.js";
@@ -24,6 +25,7 @@ class LivePage {
     this.parts = buildShell(root, this.camera);
     const { canvas, bar, charts, panel, viewer } = this.parts;
     this.view = new MapView(canvas, this.model, this.camera);
+    this.view.above.push((pen) => drawContacts(pen, this.model.frame?.touched ?? []));
     this.panel = new Panel(this.model, { go: (place) => this.camera.centre(place) });
     panel.append(this.panel.node);
     this.charts = new Charts(charts, this.model);
@@ -84,12 +86,17 @@ class LivePage {
   }
 
   refresh() {
-    const { viewer, headline } = this.parts;
+    const { viewer, headline, legend } = this.parts;
     const { scene, frame } = this.model;
     const trouble = this.trouble();
     this.charts.stale = trouble !== "" || (frame !== null && this.silentFor() > STALE_MS);
     viewer.classList.toggle("stale", this.charts.stale);
+    if (viewer.classList.contains("truth") !== (scene?.truth === true)) {
+      viewer.classList.toggle("truth");
+      this.charts.resize(); // there are fewer of them, or more
+    }
     headline.show(scene, frame, trouble);
+    legend.show(scene);
     this.panel.show();
     this.charts.show();
     this.actions.show(scene?.may_act === true, this.link?.open === true);

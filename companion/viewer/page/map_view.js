@@ -1,7 +1,7 @@
 // The map on a canvas. It draws in the browser's next picture, and only when somebody said that something has changed.
 
 import { theme } from "viewer/colours.js";
-import { drawAhead, drawMovers, drawRays, drawRover } from "viewer/layer_drive.js";
+import { claimMovers, drawAhead, drawMovers, drawRays, drawRover } from "viewer/layer_drive.js";
 import { drawFrame } from "viewer/layer_frame.js";
 import { drawBorders, drawGround } from "viewer/layer_ground.js";
 import { drawMarks, drawPointers } from "viewer/layer_marks.js";
@@ -9,6 +9,7 @@ import { Pen } from "viewer/pen.js";
 
 const SHARPEST = 2; // more canvas pixels than this for one of the page cost time and show nothing
 const MOST_INTEREST = 400;
+const USUAL_SIGHT_M = 8;
 
 export class MapView {
   constructor(canvas, model, camera) {
@@ -59,6 +60,7 @@ export class MapView {
     // These take their room first, so no name covers them.
     pen.taken.push([8, 12, 48, 48]);
     if (frame?.pose) pen.taken.push([...camera.toScreen(frame.pose[0], frame.pose[1]).map((at) => at - 16), 32, 32]);
+    if (frame) claimMovers(pen, frame);
     for (const layer of this.below) layer(pen);
     camera.world(context);
     model.track.draw(context, camera, theme.colours, model.until);
@@ -73,6 +75,14 @@ export class MapView {
     drawFrame(pen, model);
   }
 
+  /** As far as the sensor sees; without it the rover alone would fill the map. */
+  sight() {
+    const { pose, rays } = this.model.frame ?? {};
+    if (!pose) return [];
+    const far = rays?.max_m ?? USUAL_SIGHT_M;
+    return [-far, far].map((off) => [pose[0] + off, pose[1] + off]);
+  }
+
   /** The places that "fit" keeps in view. */
   interest() {
     const { scene, frame, track, map } = this.model;
@@ -83,10 +93,11 @@ export class MapView {
     if (scene?.home) places.push(scene.home);
     places.push(...(scene?.targets ?? []).slice(0, MOST_INTEREST).map((target) => target.place));
     places.push(...(track.bounds() ?? []));
-    if (places.length < 2 && map.shape) {
+    if (map.shape && (scene?.truth || places.length < 2)) {
       const { south_m: south, west_m: west, cell_m: cell, rows, columns } = map.shape;
       places.push([south, west], [south + rows * cell, west + columns * cell]);
     }
+    if (!scene?.home && !map.shape) places.push(...this.sight());
     return places;
   }
 }

@@ -69,7 +69,11 @@ export class Model {
   takePast(frames) {
     const last = frames.at(-1);
     if (last && last.t < this.lastT - BACK_S) this.forget();
-    for (const frame of frames) this.follow(frame);
+    for (const frame of frames) this.follow({ ...frame, news: frame.news?.filter((one) => !this.knows(one)) });
+  }
+
+  knows({ t, text }) {
+    return this.news.some((one) => one.t === t && one.text === text);
   }
 
   takeFrame(frame) {

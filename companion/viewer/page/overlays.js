@@ -1,4 +1,4 @@
-// What a report draws on the map beside the run itself: contacts, and the tracks of other records.
+// What is drawn on the map beside the run itself: contacts, and in a report the tracks of other records.
 
 import { make } from "viewer/dom.js";
 import { lastNotAbove } from "viewer/geometry.js";
@@ -12,12 +12,11 @@ const DASHES = [
   [2, 6],
 ];
 
-/** Contacts up to a time, as stars. */
-export function drawContacts(pen, contacts, t) {
+/** Where the rover touched something, as stars. */
+export function drawContacts(pen, places) {
   const { context, camera, colours } = pen;
-  for (const contact of contacts) {
-    if (contact.t > t) break;
-    const [x, y] = camera.toScreen(...contact.place);
+  for (const place of places) {
+    const [x, y] = camera.toScreen(...place);
     context.beginPath();
     star(x, y, 12).forEach(([px, py]) => context.lineTo(px, py));
     context.closePath();

@@ -1,7 +1,7 @@
 // The panel beside the map: large numbers, targets, news, facts.
 
 import { make, setAttribute, setText } from "viewer/dom.js";
-import { facts, readouts } from "viewer/facts.js";
+import { facts, readouts, trueFacts } from "viewer/facts.js";
 import { distance } from "viewer/geometry.js";
 import { setIcon } from "viewer/icons.js";
 import { kindOf } from "viewer/layer_marks.js";
@@ -32,9 +32,9 @@ export class Panel {
   }
 
   show() {
-    const { frame } = this.model;
+    const { frame, scene } = this.model;
     readouts(frame).forEach(([name, value, unit], i) => this.numbers[i].set(name, value, unit));
-    this.showFacts(facts(frame));
+    this.showFacts(scene?.truth ? trueFacts(frame) : facts(frame));
     this.showTargets();
     this.news.show();
   }
@@ -47,6 +47,7 @@ export class Panel {
       setAttribute(this.rows[i].row, "data-level", level);
       setIcon(this.rows[i].sign, level ?? "good");
     });
+    while (this.rows.length > list.length) this.rows.pop().row.remove(); // a link that has gone
   }
 
   addFact() {
@@ -74,7 +75,8 @@ export class Panel {
       setText(row.status, now ? "going there" : status);
       setText(row.far, frame?.pose ? metres(distance(frame.pose, target.place)) : "");
     });
-    setText(this.targetsHead, targets.length ? `Targets, ${reached} of ${scene.targets.length} reached` : "No targets");
+    const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;
+    setText(this.targetsHead, targets.length ? known : unplaced(frame?.statuses?.length ?? 0));
   }
 
   buildTargets(targets, key) {
@@ -95,6 +97,11 @@ export class Panel {
     });
     this.targets.replaceChildren(...this.targetRows.map((row) => row.node));
   }
+}
+
+// Before the rover knows where it is, nobody knows where the targets are.
+function unplaced(count) {
+  return count ? `${count} ${count === 1 ? "target" : "targets"}, not on the map yet` : "No targets";
 }
 
 function readout() {

@@ -76,10 +76,15 @@ export class Pen {
     const width = this.widthOf(text, options);
     const high = (options.size ?? 13) + 4;
     const spots = [
-      [x + away, y - high / 2, "left"],
-      [x - away - width, y - high / 2, "left"],
-      [x - width / 2, y - away - high, "left"],
-      [x - width / 2, y + away, "left"],
+      [x + away, y - high / 2],
+      [x - away - width, y - high / 2],
+      [x - width / 2, y - away - high],
+      [x - width / 2, y + away],
+      // Near an edge the middle of a long name cannot stand above or below the mark, but its end can.
+      ...[x - width + away, x - away].flatMap((left) => [
+        [left, y + away],
+        [left, y - away - high],
+      ]),
     ];
     const inside = ([left, top]) =>
       left > 4 &&

@@ -81,7 +81,11 @@ class ReportPage {
     this.view.above.push((pen) => {
       if (this.choosing) this.decisions.draw(pen);
       else this.others.drawPlaces(pen, this.playback.t);
-      drawContacts(pen, this.record.contacts, this.playback.t);
+      const past = this.record.contacts.filter((contact) => contact.t <= this.playback.t);
+      drawContacts(
+        pen,
+        past.map((contact) => contact.place),
+      );
     });
     this.decisions.changed = () => this.view.invalidate();
   }

@@ -13,7 +13,8 @@ const CLASSES = 5;
 const SPACINGS_M = [0, 0.5, 2.5];
 const SPACING_PX = 1.5;
 const STEP_M = 0.05;
-const FASTEST_M_S = 20;
+/** A place farther away than this, and than the rover's speed explains, is another idea of where it is. */
+const JUMP_M = 5;
 const TOP_SPEEDS = [0.5, 1, 1.5, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50, 100];
 
 export class Track {
@@ -26,6 +27,7 @@ export class Track {
     this.times = [];
     this.points = []; // [north, east, speed, starts a new line]
     this.batches = [];
+    this.heardAt = 0;
     this.fastest = 0;
     this.top = TOP_SPEEDS[1];
     this.broken = true;
@@ -46,9 +48,10 @@ export class Track {
   add(t, north, east, speed) {
     const last = this.points.at(-1);
     const far = last ? Math.hypot(north - last[0], east - last[1]) : Infinity;
+    const since = t - this.heardAt; // not since the last point: a rover that stood for long may jump, too
+    this.heardAt = t;
     if (last && far < STEP_M) return;
-    const since = last ? t - this.times.at(-1) : 0;
-    const starts = this.broken || far > Math.max(5, FASTEST_M_S * since);
+    const starts = this.broken || far > Math.max(JUMP_M, (2 * Math.abs(speed ?? 0) + JUMP_M) * since);
     this.times.push(t);
     this.points.push([north, east, Math.abs(speed ?? 0), starts]);
     this.broken = false;

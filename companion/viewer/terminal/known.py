@@ -74,7 +74,7 @@ def path_ahead(companion: Companion, north_m: float = 0.0, east_m: float = 0.0) 
 
 def headline_of(companion: Companion, status: Status) -> Headline:
     """In one line what is done, or why the rover stands and what it waits for."""
-    doing = doing_of(status)
+    doing = doing_of(companion, status)
     left = _left_m(companion, status) if status.activity.phase is RunPhase.DRIVING else None
     to_go = "" if left is None else f", {left:.0f} m to go"
     why = f", {doing['why']}" if doing["why"] else ""

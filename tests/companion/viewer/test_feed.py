@@ -26,7 +26,7 @@ NEAR_M = 8.0
 KEYS = {
     "kind", "t", "pose", "speed", "turn", "mode", "armed", "drives", "line", "why", "state", "statuses", "goal", "path",
     "motion", "setpoint", "rays", "movers", "figures", "battery", "gps", "decision", "guard", "news", "rates",
-    "contacts",
+    "contacts", "touched",
 }  # fmt: skip
 
 
@@ -110,13 +110,19 @@ def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_
     def look(status) -> None:
         if 50.0 < status.time_s < 50.25:
             heard.is_full = False
-        if 60.0 < status.time_s < 60.25:
+        if 51.0 < status.time_s < 51.25:
             heard.scenes.clear()
             heard.tiles.clear()
             heard.begins_anew.set()
+            watched.warn("collision 1")
+            watched.touched = [(1.0, 2.0)]
         watched.show(status)
 
     run.run(look, 0.2)
     said = [one["text"] for frame in heard.frames for one in frame["news"]]
     assert any(text.startswith("Companion:") for text in said), "it was said before anybody listened"
+    assert "collision 1" in said and (heard.frames[-1]["contacts"], heard.frames[-1]["touched"]) == (
+        1,
+        [[1.0, 2.0]],
+    )
     assert len(heard.scenes) >= 1 and len(heard.tiles) > 3

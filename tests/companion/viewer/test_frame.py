@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -13,8 +15,20 @@ from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
 from companion.core.scan import RangeScan
 from companion.mission.bounds import Bound
+from companion.navigation.field_step import Part
+from companion.safety.reasons import Activity, LatchReason, PowerReason, Reason, RunPhase, WaitReason
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
-from companion.viewer.frame import MOST_PATH, MOST_RAYS, _border, _outline, _places, _setpoint, _thinned
+from companion.viewer.frame import (
+    MOST_PATH,
+    MOST_RAYS,
+    _border,
+    _outline,
+    _places,
+    _setpoint,
+    _thinned,
+    doing_of,
+    told,
+)
 
 
 def test_an_outline_is_a_polygon_ahead_and_to_the_right() -> None:
@@ -57,3 +71,38 @@ def test_rays_say_what_was_seen_nothing_and_not_known() -> None:
 )
 def test_each_kind_of_setpoint_is_told(setpoint: object, told: dict) -> None:
     assert _setpoint(ControlCommand(Purpose.DRIVE, setpoint, 1.0)) == told and _setpoint(None) is None
+
+
+DRIVING = Activity(RunPhase.DRIVING)
+HELD = Activity(
+    RunPhase.STOPPED_AND_WAITING,
+    Reason(LatchReason.OTHER_MODE, ("GUIDED",)),
+    Reason(WaitReason.PERSON_SETS_MODE, ("X",)),
+)
+LOW = Reason(PowerReason.LOW, ("battery",))
+
+
+@pytest.mark.parametrize(
+    ("activity", "part", "broken_off", "paused", "line", "why"),
+    [
+        (DRIVING, Part.EXPLORE, None, False, "driving to gate", ""),
+        (DRIVING, Part.RETURN, None, False, "driving to gate", "going back to find another way"),
+        (DRIVING, Part.RETURN, LOW, False, "driving to gate", "battery low for the autopilot"),
+        (HELD, Part.EXPLORE, None, True, "paused on request", "waiting for a request to go on"),
+        (HELD, Part.EXPLORE, None, False, "stopped: mode is not GUIDED", "waiting for "),
+    ],
+)
+def test_the_line_says_why_the_rover_stands_or_drives_back(
+    activity: Activity, part: Part, broken_off: object, paused: bool, line: str, why: str
+) -> None:
+    companion = SimpleNamespace(
+        outcome=SimpleNamespace(broken_off=broken_off), mission_run=SimpleNamespace(paused=paused)
+    )
+    status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=SimpleNamespace(part=part))
+    doing = doing_of(cast(Any, companion), cast(Any, status))
+    assert doing["line"] == line and doing["why"].startswith(why) and bool(doing["why"]) == bool(why)
+
+
+def test_the_name_of_the_autopilot_is_said_once() -> None:
+    assert told(1.0, "info", "autopilot: Throttle armed", own=False)["text"] == "Throttle armed"
+    assert told(1.0, "info", "autopilot: as we say", own=True)["text"] == "autopilot: as we say"

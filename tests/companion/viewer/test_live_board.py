@@ -33,11 +33,6 @@ def heard(spectator: Spectator) -> tuple[list[dict], list[tuple[int, int]]]:
     return texts, places
 
 
-def texts_of(frames: list[dict]) -> list[str]:
-    """The news that they tell."""
-    return [news["text"] for one in frames for news in one["news"]]
-
-
 def board(takes_actions: bool = False) -> LiveBoard:
     made = LiveBoard(takes_actions)
     made.take(SCENE)
@@ -52,8 +47,9 @@ def test_who_comes_late_is_told_scene_past_map_and_the_newest_frame() -> None:
     texts, places = heard(live.join(False, lambda: None))
     assert [text["kind"] for text in texts] == ["scene", "past", "frame"] and texts[0]["may_act"] is False
     past = texts[1]["frames"]
-    assert [one["t"] for one in past] == [float(second) for second in range(10)] and "path" not in past[0]
-    assert texts_of([*past, texts[2]]) == [f"news {step}" for step in range(50)] and texts[2]["t"] == 9.8
+    assert [one["t"] for one in past] == [*(float(second) for second in range(10)), 9.8] and "path" not in past[0]
+    told = [one["text"] for each in past for one in each["news"]]
+    assert told == [f"news {step}" for step in range(50)] and texts[2]["t"] == 9.8 and texts[2]["news"] == []
     assert sorted(places) == [(column, 0) for column in range(TILES_AT_ONCE + 50)]
 
 
@@ -71,6 +67,23 @@ def test_a_slow_browser_misses_frames_but_no_news_and_no_tile() -> None:
     assert heard(spectator) == ([], [])
 
 
+def test_a_scene_that_changes_costs_no_news() -> None:
+    live = board()
+    spectator = live.join(False, lambda: None)
+    live.take(frame(0.0, "one"))
+    heard(spectator)
+    live.take(frame(0.4, "two"))
+    live.take({**SCENE, "targets": ["gate"]})
+    live.take(frame(0.6, "three"))
+    texts, _ = heard(spectator)
+    assert [text["kind"] for text in texts] == ["scene", "frame"]
+    assert [one["text"] for one in texts[1]["news"]] == ["two", "three"]
+    live.take({**SCENE, "map_epoch": 2})
+    live.take(frame(0.8, "four"))
+    texts, _ = heard(spectator)
+    assert [one["text"] for text in texts[1]["frames"] for one in text["news"]] == ["one", "two", "three", "four"]
+
+
 def test_another_map_begins_with_its_scene() -> None:
     live = board()
     spectator = live.join(False, lambda: None)
@@ -80,21 +93,6 @@ def test_another_map_begins_with_its_scene() -> None:
     live.take_tiles(tile_message([((7, 7), RUNS)]))
     texts, places = heard(spectator)
     assert texts[0]["map_epoch"] == 2 and places == [(7, 7)]
-
-
-def test_news_that_come_with_another_map_are_told_once() -> None:
-    live = board()
-    spectator = live.join(False, lambda: None)
-    live.take(frame(10.0, "waiting"))
-    heard(spectator)
-    live.take({**SCENE, "map_epoch": 2})
-    live.take(frame(10.2, "heading for the gate"))
-    (_, past, newest), _ = heard(spectator)
-    assert texts_of([*past["frames"], newest]) == ["waiting", "heading for the gate"], "the page forgot the first"
-    live.take({**SCENE, "map_epoch": 2, "home": [0.0, 0.0]})
-    live.take(frame(10.4, "on the way"))
-    texts, _ = heard(spectator)
-    assert texts_of(texts[-1:]) == ["on the way"], "the page still knows what it was told"
 
 
 def test_nothing_grows_without_bound() -> None:

@@ -32,8 +32,9 @@ def test_only_a_person_is_told_the_token_with_the_address(tmp_path) -> None:
     assert viewer is not None
     try:
         token = (tmp_path / "token").read_text().strip()
-        assert served(viewer, to_person=True).endswith(f"/#token={token}") and token not in served(
-            viewer, to_person=False
+        place = viewer.web.place
+        assert served(place, to_person=True).endswith(f"/#token={token}") and token not in served(
+            place, to_person=False
         )
     finally:
         viewer.close()
