@@ -108,9 +108,9 @@ def test_a_receiver_that_takes_nothing_for_a_while_is_told_all_news_later_and_a_
     heard.is_full = True
 
     def look(status) -> None:
-        if 50.0 < status.time_s < 50.25:
+        if 47.0 < status.time_s < 47.25:
             heard.is_full = False
-        if 51.0 < status.time_s < 51.25:
+        if 49.0 < status.time_s < 49.25:
             heard.scenes.clear()
             heard.tiles.clear()
             heard.begins_anew.set()
