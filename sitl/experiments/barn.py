@@ -198,6 +198,11 @@ class BarnReport(ExperimentReport):
     series: dict[tuple[Setup, str], tuple[BarnRun, ...]]
     """By setup and controller."""
 
+    @property
+    def section_name(self) -> str:
+        """See ``ExperimentReport``; other setups than the usual one stand beside it."""
+        return super().section_name + "".join(f"-{setup}" for setup in self._others())
+
     def tables(self) -> list[Table]:
         """One a setup, with a row a controller."""
         worlds = f"{len(self.worlds)} worlds"
@@ -215,6 +220,10 @@ class BarnReport(ExperimentReport):
     def _setups(self) -> list[Setup]:
         return [setup for setup in Setup if any(setup is one for one, _ in self.series)]
 
+    def _others(self) -> list[Setup]:
+        """The setups, where the usual one is not among them."""
+        return [] if Setup.GUARDED in self._setups() else self._setups()
+
     def _rows(self, setup: Setup, *, plain: bool = False) -> list[list[str]]:
         """``plain``: without intervals."""
         rows = [_row(name, runs) for (one, name), runs in self.series.items() if one is setup]
@@ -222,7 +231,7 @@ class BarnReport(ExperimentReport):
 
     def pictures(self) -> dict[str, Figure]:
         """The worst runs of the best controller."""
-        return {"barn-worst": _picture(self.worlds, worst(self.series[self._best()]))}
+        return {f"{self.section_name}-worst": _picture(self.worlds, worst(self.series[self._best()]))}
 
     def _best(self) -> tuple[Setup, str]:
         """Of the first setup."""
@@ -233,7 +242,8 @@ class BarnReport(ExperimentReport):
         """See ``ExperimentReport``."""
         kind = f"The worlds of `{self.options.archive.name}`" if self.options.archive else "Worlds of our own making"
         tables = "\n\n".join(f"{_told(one)}:\n\n{markdown_table(HEAD, self._rows(one))}" for one in self._setups())
-        return f"""## Narrow ground (BARN)
+        others = " and ".join(self._others())
+        return f"""## Narrow ground (BARN){others and f": {others}"}
 
 `{self.options.command(NAME)}`
 
@@ -248,7 +258,7 @@ resampling worlds.
 
 {tables}
 
-![The worst runs](images/barn-worst.png)
+![The worst runs](images/{self.section_name}-worst.png)
 
 The {WORST} worst runs of `{self._best()[1]}`, the slowest or those that ended badly: the way it drove.
 """
