@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+import threading
 from collections.abc import Callable
 from types import TracebackType
 from typing import Annotated
@@ -14,7 +16,7 @@ from companion.cli.live import STDERR, STDOUT, Live
 from companion.core.clock import stopwatch_s
 from companion.core.severity import Severity
 from companion.storage.unbuffered import let_go, shared_with
-from companion.viewer.terminal.painter import Painter, ViewError, terminal
+from companion.viewer.terminal.painter import CLOSING_S, Painter, ViewError, terminal
 from companion.viewer.terminal.run_view import RunView
 
 View = Annotated[bool, typer.Option("--view", help="Show map, rover and decisions on this terminal.")]
@@ -62,9 +64,18 @@ class LiveView:
         self._painter.__exit__(kind, error, trace)
         if self._in_lines:
             self._lines.__exit__(kind, error, trace)
-        elif self._painter.stuck:
+        elif self._painter.stuck or (kind is None and not self._painter.problem and not self._printed_last()):
             let_go(shared_with(STDERR, (STDOUT,)))
-        elif kind is None and not self._painter.problem:
+
+    def _printed_last(self) -> bool:
+        """Print the last picture; whether the terminal took it in time."""
+        thread = threading.Thread(target=self._print_last, name="last view", daemon=True)
+        thread.start()
+        thread.join(CLOSING_S)
+        return not thread.is_alive()
+
+    def _print_last(self) -> None:
+        with contextlib.suppress(Exception):  # a picture is not worth the result
             self._painter.print_last()
 
     def unhurried(self, seconds: float) -> None:

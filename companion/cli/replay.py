@@ -16,7 +16,7 @@ from companion.recording.reader import Record, load_record
 from companion.recording.record_clock import record_clock
 from companion.recording.record_format import RecordError
 from companion.replay.decision_list import DecisionLister, decision_at, list_lines
-from companion.replay.explain import DecisionExplainer, explanation_lines
+from companion.replay.explain import DecisionExplainer, Explanation, explanation_lines
 from companion.replay.replay import ReplayResult
 from companion.replay.replay import replay as run_again
 
@@ -85,20 +85,20 @@ def _explained(record: Record, why: str, image: Path | None) -> ReplayResult:
     picture(image)
     explainer = DecisionExplainer(number, record.settings, record.mission.rover.turning_radius_m)
     result = run_again(record, explainer)
-    _explain(explainer, image)
+    if explainer.explanation is None:
+        raise RecordError(f"{record.directory}: what is left of it ends before decision {number}")
+    _explain(explainer.explanation, image)
     return result
 
 
-def _explain(explainer: DecisionExplainer, image: Path) -> None:
-    if explainer.explanation is None:
-        return  # the replay ended before this decision, and reports that
-    for line in explanation_lines(explainer.explanation):
+def _explain(explanation: Explanation, image: Path) -> None:
+    for line in explanation_lines(explanation):
         typer.echo(line)
-    save_decision(image, explainer.explanation)
+    save_decision(image, explanation)
     typer.echo(f"picture: {image}")
-    if (choice := explainer.explanation.motions) is not None:
+    if (choice := explanation.motions) is not None:
         beside = image.with_name(f"{image.stem}-motions{image.suffix}")
-        save_motions(beside, choice, f"after decision {explainer.explanation.number}")
+        save_motions(beside, choice, f"after decision {explanation.number}")
         typer.echo(f"picture of the motions: {beside}")
 
 

@@ -41,6 +41,14 @@ class Forms:
     mp4: Path | None
 
     @property
+    def suffixes(self) -> list[tuple[str, Path | None, tuple[str, ...]]]:
+        """How the name of each must end, so that a slip of the keyboard writes over nothing else."""
+        return [
+            ("--out", self.page, (".html", ".htm")), ("--mcap", self.mcap, (".mcap",)), ("--gif", self.gif, (".gif",)),
+            ("--mp4", self.mp4, (".mp4",)),
+        ]  # fmt: skip
+
+    @property
     def files(self) -> list[Path]:
         """Every file that will be written."""
         tables = [] if self.csv is None else [self.csv / name for name in FILES]
@@ -102,6 +110,9 @@ def report(
 
 def _check(records: Sequence[Record], forms: Forms) -> None:
     """All that can be wrong with the outputs, before the work. Raises OutputError, McapError or FilmError."""
+    for option, file, suffix in forms.suffixes:
+        if file is not None and file.suffix.lower() not in suffix:
+            raise OutputError(f"{option} {file}: the name must end with {suffix[0]}")
     for file in forms.files:
         writable(file)
     apart(forms.files, [file for record in records for file in files_of(record)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
+from urllib.parse import quote
 
 import typer
 
@@ -67,6 +68,6 @@ def web_viewer(
 
 def served(place: WebPlace, *, to_person: bool) -> str:
     """Where the page is. A person gets the token with it, behind a # that browsers keep; a log file does not."""
-    token = f"#token={place.token}" if place.token and to_person else ""
+    token = f"#token={quote(place.token, safe='')}" if place.token and to_person else ""
     to_all = ", for all who can reach this address and know the token" if place.private else ""
     return f"the run is shown at {place.url}{token}{to_all}"

@@ -28,6 +28,8 @@ from companion.vehicle.state import VehicleState
 
 ARRIVES_S = 3.0
 """A mode that was asked for shows in a heartbeat by then, or it never arrived."""
+FRESH_S = 2.0
+"""Whoever may have taken over is known from a heartbeat that is no older: it comes once a second."""
 AGAIN_S = 2.0
 """A heartbeat that still shows HOLD so long after it was left was sent before."""
 
@@ -35,7 +37,8 @@ AGAIN_S = 2.0
 class MissionRequests:
     """Answers every request. A pause is HOLD, which any pilot may end; it is taken back only if it is still that one.
 
-    Whoever else sets HOLD, or another mode, keeps it: to go on is then refused.
+    Whoever sets another mode meanwhile keeps the rover, also with a HOLD that follows. To go on is refused as well
+    while the autopilot is not heard, and on a rover that was disarmed.
     """
 
     def __init__(self, run: MissionRun, notifier: TextSink) -> None:
@@ -49,19 +52,23 @@ class MissionRequests:
         match event:
             case HeartbeatSeen():
                 self._note_mode(event)
-            case PauseAsked() if self._is_heard(event.time_s):
-                refused = self._pause(event.time_s, vehicle) if event.pauses else self._go_on(event.time_s, vehicle)
-                self._answer(RequestForm.PAUSE, event.asker, refused, event.time_s)
+            case PauseAsked() if event.pauses or self._is_heard(event.time_s):  # a flood keeps nobody from stopping
+                act = self._pause if event.pauses else self._go_on
+                form = RequestForm.PAUSE if event.pauses else RequestForm.CONTINUE
+                self._answer(form, event.asker, act(event.time_s, vehicle), event.time_s)
             case TargetAsked() if self._is_heard(event.time_s):
                 self._answer(RequestForm.SKIP, event.asker, self._skip(event.index), event.time_s)
             case _:
                 pass
 
     def _note_mode(self, seen: HeartbeatSeen) -> None:
-        if seen.mode != RoverMode.HOLD:
-            self._run.paused = False
-        elif 0.0 <= seen.time_s - self._asked_s <= ARRIVES_S:
-            self._run.paused = True
+        if seen.mode == RoverMode.HOLD:
+            self._run.paused |= 0.0 <= seen.time_s - self._asked_s <= ARRIVES_S
+            self._asked_s = -math.inf
+            return
+        self._run.paused = False
+        if seen.mode != self._run.vehicle.own_mode:
+            self._asked_s = -math.inf  # somebody took over before it arrived
 
     def _is_heard(self, now_s: float) -> bool:
         """Whether there are not too many."""
@@ -87,6 +94,11 @@ class MissionRequests:
             return None
         if not self._run.paused:
             return Reason(Refusal.NOT_PAUSED, (own.name,))
+        heartbeat = vehicle.heartbeat
+        if heartbeat is None or now_s - heartbeat.time_s > FRESH_S:
+            return Reason(Refusal.NOT_HEARD)
+        if not heartbeat.armed:
+            return Reason(Refusal.DISARMED)
         self._left_s = now_s
         self._notifier.tell(f"Going on as requested: {own.name}", Severity.WARNING)
         self._run.sender.send(SetMode(own), now_s)

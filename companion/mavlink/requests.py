@@ -63,6 +63,7 @@ ANSWERED: Mapping[RequestForm, int] = MappingProxyType(
     {
         RequestForm.COMMAND: mavlink.MAV_CMD_DO_REPOSITION,
         RequestForm.PAUSE: mavlink.MAV_CMD_DO_PAUSE_CONTINUE,
+        RequestForm.CONTINUE: mavlink.MAV_CMD_DO_PAUSE_CONTINUE,
         RequestForm.SKIP: mavlink.MAV_CMD_DO_SET_MISSION_CURRENT,
     }
 )

@@ -134,6 +134,8 @@ class Refusal(Enum):
     CLOSED = "in or too near a fence or a known obstacle"
     OBSTACLE_SEEN = "an obstacle was seen there"
     NOT_PAUSED = "it was not paused by a request: set {} with ground station or transmitter"
+    NOT_HEARD = "the autopilot is not heard"
+    DISARMED = "the rover is disarmed"
     LEGS_OF_AUTO = "AUTO says which target is next"
     NOT_NEXT = "only the target after this one may be next"
 

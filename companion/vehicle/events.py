@@ -306,6 +306,7 @@ class RequestForm(StrEnum):
     ITEM = "item"
     """A guided mission item, answered with MISSION_ACK."""
     PAUSE = "pause"
+    CONTINUE = "continue"
     """DO_PAUSE_CONTINUE, answered with COMMAND_ACK."""
     SKIP = "skip"
     """DO_SET_MISSION_CURRENT, answered with COMMAND_ACK."""

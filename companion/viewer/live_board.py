@@ -57,7 +57,8 @@ class Spectator:
         board, told = self._board, []
         if self._scene and board.scene is not None:
             self._scene = False
-            told.append(json.dumps({**board.scene, "may_act": self.may_act and board.takes_actions}))
+            acts = {"may_act": self.may_act and board.takes_actions, "takes_actions": board.takes_actions}
+            told.append(json.dumps({**board.scene, **acts}))
             if self._past:
                 self._past = False
                 told.append(json.dumps({"kind": "past", "frames": board.past_frames}))

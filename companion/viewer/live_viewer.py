@@ -54,10 +54,14 @@ class LiveViewer:
 
     def show(self, status: Status, touched: Sequence[Sequence[float]] = ()) -> None:
         """To be called after each tick. ``touched``: where a simulated rover touched something, north and east."""
+        try:
+            self._pass_on()
+        except Exception as error:  # nor is what somebody asks for
+            self._requests = None
+            self._say(f"nothing is heard from the page any more, the drive goes on: {type(error).__name__}: {error}")
         if self._feed is None:
             return
         try:
-            self._pass_on()
             self._feed.touched = touched
             self._feed.show(status)
         except Exception as error:  # a picture is not worth a stop
@@ -71,7 +75,7 @@ class LiveViewer:
             return
         for one in asked:
             self._requests.take(one, self._companion)
-        for answer in self._requests.answered():
+        for answer in self._requests.answered(self._companion):
             self.web.put(wire.JSON, json.dumps(answer).encode())
 
     def close(self) -> None:

@@ -23,7 +23,9 @@ UNKNOWN, FREE, SEEN_OBSTACLE, CLOSED, COSTLY = range(5)
 """What a cell is. ``CLOSED``: by a fence, the mission or a known map; ``COSTLY``: ground that the mission calls so."""
 MOST_RUN = 32
 """A run's length takes five bits of its byte, what it is made of the other three."""
-AT_ONCE, IN_TURN = 40, 8
+MOST_NEAR = 24
+"""Tiles within the sensors' reach that are looked at each time."""
+AT_ONCE, IN_TURN = 16, 8
 """Tiles out of the sensors' reach that are looked at each time: for the first time, and those that the map may have
 forgotten meanwhile."""
 
@@ -65,7 +67,7 @@ class TileWatch:
     """Knows the tiles of one map as they were last told. A tile that never held anything is not told.
 
     Each look takes those round the rover, some of those that nobody has looked at yet, and a few others in turn: so it
-    takes milliseconds, however large the map is.
+    takes milliseconds, however large the map is and however far the sensor sees.
     """
 
     def __init__(self, evidence: EvidenceMap) -> None:
@@ -75,6 +77,7 @@ class TileWatch:
         """The cells of each."""
         self._waiting: deque[Place] = deque()
         self._in_turn: deque[Place] = deque()
+        self._far_at = 0
         self.tell_again()
 
     @property
@@ -93,7 +96,7 @@ class TileWatch:
 
     def changed(self, evidence: EvidenceMap, around: NedPoint, reach_m: float) -> list[tuple[Place, bytes]]:
         """The tiles that differ from what was told, with their cells in runs."""
-        places = self._places_around(evidence, around, reach_m)
+        places = self._nearest(evidence, around, reach_m)
         places.update(self._waiting.popleft() for _ in range(min(AT_ONCE, len(self._waiting))))
         for _ in range(min(IN_TURN, len(self._in_turn))):
             places.add(self._in_turn[0])
@@ -109,6 +112,19 @@ class TileWatch:
             self._told[place] = cells
             news.append((place, run_lengths(tile)))
         return news
+
+    def _nearest(self, evidence: EvidenceMap, around: NedPoint, reach_m: float) -> set[Place]:
+        """Those within the sensors' reach; of many the nearest, and some of the others in turn."""
+        near = self._places_around(evidence, around, reach_m)
+        if len(near) <= MOST_NEAR:
+            return near
+        x, y = evidence.frame.xy(around)
+        middle = x / TILE - 0.5, y / TILE - 0.5
+        ordered = sorted(near, key=lambda place: (math.dist(place, middle), place))
+        half = MOST_NEAR // 2
+        far = ordered[half:]
+        self._far_at = (self._far_at + half) % len(far)
+        return {*ordered[:half], *(far + far)[self._far_at : self._far_at + half]}
 
     def _places_around(self, evidence: EvidenceMap, around: NedPoint, reach_m: float) -> set[Place]:
         frame = evidence.frame

@@ -13,17 +13,24 @@ from companion.app import Companion
 from companion.core.clock import stopwatch_s
 from companion.core.frames import LocalFrame, NedPoint
 from companion.mavlink.local_station import LocalStation
-from companion.vehicle.events import RequestAnswer, RequestForm
+from companion.vehicle.events import RequestAnswer, RequestForm, RoverMode
 
-NO_ANSWER_S = 4.0
+NO_ANSWER_S, CONFIRMED_S = 4.0, 3.0
+OLD_S = 3.0
+"""What is asked for by somebody who looks at an older moment is not done, except to stop."""
 FORMS = {
     "pause": RequestForm.PAUSE,
-    "resume": RequestForm.PAUSE,
+    "resume": RequestForm.CONTINUE,
     "skip": RequestForm.SKIP,
     "goto": RequestForm.COMMAND,
 }
 NOT_DRIVING = "the mission has not begun"
+TOO_OLD = "it came too late: the page shows what was seconds ago"
+NOT_CHANGED = "the autopilot has not changed its mode"
 OTHER_GOAL = "the rover heads for something else by now"
+
+MODES = ("pause", "resume")
+"""These are done when the mode has changed."""
 
 Json = dict[str, Any]
 
@@ -43,30 +50,52 @@ class PageRequests:
     def __init__(self, station: LocalStation) -> None:
         self._station = station
         self._open: deque[_Asked] = deque()
+        self._unconfirmed: deque[_Asked] = deque()
+        """Accepted changes of the mode that no heartbeat has shown yet."""
         self._done: list[Json] = []
 
     def take(self, asked: Json, companion: Companion) -> None:
-        """A request as the web process passes it on: ``number``, ``action``, ``place`` (north and east), ``goal``."""
-        number, action = int(asked["number"]), str(asked["action"])
-        fault = self._ask(action, asked, companion)
+        """A request as the web process passes it on.
+
+        ``number``, ``action``, ``place`` (north and east), and what the page showed then: ``goal`` and the time ``t``.
+        """
+        number, action, shown_s = int(asked["number"]), str(asked["action"]), asked.get("t")
+        late = shown_s is None or not abs(companion.status().time_s - shown_s) <= OLD_S
+        fault = TOO_OLD if late and action != "pause" else self._ask(action, asked, companion)
         if fault:
             self._answer(number, action, fault)
         else:
             self._open.append(_Asked(number, action, stopwatch_s()))
 
-    def answered(self) -> list[Json]:
+    def answered(self, companion: Companion) -> list[Json]:
         """The messages to the web process since the last call."""
         for answer in self._station.answers():
             asked = next((one for one in self._open if FORMS[one.action] is answer.form), None)
-            if asked is not None:
-                self._open.remove(asked)
-                accepted = answer.answer is RequestAnswer.ACCEPTED
-                self._answer(asked.number, asked.action, "" if accepted else answer.reason or answer.answer.value)
+            if asked is None:
+                continue
+            self._open.remove(asked)
+            if answer.answer is not RequestAnswer.ACCEPTED:
+                self._answer(asked.number, asked.action, answer.reason or answer.answer.value)
+            elif asked.action in MODES:
+                self._unconfirmed.append(_Asked(asked.number, asked.action, stopwatch_s()))
+            else:
+                self._answer(asked.number, asked.action, "")
+        self._confirm(companion)
         while self._open and stopwatch_s() - self._open[0].since_s > NO_ANSWER_S:
             late = self._open.popleft()
             self._answer(late.number, late.action, "the companion did not answer")
         done, self._done = self._done, []
         return done
+
+    def _confirm(self, companion: Companion) -> None:
+        """Tell of modes that have been changed, and of those that were not."""
+        vehicle = companion.vehicle
+        for asked in tuple(self._unconfirmed):
+            holds = vehicle.heartbeat is not None and vehicle.heartbeat.mode == RoverMode.HOLD
+            changed = holds if asked.action == "pause" else vehicle.is_ours
+            if changed or stopwatch_s() - asked.since_s > CONFIRMED_S:
+                self._unconfirmed.remove(asked)
+                self._answer(asked.number, asked.action, "" if changed else NOT_CHANGED)
 
     def _ask(self, action: str, asked: Json, companion: Companion) -> str:
         """What is wrong with a request, in words; empty if it has been passed on."""

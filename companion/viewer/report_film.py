@@ -130,7 +130,7 @@ def write_mp4(film: Film, file: Path) -> None:
         except BrokenPipeError:
             pass  # what ffmpeg says of it follows
         said = child.stderr.read().decode(errors="replace").strip()
-    if child.returncode != 0:
+    if child.returncode != 0 or not file.exists():
         reason = said.splitlines()[-1] if said else f"exit code {child.returncode}"
         raise FilmError(f"{file}: ffmpeg gave up: {reason}; use --gif")
 

@@ -17,6 +17,7 @@ import hmac
 import ipaddress
 import json
 import re
+import secrets
 import socket
 import sys
 import threading
@@ -66,7 +67,8 @@ class WebApp:
         self._token = token
         self._private = private
         self._asks: dict[int, Spectator] = {}
-        self._asked = 0
+        self._asked = secrets.randbelow(2**40)
+        """Not from 0: an answer to a request of the process before must not find one of this."""
         index = (PAGE / "index.html").read_text(encoding="utf-8")
         self._index = index
         self._policy = _policy(index)
@@ -160,9 +162,9 @@ class WebApp:
                 continue
             self._asked += 1
             self._asks[self._asked] = spectator
-            place = [float(one) for one in asked.get("place") or ()]
-            goal = str(asked.get("goal", ""))[:MOST_NAME]
-            line = {"number": self._asked, "action": asked["action"], "place": place, "goal": goal}
+            place = asked["place"] if asked["action"] == "goto" else []
+            goal, shown_s = str(asked.get("goal", ""))[:MOST_NAME], asked.get("t")
+            line = {"number": self._asked, "action": asked["action"], "place": place, "goal": goal, "t": shown_s}
             sys.stdout.write(json.dumps(line) + "\n")
             sys.stdout.flush()
 
@@ -172,6 +174,8 @@ class WebApp:
             return "not allowed"
         if asked.get("kind") != "act" or asked.get("action") not in ACTIONS:
             return "unknown request"
+        if not isinstance(asked.get("t"), int | float):
+            return "no time"
         place = asked.get("place")
         if asked["action"] == "goto" and not (
             isinstance(place, list)
@@ -190,7 +194,8 @@ class WebApp:
     def _is_addressed(self, request: HTTPConnection) -> bool:
         """Whether the browser means this machine: a name of somebody else's may lead here, too (DNS rebinding)."""
         name = _host_of(request.headers.get("host", ""))
-        if name in ("localhost", self._host.lower(), socket.gethostname().lower()) or name.endswith(".local"):
+        own = socket.gethostname().lower()
+        if name in ("localhost", self._host.lower(), own, f"{own.split('.')[0]}.local"):
             return True
         try:
             ipaddress.ip_address(name)

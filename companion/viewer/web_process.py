@@ -14,6 +14,7 @@ import json
 import queue
 import secrets
 import socket
+import stat
 import subprocess
 import sys
 import threading
@@ -90,6 +91,8 @@ def _token(file: Path) -> str:
         if not file.exists():
             file.touch(mode=0o600)
             file.write_text(secrets.token_urlsafe(TOKEN_BYTES) + "\n", encoding="ascii")
+        if others := stat.S_IMODE(file.stat().st_mode) & (stat.S_IRWXG | stat.S_IRWXO):
+            raise WebError(f"--web-token {file}: others may use this file (mode bits {others:03o}); chmod 600 {file}")
         token = read_at_most(file, MOST_TOKEN_BYTES).decode("ascii").strip()
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "not a text of plain letters"

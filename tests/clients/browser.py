@@ -11,6 +11,8 @@ import pytest
 from selenium import webdriver
 from selenium.webdriver.chrome.options import Options
 from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.action_chains import ActionChains
+from selenium.webdriver.common.by import By
 
 from tests.support.served import PATIENCE_S
 
@@ -63,6 +65,11 @@ class Page:
             " b.getAttribute('aria-label') === arguments[0])); if (one) one.click(); return !!one"
         )
         self.until(lambda: self.run(script, name), 20.0)
+
+    def click(self, selector: str) -> None:
+        """The middle of the first element that this finds, with the mouse."""
+        element = self.driver.find_element(By.CSS_SELECTOR, selector)
+        ActionChains(self.driver).move_to_element(element).click().perform()
 
     @property
     def faults(self) -> list[str]:

@@ -65,7 +65,15 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.press("Pause")
             desktop.shows("HOLD", "Paused on request")
             desktop.press("Go on")
-            desktop.shows("GUIDED", "Going on as requested")
+            desktop.shows("GUIDED", "Going on as requested", "Go on: done")
+            desktop.press("Send here")
+            desktop.click("canvas")
+            desktop.press("Send")
+            desktop.shows("Send here: done", "Requested goal 1")
+            desktop.press("Skip target")
+            desktop.shows("Leave out requested goal 1?")
+            desktop.press("Skip")
+            desktop.shows("Skip target: done", "Skipping requested goal 1 as requested")
             desktop.run("sessionStorage.clear(); localStorage.clear()")
             desktop.resize(PHONE)
             desktop.open("about:blank")
@@ -73,7 +81,8 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             desktop.shows("Driving to far end", "GUIDED")
             assert int(str(desktop.run(DRAWN))) > 8
             fits(desktop, PHONE)
-            assert desktop.run("return document.querySelectorAll('.actions button').length") == 0, "nobody may act"
+            assert "Enter token to act" in desktop.text
+            assert desktop.run("return document.querySelectorAll('.actions button').length") == 1, "nobody may act"
 
 
 def fits(shown: Page, size: tuple[int, int]) -> None:

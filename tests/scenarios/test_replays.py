@@ -231,6 +231,16 @@ def test_a_record_that_is_cut_anywhere_is_replayed_as_far_as_it_goes(
     assert result.ticks <= lengths["rounds.bin"] // CHECKED_TICK.size
 
 
+def test_a_decision_that_a_cut_record_does_not_reach_is_not_explained(record: Path, tmp_path: Path) -> None:
+    copy = tmp_path / "cut"
+    shutil.copytree(record, copy)
+    with (copy / "link.tlog").open("r+b") as file:
+        file.truncate((copy / "link.tlog").stat().st_size // 2)
+    last = str(len(load_record(record).decisions))
+    result = CliRunner().invoke(app, ["replay", str(copy), "--why", last])
+    assert result.exit_code == 2 and f"ends before decision {last}" in result.output
+
+
 def test_why_a_decision_was_made_is_shown(record: Path, tmp_path: Path) -> None:
     lines = load_record(record).decisions
     number = 1 + next(i for i, line in enumerate(lines) if i and json.loads(line)["searches"])

@@ -268,8 +268,8 @@ def test_the_energy_is_what_the_autopilot_says_it_was(record: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--mcap", "{record}/link.tlog"], "is another file of this command"),
-        (["--gif", "{folder}/x", "--mcap", "{folder}/x"], "is another file of this command"),
+        (["--mcap", "{record}/link.tlog"], "the name must end with .mcap"),
+        (["--gif", "{folder}/yard.toml"], "the name must end with .gif"),
         (["--csv", "{record}/meta.json"], "cannot be written"),
         (["--gif", "{folder}/x.gif", "--open"], "--open shows the HTML file: name it with --out as well"),
     ],

@@ -10,8 +10,9 @@ const TOAST_MS = 6000;
 const NAMES = { pause: "Pause", resume: "Go on", skip: "Skip target", goto: "Send here" };
 
 export class Actions {
-  constructor(bar, stage, model, view, send) {
-    Object.assign(this, { bar, stage, model, view, send, aiming: false, aim: null });
+  /** `link` holds the functions send(message) and askToken(). */
+  constructor(bar, stage, model, view, link) {
+    Object.assign(this, { bar, stage, model, view, send: link.send, aiming: false, aim: null, confirmed: null });
     this.toast = make(
       "div",
       { class: "toast", role: "status", hidden: true },
@@ -23,11 +24,16 @@ export class Actions {
       { class: "actions", role: "toolbar", "aria-label": "Rover" },
       this.button("pause", "pause", () => this.act("pause")),
       this.button("resume", "play", () => this.act("resume")),
-      this.button("skip", "skip", () => this.act("skip")),
+      this.button("skip", "skip", () => this.askSkip()),
       (this.goto = this.button("goto", "send", () => this.toggleAim())),
     );
     this.question = make("span", { class: "question" });
-    this.yes = make("button", { type: "button", class: "strong", onclick: () => this.sendThere() }, "Send");
+    this.yes = make("button", { type: "button", class: "strong", onclick: () => this.confirmed?.() });
+    this.offer = make(
+      "div",
+      { class: "actions" },
+      make("button", { type: "button", class: "wide", onclick: () => link.askToken() }, "Enter token to act"),
+    );
     this.confirm = make(
       "div",
       { class: "confirm", hidden: true },
@@ -36,7 +42,7 @@ export class Actions {
       make("button", { type: "button", class: "wide", onclick: () => this.endAim() }, "Cancel"),
     );
     view.above.push((pen) => this.drawAim(pen));
-    this.shown = false;
+    this.shown = null;
   }
 
   button(action, sign, onclick) {
@@ -44,20 +50,24 @@ export class Actions {
   }
 
   /** Shows the buttons where acting is allowed, and locks them while nobody would hear. */
-  show(allowed, connected) {
-    if (allowed !== this.shown) {
-      this.shown = allowed;
-      if (allowed) this.bar.append(this.toast, this.confirm, this.buttons);
-      else this.bar.replaceChildren();
+  show(scene, connected) {
+    const allowed = scene?.may_act === true;
+    const shown = allowed ? "all" : scene?.takes_actions === true ? "offer" : "none";
+    if (shown !== this.shown) {
+      this.shown = shown;
+      const parts = { all: [this.toast, this.confirm, this.buttons], offer: [this.offer], none: [] };
+      this.bar.replaceChildren(...parts[shown]);
     }
+    // What is asked is of the moment when it was asked.
+    const goal = this.model.frame?.goal?.name;
+    if (!this.confirm.hidden && (!allowed || goal !== this.asked)) this.endAim();
     for (const button of [...this.buttons.children, this.yes]) button.disabled = !connected;
-    if (!allowed && this.aiming) this.endAim();
   }
 
   act(action, place) {
     // The goal that is shown now: by the time this arrives it may be another one.
     const goal = this.model.frame?.goal?.name ?? "";
-    const message = place ? { kind: "act", action, place } : { kind: "act", action, goal };
+    const message = { kind: "act", action, goal, t: this.model.frame?.t ?? null, ...(place && { place }) };
     if (!this.send(message)) {
       this.say("error", "Not sent: no connection");
       return;
@@ -95,6 +105,7 @@ export class Actions {
       return;
     }
     this.aiming = true;
+    this.asked = this.model.frame?.goal?.name;
     this.toast.hidden = true;
     this.goto.setAttribute("aria-pressed", "true");
     this.stage.classList.add("aiming");
@@ -107,16 +118,34 @@ export class Actions {
     this.aim = this.view.camera.toPlace(x, y);
     const far = distance(this.model.frame?.pose, this.aim);
     const from = Number.isFinite(far) ? `, ${metres(far)} from the rover` : "";
-    this.ask(`Send the rover to ${placeText(this.aim)}${from}?`);
-    this.yes.focus();
+    this.ask(`Send the rover to ${placeText(this.aim)}${from}?`, "Send", () => this.sendThere());
     this.view.invalidate();
     return true;
   }
 
-  ask(text) {
+  /** A question. `name` of the button that does it; without one the answer comes from the map. */
+  ask(text, name = "", confirmed = null) {
     this.confirm.hidden = false;
-    this.yes.hidden = this.aim === null;
+    this.confirmed = confirmed;
+    this.yes.hidden = confirmed === null;
+    setText(this.yes, name);
     setText(this.question, text);
+    if (confirmed) this.yes.focus();
+  }
+
+  askSkip() {
+    this.endAim();
+    const goal = this.model.frame?.goal?.name;
+    if (!goal) {
+      this.say("error", "Skip target: the rover heads for none");
+      return;
+    }
+    this.asked = goal;
+    this.toast.hidden = true;
+    this.ask(`Leave out ${goal}?`, "Skip", () => {
+      this.endAim();
+      this.act("skip");
+    });
   }
 
   sendThere() {

@@ -17,6 +17,8 @@ import { lasting } from "viewer/words.js";
 /** Frames come five a second. Without one for as long as this, what is shown is old. */
 const STALE_MS = 1500;
 const LOOK_MS = 250;
+/** The autopilot's heartbeat comes once a second. Without one for as long as this, its data is old. */
+const SILENT_S = 3.5;
 
 class LivePage {
   constructor(root) {
@@ -29,7 +31,10 @@ class LivePage {
     this.panel = new Panel(this.model, { go: (place) => this.camera.centre(place) });
     panel.append(this.panel.node);
     this.charts = new Charts(charts, this.model);
-    this.actions = new Actions(bar, viewer, this.model, this.view, (message) => this.link.send(message));
+    this.actions = new Actions(bar, viewer, this.model, this.view, {
+      send: (message) => this.link.send(message),
+      askToken: () => this.askToken("Whoever knows it may act."),
+    });
     addFiguresButton(this.parts);
     watchEdges(this.parts, this.view);
     listen(canvas, this.camera, (x, y) => this.actions.tap(x, y));
@@ -62,6 +67,10 @@ class LivePage {
   deny(text) {
     this.denied = true;
     this.refresh();
+    this.askToken(text);
+  }
+
+  askToken(text) {
     askToken(this.parts.viewer, text, (token) => {
       this.denied = false;
       this.link.token = token;
@@ -99,7 +108,7 @@ class LivePage {
     legend.show(scene);
     this.panel.show();
     this.charts.show();
-    this.actions.show(scene?.may_act === true, this.link?.open === true);
+    this.actions.show(scene, this.link?.open === true);
   }
 
   silentFor() {
@@ -110,7 +119,10 @@ class LivePage {
   trouble() {
     if (this.denied) return "Not connected: a token is needed";
     const silent = this.silentFor();
-    if (silent < STALE_MS || this.model.frame?.state === "ended") return "";
+    if (this.model.frame?.state === "ended") return "";
+    const heartbeat = this.model.frame?.rates?.heartbeat_age_s;
+    if (silent < STALE_MS && heartbeat > SILENT_S) return `Autopilot silent since ${lasting(heartbeat)}`;
+    if (silent < STALE_MS) return "";
     const since = lasting(silent / 1000);
     if (this.link?.open) return this.model.frame ? `No data since ${since}` : "";
     return `No connection since ${since}`;

@@ -97,12 +97,12 @@ def _headline(headline: Headline | None, columns: int) -> list[Text]:
 
 
 def _newest(events: Iterable[str], columns: int, rows: int) -> list[Text]:
-    """The newest texts that fit, wrapped; a text that does not fit completely is left out."""
+    """The newest texts that fit, wrapped; what does not fit is left out, the newest is cut."""
     lines: list[Text] = []
     for text in reversed(tuple(events)):
         wrapped = _wrapped(text, columns)
         if len(lines) + len(wrapped) > rows:
-            return lines
+            return lines or wrapped[:rows]
         lines = [*wrapped, *lines]
     return lines
 

@@ -8,7 +8,7 @@ import pytest
 
 from companion.core.frames import NedPoint
 from companion.executive.mission_progress import TargetStatus
-from companion.executive.mission_requests import AGAIN_S, ARRIVES_S, MissionRequests
+from companion.executive.mission_requests import AGAIN_S, ARRIVES_S, FRESH_S, MissionRequests
 from companion.mission.mission import OnBlocked
 from companion.mission.resolve import ResolvedTarget
 from companion.vehicle.commands import AnswerRequest, SetMode
@@ -91,15 +91,34 @@ def test_a_mode_that_never_arrived_can_be_asked_for_again(tmp_path: Path) -> Non
 
 
 @pytest.mark.parametrize("between", [RoverMode.MANUAL, RoverMode.GUIDED])
-def test_what_a_pilot_set_is_not_taken_back(tmp_path: Path, between: RoverMode) -> None:
+@pytest.mark.parametrize("later_s", [0.5, ARRIVES_S + 0.1])
+def test_what_a_pilot_set_is_not_taken_back(tmp_path: Path, between: RoverMode, later_s: float) -> None:
     asked = Asked(tmp_path)
     asked.pause()
     asked.in_mode(RoverMode.HOLD)
     asked.in_mode(between)
-    asked.later(ARRIVES_S + 0.1)
+    asked.later(later_s)
     asked.in_mode(RoverMode.HOLD)
     assert asked.go_on() == (DENIED, [])
     assert "set GUIDED with ground station or transmitter" in asked.notices.texts[-1]
+
+
+def test_a_pilot_who_takes_over_before_the_pause_arrives_keeps_the_rover(tmp_path: Path) -> None:
+    asked = Asked(tmp_path)
+    asked.pause()
+    asked.in_mode(RoverMode.MANUAL)
+    asked.in_mode(RoverMode.HOLD)
+    assert asked.go_on() == (DENIED, [])
+
+
+@pytest.mark.parametrize(("armed", "since_s"), [(False, 0.0), (True, FRESH_S + 0.1)])
+def test_a_rover_that_was_disarmed_or_is_not_heard_does_not_go_on(tmp_path: Path, armed: bool, since_s: float) -> None:
+    asked = Asked(tmp_path)
+    asked.pause()
+    asked.in_mode(RoverMode.HOLD)
+    asked.stand(0.0, 0.0, mode=RoverMode.HOLD, armed=armed)
+    asked.later(since_s)
+    assert asked.go_on() == (DENIED, [])
 
 
 def test_a_hold_or_another_mode_that_was_not_asked_for_here_is_not_left(tmp_path: Path) -> None:
@@ -142,3 +161,4 @@ def test_a_flood_is_not_answered(tmp_path: Path) -> None:
     for _ in range(30):
         asked.requests.take(TargetAsked(asked.now_s, ASKER, 7), asked.run.vehicle)
     assert len([one for one in asked.autopilot.taken() if isinstance(one, AnswerRequest)]) == 10
+    assert asked.pause() == (OK, [RoverMode.HOLD]), "but anybody may stop the rover"

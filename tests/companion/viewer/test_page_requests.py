@@ -13,7 +13,7 @@ from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
 from companion.settings.settings_file import parse_settings
 from companion.viewer import page_requests
-from companion.viewer.page_requests import NOT_DRIVING, OTHER_GOAL, PageRequests
+from companion.viewer.page_requests import NOT_DRIVING, OTHER_GOAL, TOO_OLD, PageRequests
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 from tests.companion.viewer.test_feed import MISSION
@@ -43,9 +43,13 @@ class Page:
     def ask(self, action: str, **more: object) -> str:
         """What was answered: nothing if it was accepted."""
         self.number += 1
-        self.requests.take({"number": self.number, "action": action, **more}, self.run.companion)
-        self.ticks(0.3)
-        (answer,) = self.requests.answered()
+        shown = {"t": self.run.companion.status().time_s, **more}
+        self.requests.take({"number": self.number, "action": action, **shown}, self.run.companion)
+        answers: list[dict] = []
+        for _ in range(20):
+            self.ticks(0.2)
+            answers += self.requests.answered(self.run.companion)
+        (answer,) = answers
         assert answer["number"] == self.number and answer["action"] == action
         assert answer["ok"] is (answer["text"] == "")
         return str(answer["text"])
@@ -61,6 +65,7 @@ def test_pause_go_on_send_and_skip_and_the_record_is_replayed(tmp_path: Path) ->
     heartbeat = companion.vehicle.heartbeat
     assert heartbeat is not None and heartbeat.mode == 4 and companion.vehicle.speed_m_s < 0.1
     assert page.ask("goto", place=[5.0, 1.0]).startswith("not driving")
+    assert page.ask("resume", t=companion.status().time_s - 5.0) == page.ask("resume", t=None) == TOO_OLD
     assert page.ask("resume") == ""
     page.drives()
     assert page.ask("goto", place=[9000.0, 0.0]).endswith("farther than 300 m")
@@ -80,8 +85,8 @@ def test_pause_go_on_send_and_skip_and_the_record_is_replayed(tmp_path: Path) ->
 def test_what_nobody_answers_is_told_after_a_while(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = Page(tmp_path / "record")
     page.requests.take({"number": 7, "action": "pause"}, page.run.companion)
-    assert page.requests.answered() == []
+    assert page.requests.answered(page.run.companion) == []
     monkeypatch.setattr(page_requests, "NO_ANSWER_S", -1.0)
-    (answer,) = page.requests.answered()
+    (answer,) = page.requests.answered(page.run.companion)
     assert answer["number"] == 7 and not answer["ok"] and "did not answer" in answer["text"]
     page.recorder.close()

@@ -119,7 +119,7 @@ def test_no_other_page_and_no_other_name_gets_in(web: WebProcess) -> None:
 
 
 def test_who_knows_the_token_may_act_and_nobody_else(with_token: WebProcess) -> None:
-    act = json.dumps({"kind": "act", "action": "goto", "place": [1.0, 2.0]})
+    act = json.dumps({"kind": "act", "action": "goto", "place": [1.0, 2.0], "t": 9.0})
     with looking(with_token) as client:
         assert next_of(client, "scene")["may_act"] is False
         client.send(act)
