@@ -18,6 +18,7 @@ from companion.viewer.map_tiles import (
     COSTLY,
     FREE,
     IN_TURN,
+    MOST_NEAR,
     SEEN_OBSTACLE,
     TILE,
     UNKNOWN,
@@ -110,3 +111,19 @@ def test_a_look_at_a_large_map_takes_some_tiles_and_comes_to_all_of_them() -> No
     assert sum(counts) == -(-height // TILE) * -(-width // TILE) and max(counts) <= AT_ONCE + IN_TURN + 9
     watch.tell_again()
     assert watch.is_behind and len(watch.changed(evidence, NedPoint(5.0, 5.0), 5.0)) >= AT_ONCE
+
+
+def test_a_sensor_that_sees_far_costs_no_more_and_what_it_finds_there_is_told_in_a_while() -> None:
+    evidence, here = new_evidence(400), NedPoint(200.0, 200.0)
+    watch, places, looks = TileWatch(evidence), [], 0
+    while watch.is_behind:
+        watch.changed(evidence, here, 120.0)
+    evidence.log_odds[:] = 3.0
+    told: set[tuple[int, int]] = set()
+    reached = watch._places_around(evidence, here, 120.0)
+    while not reached <= told:
+        places = [place for place, _ in watch.changed(evidence, here, 120.0)]
+        told.update(places)
+        looks += 1
+        assert len(places) <= MOST_NEAR + AT_ONCE + IN_TURN
+    assert len(reached) > 200 and looks <= 3 * len(reached) / MOST_NEAR
