@@ -41,6 +41,8 @@ def use_cache(environment: MutableMapping[str, str]) -> Path:
     if not environment.get(PLACE):
         writable = (place for base in _bases(environment) if _is_writable(place := base / "kernels"))
         environment[PLACE] = str(next(writable, None) or tempfile.mkdtemp(prefix="rover-companion-kernels-"))
+    # The library of the pictures keeps a list of fonts there, and not in the user's own settings.
+    environment.setdefault("MPLCONFIGDIR", str(Path(environment[PLACE]) / "matplotlib"))
     return Path(environment[PLACE])
 
 

@@ -72,7 +72,7 @@ def web_place(text: str, token_file: Path | None) -> WebPlace:
     host, _, port_text = text.rpartition(":")
     host = host.removeprefix("[").removesuffix("]") or "127.0.0.1"
     if not port_text.isascii() or not port_text.isdigit() or not 0 <= int(port_text) <= 65535:
-        raise WebError(f"--web {text}: not a place to serve; use PORT or HOST:PORT, for example 8000")
+        raise WebError(f"--web {text}: not a place to serve; use PORT (at most 65535) or HOST:PORT, for example 8000")
     place = WebPlace(host, int(port_text), "" if token_file is None else _token(token_file))
     if place.private and not place.token:
         raise WebError(

@@ -146,7 +146,9 @@ def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:
         touched = len(run.simulator.collisions)
         told = f", {touched} collision{'s' * (touched != 1)}" if touched else ""
         what = f"{run.mission.name} after {run.simulator.time_s:.0f} s of simulated time, {targets}{told}"
-    kept = f"record so far: {recorder.directory}" if isinstance(recorder, Recorder) else "nothing was written"
+    kept = "nothing was written"
+    if isinstance(recorder, Recorder):
+        kept = f"record so far: {recorder.directory}; rover-companion report {recorder.directory} shows it"
     return f"{what}; {kept}"
 
 

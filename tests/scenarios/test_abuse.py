@@ -325,6 +325,8 @@ def tree(folder: Path) -> dict[str, tuple[int, int]]:
 def watched(place: Path, allowed: list[Path], *arguments: object) -> tuple[int, str, str]:
     """A command in a read-only directory; its interpreter ends it when it writes elsewhere than allowed."""
     environment = {**os.environ, "HOME": str(place / "home"), "XDG_STATE_HOME": str(allowed[-1])}
+    # What the library of the pictures keeps of fonts.
+    environment["MPLCONFIGDIR"] = str(allowed[-1] / "matplotlib")
     first = WATCHER.format(places=[str(path) for path in allowed])
     with Forked("companion", arguments, environment, place, first) as child:
         return finished(child)

@@ -105,6 +105,15 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (Refusal.NEAR_BORDER, ("2 m away",), "it must be 2 m away"),
     (Refusal.CLOSED, (), "in or too near a fence or a known obstacle"),
     (Refusal.OBSTACLE_SEEN, (), "an obstacle was seen there"),
+    (
+        Refusal.NOT_PAUSED,
+        ("GUIDED",),
+        "it was not paused by a request: set GUIDED with ground station or transmitter",
+    ),
+    (Refusal.NOT_HEARD, (), "the autopilot is not heard"),
+    (Refusal.DISARMED, (), "the rover is disarmed"),
+    (Refusal.LEGS_OF_AUTO, (), "AUTO says which target is next"),
+    (Refusal.NOT_NEXT, (), "only the target after this one may be next"),
 ]
 
 

@@ -224,6 +224,8 @@ OPENED_OTHERWISE = {
     "companion/bench/measure.py": "/proc",
     "sitl/experiments/soak.py": "/proc",
     "companion/cli/report.py": "a browser",
+    "companion/viewer/report_csv.py": "written only",
+    "companion/viewer/report_mcap.py": "written only",
     "companion/viewer/report_page.py": "the program's own files",
     "companion/viewer/server.py": "the program's own files",
     "sitl/experiments/experiment.py": "the program's own files",
