@@ -97,7 +97,7 @@ def posts(seed: int) -> EvidenceMap:
     return evidence
 
 
-@pytest.mark.parametrize("gain", [0.7, 1.3])
+@pytest.mark.parametrize("gain", [pytest.param(0.7, marks=pytest.mark.thorough), 1.3])
 def test_it_gets_through_posts_and_touches_none_whatever_the_rover_is(gain: float) -> None:
     """Six grounds for each rover; the discs reach 2 cm beyond its sides."""
     results = [driven(posts(seed), seed, gain) for seed in range(6)]
