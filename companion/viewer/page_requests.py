@@ -99,7 +99,7 @@ class PageRequests:
 
     def _ask(self, action: str, asked: Json, companion: Companion) -> str:
         """What is wrong with a request, in words; empty if it has been passed on."""
-        if action in ("pause", "resume"):
+        if action in MODES:
             self._station.pause(action == "pause")
             return ""
         executor = companion.executor
