@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from companion.control.controller import ControlCommand, Purpose, stop_for
 from companion.control.following import GUARDED_S, Following, turn_gains
 from companion.control.local_view import LocalView
-from companion.control.motion_ground import NEAR_M, Window, look_round
+from companion.control.motion_ground import NEAR_M, Window, look_round, unseen_to_m
 from companion.control.motion_kernels import (
     Body,
     MotionProblem,
@@ -91,6 +91,8 @@ class MotionController:
         self._position = PositionAhead()
         self._window: Window | None = None
         self._looked_s = self._time_s = -math.inf
+        self._began: NedPoint | None = None
+        self._came_here = False
         self.choice: MotionChoice | None = None
         """The last one."""
         self.backwards = False
@@ -156,7 +158,9 @@ class MotionController:
     def _problem(self, path: ReferencePath, view: LocalView, model: RoverModel) -> MotionProblem:
         now_s, pose = view.pose.time_s, view.pose
         if self._window is None or now_s - self._looked_s >= LOOKS_S:
-            self._window = look_round(view.evidence, pose.point, path, self._body, model.fastest_m_s)
+            self._began = self._began or pose.point
+            self._came_here |= pose.point.distance_m(self._began) > 2.0 * unseen_to_m(self._body, True)
+            self._window = look_round(view.evidence, pose.point, path, self._body, model.fastest_m_s, self._came_here)
             self._looked_s = now_s
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
         pending = _pending(view, round(model.dead_s / STEP_S), STEP_S)

@@ -40,7 +40,10 @@ NEARER_M = 1.0
 """A path that is closed farther ahead is followed at least so far, or it counts as closed here."""
 UNDER_M, BESIDE = 0.1, 2.0
 """Round the rover ground counts as seen: so much beyond what it can turn on, and to so many times its half width. A
-lidar of 90 degrees sees the ground beside the rover's way only from there on."""
+lidar that looks 60 degrees wide sees the ground beside the rover's way only from there on."""
+BESIDE_FIRST, UNDER_FIRST_M = 1.42, 0.05
+"""Less where it has not come from elsewhere under this program: of what is beside it nothing was seen on the way. So
+much a lidar of 90 degrees needs to drive on; with a narrower one the rover turns first."""
 COARSE = 2
 """Evidence cells along the side of a cell that has a time to go."""
 
@@ -57,10 +60,13 @@ class Window:
         return point.east_m - self.corner.east_m, point.north_m - self.corner.north_m
 
 
-def look_round(evidence: EvidenceMap, here: NedPoint, path: ReferencePath, body: Body, fastest_m_s: float) -> Window:
+def look_round(
+    evidence: EvidenceMap, here: NedPoint, path: ReferencePath, body: Body, fastest_m_s: float, came_here: bool = True
+) -> Window:
     """The window as the map is now.
 
-    The ground that the rover can turn on where it stands counts as seen: no sensor sees it.
+    The ground that the rover can turn on where it stands counts as seen: no sensor sees it. ``came_here``: it came from
+    elsewhere with open eyes.
     """
     ahead = path.points[path.progress : path.progress + round(AHEAD_M / STEP_M) + 1]
     (left, low), (right, high) = _window(evidence, np.vstack((ahead, (here.north_m, here.east_m))))
@@ -74,7 +80,7 @@ def look_round(evidence: EvidenceMap, here: NedPoint, path: ReferencePath, body:
     # To the surface: the map marks what lies a little behind it.
     behind_m = np.float32(max(0.5 * cell_m, evidence.settings.hit_depth_m))
     outside = (
-        unseen & ~_under(evidence, here, (left, low), unseen.shape, _unseen_to_m(body) + float(behind_m))
+        unseen & ~_under(evidence, here, (left, low), unseen.shape, unseen_to_m(body, came_here) + float(behind_m))
     ) | blocked
     for edge in (outside[0, :], outside[-1, :], outside[:, 0], outside[:, -1]):
         edge[:] = True  # nothing is known here of what lies beyond the window
@@ -150,9 +156,11 @@ def _closed(
     return closed, cells((base + penalty >= 1.0) & (base < 1.0))
 
 
-def _unseen_to_m(body: Body) -> float:
-    """So far from the rover's place no sensor sees the ground."""
-    return max(body.around_m, BESIDE * body.radius_m) + UNDER_M
+def unseen_to_m(body: Body, came_here: bool) -> float:
+    """So far from the rover's place ground counts as seen that no sensor saw. ``came_here``: see ``look_round``."""
+    if came_here:
+        return max(body.around_m, BESIDE * body.radius_m) + UNDER_M
+    return max(body.around_m, BESIDE_FIRST * body.radius_m) + UNDER_FIRST_M
 
 
 def _under(

@@ -173,6 +173,18 @@ def test_a_rover_that_saw_nothing_behind_it_does_not_reverse_there() -> None:
         assert math.hypot(state[0] - 10.0, state[1] - 10.0) < 0.6, "what it can turn on, and a little more"
 
 
+def test_where_it_begins_it_goes_slower_over_ground_that_nobody_saw() -> None:
+    """It was begun anew: of what is beside it it remembers nothing. One that comes from elsewhere would have seen it."""
+    evidence, speeds_m_s = ground(), []
+    evidence.log_odds.fill(0.0)
+    leads = controller()
+    for tick, north_m in enumerate((3.0, 5.0)):
+        leads.follow(PATH, view(evidence, Pose(north_m, 10.0, 0.0, float(tick))))
+        assert leads.choice is not None
+        speeds_m_s.append(leads.choice.problem.admitted_m_s.max())
+    assert 0.0 < speeds_m_s[0] < 0.8 * speeds_m_s[1], speeds_m_s
+
+
 def test_what_is_told_allows_for_a_command_that_comes_later_than_the_model_says() -> None:
     """With the dead time off by as much as all else, it may be left alone only at a lower speed."""
     evidence = ground()

@@ -74,6 +74,18 @@ def test_the_ground_that_the_rover_stands_on_counts_as_seen_and_none_beyond() ->
     assert seen_m(NedPoint(HERE.north_m - 1.0, HERE.east_m)) < 0.0
 
 
+def test_where_it_begins_less_of_what_is_beside_it_counts_as_seen() -> None:
+    """Of the ground there nothing was seen on the way."""
+    evidence = ground()
+    evidence.log_odds.fill(0.0)
+    spare_m = {}
+    for came_here in (False, True):
+        window = look_round(evidence, HERE, PATH, BODY, 2.0, came_here)
+        x, y = (int(v / window.ground.cell_m) for v in window.place(HERE))
+        spare_m[came_here] = window.ground.seen_m[y, x] - BODY.radius_m
+    assert 0.1 < spare_m[False] < 0.25 < spare_m[True] < 0.5
+
+
 def test_what_the_mission_closes_keeps_the_rovers_middle_away_and_not_its_sides_once_more() -> None:
     """Two fences whose fields, grown by the rover's radius, leave 0.5 m between them. The rover is 0.8 m wide."""
     evidence, wide = new_map(empty_grid(80, 80, 0.25), 0.4, SETTINGS.mapping), Body(np.zeros(1), 0.4, 0.4)
