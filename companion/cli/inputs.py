@@ -38,6 +38,10 @@ PICTURES = (".png", ".jpg", ".jpeg")
 
 def picture(path: Path | None) -> None:
     """Like ``writable``, for an image, whose suffix decides its format. Raises OutputError."""
+    if path is not None and (path.is_dir() or path.name in ("", "..")):
+        raise OutputError(f"{path}: is a folder, not a file; add a file's name, like {path / 'picture.png'}")
+    if path is not None and not path.suffix:
+        raise OutputError(f"{path}: the name says no picture format; write {path}.png")
     if path is not None and path.suffix.lower() not in PICTURES:
         raise OutputError(f"{path}: suffix '{path.suffix}' is no picture format; known: {', '.join(PICTURES)}")
     writable(path)

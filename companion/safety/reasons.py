@@ -57,6 +57,7 @@ class LatchReason(Enum):
     """Why the mode latch keeps the companion from driving."""
 
     OTHER_MODE = "mode is not {}"
+    PAUSED = "paused on request"
     BETWEEN_LEGS = "AUTO goes on by itself"
     DISARMED = "disarmed"
     HOLD_SENT = "HOLD was asked for"
@@ -68,7 +69,7 @@ class WaitReason(Enum):
 
     HEARTBEAT = "the autopilot's heartbeat{}"
     """The figure tells in words where the companion listens."""
-    ORIGIN_AND_HOME = "the autopilot's origin and home"
+    ORIGIN_AND_HOME = "the autopilot's origin and home (they come once its GPS and EKF are ready)"
     GOOD_DATA = "good data ({})"
     FENCE = "the autopilot's fence and rally points{}"
     OTHER_COMPANION_SILENT = "another companion with the same component id to fall silent"
@@ -76,14 +77,15 @@ class WaitReason(Enum):
     CHARGED_BATTERY = "a charged battery ({})"
     ROOM_TO_BORDER = "the rover to stand {}"
     ON_THE_GRID = "the rover to stand on the mission's grid"
-    GUIDED = "GUIDED"
-    ARMING = "arming"
+    GUIDED = "GUIDED (asked for)"
+    ARMING = "arming (asked for; the autopilot says if it refuses)"
     PERSON_STARTS_AUTO = "a person to arm and to set AUTO (the autopilot drives this mission)"
     PERSON_SETS_GUIDED = "a person to set GUIDED (somebody is driving)"
     PERSON_SETS_GUIDED_AGAIN = "a person to set GUIDED (the rover was taken over, or stopped in doubt)"
     PERSON_ARMS = "a person to arm (or run with --arm)"
     AUTOPILOT_HEARD = "the autopilot to be heard again"
     PERSON_SETS_MODE = "a person to set {}"
+    REQUEST_TO_GO_ON = "a person to ask it to go on, or to set {}"
     PERSON_ARMS_AGAIN = f"a person to {ARM_AGAIN}"
     PERSON_SETS_MODE_AND_ARMS = f"a person to set {{}} and {ARM_AGAIN}"
     GOOD_DATA_AND = "good data ({}) and {}"
@@ -95,6 +97,7 @@ FOR_A_PERSON = frozenset((
     WaitReason.PERSON_SETS_GUIDED_AGAIN,
     WaitReason.PERSON_ARMS,
     WaitReason.PERSON_SETS_MODE,
+    WaitReason.REQUEST_TO_GO_ON,
     WaitReason.PERSON_ARMS_AGAIN,
     WaitReason.PERSON_SETS_MODE_AND_ARMS,
 ))  # fmt: skip

@@ -5,9 +5,12 @@ Nouns: drive permission.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from companion.core.severity import Severity, TextSink
 from companion.executive.mission_run import MissionRun, Stop
 from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
+from companion.safety.reasons import LatchReason, Reason, WaitReason
 from companion.safety.watchdogs import Monitor, first_doubt
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events import Event
@@ -38,6 +41,8 @@ class DrivePermission:
         run, settings, before = self._run, self._settings.current.safety, self._run.latch.control
         doubt = first_doubt(self._monitors, now_s)
         run.latch, verdict = check(run.latch, run.vehicle, now_s, settings, doubt)
+        if run.paused and verdict.reaction is Reaction.SILENT:
+            verdict = replace(verdict, reason=Reason(LatchReason.PAUSED))
         drives = verdict.reaction is Reaction.DRIVE
         changed = drives == run.stopped
         if changed or (drives and before is not Control.COMPANION):
@@ -49,10 +54,13 @@ class DrivePermission:
 
     def _stop(self, verdict: Verdict, now_s: float) -> Stop:
         """What is awaited is of interest only once the companion is silent."""
-        silent = verdict.reaction is Reaction.SILENT
-        return Stop(
-            verdict.reason, awaited(self._run.vehicle, now_s, self._settings.current.safety) if silent else None
-        )
+        vehicle = self._run.vehicle
+        if verdict.reaction is not Reaction.SILENT:
+            return Stop(verdict.reason, None)
+        waits = awaited(vehicle, now_s, self._settings.current.safety)
+        if self._run.paused and waits is not None and waits.kind is WaitReason.PERSON_SETS_MODE:
+            waits = Reason(WaitReason.REQUEST_TO_GO_ON, waits.figures)
+        return Stop(verdict.reason, waits)
 
     def _tell(self, verdict: Verdict, before: Control) -> None:
         """``before``: who drove until now."""

@@ -114,7 +114,8 @@ class Supervisor:
         cleared = self._arming.step(now_s)
         if cleared is None:
             return
-        text = f"Companion: {self._run.mission.name}, {len(cleared.progress.targets)} targets"
+        count = len(cleared.progress.targets)
+        text = f"Companion: {self._run.mission.name}, {count} target{'s' * (count != 1)}"
         self._notifier.tell(text, Severity.INFO)
         executor = self._run.begin(cleared.layout, cleared.progress, now_s)
         if self._saver.resume(executor, now_s):

@@ -66,6 +66,18 @@ DRIVES = {
     RoverMode.GUIDED: "ground station",
 }
 """Who drives where the companion does not; in a mode that is not named here it is the pilot."""
+MODE_NAMES = {
+    1: "ACRO",
+    3: "STEERING",
+    5: "LOITER",
+    6: "FOLLOW",
+    7: "SIMPLE",
+    8: "DOCK",
+    9: "CIRCLE",
+    12: "SMART_RTL",
+    16: "INITIALISING",
+}
+"""ArduRover's other modes."""
 
 Json = dict[str, Any]
 
@@ -83,7 +95,7 @@ def scene_of(mission: Mission, run: MissionRun, epoch: int) -> Json:
         "map_epoch": epoch,
         "home": None if home is None else _place(home),
         "origin": None if origin is None else [origin.lat_deg, origin.lon_deg],
-        "rover": {"outline": _outline(mission.rover.footprint)},
+        "rover": {"outline": _outline(mission.rover.footprint), "cruise_m_s": mission.rover.cruise_speed_m_s},
         "targets": [] if layout is None else [{"name": one.name, "place": _place(one.point)} for one in layout.targets],
         "borders": [] if layout is None else [border for one in layout.bounds for border in _border(one)],
         "map": None if executor is None else _map(executor),
@@ -190,8 +202,6 @@ def doing_of(companion: Companion, status: Status) -> Json:
         why = "" if broken_off is None else str(broken_off)
         if not why and status.decision is not None and status.decision.part is Part.RETURN:
             why = "going back to find another way"
-    elif activity.phase is RunPhase.STOPPED_AND_WAITING and companion.mission_run.paused:
-        line, why = "paused on request", "waiting for a request to go on"
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
         line, why = f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
     return {"line": line, "why": why, "state": STATES[activity.phase]}
@@ -214,7 +224,9 @@ def mode_name(vehicle: VehicleState) -> str | None:
     if vehicle.heartbeat is None:
         return None
     mode = vehicle.heartbeat.mode
-    return RoverMode(mode).name if mode in RoverMode.__members__.values() else f"mode {mode}"
+    if mode in RoverMode.__members__.values():
+        return RoverMode(mode).name
+    return MODE_NAMES.get(mode, f"mode {mode}")
 
 
 def _path(executor: MissionExecutor | None) -> list[list[float]]:
@@ -278,13 +290,14 @@ def _movers(executor: MissionExecutor, now_s: float) -> list[Json]:
 def _figures(companion: Companion, status: Status) -> Json:
     run, executor, pose = companion.mission_run, companion.executor, status.pose
     ticks = companion.outcome.tick_seconds
+    searches_s = [] if executor is None else executor.driver.searcher.seconds
     clear_m = None
     if executor is not None and pose is not None:
         room_m = clearance_m(executor.evidence, pose.point, CLEARANCE_M) - run.mission.rover.footprint.inscribed_m
         clear_m = round(max(room_m, 0.0), 2)
     return {
         "clearance_m": clear_m,
-        "planning_ms": None if executor is None else round(1e3 * executor.driver.step_s, 1),
+        "planning_ms": round(1e3 * searches_s[-1], 1) if searches_s else None,
         "latency_ms": round(1e3 * run.vehicle.latency_s, 1),
         "tick_ms": round(1e3 * ticks[-1], 2) if ticks else None,
     }

@@ -56,7 +56,7 @@ def run_of(record: Record, tally: RunTally, result: ReplayResult) -> Run:
     """The run for tables. Only a simulator knows contacts."""
     found = _contacts(record.directory)
     known = found or record_clock(record).simulated
-    return Run(str(record.directory), tally, result, len(found) if known else None)
+    return Run(str(record.directory), record.mission.name, tally, result, len(found) if known else None)
 
 
 def named(runs: Sequence[Run]) -> list[Run]:

@@ -21,6 +21,7 @@ class Run:
     """A run as the tables see it. ``contacts``: None where nobody knows them, as on a real rover."""
 
     name: str
+    mission: str
     tally: RunTally
     result: ReplayResult
     contacts: int | None
@@ -41,6 +42,9 @@ def differences(runs: Sequence[Run]) -> Json:
         ]
         for title, digits, values in _comparable(runs)
     ]  # fmt: skip
+    missions = [run.mission for run in runs]
+    if len(set(missions)) > 1:
+        rows.insert(0, ["mission (they differ)", *missions])
     return {"title": "Differences", "head": ["", *(run.name for run in runs)], "rows": rows}
 
 

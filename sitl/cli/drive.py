@@ -73,6 +73,7 @@ def drive(
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
     4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person ends after a minute.
     """
+    painter: Painter | None = None
     console, wanted = Console(), outputs(image, map_stem, json_file, report_file, record)
     recorder: Recorder | NullRecorder = NullRecorder()
     run: Drive | None = None
@@ -106,10 +107,8 @@ def drive(
     except BAD_INPUT as error:
         raise _refused(error) from error
     except KeyboardInterrupt:
-        recorder.close()
-        if run is not None and isinstance(recorder, Recorder):
-            with contextlib.suppress(OutputError):  # the program ends with what it can say
-                write_collisions(run, recorder)
+        _print_last(painter, rows_below=1)
+        _keep(run, recorder)
         raise StoppedError(_stopped(run, recorder if record else NullRecorder())) from None
     finally:
         _closed(page)
@@ -134,6 +133,14 @@ def _refused(error: Exception) -> typer.Exit:
 
 def _file(sensors: str | None) -> Path | None:
     return Path(sensors) if sensors is not None and sensors.endswith(".toml") else None
+
+
+def _keep(run: Drive | None, recorder: Recorder | NullRecorder) -> None:
+    """What was recorded of a drive that was interrupted."""
+    recorder.close()
+    if run is not None and isinstance(recorder, Recorder):
+        with contextlib.suppress(OutputError):  # the program ends with what it can say
+            write_collisions(run, recorder)
 
 
 def _stopped(run: Drive | None, recorder: Recorder | NullRecorder) -> str:

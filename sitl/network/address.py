@@ -13,7 +13,8 @@ from sitl.network.udp import UdpEndpoint
 from sitl.simulator import Simulator
 
 FORMS = "tcp:HOST:PORT, udpout:HOST:PORT, udpin:HOST:PORT, serial:PATH[:BAUD] or pty:PATH"
-TAKEN, ELSEWHERE = "choose another port", "is that an address of this computer?"
+TAKEN = "stop the other program, or choose another port with --listen"
+ELSEWHERE = "is that an address of this computer?"
 REMEDIES = {
     "serial": "check that the device exists and that you may use it",
     "pty": "name a link that does not exist yet, in a folder that does",

@@ -115,7 +115,7 @@ def test_a_report_plays_from_its_file_to_its_end(tmp_path: Path) -> None:
     assert file.stat().st_size < 2_000_000 and not re.search(r"(src|href)=\"(?!data:)", text)
     with page(DESKTOP) as report:
         report.open(file.as_uri())
-        report.shows("record, simulated")
+        report.shows("record, simulated", "Done", "1 of 1 targets reached")
         report.press("Tables")
         report.shows("Targets", "reached", "Stops and waits")
         report.press("Decisions")

@@ -30,7 +30,7 @@ def test_from_the_first_heartbeat_to_the_first_setpoint(whole: Whole) -> None:
     sent = whole.drive()
     assert whole.companion.executor is not None and whole.companion.status().activity.phase is RunPhase.DRIVING
     assert any(isinstance(command, GuidedPosition | GuidedHeading) for command in sent)
-    assert "Companion: Yard, 1 targets" in whole.companion.outcome.said
+    assert "Companion: Yard, 1 target" in whole.companion.outcome.said
     assert whole.memory.notes and not any(whole.memory.notes)
 
 

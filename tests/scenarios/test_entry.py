@@ -34,6 +34,10 @@ def command(name: str, *arguments: str) -> list[str]:
             ("rover-sitl", "drive", "missions/open.toml", "--image", "open.doc"),
             "open.doc: suffix '.doc' is no picture format; known: .png, ",
         ),
+        (
+            ("rover-sitl", "drive", "missions/open.toml", "--image", "missions"),
+            "missions: is a folder, not a file; add a file's name, like missions/picture.png",
+        ),
     ],
 )
 def test_wrong_usage_gets_one_line_and_exit_code_2(arguments: tuple[str, ...], what: str) -> None:

@@ -37,7 +37,7 @@ export class Headline {
     setText(this.spoken, trouble ? trouble.replace(/ since.*/, "") : (frame?.line ?? ""));
     setText(this.why, trouble ? lastKnown(frame) : reason(frame, state));
     setText(this.mission, scene?.mission ?? "");
-    setText(this.badge, scene ? badge(scene) : "");
+    setText(this.badge, scene ? badge(scene, state === "ended") : "");
     setText(this.clock, frame ? clock(frame.t, scene) : "");
     // A report keeps the title of its file.
     if (scene?.live !== false)
@@ -45,9 +45,10 @@ export class Headline {
   }
 }
 
-function badge(scene) {
+function badge(scene, ended) {
   if (scene.truth) return "live, simulator";
-  return [scene.live ? "live" : "record", scene.simulated ? "simulated" : ""].filter(Boolean).join(", ");
+  const source = !scene.live ? "record" : ended ? "ended" : "live";
+  return [source, scene.simulated ? "simulated" : ""].filter(Boolean).join(", ");
 }
 
 function lastKnown(frame) {

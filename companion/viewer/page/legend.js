@@ -22,6 +22,7 @@ const LINES = [
   ["goal", "where the rover goes now"],
   ["done", "target reached"],
   ["failed", "target not reached"],
+  ["touched", "contact: the rover touched something"],
 ];
 /** What a simulator shows: its own world, in which nothing is unknown and nobody plans. */
 const TRUE_AREAS = [
@@ -37,6 +38,7 @@ const TRUE_LINES = [
   ["fence", "fence of the autopilot; strokes on the closed side"],
   ["mover", "moving thing, with where it will be in 2 s"],
   ["goal", "where the autopilot drives to"],
+  ["touched", "contact: the rover touched something"],
 ];
 const KEYS = "Keys: + − zoom, 0 all, F follow, N north or heading up, T light or dark, L legend";
 

@@ -29,6 +29,7 @@ export class Model {
     this.newsCount = 0; // grows with every news, also when old ones are dropped
     this.lastT = -Infinity;
     this.track.clear();
+    this.track.expect(this.scene?.rover?.cruise_m_s);
     this.figures.clear();
   }
 
@@ -63,6 +64,7 @@ export class Model {
     if (another || shapeChanged || this.mapIsOld) this.map = new TileMap(scene.map ?? null);
     this.mapIsOld = false;
     this.scene = scene;
+    this.track.expect(scene.rover?.cruise_m_s);
   }
 
   // After a lost connection the past overlaps with what is known; the rest of it fills the gap.

@@ -62,17 +62,18 @@ export class Panel {
     const targets = (scene?.targets ?? []).slice(0, MOST_TARGETS);
     const key = JSON.stringify(targets.map((target) => [target.name, target.place]));
     if (key !== this.targetsKey) this.buildTargets(targets, key);
+    const ended = frame?.state === "ended";
     let reached = 0;
     let seen = false;
     targets.forEach((target, i) => {
       const status = frame?.statuses?.[i] ?? "pending";
-      const now = !seen && frame?.goal && status === "pending" && frame.goal.name === target.name;
+      const now = !ended && !seen && status === "pending" && frame?.goal?.name === target.name;
       seen ||= now;
       if (status === "reached") reached += 1;
       const row = this.targetRows[i];
       setAttribute(row.node, "data-kind", now ? "now" : kindOf(status));
       setIcon(row.sign, now ? "now" : ({ skipped: "skip" }[kindOf(status)] ?? kindOf(status)));
-      setText(row.status, now ? "going there" : status);
+      setText(row.status, now ? "going there" : ended && status === "pending" ? "not reached" : status);
       setText(row.far, frame?.pose ? metres(distance(frame.pose, target.place)) : "");
     });
     const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;

@@ -43,7 +43,7 @@ class ReportPage {
     this.addKeys();
     this.shownAt = -Infinity;
     this.playback.listeners.add(() => this.show());
-    this.playback.seek(record.begin);
+    this.playback.seek(record.end); // what it came to is asked for first; playing begins at the beginning
   }
 
   buildPanel() {

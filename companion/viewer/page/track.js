@@ -15,6 +15,8 @@ const SPACING_PX = 1.5;
 const STEP_M = 0.05;
 /** A place farther away than this, and than the rover's speed explains, is another idea of where it is. */
 const JUMP_M = 5;
+/** A rover that is to drive 2 m/s is a little faster at times. */
+const A_LITTLE_MORE = 1.1;
 const TOP_SPEEDS = [0.5, 1, 1.5, 2, 3, 4, 5, 7.5, 10, 15, 20, 30, 50, 100];
 
 export class Track {
@@ -61,10 +63,15 @@ export class Track {
     this.version += 1;
   }
 
+  /** The rover will be about so fast: the colours need not change on the way. */
+  expect(speed) {
+    if (speed > 0) this.measure(speed);
+  }
+
   measure(speed) {
     if (speed <= this.fastest) return;
     this.fastest = speed;
-    const top = TOP_SPEEDS.find((value) => value >= speed) ?? speed;
+    const top = TOP_SPEEDS.find((value) => value * A_LITTLE_MORE >= speed) ?? speed;
     if (top === this.top) return;
     this.top = top;
     this.batches = []; // all colours change

@@ -174,7 +174,7 @@ def test_a_rover_that_saw_nothing_behind_it_does_not_reverse_there() -> None:
 
 
 def test_where_it_begins_it_goes_slower_over_ground_that_nobody_saw() -> None:
-    """It was begun anew: of what is beside it it remembers nothing. One that comes from elsewhere would have seen it."""
+    """It was begun anew: nothing is known of what is beside it. One that comes from elsewhere would have seen it."""
     evidence, speeds_m_s = ground(), []
     evidence.log_odds.fill(0.0)
     leads = controller()

@@ -84,7 +84,7 @@ def test_without_a_terminal_every_change_is_a_line() -> None:
         ):
             live.show(seen)
     assert out.getvalue().splitlines() == [
-        "Yard: waiting for GUIDED",
+        "Yard: waiting for GUIDED (asked for)",
         "Yard: Heading for [gate]",
         "Yard: driving: gate",
     ]

@@ -27,6 +27,7 @@ from companion.viewer.frame import (
     _setpoint,
     _thinned,
     doing_of,
+    mode_name,
     told,
 )
 
@@ -83,24 +84,27 @@ LOW = Reason(PowerReason.LOW, ("battery",))
 
 
 @pytest.mark.parametrize(
-    ("activity", "part", "broken_off", "paused", "line", "why"),
+    ("activity", "part", "broken_off", "line", "why"),
     [
-        (DRIVING, Part.EXPLORE, None, False, "driving to gate", ""),
-        (DRIVING, Part.RETURN, None, False, "driving to gate", "going back to find another way"),
-        (DRIVING, Part.RETURN, LOW, False, "driving to gate", "battery low for the autopilot"),
-        (HELD, Part.EXPLORE, None, True, "paused on request", "waiting for a request to go on"),
-        (HELD, Part.EXPLORE, None, False, "stopped: mode is not GUIDED", "waiting for "),
+        (DRIVING, Part.EXPLORE, None, "driving to gate", ""),
+        (DRIVING, Part.RETURN, None, "driving to gate", "going back to find another way"),
+        (DRIVING, Part.RETURN, LOW, "driving to gate", "battery low for the autopilot"),
+        (HELD, Part.EXPLORE, None, "stopped: mode is not GUIDED", "waiting for "),
     ],
 )
 def test_the_line_says_why_the_rover_stands_or_drives_back(
-    activity: Activity, part: Part, broken_off: object, paused: bool, line: str, why: str
+    activity: Activity, part: Part, broken_off: object, line: str, why: str
 ) -> None:
-    companion = SimpleNamespace(
-        outcome=SimpleNamespace(broken_off=broken_off), mission_run=SimpleNamespace(paused=paused)
-    )
+    companion = SimpleNamespace(outcome=SimpleNamespace(broken_off=broken_off))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=SimpleNamespace(part=part))
     doing = doing_of(cast(Any, companion), cast(Any, status))
     assert doing["line"] == line and doing["why"].startswith(why) and bool(doing["why"]) == bool(why)
+
+
+@pytest.mark.parametrize(("mode", "name"), [(15, "GUIDED"), (16, "INITIALISING"), (99, "mode 99"), (None, None)])
+def test_a_mode_is_told_by_its_name(mode: int | None, name: str | None) -> None:
+    vehicle = SimpleNamespace(heartbeat=None if mode is None else SimpleNamespace(mode=mode))
+    assert mode_name(cast(Any, vehicle)) == name
 
 
 def test_the_name_of_the_autopilot_is_said_once() -> None:
