@@ -223,6 +223,8 @@ def test_less_is_admitted_towards_a_wall_and_the_less_the_longer_it_lasts() -> N
     for told_m_s in (shorter[1, 0], longer[1, 0]):
         lasts_s = 0.3 if told_m_s == shorter[1, 0] else 3.0
         assert may_be_last(told_m_s, 0.0, lasts_s, 1.0, 0.03, 0.05, problem((40, 42, 0, SIDE)))
+    faster_m_s = 1.08 * longer[1, 0]
+    assert not may_be_last(faster_m_s, 0.0, 3.0, 1.0, 0.03, 0.05, problem((40, 42, 0, SIDE))), "little is lost"
 
 
 def test_a_rover_that_touches_something_may_leave_it_but_not_touch_the_next_thing() -> None:
