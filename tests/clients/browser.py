@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from tempfile import TemporaryDirectory
 
 import pytest
 from selenium import webdriver
@@ -84,10 +86,12 @@ def page(size: tuple[int, int] = DESKTOP) -> Iterator[Page]:
     for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=Service(str(DRIVER)))
-    try:
-        shown = Page(driver)
-        shown.resize(size)
-        yield shown
-    finally:
-        driver.quit()
+    with TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # the browser leaves files behind
+        service = Service(str(DRIVER), env={**os.environ, "TMPDIR": folder})
+        driver = webdriver.Chrome(options=options, service=service)
+        try:
+            shown = Page(driver)
+            shown.resize(size)
+            yield shown
+        finally:
+            driver.quit()
