@@ -75,6 +75,7 @@ class Rasters(NamedTuple):
     """The map's rasters."""
 
     log_odds: Any
+    stamps: Any
     base: Any
     penalty: Any
     cell_m: float
@@ -93,12 +94,16 @@ def ways_left_alone(setpoint: GuidedVelocity, view: LocalView) -> list[Places] |
         places, stands = way_of(start, tells, ends_s, follows.turn_gain * gain, _worst(follows))
         if not stands:
             return None
-        if setpoint.forward_m_s * view.forward_m_s < 0.0:
-            # Until it rolls the other way it brakes, as it does when it is told to stop: no reason to refuse.
-            turned = np.flatnonzero(places[:, 3] * setpoint.forward_m_s > 0.0)
-            places = places[min(turned[0] if len(turned) else len(places), len(places) - 2) :]
         ways.append(places)
     return ways
+
+
+def once_turned_back(places: Places, setpoint: GuidedVelocity, view: LocalView) -> Places:
+    """The way from where it rolls as told; until then a rover that rolled the other way brakes."""
+    if setpoint.forward_m_s * view.forward_m_s >= 0.0:
+        return places
+    turned = np.flatnonzero(places[:, 3] * setpoint.forward_m_s > 0.0)
+    return places[min(turned[0] if len(turned) else len(places), len(places) - 2) :]
 
 
 def first_met(places: Places, view: LocalView) -> Met:
@@ -118,7 +123,12 @@ def _from_corner(view: LocalView) -> tuple[float, float]:
 
 def _rasters(evidence: EvidenceMap) -> Rasters:
     return Rasters(
-        evidence.log_odds, evidence.base.weights, evidence.penalty, evidence.evidence_m, evidence.settings.occupied_at
+        evidence.log_odds,
+        evidence.stamps,
+        evidence.base.weights,
+        evidence.penalty,
+        evidence.evidence_m,
+        evidence.settings.occupied_at,
     )
 
 
@@ -211,9 +221,17 @@ def _deepest(place, outline, under, under_m, evidence):
             deep_m = _inside_m(outline, to_north * cosine + to_east * sine, to_east * cosine - to_north * sine)
             if found != 0.0:
                 obstacle_m = max(obstacle_m, deep_m)
-            elif math.hypot((y + 0.5) * cell_m - under[0], (x + 0.5) * cell_m - under[1]) > under_m:
+            elif math.hypot((y + 0.5) * cell_m - under[0], (x + 0.5) * cell_m - under[1]) > under_m or _was_seen(
+                y, x, evidence
+            ):
                 unseen_m = max(unseen_m, deep_m)
     return obstacle_m, unseen_m
+
+
+@njit(cache=True, nogil=True)
+def _was_seen(y, x, evidence):
+    """Whether an unknown cell was an obstacle once, and forgotten."""
+    return 0 <= y < evidence.stamps.shape[0] and 0 <= x < evidence.stamps.shape[1] and evidence.stamps[y, x] > 0
 
 
 @njit(cache=True, nogil=True)

@@ -139,6 +139,8 @@ def _fitted(before: ModelEstimate, rows: NDArray[np.float64]) -> ModelEstimate:
     began, best = before.began, before.figures
     least = _error(best, began, rows)
     for dead_s in DEADS_S:
+        if not LEAST_SHARE * began.dead_s <= dead_s <= MOST_SHARE * began.dead_s:
+            continue
         tried = best._replace(dead_s=dead_s)
         if (error := _error(tried, began, rows)) < least:
             best, least = tried, error

@@ -92,7 +92,9 @@ class MotionController:
         self._window: Window | None = None
         self._looked_s = self._time_s = -math.inf
         self._began: NedPoint | None = None
-        self._came_here = False
+        """Where it was first led on the map as it is."""
+        self._came_m = 0.0
+        """So far it has rolled since, tail last."""
         self.choice: MotionChoice | None = None
         """The last one."""
         self.backwards = False
@@ -132,6 +134,7 @@ class MotionController:
         self.backwards = view.rolls_back
         passed_s = min(max(now_s - self._time_s, 0.0), 1.0)
         self._time_s = now_s
+        self._note_way(view, passed_s)
         problem = self._problem(path, view, model)
         worst = problem._replace(
             model=worst_model(model, view.following),
@@ -155,12 +158,21 @@ class MotionController:
                 return stop_for(Purpose.BLOCKED)
         return ControlCommand(Purpose.DRIVE, GuidedVelocity(told.speed_m_s, told.turn_rad_s), abs(told.speed_m_s))
 
+    def _note_way(self, view: LocalView, passed_s: float) -> None:
+        """The ground under a rover is seen: where that is forgotten, the map was begun anew."""
+        if self._began is None or not _is_seen(view, self._began):
+            self._began, self._came_m = view.pose.point, 0.0
+        elif view.forward_m_s > STANDS_M_S:
+            self._came_m += view.forward_m_s * passed_s
+
     def _problem(self, path: ReferencePath, view: LocalView, model: RoverModel) -> MotionProblem:
         now_s, pose = view.pose.time_s, view.pose
         if self._window is None or now_s - self._looked_s >= LOOKS_S:
-            self._began = self._began or pose.point
-            self._came_here |= pose.point.distance_m(self._began) > 2.0 * unseen_to_m(self._body, True)
-            self._window = look_round(view.evidence, pose.point, path, self._body, model.fastest_m_s, self._came_here)
+            came_here = self._came_m > 2.0 * unseen_to_m(self._body, came_here=True)
+            self._window = look_round(
+                view.evidence, pose.point, path, self._body, model.fastest_m_s,
+                stops_at=_stops_at(view, model), came_here=came_here,
+            )  # fmt: skip
             self._looked_s = now_s
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
         pending = _pending(view, round(model.dead_s / STEP_S), STEP_S)
@@ -185,6 +197,21 @@ class MotionController:
         best = max(BRAKE_TURNS, key=lambda share: min(spare_m[share], ENOUGH_M))
         rolls = abs(worst.start.speed_m_s) > STANDS_M_S
         return ToldVelocity(now_s, 0.0, best * fastest_rad_s if rolls else 0.0)
+
+
+def _stops_at(view: LocalView, model: RoverModel) -> NedPoint:
+    """Where it comes to stand if it brakes straight on, as late and as little as is to be reckoned with."""
+    worst, speed_m_s = worst_model(model, view.following), abs(view.forward_m_s)
+    stops_m = speed_m_s * _latest(view) * ALONE_STEP_S + speed_m_s**2 / (2.0 * worst.decel_m_s2)
+    course_rad = view.pose.heading_rad + (math.pi if view.rolls_back else 0.0)
+    return view.pose.point.moved(course_rad, stops_m)
+
+
+def _is_seen(view: LocalView, point: NedPoint) -> bool:
+    """Whether the map knows the ground there."""
+    x, y = (int(v // 1.0) for v in view.evidence.frame.xy(point))
+    height, width = view.evidence.log_odds.shape
+    return 0 <= x < width and 0 <= y < height and bool(view.evidence.log_odds[y, x] != 0.0)
 
 
 def _admitted(view: LocalView, worst: MotionProblem) -> NDArray[np.float64]:

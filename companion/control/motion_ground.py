@@ -24,7 +24,7 @@ Floats = NDArray[np.float64]
 AHEAD_M = 12.0
 """The place of the path so far ahead is where the time to go counts to."""
 AROUND_M = 3.0
-"""Ground looked at round the rover and the path up to there."""
+"""Ground looked at round the rover, the place where it would come to stand, and the path up to there."""
 ROOMY_M = 0.5
 """With so much room beside it the rover drives at full speed."""
 SLOWEST_SHARE = 0.25
@@ -61,15 +61,25 @@ class Window:
 
 
 def look_round(
-    evidence: EvidenceMap, here: NedPoint, path: ReferencePath, body: Body, fastest_m_s: float, came_here: bool = True
+    evidence: EvidenceMap,
+    here: NedPoint,
+    path: ReferencePath,
+    body: Body,
+    fastest_m_s: float,
+    *,
+    stops_at: NedPoint | None = None,
+    came_here: bool = True,
 ) -> Window:
-    """The window as the map is now.
+    """The window as the map is now: round the path, the rover, and the place where it would come to stand.
 
-    The ground that the rover can turn on where it stands counts as seen: no sensor sees it. ``came_here``: it came from
-    elsewhere with open eyes.
+    ``stops_at``: that place; None where the rover is. The ground that the rover can turn on where it stands counts as
+    seen: no sensor sees it. Not so where an obstacle was seen and forgotten. ``came_here``: it came from elsewhere with
+    open eyes.
     """
     ahead = path.points[path.progress : path.progress + round(AHEAD_M / STEP_M) + 1]
-    (left, low), (right, high) = _window(evidence, np.vstack((ahead, (here.north_m, here.east_m))))
+    stops = stops_at or here
+    places = np.vstack((ahead, (here.north_m, here.east_m), (stops.north_m, stops.east_m)))
+    (left, low), (right, high) = _window(evidence, places)
     log_odds = evidence.log_odds[low:high, left:right]
     cell_m, unseen = evidence.evidence_m, log_odds == 0.0
     closed, costly = _closed(evidence, (left, low), (right, high), body.radius_m)
@@ -78,10 +88,11 @@ def look_round(
     blocked = (log_odds >= evidence.settings.occupied_at) | closed | costly
     _close_edge(blocked, (left, low), evidence)
     # To the surface: the map marks what lies a little behind it.
+    never_seen = unseen & (evidence.stamps[low:high, left:right] == 0)
     behind_m = np.float32(max(0.5 * cell_m, evidence.settings.hit_depth_m))
-    outside = (
-        unseen & ~_under(evidence, here, (left, low), unseen.shape, unseen_to_m(body, came_here) + float(behind_m))
-    ) | blocked
+    unseen_to = unseen_to_m(body, came_here) + float(behind_m)
+    under = never_seen & _under(evidence, here, (left, low), unseen.shape, unseen_to)
+    outside = (unseen & ~under) | blocked
     for edge in (outside[0, :], outside[-1, :], outside[:, 0], outside[:, -1]):
         edge[:] = True  # nothing is known here of what lies beyond the window
     gap_m = distance_field(blocked) * np.float32(cell_m) - behind_m

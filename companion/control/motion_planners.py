@@ -141,6 +141,7 @@ class Mppi:
         costs = costs_s(motions, problem)
         weights = np.exp(-(costs - costs.min()) / self.TEMPERATURE_S)
         self._mean = np.einsum("m,mnc->nc", weights / weights.sum(), motions)[None]
+        keep_all_within(self._mean, problem)
         return Found(self._mean[0].copy(), float(costs_s(self._mean, problem)[0]), motions, costs)
 
     def forget(self) -> None:

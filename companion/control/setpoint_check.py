@@ -16,7 +16,7 @@ from collections.abc import Callable
 
 from companion.control.braking import blind_distance_m, braking_distance_m, farthest_m, overshoot_m
 from companion.control.controller import ControlCommand, Purpose, stop_for
-from companion.control.left_alone import Met, first_met, ways_left_alone
+from companion.control.left_alone import Met, Places, first_met, once_turned_back, ways_left_alone
 from companion.control.local_view import LocalView
 from companion.core.frames import NedPoint
 from companion.core.severity import Severity, TextSink
@@ -77,7 +77,7 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
     if not math.isfinite(forward_m_s) or not math.isfinite(yaw_rate_rad_s):
         return Reason(SetpointFault.NOT_A_NUMBER)
     if view.settings.guidance.controller != "points":
-        return None if _only_stops(setpoint, view) else _left_alone(setpoint, view)
+        return None if forward_m_s == yaw_rate_rad_s == 0.0 else _left_alone(setpoint, view)
     if forward_m_s == 0.0:
         return None
     base_m_s = max(view.speed_m_s, view.settings.steering.scale_base_m_s)
@@ -90,14 +90,28 @@ def velocity_stops_in_time(setpoint: Setpoint, view: LocalView, bounds: Bounds) 
     return None
 
 
-def _only_stops(setpoint: GuidedVelocity, view: LocalView) -> bool:
-    """To stand, or to brake: that may be told anywhere. A rover that stands may not turn everywhere."""
-    return setpoint.forward_m_s == 0.0 and (setpoint.yaw_rate_rad_s == 0.0 or view.speed_m_s > STANDS_M_S)
-
-
 def _left_alone(setpoint: GuidedVelocity, view: LocalView) -> Fault | None:
-    """A planned velocity: nothing that the outline meets, however much the rover turns."""
-    ways = ways_left_alone(setpoint, view)
+    """A planned velocity: nothing that the outline meets, however much the rover turns.
+
+    A rover that is told to stand, or to roll the other way, brakes first. What it would meet on a plain stop, too, is
+    no reason to refuse; what it meets only because it turns meanwhile is one.
+    """
+    ways, stops = ways_left_alone(setpoint, view), GuidedVelocity(0.0, 0.0)
+    fault = _fault_on(ways, view)
+    if fault is None or not _brakes(setpoint, view) or _fault_on(ways_left_alone(stops, view), view) is None:
+        return fault
+    if setpoint.forward_m_s == 0.0 or ways is None:
+        return None
+    return _fault_on([once_turned_back(way, setpoint, view) for way in ways], view)
+
+
+def _brakes(setpoint: GuidedVelocity, view: LocalView) -> bool:
+    """Whether the rover rolls, and is told to stand or to roll the other way."""
+    return view.speed_m_s > STANDS_M_S and setpoint.forward_m_s * view.forward_m_s <= 0.0
+
+
+def _fault_on(ways: list[Places] | None, view: LocalView) -> Fault | None:
+    """What is met on any of the ways; None stands for a rover that would never stand."""
     if ways is None:
         return Reason(SetpointFault.INTO_OBSTACLE)
     for way in ways:
@@ -125,7 +139,10 @@ def _ways(velocity: GuidedVelocity, view: LocalView) -> list[list[NedPoint]]:
         return [_stopping_way(velocity, view)]
     corner = view.evidence.base.south_west
     return [
-        [NedPoint(corner.north_m + float(north_m), corner.east_m + float(east_m)) for north_m, east_m in way[:, :2]]
+        [
+            NedPoint(corner.north_m + float(north_m), corner.east_m + float(east_m))
+            for north_m, east_m in once_turned_back(way, velocity, view)[:, :2]
+        ]
         for way in ways_left_alone(velocity, view) or []
     ]
 

@@ -200,7 +200,8 @@ class MissionExecutor:
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
-        self.driver = GoalDriver(self._controller(searcher.rng), searcher, self._runner, seed)
+        rng = np.random.default_rng((seed, self.maps_begun))
+        self.driver = GoalDriver(self._controller(rng), searcher, self._runner, seed)
         self.driver.go_on(before.tally, before.epoch)
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
         self._tracker = ObjectTracker(self.evidence)

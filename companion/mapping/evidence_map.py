@@ -36,9 +36,10 @@ class EvidenceMap:
     """What has been seen, on a raster of ``subdivisions`` cells along a field's side.
 
     ``log_odds``: shape (height * subdivisions, width * subdivisions), indexed [y, x]: 0 unknown, below 0 seen free,
-    from ``settings.occupied_at`` on an obstacle. ``base`` holds the mission's own weights (obstacles in it are
-    never forgotten: they are fences or prior knowledge), ``penalty`` what experience adds. The arrays belong to the
-    map and are changed in place by ``integrate``; ``grid`` is always up to date.
+    from ``settings.occupied_at`` on an obstacle. ``stamps``: of the scan that changed a cell last, 0 where none did: an
+    unknown cell with a stamp was an obstacle that is forgotten. ``base`` holds the mission's own weights (obstacles in
+    it are never forgotten: they are fences or prior knowledge), ``penalty`` what experience adds. The arrays belong to
+    the map and are changed in place by ``integrate``; ``grid`` is always up to date.
     """
 
     base: Grid
@@ -167,7 +168,7 @@ def forget_weak_evidence(evidence: EvidenceMap, point: NedPoint, reach_m: float)
     ]
     doubtful[window] |= occupied[window]
     found = bool(doubtful.any() or (evidence.penalty > 0.0).any())
-    evidence.log_odds[doubtful] = 0.0
+    _forget_cells(evidence, doubtful)
     evidence.penalty.fill(0.0)
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
     return found
@@ -179,9 +180,15 @@ def look_again(evidence: EvidenceMap, since_stamp: int) -> None:
     The ground becomes unknown, not free: whoever goes there looks first. What the mission itself closed stays.
     """
     old = (evidence.log_odds >= evidence.settings.occupied_at) & (evidence.stamps < since_stamp)
-    evidence.log_odds[old] = 0.0
+    _forget_cells(evidence, old)
     evidence.penalty.fill(0.0)
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+
+
+def _forget_cells(evidence: EvidenceMap, cells: NDArray[np.bool_]) -> None:
+    """They are unknown again, and remembered as once seen, also those that an earlier run saw."""
+    evidence.log_odds[cells] = 0.0
+    evidence.stamps[cells] = np.maximum(evidence.stamps[cells], 1)
 
 
 def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:

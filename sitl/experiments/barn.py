@@ -37,7 +37,7 @@ from sitl.experiments.experiment import (
     each,
 )
 from sitl.experiments.off_model import SHIPPED, Limits, off_model
-from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
+from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table, without_intervals
 from sitl.lockstep import Drive
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
 from sitl.sensors.range_sensors import Lidar, SensorSuite
@@ -279,8 +279,8 @@ def _row(name: str, runs: Sequence[BarnRun]) -> list[str]:
         name,
         f"{len(runs)}",
         with_interval(runs, lambda run: run.end is RunEnd.REACHED),
-        f"{ends.count(RunEnd.CONTACT) / len(runs):.3f}",
-        f"{ends.count(RunEnd.TIMEOUT) / len(runs):.3f}",
+        share_with_interval(ends.count(RunEnd.CONTACT), len(runs)),
+        share_with_interval(ends.count(RunEnd.TIMEOUT), len(runs)),
         with_interval(runs, lambda run: run.score()),
         f"{np.mean([run.score(OLD_FASTEST) for run in runs]):.3f}",
         with_interval(reached, lambda run: run.seconds / run.optimal_s) if reached else "-",
@@ -321,9 +321,10 @@ def _picture(worlds: Sequence[BarnWorld], runs: Sequence[BarnRun]) -> Figure:
 
 
 def standard(worlds: Sequence[BarnWorld]) -> tuple[BarnWorld, ...]:
-    """The challenge's standard set, or all worlds where a file has none of it."""
-    chosen = [world for world in worlds if world.number % STANDARD_STEP == 0 and world.number <= STANDARD_LAST]
-    return tuple(chosen or worlds)
+    """The challenge's standard set, or all worlds where a file does not have the whole of it."""
+    wanted = range(0, STANDARD_LAST + 1, STANDARD_STEP)
+    chosen = [world for world in worlds if world.number in wanted]
+    return tuple(chosen if len(chosen) == len(wanted) else worlds)
 
 
 def run(options: Options, advance: Advance) -> BarnReport:

@@ -15,7 +15,7 @@ from companion.recording.recorder import NullRecorder
 from companion.settings.settings_file import parse_settings
 from sitl.experiments.experiment import OFF_MODEL, Advance, ExperimentReport, Options, chosen_controllers, each
 from sitl.experiments.off_model import off_model, parameters_for
-from sitl.experiments.results_page import markdown_table, terminal_table
+from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table
 from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
 from sitl.world.truth import SimStart
@@ -32,7 +32,7 @@ THICK_M = 0.2
 ASIDE_M = 2.0
 """The gate lies up to so far beside the line from start to goal."""
 TIME_LIMIT_S = 240.0
-HEAD = ("controller", "gate m", *(f"{angle:g} deg" for angle in ANGLES_DEG), "contacts", "mean s")
+HEAD = ("controller", "gate m", *(f"{angle:g} deg" for angle in ANGLES_DEG), "reached (95 %)", "contacts", "mean s")
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +109,8 @@ class GatesReport(ExperimentReport):
                 times_s = [one.seconds for one in own if one.reached]
                 mean = f"{np.mean(times_s):.1f}" if times_s else "-"
                 contacts = sum(one.contacts for one in own)
-                rows.append([name, f"{width_m:g}", *map(str, reached), f"{contacts}", mean])
+                share = share_with_interval(sum(reached), len(own))
+                rows.append([name, f"{width_m:g}", *map(str, reached), share, f"{contacts}", mean])
         return rows
 
     def section(self) -> str:

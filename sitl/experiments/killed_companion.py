@@ -29,6 +29,7 @@ from companion.storage.files import OsDisk
 from sitl.experiments.dead_companion import STOOD_M_S, SUITES, shipped, with_suite
 from sitl.experiments.experiment import (
     GUARD,
+    OFF_MODEL,
     POINTS,
     Advance,
     ExperimentReport,
@@ -36,7 +37,8 @@ from sitl.experiments.experiment import (
     chosen_controllers,
     each,
 )
-from sitl.experiments.results_page import markdown_table, terminal_table
+from sitl.experiments.off_model import off_model
+from sitl.experiments.results_page import markdown_table, share_with_interval, terminal_table
 from sitl.experiments.soak import Person
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
@@ -105,6 +107,11 @@ class KilledDrive:
         return len(self.contacts) - self.run_into
 
     @property
+    def touched_what_stands(self) -> int:
+        """Contacts with what does not move."""
+        return sum(one.mover is None for one in self.contacts)
+
+    @property
     def run_into(self) -> int:
         """It stood, and something that moves came along."""
         return sum(one.mover is not None and abs(one.speed_m_s) < STOOD_M_S for one in self.contacts)
@@ -138,15 +145,27 @@ def kept_in(directory: Path, mission: Mission) -> Checkpointer:
 
 
 def drive_with_deaths(
-    mission: Mission, motors: Motors, seed: int, settings: Settings | None = None, *, guarded: bool = False
+    mission: Mission,
+    motors: Motors,
+    seed: int,
+    settings: Settings | None = None,
+    *,
+    guarded: bool = False,
+    off: float = 0.0,
+    late_s: float = 0.0,
 ) -> KilledDrive:
     """Drive a mission to its end while its companion is killed every few seconds.
 
-    ``settings``: None for the defaults. ``guarded``: with the guard on the autopilot.
+    ``settings``: None for the defaults. ``guarded``: with the guard on the autopilot. ``off``: the mission's own rover
+    differs by up to this share from what the companion takes it for, if it turns on the spot. ``late_s``: so long each
+    message takes over the link, each way.
     """
     suite, settings = str(mission.sitl.sensors) if mission.sitl is not None else "", settings or Settings()
     result = KilledDrive(mission.name, suite, motors, seed)
     rng, person, scenario = np.random.default_rng((seed, 13)), Person(), scenario_from_mission(mission)
+    if off and motors is Motors.OWN and mission.rover.turning_radius_m <= 0.0:
+        drivetrain, limits = off_model(np.random.default_rng((seed, 54)), off)
+        scenario = replace(scenario, drivetrain=drivetrain, parameters={**scenario.parameters, **limits})
     if guarded:
         scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
     with TemporaryDirectory() as folder:
@@ -159,6 +178,7 @@ def drive_with_deaths(
             NullRecorder(),
             TIME_LIMIT_S,
             kept_in(place, mission),
+            late_s=late_s,
         )
         simulator = drive.simulator
         dies_s: float | None = None
@@ -190,12 +210,19 @@ def deaths_of(
     count: int,
     controller: ControllerKind = POINTS,
     guarded: bool = False,
+    off: float = OFF_MODEL,
+    late_s: float = 0.0,
 ) -> list[KilledDrive]:
-    """As many drives as it takes to die so often."""
+    """As many drives as it takes to die so often. ``off``: where motions are planned."""
     drives: list[KilledDrive] = []
     settings = parse_settings({"guidance": {"controller": controller}}, NAME)
     while sum(len(one.deaths) for one in drives) < count and len(drives) < count:
-        drives.append(drive_with_deaths(mission, motors, seed + len(drives), settings, guarded=guarded))
+        own_off = 0.0 if controller == POINTS else off
+        drives.append(
+            drive_with_deaths(
+                mission, motors, seed + len(drives), settings, guarded=guarded, off=own_off, late_s=late_s
+            )
+        )
     return drives
 
 
@@ -267,8 +294,11 @@ class KilledReport(ExperimentReport):
         touched, run_into = sum(d.touched for d in self.drives), sum(d.run_into for d in self.drives)
         guard = f"The guard on the autopilot waits {GUARD['SCR_USER1']:g} ms.\n\n" if self.options.guard else ""
         if self._planned:
+            touched_planned = sum(d.touched_what_stands for d in self.drives if d.controller != POINTS)
             guard += f"""Motions were planned in the drives with {self._planned} of these deaths;
-with thin beams and on arcs `{POINTS}` leads the rover whatever is asked for.
+with thin beams and on arcs `{POINTS}` leads the rover whatever is asked for. The missions' own rovers are
+{self.options.mismatch}. Contacts of planned rovers with what
+stands, a death: {share_with_interval(touched_planned, self._planned)}.
 
 """
         return f"""## A companion that is killed and resumed{TITLE_ENDS[self.section_name]}
@@ -317,7 +347,7 @@ def run(options: Options, advance: Advance) -> KilledReport:
     drives: list[KilledDrive] = []
     seeds = range(options.seed, options.seed + 100 * len(missions), 100)
     tasks = (
-        (mission, motors, seed, options.runs, controller, options.guard)
+        (mission, motors, seed, options.runs, controller, options.guard, options.off, options.late_s)
         for (mission, motors, controller), seed in zip(missions, seeds, strict=True)
     )
     for done, some in enumerate(each(options.jobs, deaths_of, tasks, options.keep), start=1):

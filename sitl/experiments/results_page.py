@@ -50,6 +50,16 @@ def terminal_table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]
     return table
 
 
+def share_with_interval(count: int, of: int) -> str:
+    """A share of runs, and its 95 % interval after Clopper and Pearson (exact): of no contact in 100, 0 to 0.036."""
+    from scipy.stats import binomtest
+
+    if of == 0:
+        return "-"
+    bounds = binomtest(count, of).proportion_ci(0.95, "exact")
+    return f"{count / of:.3f} ({bounds.low:.3f} to {bounds.high:.3f})"
+
+
 def without_intervals(rows: Sequence[Sequence[str]]) -> list[list[str]]:
     """The same figures without what stands in brackets: a terminal is narrow."""
     return [[cell.partition(" (")[0] for cell in row] for row in rows]

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from shapely import affinity
 
 from companion.control.following import turn_gains
-from companion.control.left_alone import Met, first_met, ways_left_alone
+from companion.control.left_alone import Met, first_met, once_turned_back, ways_left_alone
 from companion.control.local_view import LocalView
 from companion.control.motion_controller import ALONE_STEP_S, _latest, _pending, rover_model, worst_model
 from companion.control.motion_kernels import moved
@@ -24,7 +24,7 @@ from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import empty_grid
 from companion.core.rover_limits import RoverLimits
-from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mapping.evidence_map import EvidenceMap, forget_weak_evidence, new_map
 from companion.mission.bounds import Bound, Bounds
 from companion.safety.reasons import SetpointFault
 from companion.settings import Settings
@@ -88,6 +88,34 @@ def test_braking_is_told_anywhere() -> None:
     for told in (GuidedVelocity(0.0, 0.0), GuidedVelocity(0.0, 0.8)):
         assert fault(told, view(evidence, 1.5)) is None
     assert fault(GuidedVelocity(0.1, 0.0), view(evidence, 1.5)) is SetpointFault.INTO_OBSTACLE
+
+
+def test_a_rover_that_brakes_may_not_turn_into_something_meanwhile() -> None:
+    evidence = open_ground()
+    put(evidence, 0.65, 0.35)
+    at = view(evidence, 0.06)
+    assert fault(GuidedVelocity(0.0, 1.5), at) is SetpointFault.INTO_OBSTACLE
+    assert fault(GuidedVelocity(0.0, 0.0), at) is fault(GuidedVelocity(0.0, -1.5), at) is None
+
+
+def test_a_rover_that_is_told_to_go_back_may_not_turn_into_something_before_it_does() -> None:
+    evidence = open_ground()
+    for north_m in np.arange(-1.5, 3.5, 0.1):
+        put(evidence, north_m, 0.6)
+    at = view(evidence, 1.8)
+    assert fault(GuidedVelocity(-0.3, 1.5), at) is SetpointFault.INTO_OBSTACLE
+    assert fault(GuidedVelocity(-0.3, 0.0), at) is None
+
+
+def test_an_obstacle_that_was_forgotten_counts_as_unseen_also_beside_the_rover() -> None:
+    evidence = open_ground()
+    put(evidence, -0.85, 0.02)
+    put(evidence, 0.0, 0.5, 0.0)  # nobody ever saw this
+    back = GuidedVelocity(-0.6, 0.0)
+    assert fault(back, view(evidence)) is SetpointFault.INTO_OBSTACLE
+    assert forget_weak_evidence(evidence, NedPoint(MIDDLE, MIDDLE), 2.5)
+    assert fault(back, view(evidence)) is SetpointFault.ONTO_UNSEEN
+    assert fault(GuidedVelocity(0.3, 0.4), view(evidence)) is None
 
 
 def test_ground_that_was_not_seen_counts_but_not_where_no_sensor_sees_it() -> None:
@@ -196,6 +224,10 @@ def test_what_passes_is_free_under_the_outline_in_shapes(
         return
     ways = ways_left_alone(told, at)
     assert ways is not None and len(ways) == len(turn_gains(at.following, at.settings.guidance.velocity_lasts_s))
+    stops = ways_left_alone(GuidedVelocity(0.0, 0.0), at)
+    assert stops is not None
+    if speed_m_s * forward_m_s < 0.0 and any(first_met(way, at) is not Met.NOTHING for way in stops):
+        ways = [once_turned_back(way, told, at) for way in ways]
     unseen = shapely.points((np.argwhere(evidence.log_odds == 0.0)[:, ::-1] + 0.5) * CELL_M)
     far = unseen[shapely.distance(unseen, shapely.Point(MIDDLE, MIDDLE)) > body.radius_m + 0.8]
     for way in ways:

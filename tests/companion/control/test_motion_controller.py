@@ -174,15 +174,26 @@ def test_a_rover_that_saw_nothing_behind_it_does_not_reverse_there() -> None:
 
 
 def test_where_it_begins_it_goes_slower_over_ground_that_nobody_saw() -> None:
-    """It was begun anew: nothing is known of what is beside it. One that comes from elsewhere would have seen it."""
-    evidence, speeds_m_s = ground(), []
+    """Of what is beside it nothing is known; one that came here on this map, looking ahead, would have seen it."""
+    evidence = ground()
     evidence.log_odds.fill(0.0)
-    leads = controller()
-    for tick, north_m in enumerate((3.0, 5.0)):
-        leads.follow(PATH, view(evidence, Pose(north_m, 10.0, 0.0, float(tick))))
+    wall(evidence, 10.0, 9.5, 10.5, -1.0)  # where it began, the ground is seen
+
+    def fastest_m_s(*moves: tuple[float, float]) -> float:
+        """``moves``: northings and forward speeds, half a second apart."""
+        leads = controller()
+        for number, (north_m, forward_m_s) in enumerate(((10.0, 0.0), *moves)):
+            at = view(evidence, Pose(north_m, 10.0, 0.0, 0.5 * number), abs(forward_m_s))
+            leads.follow(PATH, replace(at, rolls_back=forward_m_s < 0.0))
         assert leads.choice is not None
-        speeds_m_s.append(leads.choice.problem.admitted_m_s.max())
-    assert 0.0 < speeds_m_s[0] < 0.8 * speeds_m_s[1], speeds_m_s
+        return float(leads.choice.problem.admitted_m_s.max())
+
+    ahead, back = ([(10.0 + way * 0.5 * step, way) for step in range(6)] for way in (1.0, -1.0))
+    first_m_s, later_m_s = fastest_m_s((12.5, 0.0)), fastest_m_s(*ahead, (12.5, 0.0))
+    assert 0.0 < first_m_s < 0.8 * later_m_s, "its position jumped there, or it drove there"
+    assert fastest_m_s(*back, (7.5, 0.0)) == first_m_s, "tail first it saw nothing"
+    wall(evidence, 10.0, 9.5, 10.5, 0.0)
+    assert fastest_m_s(*ahead, (12.5, 0.0)) == first_m_s, "the map was begun anew"
 
 
 def test_what_is_told_allows_for_a_command_that_comes_later_than_the_model_says() -> None:

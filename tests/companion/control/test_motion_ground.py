@@ -12,7 +12,7 @@ from companion.control.motion_kernels import Body
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import NedPoint
 from companion.core.grid import empty_grid
-from companion.mapping.evidence_map import EvidenceMap, new_map
+from companion.mapping.evidence_map import EvidenceMap, forget_weak_evidence, new_map
 from companion.settings import Settings
 
 SETTINGS = Settings()
@@ -80,10 +80,20 @@ def test_where_it_begins_less_of_what_is_beside_it_counts_as_seen() -> None:
     evidence.log_odds.fill(0.0)
     spare_m = {}
     for came_here in (False, True):
-        window = look_round(evidence, HERE, PATH, BODY, 2.0, came_here)
+        window = look_round(evidence, HERE, PATH, BODY, 2.0, came_here=came_here)
         x, y = (int(v / window.ground.cell_m) for v in window.place(HERE))
         spare_m[came_here] = window.ground.seen_m[y, x] - BODY.radius_m
     assert 0.1 < spare_m[False] < 0.25 < spare_m[True] < 0.5
+
+
+def test_an_obstacle_that_was_forgotten_counts_as_unseen_also_beside_the_rover() -> None:
+    evidence = ground()
+    evidence.log_odds.fill(0.0)
+    wall(evidence, HERE.north_m, 10.5, 10.6)
+    assert forget_weak_evidence(evidence, HERE, 2.5)
+    window = seen(evidence)
+    x, y = (int(v / window.ground.cell_m) for v in window.place(HERE))
+    assert window.ground.seen_m[y, x] < 0.5 < window.ground.gap_m[y, x]
 
 
 def test_what_the_mission_closes_keeps_the_rovers_middle_away_and_not_its_sides_once_more() -> None:
