@@ -18,7 +18,7 @@ from companion.mapping.map_files import MapError
 from companion.recording.reader import Record, files_of, load_record
 from companion.recording.record_clock import record_clock
 from companion.recording.record_format import RecordError
-from companion.replay.replay import Observers, ReplayObserver, replay
+from companion.replay.replay import Observers, ReplayObserver, ReplayResult, replay
 from companion.viewer.report_csv import FILES, CsvReport
 from companion.viewer.report_data import ReportWatch, as_json, counted, joined, named, run_of
 from companion.viewer.report_film import Film, FilmError, check_ffmpeg, write_gif, write_mp4
@@ -140,6 +140,7 @@ def _made(records: Sequence[Record], forms: Forms) -> list[Run]:
             stack.callback(messages.close)
             observers.append(messages)
         result = replay(first, Observers(observers))
+        _refuse_silent(first, result)
     runs = named([run_of(first, tally, result), *(counted(one) for one in records[1:])])
     if forms.csv is not None:
         typer.echo(f"tables: {forms.csv} ({', '.join(FILES)})")
@@ -171,8 +172,15 @@ def write_report(record: Record, file: Path) -> str:
     """
     tally, watched = RunTally(), ReportWatch(record)
     result = replay(record, Observers([tally, watched]))
+    _refuse_silent(record, result)
     run = named([run_of(record, tally, result)])[0]
     return _page_written(record, joined(record, watched, run, []), file)
+
+
+def _refuse_silent(record: Record, result: ReplayResult) -> None:
+    """Raises RecordError where no autopilot was heard."""
+    if result.heard == 0:
+        raise RecordError(f"{record.directory}: no packet of an autopilot is in it; there is nothing to show")
 
 
 def _page_written(record: Record, data: dict[str, Any], file: Path) -> str:

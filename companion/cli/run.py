@@ -247,6 +247,7 @@ def _ended(companion: Companion, rig: _Rig) -> int:
             _save_map(companion, rig.place, rig.budget)
             if rig.recorder.problem:
                 typer.echo(rig.recorder.problem, err=True)
+            typer.echo(f"record: {rig.place}; rover-companion report {rig.place} shows it")
     return code
 
 

@@ -31,8 +31,9 @@ class Arrivals:
         for times_s in self._arrived.values():
             while times_s and not 0.0 <= now_s - times_s[0] <= RATE_S:
                 times_s.popleft()
-        heartbeat = vehicle.heartbeat
+        heartbeat, position = vehicle.heartbeat, vehicle.position
         return {
             **{name: round(len(times_s) / RATE_S, 1) for name, times_s in self._arrived.items()},
             "heartbeat_age_s": None if heartbeat is None else round(max(now_s - heartbeat.time_s, 0.0), 1),
+            "position_age_s": None if position is None else round(max(now_s - position.time_s, 0.0), 1),
         }

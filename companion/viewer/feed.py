@@ -81,6 +81,13 @@ class ViewerFeed:
         self._tell_tiles(status, now_s)
         self._tell_frame(status)
 
+    def end(self, line: str) -> None:
+        """The last moment, of a run that ended otherwise than by itself. ``line``: how."""
+        status = self._companion.status()
+        frame = self._frame(status)
+        if frame["state"] != "ended" and self._put({**frame, "state": "ended", "line": line, "why": ""}):
+            self._news = []
+
     def _tell_scene(self, now_s: float) -> None:
         """If anything of it is new; looked at now and then only."""
         companion = self._companion
@@ -116,12 +123,15 @@ class ViewerFeed:
             self._watch.tell_again(place for place, _ in news)
 
     def _tell_frame(self, status: Status) -> None:
+        if self._put(self._frame(status)):
+            self._news = []
+
+    def _frame(self, status: Status) -> Json:
         frame = frame_of(self._companion, status)
         frame["news"] = self._news
         frame["rates"] = self._rates.at(self._companion.vehicle, status.time_s)
         frame["contacts"], frame["touched"] = len(self.touched), list(self.touched[-TOUCHED_KEPT:])
-        if self._put(frame):
-            self._news = []
+        return frame
 
     def _put(self, message: Json) -> bool:
         return self._receiver.put(wire.JSON, json.dumps(message, allow_nan=False).encode())

@@ -25,13 +25,14 @@ from companion.core.frames import LocalFrame, NedPoint
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity
 from companion.executive.mission_executor import MissionExecutor
+from companion.executive.mission_progress import TargetStatus
 from companion.executive.mission_run import MissionRun
 from companion.mapping.map_queries import clearance_m
 from companion.mission.bounds import Bound
 from companion.mission.mission import Mission
 from companion.navigation.field_step import Part
 from companion.safety.mode_latch import Control
-from companion.safety.reasons import RunPhase
+from companion.safety.reasons import EndReason, LatchReason, RunPhase
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
 from companion.vehicle.events import RoverMode
 from companion.vehicle.state import VehicleState
@@ -43,6 +44,12 @@ CIRCLE = 24
 MOST_PATH, MOST_RAYS = 200, 180
 CLEARANCE_M = 5.0
 """No wider clearance is told."""
+ROLLS_M_S = 0.15
+"""A rover that is faster does not stand."""
+MOST_MISSED = 3
+"""So many targets that were not reached are named."""
+REACHED = TargetStatus.REACHED
+NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
 """A scan or a planned motion that is older is not shown."""
 STATES = {
@@ -204,7 +211,38 @@ def doing_of(companion: Companion, status: Status) -> Json:
             why = "going back to find another way"
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
         line, why = f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
-    return {"line": line, "why": why, "state": STATES[activity.phase]}
+    elif activity.phase is RunPhase.WAITING:
+        line, _, why = line.partition(" (")
+        why = why.removesuffix(")")
+    state = STATES[activity.phase]
+    if state == "stopped" and (other := _driven_by(companion)):
+        line, state = other, "waiting"
+    elif state == "stopped" and abs(companion.vehicle.forward_m_s) > ROLLS_M_S:
+        line = line.replace("stopped: ", "stopping: ", 1)
+    elif state == "ended":
+        line, why = _ended(companion, line)
+    return {"line": line, "why": why, "state": state}
+
+
+def _driven_by(companion: Companion) -> str:
+    """Who drives in place of the companion; empty for nobody."""
+    run, vehicle = companion.mission_run, companion.vehicle
+    if run.stop is None or run.stop.reason is None or run.stop.reason.kind is not LatchReason.OTHER_MODE:
+        return ""
+    driver = mode_of(vehicle, run)["drives"]
+    return "" if driver in ("nobody", "companion") else f"the {driver} drives ({mode_name(vehicle)})"
+
+
+def _ended(companion: Companion, line: str) -> tuple[str, str]:
+    """How it ended; where not every target was reached, which were not."""
+    statuses = companion.statuses()
+    missed = [f"{name}: {NOT_REACHED.get(status, status)}" for name, status in statuses if status != REACHED]
+    if not missed:
+        return line, ""
+    more = f", and {len(missed) - MOST_MISSED} more" if len(missed) > MOST_MISSED else ""
+    ended = f"{line}: " if line != str(EndReason.DONE.value) else "ended: "
+    reached = f"{len(statuses) - len(missed)} of {len(statuses)} targets reached"
+    return ended + reached, ", ".join(missed[:MOST_MISSED]) + more
 
 
 def mode_of(vehicle: VehicleState, run: MissionRun) -> Json:
@@ -214,8 +252,8 @@ def mode_of(vehicle: VehicleState, run: MissionRun) -> Json:
         return {"mode": None, "armed": None, "drives": "nobody"}
     named = heartbeat.mode in RoverMode.__members__.values()
     drives = DRIVES[RoverMode(heartbeat.mode)] if named else "pilot"
-    if run.latch.control is Control.COMPANION and vehicle.is_ours:
-        drives = "companion"
+    if vehicle.is_ours:  # in doubt it has given the rover up, and asked for HOLD
+        drives = "companion" if run.latch.control is Control.COMPANION else "nobody"
     return {"mode": mode_name(vehicle), "armed": heartbeat.armed, "drives": drives if heartbeat.armed else "nobody"}
 
 

@@ -78,6 +78,11 @@ class LiveViewer:
         for answer in self._requests.answered(self._companion):
             self.web.put(wire.JSON, json.dumps(answer).encode())
 
+    def end(self, line: str) -> None:
+        """Tell how a run ended that did not end by itself."""
+        if self._feed is not None:
+            self._feed.end(line)
+
     def close(self) -> None:
         """Tell the last moment, and end."""
         self.web.close()

@@ -85,6 +85,7 @@ def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) ->
     clock = record_clock(record)
     scene = {
         "live": False,
+        "cut": not record.complete,
         "simulated": clock.simulated,
         "began_unix_s": None if clock.simulated else round(1e-6 * clock.began_us, 1),
         "may_act": False,

@@ -17,6 +17,8 @@ from companion.viewer.energy import EnergyMeter
 
 MOVES_M_S = 0.05
 """A slower rover stands."""
+OLD_S = 1.0
+"""A speed that was heard longer ago says nothing of now."""
 STOPPED = (RunPhase.STOPPED, RunPhase.STOPPED_AND_WAITING, RunPhase.WAY_BLOCKED)
 STOOD = (*STOPPED, RunPhase.WAITING)
 TRACK_S = 0.4
@@ -102,7 +104,9 @@ class RunTally(ReplayObserver):
         """See ``ReplayObserver``."""
         step_s, self.seconds = time_s - self.seconds, time_s
         vehicle = companion.vehicle
-        if vehicle.speed_m_s > MOVES_M_S:
+        position = vehicle.position
+        is_heard = position is not None and companion.status().time_s - position.time_s <= OLD_S
+        if vehicle.speed_m_s > MOVES_M_S and is_heard:
             self.driven_m += vehicle.speed_m_s * step_s
             self.moving_s += step_s
             self.backwards_m += max(-vehicle.forward_m_s, 0.0) * step_s

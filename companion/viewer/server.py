@@ -46,6 +46,8 @@ MOST_NAME = 200
 HELLO_S, SEND_S = 10.0, 20.0
 ACTIONS_A_SECOND = 5
 WRONG_TOKEN_S = 0.5
+LAST_S = 0.4
+"""So long browsers have to be told the last moment."""
 ACTIONS = ("pause", "resume", "goto", "skip")
 HEADERS = {
     "X-Content-Type-Options": "nosniff",
@@ -264,8 +266,8 @@ def _listen(app: WebApp, server: uvicorn.Server, loop: asyncio.AbstractEventLoop
     with contextlib.suppress(ValueError, OSError, RuntimeError):
         while (message := wire.read_message(sys.stdin.buffer)) is not None:
             loop.call_soon_threadsafe(take, *message)
-    with contextlib.suppress(RuntimeError):
-        loop.call_soon_threadsafe(setattr, server, "should_exit", True)
+    with contextlib.suppress(RuntimeError):  # once everybody has been told the last moment
+        loop.call_soon_threadsafe(loop.call_later, LAST_S, setattr, server, "should_exit", True)
 
 
 async def _run(descriptor: int) -> None:

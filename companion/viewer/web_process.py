@@ -87,6 +87,10 @@ def web_place(text: str, token_file: Path | None) -> WebPlace:
 
 def _token(file: Path) -> str:
     """The token in a file that only its owner may read. Raises WebError."""
+    if file.is_dir():
+        raise WebError(f"--web-token {file}: is a folder; name a file in it")
+    if not file.parent.is_dir():
+        raise WebError(f"--web-token {file}: there is no folder {file.parent}; make it, or name another one")
     try:
         if not file.exists():
             file.touch(mode=0o600)

@@ -104,10 +104,12 @@ def drive(
             report = run_with_progress(run, console, pace, also)
         else:
             report = run_with_view(run, painter, _paced(run, pace), also)
+        _end(page, f"ended: {report.outcome}")
     except BAD_INPUT as error:
         raise _refused(error) from error
     except KeyboardInterrupt:
         _print_last(painter, rows_below=1)
+        _end(page, "stopped by the user")
         _keep(run, recorder)
         raise StoppedError(_stopped(run, recorder if record else NullRecorder())) from None
     finally:
@@ -176,6 +178,12 @@ def _note(scenario: Scenario) -> None:
 def _say_if_compiling(settings: Settings, mission: Mission) -> None:
     if not kernels_warm(settings, mission.rover.turning_radius_m):
         typer.echo(COMPILING, err=True)
+
+
+def _end(page: LiveViewer | None, line: str) -> None:
+    """How it ended, for the page, where the companion did not end it."""
+    if page is not None:
+        page.end(line)
 
 
 def _closed(page: LiveViewer | None) -> None:

@@ -105,7 +105,9 @@ def run_with_progress(run: Drive, console: Console, pace: Pace, also: Also = Als
             pace.wait(status.time_s)
 
         report = run.run(observe, also.every_s)
-        telling.tell(run.take_status())
+        last = run.take_status()
+        telling.tell(last)
+        also.show(last)
         progress.update(task, total=1, completed=1, state=report.outcome)
     return report
 
@@ -125,7 +127,9 @@ def _run_with_lines(run: Drive, console: Console, pace: Pace, also: Also) -> Rep
         pace.wait(status.time_s)
 
     report = run.run(observe, also.every_s)
-    telling.tell(run.take_status())
+    last = run.take_status()
+    telling.tell(last)
+    also.show(last)
     return report
 
 

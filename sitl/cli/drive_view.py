@@ -29,7 +29,7 @@ def run_with_view(run: Drive, painter: Painter, pace: Callable[[float], None], a
             pace(status.time_s)
 
         report = run.run(observe, also.every_s)
-        shown.finish(report)
+        also.show(shown.finish(report))
     return report
 
 
@@ -79,11 +79,12 @@ class DriveView:
         self._told = f"{time_s:.0f} s: {reason}{f' ({self._repeats} times)' * (self._repeats > 1)}"
         self._watching.tell(self._told)
 
-    def finish(self, report: Report) -> None:
-        """Draw the last moment, with what the drive came to."""
+    def finish(self, report: Report) -> Status:
+        """Draw the last moment, with what the drive came to; that moment."""
         status = self._run.take_status()
         self._take_in(status)
         self._show(self._view(status, stopwatch_s(), outcome_line(report)))
+        return status
 
     def _show(self, view: View) -> None:
         self._painter.show(lambda: view)

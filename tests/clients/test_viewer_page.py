@@ -83,6 +83,8 @@ def test_a_run_can_be_watched_on_any_screen_and_again_after_the_web_process_was_
             fits(desktop, PHONE)
             assert "Enter token to act" in desktop.text
             assert desktop.run("return document.querySelectorAll('.actions button').length") == 1, "nobody may act"
+            program.child.send_signal(signal.SIGINT)
+            desktop.shows("Stopped by the user")
 
 
 def fits(shown: Page, size: tuple[int, int]) -> None:

@@ -47,7 +47,7 @@ export class Headline {
 
 function badge(scene, ended) {
   if (scene.truth) return "live, simulator";
-  const source = !scene.live ? "record" : ended ? "ended" : "live";
+  const source = !scene.live ? (scene.cut ? "record, cut short" : "record") : ended ? "ended" : "live";
   return [source, scene.simulated ? "simulated" : ""].filter(Boolean).join(", ");
 }
 
@@ -63,7 +63,7 @@ function reached({ statuses = [] }) {
 function reason(frame, state) {
   if (!frame) return "";
   if (frame.why) return sentence(frame.why);
-  if (state === "ended" && frame.statuses?.length) return `${reached(frame)} of ${frame.statuses.length} targets reached`;
+  if (state === "ended") return frame.statuses?.length ? `${reached(frame)} of ${frame.statuses.length} targets reached` : "";
   if (state !== "driving" || !frame.goal || !frame.pose) return "";
   const rest = wayLeft(frame);
   const way = Number.isFinite(rest)

@@ -19,6 +19,8 @@ const STALE_MS = 1500;
 const LOOK_MS = 250;
 /** The autopilot's heartbeat comes once a second. Without one for as long as this, its data is old. */
 const SILENT_S = 3.5;
+/** Positions come several times a second. Without one for as long as this, place and speed are old. */
+const OLD_POSITION_S = 1.5;
 
 class LivePage {
   constructor(root) {
@@ -98,7 +100,8 @@ class LivePage {
     const { viewer, headline, legend } = this.parts;
     const { scene, frame } = this.model;
     const trouble = this.trouble();
-    this.charts.stale = trouble !== "" || (frame !== null && this.silentFor() > STALE_MS);
+    const old = frame?.state !== "ended" && frame?.rates?.position_age_s > OLD_POSITION_S;
+    this.charts.stale = old || trouble !== "" || (frame !== null && this.silentFor() > STALE_MS);
     viewer.classList.toggle("stale", this.charts.stale);
     if (viewer.classList.contains("truth") !== (scene?.truth === true)) {
       viewer.classList.toggle("truth");

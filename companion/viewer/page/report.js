@@ -119,7 +119,8 @@ class ReportPage {
     const now = performance.now();
     if (this.playback.playing && now - this.shownAt < PANEL_MS) return;
     this.shownAt = now;
-    this.parts.headline.show(this.model.scene, this.model.frame);
+    const cut = this.record.scene.cut && this.playback.t >= this.record.end;
+    this.parts.headline.show(this.model.scene, this.model.frame, cut ? "The record ends here: it was cut short" : "");
     this.panel.show();
     this.decisions.show(this.playback.t);
     this.charts.show();

@@ -6,7 +6,8 @@ const KEPT_AS = "viewer-token";
 
 /** The token, or null. It is removed from the address, so that nobody copies it with the address. */
 export function findToken() {
-  const given = new URLSearchParams(location.hash.slice(1)).get("token");
+  const hash = location.hash.slice(1);
+  const given = new URLSearchParams(hash).get("token") ?? (hash.includes("=") ? null : decodeURIComponent(hash));
   if (given) {
     keepToken(given);
     history.replaceState(null, "", location.pathname + location.search);

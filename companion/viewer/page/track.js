@@ -65,13 +65,17 @@ export class Track {
 
   /** The rover will be about so fast: the colours need not change on the way. */
   expect(speed) {
-    if (speed > 0) this.measure(speed);
+    if (!(speed > 0)) return;
+    this.expected = 0;
+    this.measure(speed);
+    this.expected = speed;
   }
 
   measure(speed) {
     if (speed <= this.fastest) return;
     this.fastest = speed;
     const top = TOP_SPEEDS.find((value) => value * A_LITTLE_MORE >= speed) ?? speed;
+    if (this.expected && speed < 2 * this.expected && top > this.top) return; // as on ice: not worth other colours
     if (top === this.top) return;
     this.top = top;
     this.batches = []; // all colours change

@@ -14,10 +14,13 @@ from companion.control.controller import ControlCommand, Purpose
 from companion.core.footprint import Footprint
 from companion.core.frames import NedPoint
 from companion.core.scan import RangeScan
+from companion.executive.mission_progress import TargetStatus
 from companion.mission.bounds import Bound
 from companion.navigation.field_step import Part
-from companion.safety.reasons import Activity, LatchReason, PowerReason, Reason, RunPhase, WaitReason
+from companion.safety.mode_latch import Control
+from companion.safety.reasons import Activity, Doubt, EndReason, LatchReason, PowerReason, Reason, RunPhase, WaitReason
 from companion.vehicle.commands import GuidedHeading, GuidedPosition, GuidedVelocity
+from companion.vehicle.events import RoverMode
 from companion.viewer.frame import (
     MOST_PATH,
     MOST_RAYS,
@@ -28,6 +31,7 @@ from companion.viewer.frame import (
     _thinned,
     doing_of,
     mode_name,
+    mode_of,
     told,
 )
 
@@ -75,30 +79,55 @@ def test_each_kind_of_setpoint_is_told(setpoint: object, told: dict) -> None:
 
 
 DRIVING = Activity(RunPhase.DRIVING)
-HELD = Activity(
-    RunPhase.STOPPED_AND_WAITING,
-    Reason(LatchReason.OTHER_MODE, ("GUIDED",)),
-    Reason(WaitReason.PERSON_SETS_MODE, ("X",)),
-)
+NOT_OURS = Reason(LatchReason.OTHER_MODE, ("GUIDED",))
+HELD = Activity(RunPhase.STOPPED_AND_WAITING, NOT_OURS, Reason(WaitReason.PERSON_SETS_MODE, ("X",)))
+WAITING = Activity(RunPhase.WAITING, awaited=Reason(WaitReason.ARMING))
+DOUBTED = Activity(RunPhase.STOPPED, Reason(Doubt.POSITION_WANDERS))
+DONE, BY_USER = (Activity(RunPhase.ENDED, Reason(kind)) for kind in (EndReason.DONE, EndReason.STOPPED_BY_USER))
 LOW = Reason(PowerReason.LOW, ("battery",))
+ROLLS, PILOT = {"forward_m_s": 1.0}, {"mode": RoverMode.MANUAL}
+SHED = {"shed": TargetStatus.UNREACHABLE}
 
 
 @pytest.mark.parametrize(
-    ("activity", "part", "broken_off", "line", "why"),
+    ("activity", "given", "line", "why"),
     [
-        (DRIVING, Part.EXPLORE, None, "driving to gate", ""),
-        (DRIVING, Part.RETURN, None, "driving to gate", "going back to find another way"),
-        (DRIVING, Part.RETURN, LOW, "driving to gate", "battery low for the autopilot"),
-        (HELD, Part.EXPLORE, None, "stopped: mode is not GUIDED", "waiting for "),
+        (DRIVING, {}, "driving to gate", ""),
+        (DRIVING, {"part": Part.RETURN}, "driving to gate", "going back to find another way"),
+        (DRIVING, {"part": Part.RETURN, "broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
+        (WAITING, {}, "waiting for arming", "asked for; the autopilot says if it refuses"),
+        (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
+        (HELD, PILOT, "the pilot drives (MANUAL)", "waiting for a person to set X"),
+        (DOUBTED, {}, "stopped: position wanders", ""),
+        (DOUBTED, ROLLS, "stopping: position wanders", ""),
+        (DONE, {}, "done", ""),
+        (DONE, SHED, "ended: 1 of 2 targets reached", "shed: unreachable"),
+        (BY_USER, {"shed": TargetStatus.PENDING}, "stopped by the user: 1 of 2 targets reached", "shed: not reached"),
     ],
 )
-def test_the_line_says_why_the_rover_stands_or_drives_back(
-    activity: Activity, part: Part, broken_off: object, line: str, why: str
+def test_the_line_says_what_the_rover_does_and_why_it_stands(
+    activity: Activity, given: dict[str, Any], line: str, why: str
 ) -> None:
-    companion = SimpleNamespace(outcome=SimpleNamespace(broken_off=broken_off))
-    status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=SimpleNamespace(part=part))
+    heartbeat = SimpleNamespace(mode=given.get("mode", RoverMode.HOLD), armed=True)
+    vehicle = SimpleNamespace(heartbeat=heartbeat, is_ours=False, forward_m_s=given.get("forward_m_s", 0.0))
+    run = SimpleNamespace(stop=SimpleNamespace(reason=activity.reason), latch=SimpleNamespace(control=Control.PERSON))
+    statuses = [("gate", TargetStatus.REACHED), *((name, given[name]) for name in ("shed",) if name in given)]
+    companion = SimpleNamespace(
+        outcome=SimpleNamespace(broken_off=given.get("broken_off")), mission_run=run, vehicle=vehicle,
+        statuses=lambda: statuses,
+    )  # fmt: skip
+    decision = SimpleNamespace(part=given.get("part", Part.EXPLORE))
+    status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)
     doing = doing_of(cast(Any, companion), cast(Any, status))
-    assert doing["line"] == line and doing["why"].startswith(why) and bool(doing["why"]) == bool(why)
+    assert (doing["line"], doing["why"]) == (line, why)
+
+
+def test_a_rover_that_was_given_up_in_doubt_is_driven_by_nobody() -> None:
+    """It is still in GUIDED: HOLD was asked for, and no heartbeat has shown it."""
+    vehicle = SimpleNamespace(heartbeat=SimpleNamespace(mode=RoverMode.GUIDED, armed=True), is_ours=True)
+    for control, driver in ((Control.PERSON, "nobody"), (Control.COMPANION, "companion")):
+        run = SimpleNamespace(latch=SimpleNamespace(control=control))
+        assert mode_of(cast(Any, vehicle), cast(Any, run))["drives"] == driver
 
 
 @pytest.mark.parametrize(("mode", "name"), [(15, "GUIDED"), (16, "INITIALISING"), (99, "mode 99"), (None, None)])

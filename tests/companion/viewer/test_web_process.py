@@ -235,7 +235,8 @@ def test_places_and_tokens(tmp_path: Path) -> None:
         ("0.0.0.0:8000", None, "--web-token FILE"),
         ("http://localhost", None, "not a place"),
         ("70000", None, "not a place"),
-        ("8000", tmp_path, "Is a directory"),
+        ("8000", tmp_path, "is a folder; name a file"),
+        ("8000", tmp_path / "none" / "token", "there is no folder"),
     ):
         with pytest.raises(WebError, match=says):
             web_place(text, given)
