@@ -38,7 +38,7 @@ PICTURES = (".png", ".jpg", ".jpeg")
 
 def picture(path: Path | None) -> None:
     """Like ``writable``, for an image, whose suffix decides its format. Raises OutputError."""
-    if path is not None and (path.is_dir() or path.name in ("", "..")):
+    if path is not None and (os.path.isdir(path) or path.name in ("", "..")):  # Path.is_dir may raise
         raise OutputError(f"{path}: is a folder, not a file; add a file's name, like {path / 'picture.png'}")
     if path is not None and not path.suffix:
         raise OutputError(f"{path}: the name says no picture format; write {path}.png")
