@@ -94,7 +94,7 @@ class MotionController:
         self._began: NedPoint | None = None
         """Where it was first led on the map as it is."""
         self._came_m = 0.0
-        """So far it has rolled since, tail last."""
+        """So far it has rolled forwards since."""
         self.choice: MotionChoice | None = None
         """The last one."""
         self.backwards = False
@@ -209,7 +209,7 @@ def _stops_at(view: LocalView, model: RoverModel) -> NedPoint:
 
 def _is_seen(view: LocalView, point: NedPoint) -> bool:
     """Whether the map knows the ground there."""
-    x, y = (int(v // 1.0) for v in view.evidence.frame.xy(point))
+    x, y = (math.floor(v) for v in view.evidence.frame.xy(point))
     height, width = view.evidence.log_odds.shape
     return 0 <= x < width and 0 <= y < height and bool(view.evidence.log_odds[y, x] != 0.0)
 
