@@ -29,6 +29,7 @@ class LocalView:
     ``placed_s``: when a position was told last.
     ``held_m_s``: so much slower than its throttle would let it go on firm ground. ``rolls_back``: it moves tail first.
     ``following``: how it follows velocities, as far as is known. ``body``: its outline, if it is no circle.
+    ``scans``: so many have been taken into the map.
     """
 
     pose: Pose
@@ -44,6 +45,7 @@ class LocalView:
     rolls_back: bool = False
     following: Following = AS_SHIPPED
     body: Footprint | None = None
+    scans: int = 0
 
     @property
     def footprint(self) -> Footprint:

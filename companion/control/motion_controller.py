@@ -42,7 +42,7 @@ HORIZON_S, STEP_S = 2.5, 0.1
 ALONE_STEP_S = 0.05
 """Of the way of a rover that is left alone: a turn that begins so much earlier ends decimetres away."""
 LOOKS_S = 0.09
-"""The ground is looked at anew after so long."""
+"""The ground is looked at anew after so long, and whenever a scan was taken into the map: the last look knows it, too."""
 WEIGHTS = Weights(
     margin_m=0.03, margin_s=0.06, tight=4.0, near_m=0.4, risk=0.5, unseen=0.3, turn=0.5, change=0.1, late=0.4
 )
@@ -91,6 +91,7 @@ class MotionController:
         self._position = PositionAhead()
         self._window: Window | None = None
         self._looked_s = self._time_s = -math.inf
+        self._looked_scans = 0
         self._began: NedPoint | None = None
         """Where it was first led on the map as it is."""
         self._came_m = 0.0
@@ -167,13 +168,13 @@ class MotionController:
 
     def _problem(self, path: ReferencePath, view: LocalView, model: RoverModel) -> MotionProblem:
         now_s, pose = view.pose.time_s, view.pose
-        if self._window is None or now_s - self._looked_s >= LOOKS_S:
+        if self._window is None or view.scans != self._looked_scans or now_s - self._looked_s >= LOOKS_S:
             came_here = self._came_m > 2.0 * unseen_to_m(self._body, came_here=True)
             self._window = look_round(
                 view.evidence, pose.point, path, self._body, model.fastest_m_s,
                 stops_at=_stops_at(view, model), came_here=came_here,
             )  # fmt: skip
-            self._looked_s = now_s
+            self._looked_s, self._looked_scans = now_s, view.scans
         start = Start(*self._window.place(pose.point), pose.heading_rad, view.forward_m_s, view.yaw_rate_rad_s)
         pending = _pending(view, round(model.dead_s / STEP_S), STEP_S)
         return MotionProblem(

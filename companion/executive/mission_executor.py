@@ -335,7 +335,7 @@ class MissionExecutor:
         rover = self._limits if self.controller == "points" else within_limits(self._limits, vehicle.parameters)
         return LocalView(
             pose, vehicle.speed_m_s, self.evidence, rover, settings, rate_rad_s, rolls_back=back,
-            following=follows, body=self._mission.rover.footprint,
+            following=follows, body=self._mission.rover.footprint, scans=self._scans,
         )  # fmt: skip
 
     def _moving(self, vehicle: VehicleState, view: LocalView) -> tuple[Moving, ...]:

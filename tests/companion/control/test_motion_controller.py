@@ -196,6 +196,16 @@ def test_where_it_begins_it_goes_slower_over_ground_that_nobody_saw() -> None:
     assert fastest_m_s(*ahead, (12.5, 0.0)) == first_m_s, "the map was begun anew"
 
 
+def test_what_a_scan_shows_counts_in_the_tick_that_mapped_it() -> None:
+    """The last look knows it in that tick, and would refuse what was chosen without it."""
+    evidence, leads = ground(), controller()
+    moment = view(evidence, Pose(6.5, 10.0, 0.0, 0.0), 1.5)
+    open_m_s = leads.follow(PATH, replace(moment, scans=1)).speed_m_s
+    wall(evidence, 8.0, 8.0, 12.0)
+    at = replace(moment, pose=replace(moment.pose, time_s=TICK_S), scans=2)
+    assert open_m_s > 1.5 and leads.follow(PATH, at).speed_m_s < 1.0
+
+
 def test_what_is_told_allows_for_a_command_that_comes_later_than_the_model_says() -> None:
     """With the dead time off by as much as all else, it may be left alone only at a lower speed."""
     evidence = ground()
