@@ -42,7 +42,7 @@ HORIZON_S, STEP_S = 2.5, 0.1
 ALONE_STEP_S = 0.05
 """Of the way of a rover that is left alone: a turn that begins so much earlier ends decimetres away."""
 LOOKS_S = 0.09
-"""The ground is looked at anew after so long, and whenever a scan was taken into the map: the last look knows it, too."""
+"""The ground is looked at anew after so long, and whenever a scan was mapped: the last look knows that scan, too."""
 WEIGHTS = Weights(
     margin_m=0.03, margin_s=0.06, tight=4.0, near_m=0.4, risk=0.5, unseen=0.3, turn=0.5, change=0.1, late=0.4
 )

@@ -93,6 +93,8 @@ class GoalDriver:
         self._planned_among: tuple[Moving, ...] = ()
         self._replanned_s = -math.inf
         self._avoidance = CollisionAvoidance()
+        self.makes_way = False
+        """Whether something else than the path leads in this tick, because of what moves."""
 
     def head_for(
         self, goal: ResolvedTarget, view: LocalView, way: tuple[Cell, ...] = (), driven: Steps = frozenset()
@@ -189,7 +191,7 @@ class GoalDriver:
 
     def guide(self, view: LocalView, moving: tuple[Moving, ...] = ()) -> ControlCommand:
         """The command for this tick: along the path, and out of the way of what moves."""
-        command = self._follow(view)
+        self.makes_way, command = False, self._follow(view)
         if not moving or (self.decision is not None and self.decision.action is Action.REACHED):
             return command
         command, yields = self._avoided(command, view, moving)
@@ -206,6 +208,7 @@ class GoalDriver:
         line, path = controller.line_ahead(self.path), self.path
         foresees = None if path is None else partial(controller.foreseen, path, view)
         option = self._avoidance.avoid(command, line, view, moving, backwards=controller.backwards, foresees=foresees)
+        self.makes_way = option.yields
         return option.command, option.yields
 
     def _follow(self, view: LocalView) -> ControlCommand:

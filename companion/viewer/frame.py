@@ -49,6 +49,7 @@ ROLLS_M_S = 0.15
 MOST_MISSED = 3
 """So many targets that were not reached are named."""
 REACHED = TargetStatus.REACHED
+MAKES_WAY = "making way for something that moves"
 NOT_REACHED = {TargetStatus.PENDING: "not reached"}
 NEWEST_S = 0.5
 """A scan or a planned motion that is older is not shown."""
@@ -114,7 +115,6 @@ def frame_of(companion: Companion, status: Status) -> Json:
     """The moment. ``news`` are those of this tick alone."""
     run, executor = companion.mission_run, companion.executor
     vehicle, now_s, pose = run.vehicle, status.time_s, status.pose
-    goal = None if executor is None or executor.progress.ended else executor.progress.goal
     return {
         "kind": "frame",
         "t": round(now_s, 2),
@@ -124,7 +124,7 @@ def frame_of(companion: Companion, status: Status) -> Json:
         **mode_of(vehicle, run),
         **doing_of(companion, status),
         "statuses": [str(one) for _, one in run.statuses()],
-        "goal": None if goal is None else {"name": goal.name, "place": _place(goal.point)},
+        "goal": _goal(executor),
         "path": _path(executor),
         "motion": _motion(executor, now_s),
         "setpoint": _setpoint(run.told),
@@ -151,6 +151,14 @@ def told(time_s: float, level: str, text: str, *, own: bool = True) -> Json:
 
 def _place(point: NedPoint) -> list[float]:
     return [round(point.north_m, 3), round(point.east_m, 3)]
+
+
+def _goal(executor: MissionExecutor | None) -> Json | None:
+    """What the rover heads for. ``asked``: a person has asked for it on the way; it is none of the targets."""
+    if executor is None or executor.progress.ended:
+        return None
+    goal = executor.progress.goal
+    return {"name": goal.name, "place": _place(goal.point), "asked": executor.progress.requested is not None}
 
 
 def _places(points: NDArray[np.float64], most: int) -> list[list[float]]:
@@ -209,6 +217,8 @@ def doing_of(companion: Companion, status: Status) -> Json:
         why = "" if broken_off is None else str(broken_off)
         if not why and status.decision is not None and status.decision.part is Part.RETURN:
             why = "going back to find another way"
+        if not why and companion.executor is not None and companion.executor.driver.makes_way:
+            why = MAKES_WAY
     elif activity.phase is RunPhase.STOPPED_AND_WAITING:
         line, why = f"stopped: {activity.reason}", f"waiting for {activity.awaited}"
     elif activity.phase is RunPhase.WAITING:

@@ -27,6 +27,7 @@ FORMS = {
 NOT_DRIVING = "the mission has not begun"
 TOO_OLD = "it came too late: the page shows what was seconds ago"
 NOT_CHANGED = "the autopilot has not changed its mode"
+NOT_PAUSED = "it is not paused"
 OTHER_GOAL = "the rover heads for something else by now"
 
 MODES = ("pause", "resume")
@@ -63,7 +64,7 @@ class PageRequests:
         late = shown_s is None or not abs(companion.status().time_s - shown_s) <= OLD_S
         fault = TOO_OLD if late and action != "pause" else self._ask(action, asked, companion)
         if fault:
-            self._answer(number, action, fault)
+            self._answer(number, action, fault, ok=fault == NOT_PAUSED)
         else:
             self._open.append(_Asked(number, action, stopwatch_s()))
 
@@ -98,7 +99,9 @@ class PageRequests:
                 self._answer(asked.number, asked.action, "" if changed else NOT_CHANGED)
 
     def _ask(self, action: str, asked: Json, companion: Companion) -> str:
-        """What is wrong with a request, in words; empty if it has been passed on."""
+        """Why a request is not passed on, in words; empty if it is."""
+        if action == "resume" and companion.mission_run.is_driving:
+            return NOT_PAUSED
         if action in MODES:
             self._station.pause(action == "pause")
             return ""
@@ -114,6 +117,7 @@ class PageRequests:
         self._station.skip_to(progress.index + (progress.requested is None))
         return ""
 
-    def _answer(self, number: int, action: str, fault: str) -> None:
-        answer = {"kind": "answer", "number": number, "action": action, "ok": not fault, "text": fault}
+    def _answer(self, number: int, action: str, text: str, *, ok: bool = False) -> None:
+        """``text``: what is wrong; empty for nothing. ``ok``: it is no fault."""
+        answer = {"kind": "answer", "number": number, "action": action, "ok": ok or not text, "text": text}
         self._done.append(answer)

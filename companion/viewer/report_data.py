@@ -99,7 +99,9 @@ def joined(record: Record, watched: ReportWatch, run: Run, others: list[Run]) ->
         "decisions": watched.decisions,
         "contacts": contacts,
         "tables": [*([differences([run, *others])] if others else []), *tables_of(run)],
-        "others": [{"name": one.name, "track": one.tally.track} for one in others],
+        "others": [
+            {"name": one.name, "track": one.tally.track, "elsewhere": one.mission != run.mission} for one in others
+        ],
     }
 
 

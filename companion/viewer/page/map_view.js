@@ -92,7 +92,7 @@ export class MapView {
     if (frame?.path) places.push(...frame.path.slice(0, MOST_INTEREST));
     if (scene?.home) places.push(scene.home);
     places.push(...(scene?.targets ?? []).slice(0, MOST_INTEREST).map((target) => target.place));
-    places.push(...(track.bounds() ?? []));
+    places.push(...(track.bounds() ?? []), ...map.bounds());
     if (map.shape && (scene?.truth || places.length < 2)) {
       const { south_m: south, west_m: west, cell_m: cell, rows, columns } = map.shape;
       places.push([south, west], [south + rows * cell, west + columns * cell]);

@@ -34,7 +34,7 @@ export class Others {
     // Clocks differ between runs: each is counted from its own beginning.
     this.others = others.map((other) => ({
       ...other,
-      shown: true,
+      shown: !other.elsewhere, // another mission has its own zero: its track says nothing on this map
       times: other.track.map(([t]) => t - other.track[0][0]),
       line: other.track.map((p) => p.slice(1)),
     }));
@@ -42,14 +42,14 @@ export class Others {
     const row = (other, i) => {
       const box = make("input", {
         type: "checkbox",
-        checked: true,
+        checked: other.shown,
         onchange: () => {
           other.shown = box.checked;
           changed();
         },
       });
       const swatch = make("span", { class: `other other-${i % DASHES.length}` });
-      return make("label", {}, box, swatch, other.name);
+      return make("label", {}, box, swatch, other.elsewhere ? `${other.name} (another mission)` : other.name);
     };
     this.node = make(
       "div",

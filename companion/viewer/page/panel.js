@@ -18,6 +18,8 @@ export class Panel {
     this.numbers = [0, 1, 2].map(() => readout());
     this.targetsHead = make("h2", {}, "Targets");
     this.targets = make("ol", { class: "targets" });
+    // A goal that somebody has asked for while the mission was under way: it comes before the targets.
+    this.asked = make("p", { class: "asked", hidden: true });
     this.news = new NewsList(model, jump);
     this.rows = [];
     this.facts = make("dl", { class: "facts" });
@@ -25,7 +27,7 @@ export class Panel {
       "div",
       { class: "sections" },
       make("div", { class: "readouts" }, ...this.numbers.map((each) => each.node)),
-      make("section", { class: "targets-section" }, this.targetsHead, this.targets),
+      make("section", { class: "targets-section" }, this.targetsHead, this.asked, this.targets),
       make("section", { class: "news-section" }, make("h2", {}, "News"), this.news.node),
       make("section", { class: "facts-section" }, make("h2", {}, "Facts"), this.facts),
     );
@@ -77,6 +79,9 @@ export class Panel {
       setText(row.far, frame?.pose ? metres(distance(frame.pose, target.place)) : "");
     });
     const known = `Targets, ${reached} of ${scene?.targets?.length} reached`;
+    const first = frame?.goal?.asked === true && !ended;
+    this.asked.hidden = !first;
+    setText(this.asked, first ? `First, as asked: ${frame.goal.name}` : "");
     setText(this.targetsHead, targets.length ? known : unplaced(frame?.statuses?.length ?? 0));
   }
 

@@ -57,6 +57,7 @@ export class TileMap {
     this.tiles = new Map();
     this.blocks = new Map();
     this.dirty = new Set();
+    this.seen = null; // columns and rows of cells: [west, south, east, north], the last two beyond
   }
 
   /** Takes one tile; tiles outside the map are ignored. */
@@ -67,6 +68,34 @@ export class TileMap {
     if (!cells) this.tiles.set(key, (cells = new Uint8Array(this.shape.tile ** 2)));
     unpack(bytes, cells);
     this.dirty.add(key);
+    this.widen(column, row, cells);
+  }
+
+  // Ground that was seen, of this tile, belongs to what there is to look at. What a mission closes does not.
+  widen(column, row, cells) {
+    const { tile } = this.shape;
+    const [x0, y0] = [column * tile, row * tile];
+    const [west, south, east, north] = this.seen ?? [Infinity, Infinity, -Infinity, -Infinity];
+    if (x0 >= west && y0 >= south && x0 + tile <= east && y0 + tile <= north) return;
+    let [left, low, right, high] = [west, south, east, north];
+    cells.forEach((kind, i) => {
+      if (kind !== FREE && kind !== OBSTACLE) return;
+      const [x, y] = [x0 + (i % tile), y0 + Math.floor(i / tile)];
+      [left, low] = [Math.min(left, x), Math.min(low, y)];
+      [right, high] = [Math.max(right, x + 1), Math.max(high, y + 1)];
+    });
+    if (right > left) this.seen = [left, low, right, high];
+  }
+
+  /** Two corners of the ground that was seen so far, north and east in metres; none before. */
+  bounds() {
+    if (!this.seen) return [];
+    const { south_m: south, west_m: west, cell_m: cell } = this.shape;
+    const [left, low, right, high] = this.seen;
+    return [
+      [south + low * cell, west + left * cell],
+      [south + high * cell, west + right * cell],
+    ];
   }
 
   /** Makes one tile unknown again, for seeking back in a record. */

@@ -94,6 +94,7 @@ SHED = {"shed": TargetStatus.UNREACHABLE}
     [
         (DRIVING, {}, "driving to gate", ""),
         (DRIVING, {"part": Part.RETURN}, "driving to gate", "going back to find another way"),
+        (DRIVING, {"makes_way": True}, "driving to gate", "making way for something that moves"),
         (DRIVING, {"part": Part.RETURN, "broken_off": LOW}, "driving to gate", "battery low for the autopilot"),
         (WAITING, {}, "waiting for arming", "asked for; the autopilot says if it refuses"),
         (HELD, {}, "stopped: mode is not GUIDED", "waiting for a person to set X"),
@@ -114,7 +115,7 @@ def test_the_line_says_what_the_rover_does_and_why_it_stands(
     statuses = [("gate", TargetStatus.REACHED), *((name, given[name]) for name in ("shed",) if name in given)]
     companion = SimpleNamespace(
         outcome=SimpleNamespace(broken_off=given.get("broken_off")), mission_run=run, vehicle=vehicle,
-        statuses=lambda: statuses,
+        statuses=lambda: statuses, executor=SimpleNamespace(driver=SimpleNamespace(makes_way=given.get("makes_way"))),
     )  # fmt: skip
     decision = SimpleNamespace(part=given.get("part", Part.EXPLORE))
     status = SimpleNamespace(activity=activity, target="gate", doing=str(activity), decision=decision)

@@ -13,7 +13,7 @@ from companion.recording.recorder import Recorder
 from companion.replay.replay import replay
 from companion.settings.settings_file import parse_settings
 from companion.viewer import page_requests
-from companion.viewer.page_requests import NOT_DRIVING, OTHER_GOAL, TOO_OLD, PageRequests
+from companion.viewer.page_requests import NOT_DRIVING, NOT_PAUSED, OTHER_GOAL, TOO_OLD, PageRequests
 from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 from tests.companion.viewer.test_feed import MISSION
@@ -51,7 +51,7 @@ class Page:
             answers += self.requests.answered(self.run.companion)
         (answer,) = answers
         assert answer["number"] == self.number and answer["action"] == action
-        assert answer["ok"] is (answer["text"] == "")
+        assert answer["ok"] is (answer["text"] in ("", NOT_PAUSED))
         return str(answer["text"])
 
 
@@ -60,6 +60,7 @@ def test_pause_go_on_send_and_skip_and_the_record_is_replayed(tmp_path: Path) ->
     assert page.ask("skip", goal="far end") == page.ask("goto", place=[1.0, 1.0]) == NOT_DRIVING
     page.drives()
     companion = page.run.companion
+    assert page.ask("resume") == NOT_PAUSED
     assert page.ask("pause") == ""
     page.ticks(3.0)
     heartbeat = companion.vehicle.heartbeat
