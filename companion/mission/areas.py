@@ -12,7 +12,7 @@ from shapely.geometry.base import BaseGeometry
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import Cell, Grid
-from companion.mission.mission import Area, Place
+from companion.mission.mission import Area, Here, Place
 
 Mask = NDArray[np.bool_]
 
@@ -27,7 +27,8 @@ CIRCLE_QUARTER = 32
 class Places:
     """Converts a mission's places to the local frame.
 
-    ``middle_of``: the middle of a field, if the mission's grid is fixed.
+    ``middle_of``: the middle of a field, if the mission's grid is fixed. Where a place is the rover's own, it is told
+    to be at home: nobody drives there.
     """
 
     frame: LocalFrame
@@ -40,6 +41,8 @@ class Places:
             return self.frame.to_ned(place)
         if isinstance(place, Cell):
             return self.middle_of(place)
+        if isinstance(place, Here):
+            return self.home
         return NedPoint(self.home.north_m + place.north_m, self.home.east_m + place.east_m)
 
 

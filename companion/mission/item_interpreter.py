@@ -1,7 +1,7 @@
 """Interprets MAVLink mission items as a rover's mission: shared by files of ground stations and the stored mission.
 
-The items are walked in ArduPilot's order, with jumps. Every item becomes a target, a fence, a note or an error with its
-index and name: none is dropped silently.
+The items are walked in ArduPilot's order, with jumps. Every item becomes a target, a command at a target, a fence, a
+note, or is named as unknown with all others: none is dropped silently.
 """
 
 from __future__ import annotations
@@ -15,26 +15,37 @@ from pathlib import Path
 from companion.core.frames import GeoPoint
 from companion.core.grid import BASE_WEIGHT
 from companion.mission import mav_commands as mav
+from companion.mission.do_commands import TAKEN, WITH_PLACE, WITHOUT_EFFECT, DoCommand, why_not
 from companion.mission.fence_items import fences_of, is_fence
+from companion.mission.item_walk import ItemWalk
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
-from companion.mission.mission import Area, HomePoint, Mission, OnBlocked, Place, Target, WeightedArea
+from companion.mission.loiter_circle import corners
+from companion.mission.mission import HERE, Area, Here, HomePoint, Mission, OnBlocked, Patrol, Place, Target, WeightedArea
 
 MAX_TARGETS = 10_000
 FOR_EVER_S = 1e9
 GROUND_M = 1.0
 """Width of the ground along the lines that the autopilot drives by itself."""
+ABOVE_HOME = 3
+"""The frame in which a place without a usable one is sent."""
 
 
 @dataclass
 class _Walk:
-    """The state of the walk through the items."""
+    """What has become of the items so far. ``home``: where it lies after DO_SET_HOME, None if it has not moved."""
 
     targets: list[Target] = field(default_factory=list)
+    commands: list[DoCommand] = field(default_factory=list)
+    """For the autopilot, before the first target."""
+    condition: DoCommand | None = None
+    """A condition that the next command has to wait for."""
     notes: list[str] = field(default_factory=list)
+    unknown: dict[tuple[str, str], list[Item]] = field(default_factory=dict)
+    """Items that this rover cannot do, by what they are and why not."""
     speed_m_s: float | None = None
+    home: Place | None = None
     ended_by: Item | None = None
     visits: Counter[int] = field(default_factory=Counter)
-    jumps: Counter[int] = field(default_factory=Counter)
     in_auto: bool = False
     passed: list[GeoPoint] = field(default_factory=list)
     """Places that the autopilot drives to by itself."""
@@ -43,11 +54,31 @@ class _Walk:
         if text not in self.notes:
             self.notes.append(text)
 
+    def refuse(self, item: Item, why: str) -> None:
+        """Name it with the others. Once is enough in a loop."""
+        items = self.unknown.setdefault((item.what, why), [])
+        if item not in items:
+            items.append(item)
 
-def mission_from_items(items: Sequence[Item], path: Path | None, name: str, planned_home: GeoPoint | None) -> Mission:
-    """The mission that the items describe. Raises ItemError with the item's index and its command."""
+
+def mission_from_items(
+    items: Sequence[Item],
+    path: Path | None,
+    name: str,
+    planned_home: GeoPoint | None,
+    *,
+    skip_unknown: bool = False,
+) -> Mission:
+    """The mission that the items describe. ``skip_unknown``: without those that this rover cannot do.
+
+    Raises ItemError with the item's index and its command; what cannot be done is named with all its items at once.
+    """
     fences = fences_of([item for item in items if is_fence(item)])
-    walk = _walk_items([item for item in items if not is_fence(item)])
+    route = [item for item in items if not is_fence(item)]
+    walk, patrol = _walk_items(route)
+    lines = [_unknown_text(what, why, found) for (what, why), found in walk.unknown.items()]
+    if lines and not skip_unknown:
+        raise ItemError(f"{'; '.join(lines)}; --skip-unknown drives the rest")
     return Mission(
         name=name,
         targets=tuple(walk.targets),
@@ -57,76 +88,139 @@ def mission_from_items(items: Sequence[Item], path: Path | None, name: str, plan
         in_auto=walk.in_auto,
         planned_home=planned_home,
         source=path,
-        notes=(*walk.notes, *fences.notes),
+        notes=(*(f"left out: {line}" for line in lines), *walk.notes, *fences.notes),
+        commands=tuple(walk.commands),
+        patrol=patrol,
     )
+
+
+def _unknown_text(what: str, why: str, items: list[Item]) -> str:
+    numbers = [str(item.index) for item in items if item.index >= 0]
+    where = f"item{'s' * (len(numbers) > 1)} {', '.join(numbers)}: " if numbers else ""
+    return f"{where}{what}: {why}"
 
 
 # --- where to go -----------------------------------------------------------------------------------------------------
 
 
-def _walk_items(items: Sequence[Item]) -> _Walk:
-    walk = _Walk(in_auto=any(_hands_over(item) for item in items))
-    places = {item.index: i for i, item in enumerate(items)}
-    i = steps = 0
-    while i < len(items):
+def _walk_items(items: Sequence[Item]) -> tuple[_Walk, Patrol | None]:
+    walk, order = _Walk(in_auto=any(_hands_over(item) for item in items)), ItemWalk(items)
+    steps = 0
+    while not order.over:
+        item = items[order.here]
         steps += 1
         if steps > MAX_ITEMS or len(walk.targets) > MAX_TARGETS:
-            raise ItemError(f"{items[i].label}: jumps make this mission longer than {MAX_TARGETS} targets")
-        item = items[i]
-        if item.command == mav.DO_JUMP:
-            i = _after_jump(item, i, places, walk)
+            raise ItemError(f"{item.label}: jumps make this mission longer than {MAX_TARGETS} targets")
+        if item.command in (mav.DO_JUMP, mav.DO_JUMP_TAG):
+            if walk.in_auto and item.param(2) == -1.0:
+                raise ItemError(f"{item.label}: repeats for ever; in AUTO a mission needs an end")
+            order.jump(item, len(walk.targets), walk.speed_m_s)
             continue
-        if walk.in_auto:
-            _auto_item(item, walk)
-        elif item.command in _TRAVEL:
-            _travel(item, walk)
-        elif item.command == mav.NAV_DELAY:
-            _delay(item, walk)
-        elif item.command == mav.DO_CHANGE_SPEED:
-            _change_speed(item, walk)
-        else:
-            raise ItemError(f"{item.label}: not understood; a rover can do waypoints, holds, speeds, jumps and return")
-        i += 1
-    return walk
+        _take(item, walk)
+        order.here += 1
+    for number, (to, times) in order.jumped.items():
+        walk.note(f"item {number}: {mav.command_name(mav.DO_JUMP)}: to item {to}, {times} times, written out")
+    return walk, None if order.loop is None else _patrol(walk, *order.loop)
+
+
+def _take(item: Item, walk: _Walk) -> None:
+    """What one item means."""
+    if item.kind:
+        walk.refuse(item, "is not understood")
+    elif walk.in_auto:
+        _auto_item(item, walk)
+    elif item.command in _TRAVEL:
+        _travel(item, walk)
+    elif item.command == mav.NAV_LOITER_TURNS:
+        _circle(item, walk)
+    elif item.command == mav.NAV_DELAY:
+        _delay(item, walk)
+    elif item.command == mav.DO_CHANGE_SPEED:
+        _change_speed(item, walk)
+    elif item.command in (mav.CONDITION_DELAY, mav.CONDITION_DISTANCE):
+        _condition(item, walk)
+    elif item.command == mav.DO_SET_REVERSE:
+        if item.param(1) == 1.0:
+            walk.refuse(item, "the companion drives forwards, the way that its sensors look")
+    elif item.command in TAKEN:
+        _command(item, walk)
+    elif item.command in WITHOUT_EFFECT or item.command == mav.NAV_GUIDED_ENABLE:
+        if reason := WITHOUT_EFFECT.get(item.command, "begins nothing with p1 0"):
+            walk.note(f"{item.label}: {reason}, so it is not used")
+    else:
+        walk.refuse(item, why_not(item.command))
 
 
 _TRAVEL = (mav.NAV_WAYPOINT, mav.NAV_LOITER_UNLIM, mav.NAV_LOITER_TIME, mav.NAV_RETURN_TO_LAUNCH)
 
 
 def _travel(item: Item, walk: _Walk) -> None:
-    if walk.ended_by is not None:
-        raise ItemError(f"{item.label}: can never begin, {walk.ended_by.label} never ends")
+    _refuse_after_the_end(item, walk)
     if item.command == mav.NAV_LOITER_UNLIM:
         walk.ended_by = item
         walk.note(f"{item.label}: stays there, the mission ends")
     place = _place(item, walk)
-    if place is None:
-        return
-    walk.visits[item.index] += 1
-    turn = walk.visits[item.index]
-    name = "home" if item.command == mav.NAV_RETURN_TO_LAUNCH else f"waypoint {item.index}"
     hold_s = item.param(1) if item.command in (mav.NAV_WAYPOINT, mav.NAV_LOITER_TIME) else 0.0
     if not (math.isfinite(hold_s) and hold_s >= 0.0):
         raise ItemError(f"{item.label}: a hold of {hold_s} s")
-    walk.targets.append(
-        Target(name if turn == 1 else f"{name} pass {turn}", place, hold_s=hold_s, speed_m_s=walk.speed_m_s)
-    )
+    _add(Target(_name(item, walk), place, hold_s=hold_s, speed_m_s=walk.speed_m_s), walk)
     _note_unused(item, walk)
 
 
-def _place(item: Item, walk: _Walk) -> Place | None:
-    """The place of an item; None: where the rover is."""
+def _add(target: Target, walk: _Walk) -> None:
+    """One more place to go to; a condition on the way there has had its time."""
+    walk.condition = None
+    walk.targets.append(target)
+
+
+def _refuse_after_the_end(item: Item, walk: _Walk) -> None:
+    if walk.ended_by is not None:
+        raise ItemError(f"{item.label}: can never begin, {walk.ended_by.label} never ends")
+
+
+def _name(item: Item, walk: _Walk) -> str:
+    """The name of the target that an item makes, with a number from its second turn on."""
+    walk.visits[item.index] += 1
+    turn = walk.visits[item.index]
+    name = "home" if item.command == mav.NAV_RETURN_TO_LAUNCH else f"waypoint {item.index}"
+    return name if turn == 1 else f"{name} pass {turn}"
+
+
+def _place(item: Item, walk: _Walk) -> Place:
+    """The place of an item."""
     if item.command == mav.NAV_RETURN_TO_LAUNCH:
-        return HomePoint(0.0, 0.0)
+        return HomePoint(0.0, 0.0) if walk.home is None else walk.home
+    if item.is_here:
+        walk.note(f"{item.label}: has no place of its own (0, 0): where the rover is then, as ArduRover takes it")
+        return HERE
     if item.frame not in mav.GLOBAL_FRAMES:
         frame = mav.FRAME_NAMES.get(item.frame, "unknown")
         raise ItemError(f"{item.label}: frame {item.frame} ({frame}) has no latitude and longitude")
-    if item.lat_deg == 0.0 and item.lon_deg == 0.0:
-        # To ArduPilot, 0, 0 means the present place.
-        if item.command == mav.NAV_LOITER_UNLIM and walk.targets:
-            return None
-        raise ItemError(f"{item.label}: has no place (latitude and longitude are 0)")
     return geo_point(item.lat_deg, item.lon_deg, item.label)
+
+
+def _circle(item: Item, walk: _Walk) -> None:
+    """NAV_LOITER_TURNS: p1 turns, p3 radius (negative: counterclockwise), round its place or where the rover is."""
+    _refuse_after_the_end(item, walk)
+    before = _last_place(walk)
+    centre = before if item.is_here else _place(item, walk)
+    turns, radius_m = item.param(1), item.param(3)
+    if not isinstance(centre, GeoPoint):
+        walk.refuse(item, "the centre of its circle is where the rover happens to be")
+        return
+    if not (0.0 <= turns <= 255.0 and math.isfinite(radius_m) and abs(radius_m) <= 2550.0):
+        raise ItemError(f"{item.label}: {turns:g} turns of {radius_m:g} m radius")
+    places = corners(centre, radius_m, turns, before if isinstance(before, GeoPoint) else None)
+    name = _name(item, walk)
+    for number, place in enumerate(places, 1):
+        text = name if len(places) == 1 else f"{name} ({number} of {len(places)})"
+        _add(Target(text, place, speed_m_s=walk.speed_m_s), walk)
+    walk.note(f"{item.label}: {turns:g} turns of {abs(radius_m):g} m radius, driven through {len(places)} places")
+
+
+def _last_place(walk: _Walk) -> Place | None:
+    """Where the rover is then, as far as the items tell."""
+    return next((target.place for target in reversed(walk.targets) if not isinstance(target.place, Here)), None)
 
 
 def _note_unused(item: Item, walk: _Walk) -> None:
@@ -143,6 +237,21 @@ def _note_unused(item: Item, walk: _Walk) -> None:
         walk.note(f"{item.label}: the rover goes on after it, though autocontinue is off")
 
 
+def _patrol(walk: _Walk, jump: Item, first: int, end: int) -> Patrol:
+    """Keep one lap of an endless loop, and what comes before it. Raises ItemError for a loop that leads nowhere."""
+    lap = walk.targets[first:end]
+    if all(isinstance(target.place, Here) for target in lap):
+        raise ItemError(f"{jump.label}: repeats for ever without a place to go to")
+    before = walk.targets[:first]
+    while len(before) >= len(lap) and [replace(a, name="") for a in before[-len(lap) :]] == [
+        replace(b, name="") for b in lap
+    ]:
+        lap, before = before[-len(lap) :], before[: -len(lap)]
+    walk.targets = [*before, *lap]
+    walk.note(f"{jump.label}: a patrol: the last {len(lap)} targets again and again, until somebody ends it")
+    return Patrol(len(before))
+
+
 # --- legs of a mission that the autopilot drives itself, in AUTO -----------------------------------------------------
 
 
@@ -156,16 +265,15 @@ def _auto_item(item: Item, walk: _Walk) -> None:
     The target has no end of its own: the autopilot decides when it goes on.
     """
     if _hands_over(item):
+        if item.is_here:
+            raise ItemError(f"{item.label}: has no place (latitude and longitude are 0)")
         place = _place(item, walk)
         walk.visits[item.index] += 1
         turn = walk.visits[item.index]
         name = f"guided item {item.index}" if turn == 1 else f"guided item {item.index} pass {turn}"
-        assert place is not None
         walk.targets.append(Target(name, place, hold_s=FOR_EVER_S, on_blocked=OnBlocked.WAIT, speed_m_s=None))
         walk.note("the autopilot drives this mission itself, in AUTO; the companion drives what it hands over")
-    elif (
-        item.command <= mav.NAV_LAST and item.frame in mav.GLOBAL_FRAMES and (item.lat_deg, item.lon_deg) != (0.0, 0.0)
-    ):
+    elif item.command <= mav.NAV_LAST and item.frame in mav.GLOBAL_FRAMES and not item.is_here:
         walk.passed.append(geo_point(item.lat_deg, item.lon_deg, item.label))
 
 
@@ -178,14 +286,65 @@ def _ground_along(passed: list[GeoPoint]) -> tuple[WeightedArea, ...]:
     return (WeightedArea(area, BASE_WEIGHT),)
 
 
+# --- what to do there ------------------------------------------------------------------------------------------------
+
+
 def _delay(item: Item, walk: _Walk) -> None:
-    """NAV_DELAY: a longer hold at the last target."""
+    """NAV_DELAY: a longer hold at the last target, or one where the rover is."""
     delay_s = item.param(1)
-    if not walk.targets:
-        raise ItemError(f"{item.label}: a delay before the first waypoint is not understood")
     if not (math.isfinite(delay_s) and delay_s >= 0.0):
-        raise ItemError(f"{item.label}: waiting for a time of day is not understood")
+        walk.refuse(item, "waiting for a time of day is not understood")
+        return
+    if walk.condition is not None or any(command.is_conditional for command in _commands_here(walk)):
+        walk.refuse(item, "a delay after a condition on the way is not understood")
+        return
+    if not walk.targets:
+        _add(Target(_name(item, walk), HERE), walk)
     walk.targets[-1] = replace(walk.targets[-1], hold_s=walk.targets[-1].hold_s + delay_s)
+
+
+def _commands_here(walk: _Walk) -> Sequence[DoCommand]:
+    return walk.targets[-1].commands if walk.targets else walk.commands
+
+
+def _condition(item: Item, walk: _Walk) -> None:
+    """CONDITION_DELAY: p1 seconds; CONDITION_DISTANCE: p1 metres to the next place."""
+    value = item.param(1)
+    if not (math.isfinite(value) and value >= 0.0):
+        raise ItemError(f"{item.label}: a condition of {value:g}")
+    by_time = item.command == mav.CONDITION_DELAY
+    before = walk.condition
+    delay_s = value + (before.delay_s or 0.0 if before else 0.0) if by_time else (before.delay_s if before else None)
+    within_m = (before.within_m if before else None) if by_time else value
+    walk.condition = DoCommand(item.command, (), delay_s=delay_s, within_m=within_m)
+
+
+def _command(item: Item, walk: _Walk) -> None:
+    """A command for the autopilot at the last place, or where the mission begins."""
+    rest = (item.lat_deg, item.lon_deg, item.altitude_m)
+    given = tuple(None if math.isnan(value) else value for value in (*item.params, *rest))
+    place, frame = None, 0
+    if item.command in WITH_PLACE and not item.is_here:
+        place = geo_point(item.lat_deg, item.lon_deg, item.label)
+        frame = item.frame if item.frame in mav.GLOBAL_FRAMES else ABOVE_HOME
+        given = (*given[:4], None, None, given[6])
+    if item.command == mav.DO_SET_HOME:
+        walk.home = place if place is not None and item.param(1) != 1.0 else _last_place(walk)
+    condition, walk.condition = walk.condition, None
+    command = DoCommand(
+        item.command,
+        given,
+        place,
+        frame,
+        item.index,
+        after_s=walk.targets[-1].hold_s if walk.targets else 0.0,
+        delay_s=condition.delay_s if condition else None,
+        within_m=condition.within_m if condition else None,
+    )
+    if not walk.targets:
+        walk.commands.append(command)
+    else:
+        walk.targets[-1] = replace(walk.targets[-1], commands=(*walk.targets[-1].commands, command))
 
 
 def _change_speed(item: Item, walk: _Walk) -> None:
@@ -201,19 +360,3 @@ def _change_speed(item: Item, walk: _Walk) -> None:
         walk.speed_m_s = speed_m_s
     if item.param(3) not in (0.0, -1.0):
         walk.note(f"{item.label}: throttle {item.param(3):g} is not used")
-
-
-def _after_jump(item: Item, here: int, places: dict[int, int], walk: _Walk) -> int:
-    """The next position. As in ArduPilot, each jump item counts its jumps over the whole mission."""
-    to, repeats = item.param(1), item.param(2)
-    if repeats == -1.0:
-        raise ItemError(f"{item.label}: repeats for ever (-1); give a number of repeats")
-    if not (math.isfinite(repeats) and repeats >= 0.0 and repeats == int(repeats)):
-        raise ItemError(f"{item.label}: {repeats:g} repeats")
-    if not math.isfinite(to) or to != int(to) or int(to) not in places or int(to) == item.index:
-        raise ItemError(f"{item.label}: there is no item {to:g} to jump to")
-    if walk.jumps[item.index] >= repeats:
-        return here + 1
-    walk.jumps[item.index] += 1
-    walk.note(f"{item.label}: to item {int(to)}, {int(repeats)} times, written out")
-    return places[int(to)]

@@ -17,7 +17,10 @@ class ItemError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Item:
-    """One mission item. Jumps refer to ``index``; ``params`` are p1 to p4, nan where the file has none."""
+    """One mission item. Jumps refer to ``index``; ``params`` are p1 to p4, nan where the file has none.
+
+    ``lat_deg``, ``lon_deg`` and ``altitude_m`` are p5 to p7 of commands without a place.
+    """
 
     index: int
     command: int
@@ -26,16 +29,29 @@ class Item:
     lat_deg: float
     lon_deg: float
     autocontinue: bool = True
+    altitude_m: float = 0.0
+    kind: str = ""
+    """What it is, if it is no MAVLink command."""
+
+    @property
+    def what(self) -> str:
+        """Its command with its number, for people."""
+        return self.kind or mav.command_name(self.command)
 
     @property
     def label(self) -> str:
         """Its name in messages."""
-        return f"item {self.index}: {mav.command_name(self.command)}"
+        return f"item {self.index}: {self.what}"
 
     def param(self, number: int) -> float:
         """p1 to p4; a missing one is 0, the default in every command that is understood here."""
         value = self.params[number - 1]
         return 0.0 if math.isnan(value) else value
+
+    @property
+    def is_here(self) -> bool:
+        """Whether it has no place of its own: to ArduPilot, latitude and longitude 0 are the present place."""
+        return self.lat_deg == 0.0 and self.lon_deg == 0.0
 
 
 def geo_point(lat_deg: float, lon_deg: float, what: str) -> GeoPoint:

@@ -11,8 +11,10 @@ from companion.mission.toml_reader import load as load_toml
 from companion.storage.files import why_no_file
 
 
-def load_mission(path: Path, *, simulated: bool = True) -> Mission:
+def load_mission(path: Path, *, simulated: bool = True, skip_unknown: bool = False) -> Mission:
     """Read and check a mission. ``simulated``: also what only the simulator needs.
+
+    ``skip_unknown``: without the items of a ground station's file that this rover cannot do.
 
     ``.toml`` is this project's format, ``.plan`` QGroundControl's, ``.waypoints``, ``.txt``, ``.mission`` and ``.wpl``
     are QGC WPL files. Raises MissionError: one line with file, place and reason.
@@ -24,7 +26,7 @@ def load_mission(path: Path, *, simulated: bool = True) -> Mission:
         return load_toml(path, simulated=simulated)
     if suffix not in SUFFIXES:
         raise MissionError(f"{path}: suffix '{path.suffix}' is no mission format; known: .toml, {', '.join(SUFFIXES)}")
-    mission = load_ground_station_file(path)
+    mission = load_ground_station_file(path, skip_unknown=skip_unknown)
     if not mission.targets and (mission.keep_out or mission.keep_in):
         raise MissionError(
             f'{path}: holds fences but no place to go to; a TOML mission takes them in by fence = "{path.name}"'

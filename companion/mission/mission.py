@@ -12,6 +12,7 @@ from pathlib import Path
 from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
+from companion.mission.do_commands import DoCommand
 from companion.mission.sensor_tables import Sensors
 
 
@@ -36,19 +37,39 @@ class HomePoint:
     east_m: float
 
 
-Place = Cell | HomePoint | GeoPoint
-"""A place in a mission: a field of its grid, metres from home, or latitude and longitude."""
+@dataclass(frozen=True, slots=True)
+class Here:
+    """Where the rover is when its turn comes: what ArduPilot takes latitude and longitude 0 to be."""
+
+    here: bool
+
+
+HERE = Here(here=True)
+Place = Cell | HomePoint | GeoPoint | Here
+"""A place in a mission: a field of its grid, metres from home, latitude and longitude, or where the rover is."""
 
 
 @dataclass(frozen=True, slots=True)
 class Target:
-    """One place to reach."""
+    """One place to reach. ``commands``: for the autopilot, once it is reached."""
 
     name: str
     place: Place
     hold_s: float = 0.0
     on_blocked: OnBlocked = OnBlocked.SKIP
     speed_m_s: float | None = None
+    commands: tuple[DoCommand, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Patrol:
+    """The targets from number ``first`` (from 0) to the last are driven again and again.
+
+    ``laps``: so often; None: until somebody ends it.
+    """
+
+    first: int = 0
+    laps: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +188,7 @@ class Mission:
     autopilot drives this mission in AUTO and hands targets over to the companion, in its own order (NAV_GUIDED_ENABLE).
     ``stored``: the digest of the autopilot's stored items if the mission was read from them, else empty. ``notes``: for
     people, what was read beyond the targets. ``also_read``: further files that the mission was read from.
+    ``commands``: for the autopilot, where the mission begins. ``patrol``: None if every target has one turn.
     """
 
     name: str
@@ -186,6 +208,8 @@ class Mission:
     stored: str = ""
     notes: tuple[str, ...] = ()
     also_read: tuple[Path, ...] = ()
+    commands: tuple[DoCommand, ...] = ()
+    patrol: Patrol | None = None
 
     @property
     def files(self) -> tuple[Path, ...]:

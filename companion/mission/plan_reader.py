@@ -9,6 +9,7 @@ import json
 import math
 import reprlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from companion.core.frames import GeoPoint
@@ -26,16 +27,16 @@ LARGEST = 1e18
 Json = dict[str, object]
 
 
-def load(path: Path) -> Mission:
+def load(path: Path, *, skip_unknown: bool = False) -> Mission:
     """Read a plan; fences without any target are allowed. Raises MissionError: file, place, reason."""
     plan = _read(path)
     try:
-        return _mission(plan, path)
+        return _mission(plan, path, skip_unknown=skip_unknown)
     except ItemError as error:
         raise MissionError(f"{path}: {error}") from None
 
 
-def _mission(plan: Json, path: Path) -> Mission:
+def _mission(plan: Json, path: Path, *, skip_unknown: bool) -> Mission:
     if plan.get("fileType") != "Plan":
         raise ItemError(f'fileType: expected "Plan", got {reprlib.repr(plan.get("fileType"))}')
     _expect_version(plan, "version", 1)
@@ -51,15 +52,12 @@ def _mission(plan: Json, path: Path) -> Mission:
         seen.add(item.index)
     home = listing.get("plannedHomePosition")
     planned_home = None if home is None else _geo(home, "mission.plannedHomePosition")
-    mission = mission_from_items(items, path, path.stem, planned_home)
+    mission = mission_from_items(items, path, path.stem, planned_home, skip_unknown=skip_unknown)
     keep_out, keep_in, notes = _geofence(plan)
-    return Mission(
-        name=mission.name,
-        targets=mission.targets,
+    return replace(
+        mission,
         keep_out=mission.keep_out + keep_out,
         keep_in=mission.keep_in + keep_in,
-        planned_home=planned_home,
-        source=path,
         notes=(*mission.notes, *notes, *_rally_notes(plan)),
     )
 
@@ -93,7 +91,9 @@ def _items(entries: list[object], place: str, *, inner: bool = False) -> Iterato
             name = reprlib.repr(entry.get("complexItemType"))
             transects = entry.get("TransectStyleComplexItem")
             if not isinstance(transects, dict) or not isinstance(transects.get("Items"), list):
-                raise ItemError(f"{where}: ComplexItem {name} is not understood")
+                kind = f"{where}: ComplexItem {name}"
+                yield Item(-position, 0, 0, (0.0, 0.0, 0.0, 0.0), 0.0, 0.0, kind=kind)
+                continue
             yield from _items(transects["Items"], f"{where} ({name}) item", inner=True)
         else:
             raise ItemError(f"{where}: type {reprlib.repr(kind)} is not understood")
@@ -107,7 +107,8 @@ def _simple_item(entry: Json, where: str, position: int) -> Item:
     command, frame = _whole(entry.get("command"), f"{where}: command"), _whole(entry.get("frame"), f"{where}: frame")
     index = _whole(entry.get("doJumpId", position), f"{where}: doJumpId")
     p1, p2, p3, p4 = values[:4]
-    return Item(index, command, frame, (p1, p2, p3, p4), values[4], values[5], entry.get("autoContinue", True) is True)
+    autocontinue = entry.get("autoContinue", True) is True
+    return Item(index, command, frame, (p1, p2, p3, p4), values[4], values[5], autocontinue, values[6])
 
 
 # --- fences and rally points -----------------------------------------------------------------------------------------

@@ -15,7 +15,8 @@ from companion.mission.areas import Mask, Places, shape_of, touched
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bound, Bounds, autopilot_bounds, mission_bounds
 from companion.mission.check import MAX_GRID_FIELDS
-from companion.mission.mission import Mission, MissionError, OnBlocked
+from companion.mission.do_commands import DoCommand
+from companion.mission.mission import Here, Mission, MissionError, OnBlocked
 from companion.mission.prior_map import stamp_prior
 
 MIN_MARGIN_M = 25.0
@@ -25,7 +26,10 @@ ENOUGH_FIELDS = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class ResolvedTarget:
-    """A target in the local frame, and its field of the grid."""
+    """A target in the local frame, and its field of the grid.
+
+    ``here``: it is reached wherever the rover is when its turn comes; ``point`` is then only the place before.
+    """
 
     name: str
     point: NedPoint
@@ -33,6 +37,8 @@ class ResolvedTarget:
     hold_s: float
     on_blocked: OnBlocked
     speed_m_s: float | None
+    commands: tuple[DoCommand, ...] = ()
+    here: bool = False
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -99,7 +105,10 @@ def _resolved(
     grid = _fixed_grid(mission, home)
     fixed = grid is not None
     places = Places(frame, home, _no_fields if grid is None else grid.centre_of)
-    points = [places.point(target.place) for target in mission.targets]
+    points: list[NedPoint] = []
+    for target in mission.targets:
+        here = isinstance(target.place, Here)
+        points.append(points[-1] if here and points else places.point(target.place))
     if grid is None:
         grid = _enclosing_grid(mission, places, points, prior, fine_m)
     if prior is not None:
@@ -118,9 +127,14 @@ def _resolved(
             raise MissionError(
                 f"{what}: {_away(home, point)} is outside the grid of {grid.width} x {grid.height} fields"
             )
-        if reason := _refusal(what, cell, shut):
+        if not isinstance(target.place, Here) and (reason := _refusal(what, cell, shut)):
             refused[i] = reason
-        targets.append(ResolvedTarget(target.name, point, cell, target.hold_s, target.on_blocked, target.speed_m_s))
+        here = isinstance(target.place, Here)
+        targets.append(
+            ResolvedTarget(
+                target.name, point, cell, target.hold_s, target.on_blocked, target.speed_m_s, target.commands, here
+            )
+        )
     home_cell = grid.cell_at(home)
     _refusal("home (where the rover begins)", home_cell, shut)
     closed = np.zeros(weights.shape, np.bool_)

@@ -15,8 +15,8 @@ from companion.mission.waypoints_reader import home_of
 NAME = "the autopilot's mission"
 
 
-def mission_of(items: Sequence[Item]) -> Mission:
-    """The mission that the items describe; item 0 is home.
+def mission_of(items: Sequence[Item], *, skip_unknown: bool = False) -> Mission:
+    """The mission that the items describe; item 0 is home. ``skip_unknown``: without those that no rover can do.
 
     Raises MissionError: one line with the item and the reason.
     """
@@ -24,7 +24,7 @@ def mission_of(items: Sequence[Item]) -> Mission:
         raise MissionError(f"{NAME}: there is none; upload one to the autopilot, or give a MISSION file")
     try:
         home, rest = home_of(list(items))
-        mission = mission_from_items(rest, None, NAME, home)
+        mission = mission_from_items(rest, None, NAME, home, skip_unknown=skip_unknown)
     except ItemError as error:
         raise MissionError(f"{NAME}: {error}") from None
     check_mission(mission)

@@ -259,7 +259,7 @@ def load(path: Path, *, simulated: bool = True) -> Mission:
 
 def _mission(table: MissionTable, path: Path) -> Mission:
     folder = path.parent
-    fences = load_ground_station_file(folder / table.fence) if table.fence else None
+    fences = load_ground_station_file(folder / table.fence, skip_unknown=True) if table.fence else None
     keep_out = tuple(_named(path, "keep_out", i, item.area) for i, item in enumerate(table.keep_out, 1))
     keep_in = tuple(_named(path, "keep_in", i, item.area) for i, item in enumerate(table.keep_in, 1))
     return Mission(

@@ -25,7 +25,7 @@ HEADER = ("QGC", "WPL", "110")
 MAX_BYTES = 20_000_000
 
 
-def load(path: Path) -> Mission:
+def load(path: Path, *, skip_unknown: bool = False) -> Mission:
     """Read a WPL file; fences without any target are allowed. Raises MissionError: file, line or item, reason."""
     lines = _lines(path)
     if not lines or tuple(lines[0][1]) != HEADER:
@@ -44,7 +44,7 @@ def load(path: Path) -> Mission:
         raise MissionError(f"{path}: holds no items")
     try:
         home, items = home_of(items)
-        return mission_from_items(items, path, path.stem, home)
+        return mission_from_items(items, path, path.stem, home, skip_unknown=skip_unknown)
     except ItemError as error:
         raise MissionError(f"{path}: {error}") from None
 
@@ -68,9 +68,9 @@ def _item(words: list[str], position: int) -> Item:
         raise ValueError(f"item {position} is expected here, found item {index}")
     p1, p2, p3, p4 = (_real(word, f"p{i}", nan=True) for i, word in enumerate(words[4:8], start=1))
     lat_deg, lon_deg = _real(words[8], "latitude"), _real(words[9], "longitude")
-    _real(words[10], "altitude", nan=True)
+    altitude_m = _real(words[10], "altitude", nan=True)
     autocontinue = _whole(words[11], "autocontinue") != 0
-    return Item(index, command, frame, (p1, p2, p3, p4), lat_deg, lon_deg, autocontinue)
+    return Item(index, command, frame, (p1, p2, p3, p4), lat_deg, lon_deg, autocontinue, altitude_m)
 
 
 def home_of(items: list[Item]) -> tuple[GeoPoint | None, list[Item]]:
