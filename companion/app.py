@@ -12,7 +12,10 @@ from companion.checkpoint.checkpointer import Checkpointer
 from companion.control.model_estimate import ModelEstimate
 from companion.core.clock import Clock
 from companion.core.frames import GeoPoint
+from companion.executive.command_progress import CommandProgress
+from companion.executive.command_report import command_lines, commands_done
 from companion.executive.goal_driver import GoalDriver
+from companion.executive.laps import LapSummary
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_progress import MissionProgress, TargetStatus
 from companion.mapping.evidence_map import EvidenceMap
@@ -97,6 +100,29 @@ class Companion:
     def statuses(self) -> list[tuple[str, TargetStatus]]:
         """Every target's name and what has become of it so far."""
         return self.mission_run.statuses()
+
+    def command_lines(self) -> list[str]:
+        """A line for each command of the mission: what has become of it so far."""
+        return command_lines(self.mission_run.mission, self._commands)
+
+    def commands_done(self) -> str:
+        """How many of the mission's commands had which result; empty for a mission without commands."""
+        return commands_done(self.mission_run.mission, self._commands)
+
+    @property
+    def _commands(self) -> CommandProgress | None:
+        return None if self.executor is None else self.executor.progress.commands
+
+    @property
+    def laps(self) -> tuple[LapSummary, ...]:
+        """The newest laps of a patrol that have ended."""
+        return () if self.executor is None else tuple(self.executor.laps)
+
+    @property
+    def complete(self) -> bool:
+        """Whether every target has been reached, in every lap."""
+        missed = 0 if self.executor is None else self.executor.progress.missed
+        return not missed and all(status is TargetStatus.REACHED for _, status in self.statuses())
 
     @property
     def estimate(self) -> ModelEstimate | None:

@@ -119,6 +119,14 @@ class Report:
     collisions: int = 0
     contacts: list[dict[str, float | str]] = field(default_factory=list)
     """Each collision: time, place from the start, speed, with what."""
+    commands: list[str] = field(default_factory=list)
+    """What became of each command of the mission, a line each."""
+    commands_done: str = ""
+    """How many of them had which result; empty for a mission without commands."""
+    laps: list[str] = field(default_factory=list)
+    """A line for each lap of a patrol that has ended."""
+    autopilot_commands: list[dict[str, object]] = field(default_factory=list)
+    """The commands that the autopilot has answered."""
     refused: int = 0
     """Setpoints rejected by the companion's own check before sending."""
     sim_time_s: float = 0.0
@@ -238,6 +246,9 @@ class Drive:
         report.targets = companion.statuses()
         report.collisions = len(self.simulator.collisions)
         report.contacts = self.contacts
+        report.commands, report.commands_done = companion.command_lines(), companion.commands_done()
+        report.laps = [str(lap) for lap in companion.laps]
+        report.autopilot_commands = [event.as_json() for event in self.simulator.commands]
         report.refused = companion.mission_run.setpoint_check.refused.total()
         report.following = "" if companion.estimate is None else described(companion.estimate)
         report.distance_m = self.simulator.driven_m

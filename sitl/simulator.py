@@ -17,8 +17,9 @@ from sitl.autopilot.autopilot import Autopilot
 from sitl.autopilot.control.records import LOOP_HZ
 from sitl.autopilot.control.tasks import compile_begins
 from sitl.autopilot.lidar import LidarComponent
+from sitl.autopilot.payload import CommandEvent
 from sitl.autopilot.signing import SECURE_PORT, StoredKey
-from sitl.autopilot.state import Storage
+from sitl.autopilot.state import CommandLog, Storage
 from sitl.autopilot.traffic import Traffic
 from sitl.autopilot.vehicle import Vehicle
 from sitl.faults.link_faults import LinkQueue
@@ -87,6 +88,7 @@ class Simulator:
         self._links: list[SimLink] = []
         self._signing_key = StoredKey()
         self._collisions: list[Collision] = []
+        self._command_log = CommandLog()
         self._surroundings, self._doors_move_s = world.surroundings(0.0), world.next_change_s(0.0)
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
         self._player = FaultPlayer(faults or FaultPlan(), seed)
@@ -105,6 +107,8 @@ class Simulator:
         self._vehicle.control["tick"] = 0
         self._vehicle.estimate["heading_rad"] = rover["heading_rad"]
         self._vehicle.signing.restore(self._signing_key)
+        self._command_log.booted_s = self.time_s
+        self._vehicle.command_log = self._command_log
         self._autopilot = Autopilot(self._vehicle)
         lidar = self._sensing.suite.lidar
         self._lidar = LidarComponent(lidar, self._sensing, self._vehicle) if lidar else None
@@ -138,6 +142,11 @@ class Simulator:
     def collisions(self) -> tuple[Collision, ...]:
         """All contacts with obstacles so far; a lasting one counts once."""
         return tuple(self._collisions)
+
+    @property
+    def commands(self) -> tuple[CommandEvent, ...]:
+        """The commands for servos, relays and so on that the autopilot has answered, or has done in AUTO."""
+        return tuple(self._command_log.events)
 
     @property
     def driven_m(self) -> float:

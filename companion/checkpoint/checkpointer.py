@@ -15,11 +15,15 @@ from companion.checkpoint.state_format import (
     MAX_DURATION_S,
     Raster,
     RowBand,
+    SavedCommands,
+    SavedCommandTally,
     SavedEstimate,
     SavedFollowing,
     SavedGenerator,
     SavedGrid,
+    SavedLap,
     SavedNavState,
+    SavedOpenCommand,
     SavedPlace,
     SavedProgress,
     SavedRequestedGoal,
@@ -30,6 +34,8 @@ from companion.control.model_estimate import ModelEstimate
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import Cell, Grid
 from companion.core.tick_marks import Mark
+from companion.executive.command_progress import CommandProgress
+from companion.executive.laps import LapStart
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_progress import MissionProgress
 from companion.mapping.evidence_map import EvidenceMap
@@ -97,6 +103,8 @@ class Snapshot:
     sticks_us: tuple[int, int] | None
     guarded: bool
     estimate: ModelEstimate
+    lap: LapStart
+    driven_m: float
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -119,6 +127,10 @@ class StateWriter(Protocol):
     @property
     def problem(self) -> str:
         """Why the last write failed; empty if it succeeded."""
+        ...
+
+    def holds(self, progress: MissionProgress) -> bool:
+        """Whether the state on the disk has the same commands of the mission open."""
         ...
 
     def put(self, update: StateUpdate) -> None:
@@ -169,6 +181,10 @@ class Checkpointer:
             return False
         resume_mission(self.previous, executor, vehicle, now_s)
         return True
+
+    def holds(self, progress: MissionProgress) -> bool:
+        """Whether the saved state has the same commands of the mission open."""
+        return self._writer.holds(progress)
 
     def update(self, moment: RunMoment) -> None:
         """At the end of each tick: copy a part of the map, and write the state, if it is time."""
@@ -237,6 +253,8 @@ class Checkpointer:
             sticks_us=moment.vehicle.sticks.rest_us,
             guarded=moment.vehicle.guard_at(moment.now_s) is not None,
             estimate=executor.estimator.estimate,
+            lap=executor.lap_start or LapStart(moment.now_s),
+            driven_m=executor.odometer.driven_m,
         )
 
 
@@ -273,6 +291,8 @@ def saved_state(snapshot: Snapshot) -> SavedState:
         origin=(snapshot.origin.lat_deg, snapshot.origin.lon_deg),
         home=(snapshot.home.lat_deg, snapshot.home.lon_deg),
         progress=_saved_progress(snapshot.progress, snapshot.now_s),
+        lap=_saved_lap(snapshot),
+        commands=_saved_commands(snapshot.progress.commands, snapshot.now_s),
         nav_state=None if snapshot.nav_state is None else _saved_nav_state(snapshot.nav_state, snapshot.doubts_left),
         trail=snapshot.trail,
         ground=ground,
@@ -304,6 +324,37 @@ def _saved_progress(progress: MissionProgress, now_s: float) -> SavedProgress:
         left_s=_left_s(progress.until_s, now_s),
         give_up_left_s=None if give_up_s is None else _left_s(give_up_s, now_s),
         requested=None if progress.requested is None else _saved_requested(progress.requested),
+    )
+
+
+def _saved_lap(snapshot: Snapshot) -> SavedLap:
+    progress, lap = snapshot.progress, snapshot.lap
+    return SavedLap(
+        number=progress.lap,
+        elapsed_s=_left_s(snapshot.now_s, lap.time_s),
+        driven_m=max(snapshot.driven_m - lap.driven_m, 0.0),
+        failed_before=lap.failed,
+        missed=progress.missed,
+    )
+
+
+def _saved_commands(commands: CommandProgress, now_s: float) -> SavedCommands:
+    """Only what is open, and what became of the others: the commands themselves are in the mission."""
+    return SavedCommands(
+        open=tuple(
+            SavedOpenCommand(
+                place=one.place,
+                number=one.number,
+                left_s=None if one.due_s is None else _left_s(one.due_s, now_s),
+                on_way=one.on_way,
+                announced=one.announced,
+            )
+            for one in commands.open
+        ),
+        tallies=tuple(
+            SavedCommandTally(place=one.place, number=one.number, counts=one.counts, answer=one.answer)
+            for one in commands.tallies
+        ),
     )
 
 

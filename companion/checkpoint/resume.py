@@ -13,6 +13,7 @@ import numpy as np
 
 from companion.checkpoint.state_format import (
     Raster,
+    SavedCommands,
     SavedEstimate,
     SavedGenerator,
     SavedNavState,
@@ -23,13 +24,16 @@ from companion.control.following import Following
 from companion.control.model_estimate import ModelEstimate
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import Cell
+from companion.executive.command_progress import START, CommandProgress, CommandTally, OpenCommand
 from companion.executive.goal_driver import Tally
+from companion.executive.laps import LapStart
 from companion.executive.mission_executor import ORIGIN_MOVED_M, MissionExecutor
 from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
 from companion.executive.mission_progress import MissionPhase, MissionProgress
 from companion.mapping.evidence_map import restore
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
-from companion.mission.mission import Mission, OnBlocked
+from companion.mission.do_commands import DoCommand
+from companion.mission.mission import Mission, OnBlocked, Patrol
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import NavState
 from companion.safety.mode_latch import Control
@@ -127,7 +131,7 @@ def resumed_layout(
     start = _in_frame(state.progress.start, saved_origin, origin)
     start_pose = Pose(start.north_m, start.east_m, 0.0, now_s)
     layout = lay(mission, settings, origin, GeoPoint(*state.home), start_pose, fence)
-    progress = _progress(layout, state, saved_origin, now_s)
+    progress = _progress(layout, state, saved_origin, now_s, mission.patrol, mission.commands)
     evidence, shift = layout.evidence, grid_shift(state, layout)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:
         return layout, progress, "without its map (the settings of the map have changed)"
@@ -153,6 +157,8 @@ def resume_mission(previous: PreviousRun, executor: MissionExecutor, vehicle: Ve
     executor.driver.go_on(tally, state.tally.epoch)
     if state.draws is not None:
         executor.driver.searcher.rng.bit_generator.state = _numpy_state(state.draws)
+    executor.resume_commands()
+    executor.lap_start = LapStart(now_s - state.lap.elapsed_s, -state.lap.driven_m, state.lap.failed_before)
     if state.estimate is not None:
         executor.estimator.go_on(resumed_estimate(state.estimate))
     shift = grid_shift(state, executor.layout)
@@ -196,13 +202,21 @@ def resumed_nav_state(saved: SavedNavState, shift: Cell) -> NavState:
     )
 
 
-def _progress(layout: MissionLayout, state: SavedState, saved_origin: GeoPoint, now_s: float) -> MissionProgress:
+def _progress(
+    layout: MissionLayout,
+    state: SavedState,
+    saved_origin: GeoPoint,
+    now_s: float,
+    patrol: Patrol | None,
+    commands: tuple[DoCommand, ...],
+) -> MissionProgress:
     """The saved progress, with the targets in the present frame."""
     saved, requested = state.progress, None
     if saved.requested is not None:
         point = _in_frame(saved.requested, saved_origin, layout.origin)
         cell = layout.evidence.base.cell_at(point)
         requested = ResolvedTarget(saved.requested.name, point, cell, 0.0, OnBlocked.SKIP, saved.requested.speed_m_s)
+    mission_commands = {place: target.commands for place, target in enumerate(layout.targets)} | {START: commands}
     return MissionProgress(
         layout.targets,
         replace(layout.start, name=saved.start.name),
@@ -212,7 +226,33 @@ def _progress(layout: MissionLayout, state: SavedState, saved_origin: GeoPoint, 
         until_s=now_s + saved.left_s,
         give_up_s=None if saved.give_up_left_s is None else now_s + saved.give_up_left_s,
         requested=requested,
+        commands=_commands(state.commands, mission_commands, now_s),
+        patrol=patrol,
+        lap=state.lap.number,
+        missed=state.lap.missed,
     )
+
+
+def _commands(saved: SavedCommands, commands: Mapping[int, tuple[DoCommand, ...]], now_s: float) -> CommandProgress:
+    """How far the commands of the mission are; what is not in the mission was never asked for."""
+    opened = tuple(
+        OpenCommand(
+            one.place,
+            one.number,
+            commands[one.place][one.number],
+            None if one.left_s is None else now_s + one.left_s,
+            one.on_way,
+            one.announced,
+        )
+        for one in saved.open
+        if one.number < len(commands.get(one.place, ()))
+    )
+    tallies = tuple(
+        CommandTally(one.place, one.number, one.counts, one.answer)
+        for one in saved.tallies
+        if one.number < len(commands.get(one.place, ()))
+    )
+    return CommandProgress(opened, tallies)
 
 
 def _in_frame(place: SavedPlace, saved_origin: GeoPoint, origin: GeoPoint) -> NedPoint:

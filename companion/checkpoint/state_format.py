@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
+from companion.executive.command_progress import CommandResult
 from companion.executive.mission_progress import MissionPhase, TargetStatus
 from companion.mapping.evidence_map import MAX_EVIDENCE_CELLS
 from companion.mission.check import MAX_GRID_FIELDS
@@ -28,7 +29,7 @@ from companion.safety.mode_latch import Control
 from companion.storage.validation import first_fault
 from companion.vehicle.rc_input import PULSES_US
 
-VERSION = 2
+VERSION = 3
 MAGIC = b"rover-companion state "
 LENGTH = struct.Struct(">I")
 SUM_BYTES = hashlib.sha256().digest_size
@@ -103,6 +104,42 @@ class SavedProgress(SavedValues):
         if self.index > len(self.statuses) or (self.phase in NEEDS_TARGET and self.index == len(self.statuses)):
             raise ValueError("there is no such target")
         return self
+
+
+class SavedOpenCommand(SavedValues):
+    """A command of the mission that is open: see ``OpenCommand``. ``place``: -1 where the mission begins."""
+
+    place: Annotated[int, Field(ge=-1, lt=MAX_TARGETS)]
+    number: Count
+    left_s: Seconds | None
+    on_way: bool
+    announced: bool
+
+
+class SavedCommandTally(SavedValues):
+    """What became of a command so far: see ``CommandTally``."""
+
+    place: Annotated[int, Field(ge=-1, lt=MAX_TARGETS)]
+    number: Count
+    counts: tuple[tuple[CommandResult, Count], ...] = Field(max_length=len(CommandResult))
+    answer: Annotated[int, Field(ge=-1, le=255)] | None
+
+
+class SavedCommands(SavedValues):
+    """How far the commands of the mission are."""
+
+    open: tuple[SavedOpenCommand, ...] = Field((), max_length=MAX_TARGETS)
+    tallies: tuple[SavedCommandTally, ...] = Field((), max_length=MAX_TARGETS)
+
+
+class SavedLap(SavedValues):
+    """The present lap of a patrol. ``failed_before``: commands refused or unanswered in the laps before."""
+
+    number: Annotated[int, Field(ge=1, lt=2**63)] = 1
+    elapsed_s: Seconds = 0.0
+    driven_m: Annotated[float, Field(ge=0.0, le=1e9)] = 0.0
+    failed_before: Count = 0
+    missed: Count = 0
 
 
 class SavedNavState(SavedValues):
@@ -182,6 +219,7 @@ class SavedState(SavedValues):
     ahead of it, constant while both keep running. ``trail``: the way from the start of the mission to here, without
     loops. ``sticks_us``: rest position of the pilot's sticks (steering, throttle), None if they were not seen.
     ``guarded``: a guard on the autopilot was there. ``estimate``: of how the rover follows velocities.
+    ``lap``, ``commands``: of a patrol, and those of the mission for the autopilot.
     """
 
     mission: str
@@ -203,6 +241,8 @@ class SavedState(SavedValues):
     sticks_us: tuple[Pulse, Pulse] | None = None
     guarded: bool = False
     estimate: SavedEstimate | None = None
+    lap: SavedLap = SavedLap()
+    commands: SavedCommands = SavedCommands()
 
     @property
     def reached(self) -> int:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from companion.checkpoint.checkpointer import Snapshot, StateUpdate, saved_state
 from companion.checkpoint.state_format import RowBand, compressed_rows, encode_state
+from companion.executive.command_progress import CommandProgress
+from companion.executive.mission_progress import MissionProgress
 from companion.storage.background_writer import BackgroundWorker, ShutdownBudget
 from companion.storage.files import Disk, replace_file
 
@@ -23,6 +25,11 @@ class StateFile:
         self._disk = disk
         self._bands: dict[RowBand, bytes] = {}
         self._written = b""
+        self._commands: CommandProgress | None = None
+
+    def holds(self, progress: MissionProgress) -> bool:
+        """See StateWriter. The file that was written last, as far as is known."""
+        return self._commands == progress.commands
 
     def apply(self, update: StateUpdate) -> None:
         """Keep the rows. If there is a snapshot, write the file unless its content is unchanged."""
@@ -37,6 +44,7 @@ class StateFile:
             if data != self._written or self.problem:
                 replace_file(self._disk, self.path, data)
             self._written, self.problem = data, ""
+            self._commands = update.snapshot.progress.commands
         except OSError as error:
             self.problem = f"{self.path}: the state cannot be saved: {error.strerror or error}"
         except ValueError as error:  # a value outside the limits of SavedState
@@ -62,6 +70,10 @@ class ThreadStateWriter:
         """See StateWriter."""
         late = f"{self._file.path}: the state is not saved yet: the disk does not answer"
         return late if self._is_late else self._file.problem
+
+    def holds(self, progress: MissionProgress) -> bool:
+        """See StateWriter."""
+        return self._file.holds(progress)
 
     def put(self, update: StateUpdate) -> None:
         """See StateWriter."""

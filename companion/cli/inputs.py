@@ -7,7 +7,7 @@ import importlib.metadata
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 
@@ -17,6 +17,17 @@ from companion.storage.files import refuse_pipe
 
 EXIT_BAD_INPUT = 2
 """Of every command: it has not begun, since a file or an option cannot be used."""
+
+
+SkipUnknown = Annotated[
+    bool,
+    typer.Option(
+        "--skip-unknown", help="Leave out what no rover can do in a ground station's mission; drive the rest."
+    ),
+]
+Laps = Annotated[
+    int | None, typer.Option(min=1, help="End a patrol after so many laps; any mission may be driven several times.")
+]
 
 
 class OutputError(Exception):

@@ -10,12 +10,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from companion.cli.inputs import EXIT_BAD_INPUT
+from companion.cli.inputs import EXIT_BAD_INPUT, SkipUnknown
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.mapping.map_files import MapError, load_map
+from companion.mission.do_commands import DoCommand
 from companion.mission.load import load_mission
-from companion.mission.mission import Area, Mission, MissionError, MoverSpec, Place
+from companion.mission.mission import Area, Here, Mission, MissionError, MoverSpec, Place
 from companion.mission.resolve import resolve
 from companion.storage.toml_file import read_toml
 
@@ -30,10 +31,11 @@ def group() -> None:
 @app.command()
 def check(
     mission_file: Annotated[Path, typer.Argument(metavar="FILE", help="TOML, .plan or .waypoints file.")],
+    skip_unknown: SkipUnknown = False,
 ) -> None:
     """Print what was understood of FILE. Exit code 0, or 2 with one line of reason."""
     try:
-        mission = load_mission(mission_file)
+        mission = load_mission(mission_file, skip_unknown=skip_unknown)
         maps = _maps(mission)
         _try_resolve(mission)
     except (MissionError, MapError) as error:
@@ -62,7 +64,13 @@ def show(mission: Mission, maps: list[str], console: Console) -> None:
     """Print the mission."""
     console.print(f"[bold]{escape(mission.name)}[/bold]", soft_wrap=True)
     console.print(_targets(mission))
-    for line in (*_ground(mission), *_vehicle(mission), *maps, *(f"note: {note}" for note in mission.notes)):
+    for line in (
+        *_commands(mission),
+        *_ground(mission),
+        *_vehicle(mission),
+        *maps,
+        *(f"note: {note}" for note in mission.notes),
+    ):
         console.print(escape(line), soft_wrap=True)
 
 
@@ -74,6 +82,32 @@ def _targets(mission: Mission) -> Table:
         name, place = escape(target.name), place_text(target.place)
         table.add_row(str(number), name, place, hold, target.on_blocked.value, f"{speed_m_s:g} m/s")
     return table
+
+
+def _commands(mission: Mission) -> list[str]:
+    """What the autopilot is told where, and which targets are a patrol."""
+    places = [("where the mission begins", mission.commands)]
+    places += [(f"at {target.name}", target.commands) for target in mission.targets]
+    lines = [f"{command_text(command)} {where}" for where, commands in places for command in commands]
+    if mission.patrol is not None:
+        first, laps = mission.targets[mission.patrol.first].name, mission.patrol.laps
+        often = "until somebody ends it" if laps is None else f"{laps} times"
+        lines.append(f"patrol: from {first} to {mission.targets[-1].name} {often}")
+    return lines
+
+
+def command_text(command: DoCommand) -> str:
+    """A command in words: what, whither, when."""
+    parts = [f"command: {command.name}"]
+    if command.place is not None:
+        parts.append(f"({place_text(command.place)})")
+    if command.after_s > 0.0:
+        parts.append(f"{command.after_s:g} s after arrival")
+    if command.delay_s is not None:
+        parts.append(f"{command.delay_s:g} s on the way on")
+    if command.within_m is not None:
+        parts.append(f"within {command.within_m:g} m of the next target")
+    return " ".join([*parts, "once" if not command.repeatable else ""]).strip()
 
 
 def _ground(mission: Mission) -> list[str]:
@@ -137,6 +171,8 @@ def place_text(place: Place) -> str:
         return f"field {place.x}, {place.y}"
     if isinstance(place, GeoPoint):
         return f"{place.lat_deg:.7f}, {place.lon_deg:.7f}"
+    if isinstance(place, Here):
+        return "where the rover is then"
     if place.north_m == place.east_m == 0.0:
         return "home"
     north_south = f"{abs(place.north_m):g} m {'south' if place.north_m < 0.0 else 'north'}"

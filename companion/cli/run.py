@@ -15,7 +15,7 @@ import typer
 
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, SkipUnknown, usable_settings
 from companion.cli.live import STDERR, Live, Reader, error_console, levelled, reader_of
 from companion.cli.live_view import LiveView, View, painter_for
 from companion.cli.service import Service
@@ -32,7 +32,7 @@ from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError
-from companion.mission.mission import Mission, MissionError
+from companion.mission.mission import Mission, MissionError, with_laps
 from companion.navigation.step_runner import ThreadRunner
 from companion.recording.record_format import STATE, RecordError
 from companion.recording.recorder import NullRecorder, Recorder
@@ -83,6 +83,8 @@ def run(
     signing_key: Annotated[
         Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
     ] = None,
+    skip_unknown: SkipUnknown = False,
+    laps: Laps = None,
     web: Web = None,
     web_token: Token = None,
     web_actions: Actions = False,
@@ -118,11 +120,11 @@ def run(
             if page is not None:
                 ends.callback(page.close)
                 say(served(page.web.place, to_person=reader is Reader.PERSON))
-            source = Source(mission_file, connect, from_autopilot=from_autopilot)
+            source = Source(mission_file, connect, from_autopilot=from_autopilot, skip_unknown=skip_unknown)
             mission = source.mission(settings, signer, stop, say)
             if mission is None:
                 raise SystemExit(EXIT_STOPPED)
-            refuse_arming(mission, arm=arm)
+            mission = refuse_arming(with_laps(mission, laps), arm=arm)
             keeping = RunState(mission, state, resume=resume, say=say)
             ends.callback(keeping.close)
             if keeping.ended:
@@ -237,7 +239,10 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
 def _ended(companion: Companion, rig: _Rig) -> int:
     """Print the result, and what could not be saved; returns the exit code."""
     code = _print_statuses(companion.statuses(), companion.outcome.broken_off)
+    code = code if companion.complete else EXIT_MISSED
     with contextlib.suppress(OSError):  # no reader: the exit code remains
+        for line in (*companion.command_lines(), *map(str, companion.laps)):
+            typer.echo(line)
         if companion.estimate is not None:
             typer.echo(f"the rover follows velocities {described(companion.estimate)}")
         for line in (rig.files.close(), rig.keeping.problem, str(rig.autopilot.codec.counters.refused)):

@@ -35,12 +35,15 @@ class Stopper(Protocol):
 class Source:
     """Loads the mission and opens the link once. Raises MissionError unless either a file or the autopilot is given."""
 
-    def __init__(self, mission_file: Path | None, connect: str, *, from_autopilot: bool) -> None:
+    def __init__(
+        self, mission_file: Path | None, connect: str, *, from_autopilot: bool, skip_unknown: bool = False
+    ) -> None:
         if (mission_file is not None) == from_autopilot:
             given = "both were given" if from_autopilot else "neither was given"
             raise MissionError(f"run: give a MISSION file or --from-autopilot: {given}")
         self._file = mission_file
         self._connect = connect
+        self._skip_unknown = skip_unknown
         self._link: ByteLink | None = None
 
     def mission(
@@ -48,7 +51,7 @@ class Source:
     ) -> Mission | None:
         """The mission; None if a signal came during the download. Raises MissionError, LinkError."""
         if self._file is not None:
-            return load_mission(self._file, simulated=False)
+            return load_mission(self._file, simulated=False, skip_unknown=self._skip_unknown)
         autopilot = AutopilotLink(self.link(), Codec(settings.link, signer=signer), settings.link)
         fetching = MissionFetcher(autopilot, WallClock(), settings.link.tick_hz)
         stop.listener, shown = fetching, ""
@@ -63,7 +66,7 @@ class Source:
             items = fetching.fetch(show)
         finally:
             stop.listener = None
-        return None if items is None else mission_of(items)
+        return None if items is None else mission_of(items, skip_unknown=self._skip_unknown)
 
     def link(self) -> ByteLink:
         """The link to the autopilot, opened at the first call. Raises LinkError."""
@@ -72,10 +75,11 @@ class Source:
         return self._link
 
 
-def refuse_arming(mission: Mission, *, arm: bool) -> None:
-    """Refuse --arm for a mission that the autopilot drives in AUTO. Raises MissionError."""
+def refuse_arming(mission: Mission, *, arm: bool) -> Mission:
+    """The mission, unless the autopilot drives it in AUTO and ``arm`` is given. Raises MissionError."""
     if mission.in_auto and arm:
         raise MissionError(
             f"{mission.source or mission.name}: the autopilot drives this mission in AUTO (NAV_GUIDED_ENABLE), "
             "so a person arms; leave out --arm"
         )
+    return mission

@@ -32,3 +32,5 @@ class Mark(IntFlag):
     """Some packets had been refused by then because their signature was too old or had been seen before."""
     UNSAVED = 512
     """The last attempt to save the state of the run failed."""
+    SAVED = 1024
+    """The announcement of a command was in the saved state, or there is no saved state: it may go out."""

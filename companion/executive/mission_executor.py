@@ -6,6 +6,8 @@ Nouns: mission executor, mission task.
 from __future__ import annotations
 
 import math
+from collections import deque
+from dataclasses import replace
 from enum import Enum, auto
 from pathlib import Path
 
@@ -21,14 +23,18 @@ from companion.core.grid import Cell
 from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
+from companion.executive.command_progress import START, CommandResult, names
+from companion.executive.command_sender import CommandSender, place_name
 from companion.executive.controller_choice import settings_in_force
 from companion.executive.goal_driver import GoalDriver, controller_for
+from companion.executive.laps import LapStart, LapSummary, Odometer, lap_summary
 from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, from_home, lay_again
 from companion.executive.mission_progress import (
     MissionPhase,
     MissionProgress,
     TargetStatus,
     ended_at,
+    ended_early,
     on_reached,
     on_time,
     on_unreachable,
@@ -36,12 +42,14 @@ from companion.executive.mission_progress import (
     returning,
     sent_to,
     skipped,
+    stood_still,
     with_requested,
 )
 from companion.executive.return_path import Refuge, Trail, refuges
 from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
+from companion.mission.do_commands import DoCommand
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
@@ -54,6 +62,8 @@ from companion.recording.recorder import RunLog
 from companion.safety.reasons import RunPhase
 from companion.settings import ControllerKind, Settings
 from companion.settings.live_settings import LiveSettings
+from companion.vehicle.commands import RunCommand
+from companion.vehicle.events import AckSeen
 from companion.vehicle.state import VehicleState
 
 ORIGIN_MOVED_M = 0.2
@@ -68,6 +78,11 @@ ROLLS_M_S = 0.1
 """However small roll_out_m_s is: slower than this it does not roll."""
 WATCHED_SCANS = 20
 """After a wait, obstacles that are not in this many newest scans are forgotten: a door may have opened."""
+LAPS_KEPT = 1000
+"""The summaries of so many newest laps are kept."""
+LAP_M = 1.0
+"""A shorter lap has led nowhere: the next one begins after a while."""
+FAILED = (CommandResult.REFUSED, CommandResult.UNANSWERED)
 
 
 class MissionTask(Enum):
@@ -147,6 +162,13 @@ class MissionExecutor:
         """How many the navigator has made."""
         self.moving: tuple[Moving, ...] = ()
         """What moves round the rover, as of the last tick."""
+        self.command_sender = CommandSender(notifier)
+        self.odometer = Odometer()
+        self.lap_start: LapStart | None = None
+        """None before the first tick."""
+        self.laps: deque[LapSummary] = deque(maxlen=LAPS_KEPT)
+        """The laps of a patrol that have ended."""
+        self._now_s = 0.0
 
     @property
     def evidence(self) -> EvidenceMap:
@@ -206,6 +228,7 @@ class MissionExecutor:
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
         self._tracker = ObjectTracker(self.evidence)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
+        self.odometer.forget_place()
         return True
 
     def forget_map(self, now_s: float) -> None:
@@ -234,12 +257,17 @@ class MissionExecutor:
 
     def request(self, goal: ResolvedTarget) -> None:
         """Drive to a goal that a person asks for first; then the mission goes on."""
-        self.progress = with_requested(self.progress, goal)
+        self._advance(with_requested(self.progress, goal))
         self.driver.leave()
 
     def skip(self) -> None:
         """Leave the present goal out."""
-        self.progress = skipped(self.progress)
+        self._advance(skipped(self.progress))
+        self.driver.leave()
+
+    def end_early(self) -> None:
+        """End the mission here, as for a patrol that nothing else ends."""
+        self._advance(ended_early(self.progress))
         self.driver.leave()
 
     def park(self) -> None:
@@ -270,9 +298,92 @@ class MissionExecutor:
         """The next place to try."""
         refuge = self._refuges[0]
         self._rolls_until_s = None
-        self.progress = returning(self.progress, refuge.place)
+        self._advance(returning(self.progress, refuge.place))
         along = " along the way it came" if refuge.way else ""
         self._notifier.tell(f"Back to {refuge.place.name}, {refuge.length_m:.0f} m{along}", Severity.WARNING)
+
+    # Commands of the mission, and laps ----------------------------------------------------------------------------
+
+    def commands_due(self, vehicle: VehicleState, now_s: float) -> RunCommand | None:
+        """The command to send in this tick, if there is one. Asked only while the rover is driven."""
+        pose, goal = vehicle.pose_at(now_s), self.progress.goal
+        left_m = math.inf if pose is None or self.progress.ended else pose.point.distance_m(goal.point)
+        commands, command = self.command_sender.due(
+            self.progress.commands, now_s, left_m, vehicle.latency_s, self._commands_place
+        )
+        self.progress = replace(self.progress, commands=commands)
+        return command
+
+    def answered(self, ack: AckSeen) -> None:
+        """An answer of the autopilot to any command."""
+        commands = self.command_sender.answered(self.progress.commands, ack, self._commands_place)
+        if commands is not self.progress.commands:
+            self.progress = replace(self.progress, commands=commands)
+
+    def resume_commands(self) -> None:
+        """Take up the commands that an earlier run has left open."""
+        commands = self.command_sender.resume(self.progress.commands, self._commands_place)
+        self.progress = replace(self.progress, commands=commands)
+
+    @property
+    def _commands_place(self) -> str:
+        return place_name(self.progress.commands.head, tuple(target.name for target in self.progress.targets))
+
+    @property
+    def _busy_here(self) -> bool:
+        """Whether the rover stays for a command; not on its way back, where nothing may hold it up."""
+        return self.progress.commands.keeps_here and self.progress.phase is not MissionPhase.HOME
+
+    def _reach_here(self, now_s: float) -> None:
+        """A target without a place of its own is reached where the rover is."""
+        self._notifier.tell(f"Reached {self.progress.goal.name}, where the rover is", Severity.INFO)
+        self._advance(on_reached(self.progress, now_s), now_s)
+        self.driver.leave()
+
+    def _note_way(self, pose: Pose, now_s: float) -> None:
+        self.odometer.at(pose.point)
+        if self.lap_start is None:
+            self.lap_start = LapStart(now_s)
+        self._now_s = now_s
+
+    def _advance(self, progress: MissionProgress, now_s: float | None = None) -> None:
+        """The mission's progress from here on. Commands that were left out, and a lap that has ended, are told."""
+        before, self.progress = self.progress, progress
+        now_s = self._now_s if now_s is None else now_s
+        if progress.lap > before.lap:
+            self._end_lap(before.lap, now_s)
+        if progress.commands.total(CommandResult.LEFT_OUT) > before.commands.total(CommandResult.LEFT_OUT):
+            self._tell_left_out(before, progress)
+
+    def _tell_left_out(self, before: MissionProgress, after: MissionProgress) -> None:
+        counts = {(t.place, t.number): t.count(CommandResult.LEFT_OUT) for t in before.commands.tallies}
+        left = [
+            self.command_at(t.place, t.number)
+            for t in after.commands.tallies
+            if t.count(CommandResult.LEFT_OUT) > counts.get((t.place, t.number), 0)
+        ]
+        self._notifier.tell(f"Not sent, the rover is not there: {names(left)}", Severity.WARNING)
+
+    def command_at(self, place: int, number: int) -> DoCommand:
+        """The command of this number at a place."""
+        commands = self._mission.commands if place == START else self._mission.targets[place].commands
+        return commands[number]
+
+    def _end_lap(self, number: int, now_s: float) -> None:
+        progress, start = self.progress, self.lap_start or LapStart(now_s)
+        first = 0 if progress.patrol is None else progress.patrol.first
+        missed = [
+            target.name
+            for target, status in zip(progress.targets[first:], progress.last_lap, strict=True)
+            if status is not TargetStatus.REACHED
+        ]
+        failed = progress.commands.total(*FAILED)
+        lap = lap_summary(number, start, now_s, self.odometer.driven_m, missed, failed)
+        self.lap_start = LapStart(now_s, self.odometer.driven_m, failed)
+        self.laps.append(lap)
+        self._notifier.tell(str(lap), Severity.INFO)
+        if lap.driven_m < LAP_M:
+            self.progress = stood_still(progress, now_s, self._settings.current.navigator.wait_retry_s)
 
     # One tick ----------------------------------------------------------------------------------------------------
 
@@ -281,14 +392,18 @@ class MissionExecutor:
         view = self.view(vehicle, now_s)
         self.moving = self._moving(vehicle, view)
         self.trail.enter(self.evidence.base.cell_at(view.pose.point), view.pose.point)
+        self._note_way(view.pose, now_s)
         waited = self.progress.phase is MissionPhase.WAIT
-        self.progress = on_time(self.progress, now_s)
+        self._advance(on_time(self.progress, now_s), now_s)
         if waited and self.progress.phase is MissionPhase.TRAVEL:
             look_again(self.evidence, self._scans - WATCHED_SCANS)
         if self.progress.ended:
             return MissionTask.END
-        if self.progress.phase in (MissionPhase.STAY, MissionPhase.WAIT):
-            self.phase = RunPhase.STAYING if self.progress.phase is MissionPhase.STAY else RunPhase.WAY_BLOCKED
+        if self.progress.goal.here and self.progress.phase is MissionPhase.TRAVEL and not self._busy_here:
+            self._reach_here(now_s)
+        if self.progress.phase in (MissionPhase.STAY, MissionPhase.WAIT) or self._busy_here:
+            waits = self.progress.phase is MissionPhase.WAIT
+            self.phase = RunPhase.WAY_BLOCKED if waits else RunPhase.STAYING
             self.driver.pause()
             return MissionTask.STAND
         if self.driver.goal != self.progress.goal:
@@ -363,7 +478,7 @@ class MissionExecutor:
             return False
         self._notifier.tell(f"Refused: {reason}", Severity.WARNING)
         navigator = self._settings.current.navigator
-        self.progress = on_unreachable(self.progress, now_s, navigator.wait_retry_s, navigator.wait_limit_s)
+        self._advance(on_unreachable(self.progress, now_s, navigator.wait_retry_s, navigator.wait_limit_s), now_s)
         return True
 
     def _rolls_on(self, view: LocalView) -> bool:
@@ -392,7 +507,7 @@ class MissionExecutor:
         self._log.write_decision(now_s, goal.name, decision)
         if decision.action is Action.REACHED:
             self._notifier.tell(f"Reached {goal.name}", Severity.INFO)
-            self.progress = on_reached(self.progress, now_s)
+            self._advance(on_reached(self.progress, now_s), now_s)
         elif decision.action is Action.UNREACHABLE:
             self._notifier.tell(f"Unreachable: {goal.name} ({decision.reason})", Severity.WARNING)
             navigator = self._settings.current.navigator
@@ -402,6 +517,6 @@ class MissionExecutor:
             else:
                 # How long a leg of AUTO may take is the autopilot's to say (DO_GUIDED_LIMITS).
                 limit_s = math.inf if self._mission.in_auto else navigator.wait_limit_s
-                self.progress = on_unreachable(self.progress, now_s, navigator.wait_retry_s, limit_s)
+                self._advance(on_unreachable(self.progress, now_s, navigator.wait_retry_s, limit_s), now_s)
         if decision.action in (Action.REACHED, Action.UNREACHABLE):
             self.driver.leave()

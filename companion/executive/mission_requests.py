@@ -105,7 +105,10 @@ class MissionRequests:
         return None
 
     def _skip(self, index: int) -> Reason[Refusal] | None:
-        """Leave the present goal out. ``index``: of the target to go on with, so that none is skipped by mistake."""
+        """Leave the present goal out. ``index``: of the target to go on with, so that none is skipped by mistake.
+
+        The number of targets ends a patrol at any time.
+        """
         executor = self._run.executor
         if executor is None:
             return Reason(Refusal.NOT_DRIVING, (self._run.activity,))
@@ -118,7 +121,11 @@ class MissionRequests:
             return Reason(Refusal.ENDED)
         if progress.requested is None and index == progress.index:
             return None
-        if index != progress.index + (progress.requested is None):
+        if progress.patrol is not None and index == len(progress.targets):
+            self._notifier.tell("Ending the patrol as requested", Severity.WARNING)
+            executor.end_early()
+            return None
+        if index != (progress.following if progress.requested is None else progress.index):
             return Reason(Refusal.NOT_NEXT)
         self._notifier.tell(f"Skipping {progress.goal.name} as requested", Severity.WARNING)
         executor.skip()

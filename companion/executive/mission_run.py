@@ -32,7 +32,7 @@ from companion.safety.mode_latch import LatchState, Reaction, Verdict
 from companion.safety.reasons import Activity, EndReason, Reason, RunPhase, WaitReason
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.commands import Command, GuidedPosition, SetMode
-from companion.vehicle.events import RoverMode
+from companion.vehicle.events import AckSeen, Event, RoverMode
 from companion.vehicle.motion_limits import full_throttle_m_s
 from companion.vehicle.state import VehicleState
 
@@ -175,7 +175,20 @@ class MissionRun:
         """What to do in this tick: what the verdict demands, or, if the rover may be driven, what the mission needs."""
         if verdict.reaction is not Reaction.DRIVE or self.executor is None:
             return ORDERS.get(verdict.reaction, Order.NOTHING)
-        return self.executor.decide(self.vehicle, now_s)
+        task = self.executor.decide(self.vehicle, now_s)
+        self._command(self.executor, now_s)
+        return task
+
+    def _command(self, executor: MissionExecutor, now_s: float) -> None:
+        """Send the command of the mission that is due now: only while the rover is driven, beside the setpoints."""
+        command = executor.commands_due(self.vehicle, now_s)
+        if command is not None:
+            self.sender.send(command, now_s)
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event: the mission's commands await their answers."""
+        if isinstance(event, AckSeen) and self.executor is not None:
+            self.executor.answered(event)
 
     def guide(self, task: MissionTask | Order, now_s: float) -> ControlCommand | Command | None:
         """The command for that. What the mission wants passes the check of setpoints before it is sent."""

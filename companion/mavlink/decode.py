@@ -49,6 +49,12 @@ ROVERS = (mavlink.MAV_TYPE_GROUND_ROVER, mavlink.MAV_TYPE_SURFACE_BOAT)
 REBOOT_MS = 5000
 """If the boot time runs back by more than this (more than packets overtake each other), the autopilot has restarted."""
 MISSION_ACK_COMMAND = -1
+WHOLE_NUMBERS = (
+    mavlink.MAV_CMD_DO_DIGICAM_CONFIGURE,
+    mavlink.MAV_CMD_DO_DIGICAM_CONTROL,
+    mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW,
+)
+"""Mission items whose x and y are p5 and p6 as they are (AP_Mission)."""
 NOT_TOLD = 0xFFFF
 """``total`` of MISSION_CURRENT."""
 NO_CELL_MV = 65535
@@ -272,9 +278,10 @@ class Decoder:
         if not self._is_for_us(message):
             return None
         params = (message.param1, message.param2, message.param3, message.param4)
-        place = (message.x / 1e7, message.y / 1e7)
+        scale = 1.0 if message.command in WHOLE_NUMBERS else 1e7
+        place = (message.x / scale, message.y / scale)
         head = (message.mission_type, message.seq, message.command, message.frame)
-        return PlanItemSeen(time_s, *head, params, *place, bool(message.autocontinue))
+        return PlanItemSeen(time_s, *head, params, *place, bool(message.autocontinue), message.z)
 
     def _leg(self, message: Any, time_s: float) -> Event | None:
         """A leg of an AUTO mission that is handed over to this component."""

@@ -125,7 +125,8 @@ class Downloads:
 
     def _add_item(self, now: _Transfer, event: PlanItemSeen) -> None:
         place = (event.lat_deg, event.lon_deg)
-        now.items.append(Item(event.index, event.command, event.frame, event.params, *place, event.autocontinue))
+        rest = (*place, event.autocontinue, event.altitude_m)
+        now.items.append(Item(event.index, event.command, event.frame, event.params, *rest))
         self._next(now, event.time_s)
 
     def _next(self, now: _Transfer, time_s: float) -> None:

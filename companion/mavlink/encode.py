@@ -29,6 +29,7 @@ from companion.vehicle.commands import (
     RequestList,
     RequestMessage,
     RequestRate,
+    RunCommand,
     RunPrearmChecks,
     SetMode,
     StatusText,
@@ -104,8 +105,8 @@ class Encoder:
                 return self._text(command)
             case RequestList() | RequestItem() | EndTransfer() | FileRequest():
                 return [self._transfer(command)]
-            case AnswerRequest():
-                return [answer_message(command)]
+            case AnswerRequest() | RunCommand():
+                return [answer_message(command) if isinstance(command, AnswerRequest) else self._run_command(command)]
             case ParameterValue():
                 return [_parameter_value(command)]
             case NamedValue():
@@ -119,6 +120,20 @@ class Encoder:
         number = command_number(command)
         return mavlink.MAVLink_command_long_message(
             self._system_id, 1, number, again, first, second, third, 0.0, 0.0, 0.0, 0.0
+        )
+
+    def _run_command(self, command: RunCommand) -> Any:
+        """As COMMAND_INT with a place, whose degrees a float could not hold. What is not given is 0, or NaN where 0
+        would be an order: an angle or a rate of a gimbal."""
+        missing = math.nan if command.number == mavlink.MAV_CMD_DO_GIMBAL_MANAGER_PITCHYAW else 0.0
+        first = [missing if value is None else value for value in command.params[:4]]
+        rest = [0.0 if value is None else value for value in command.params[4:]]
+        to = (self._system_id, 1)
+        if command.place is None:
+            return mavlink.MAVLink_command_long_message(*to, command.number, command.repetition, *first, *rest)
+        lat_e7, lon_e7 = (round(value * 1e7) for value in command.place)
+        return mavlink.MAVLink_command_int_message(
+            *to, command.frame, command.number, 0, 0, *first, lat_e7, lon_e7, rest[2]
         )
 
     def _position(self, point: NedPoint, origin: GeoPoint | None) -> Any:

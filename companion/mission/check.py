@@ -6,9 +6,13 @@ import shapely
 
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
+from companion.mission import mav_commands as mav
+from companion.mission.do_commands import TAKEN, DoCommand
 from companion.mission.mission import Area, HomePoint, Mission, MissionError, Place
 from companion.storage.files import why_no_file
 
+LARGEST = 1e9
+"""A parameter of a command is no larger: it is sent as a float."""
 MAX_GRID_FIELDS = 4_000_000
 """Larger grids are refused: the companion holds several rasters of that size."""
 
@@ -22,6 +26,9 @@ def check_mission(mission: Mission) -> None:
                 _check_area(mission, f"{kind} {number}", area)
         for number, target in enumerate(mission.targets, start=1):
             _check_place(mission, f"target {number} '{target.name}'", target.place)
+        for number, target in enumerate(mission.targets, start=1):
+            _check_commands(f"target {number} '{target.name}'", target.commands)
+        _check_commands("where the mission begins", mission.commands)
         if not mission.targets:
             raise MissionError("target: there is none; a mission needs at least one place to go to")
         _check_files(mission)
@@ -67,6 +74,15 @@ def _check_place(mission: Mission, what: str, place: Place) -> None:
         )
 
 
+def _check_commands(what: str, commands: tuple[DoCommand, ...]) -> None:
+    """Only what the autopilot takes, with finite numbers."""
+    for number, command in enumerate(commands, start=1):
+        if command.command not in TAKEN:
+            raise MissionError(f"{what}: command {number}: {mav.command_name(command.command)} cannot be given there")
+        if not all(value is None or abs(value) <= LARGEST for value in command.params):
+            raise MissionError(f"{what}: command {number}: {command.name}: a parameter is no number that can be sent")
+
+
 def _check_area(mission: Mission, what: str, area: Area) -> None:
     """Areas may extend beyond the grid; polygons must be simple, lines need two places."""
     if any(isinstance(place, Cell) for place in area.places) and mission.grid.size is None:
@@ -91,6 +107,7 @@ def _plane(place: Place, first: Place) -> tuple[float, float]:
         return ((place.lon_deg - west_deg + 180.0) % 360.0 - 180.0, place.lat_deg)
     if isinstance(place, HomePoint):
         return (place.east_m, place.north_m)
+    assert isinstance(place, Cell)
     return (float(place.x), float(place.y))
 
 

@@ -17,6 +17,8 @@ from companion.core.frames import GeoPoint
 from companion.mission import mav_commands as mav
 
 PARAMETERS = 7
+SHOWN_MOST, SHOWN_LEAST = 4, 2
+"""So many parameters are told to people, if the command has so many."""
 Params = tuple[float | None, ...]
 
 TAKEN: Mapping[int, int] = MappingProxyType(
@@ -98,8 +100,9 @@ class DoCommand:
     @property
     def name(self) -> str:
         """Its MAVLink name and the parameters that were given, for people."""
-        last = max((i for i, value in enumerate(self.params[:4], 1) if value), default=0)
-        values = " ".join(f"{value or 0.0:g}" for value in self.params[:last])
+        shown = min(TAKEN.get(self.command, SHOWN_MOST), SHOWN_MOST)
+        last = max((i for i, value in enumerate(self.params[:shown], 1) if value), default=0)
+        values = " ".join(f"{value or 0.0:g}" for value in self.params[: max(last, min(shown, SHOWN_LEAST))])
         return f"{mav.NAMES[self.command]}{f' {values}' if values else ''}"
 
     @property
@@ -126,10 +129,10 @@ def command_of_name(name: str) -> int:
     """The number of a command that can be given at a place. Raises ValueError with the reason."""
     plain = name.upper().removeprefix("MAV_CMD_")
     number = next((number for number, known in mav.NAMES.items() if known == plain), None)
-    if number in TAKEN:
-        return number
     if number is None:
         raise ValueError(f"name: {name!r:.60} is no MAVLink command known here; docs/missions.md lists them")
+    if number in TAKEN:
+        return number
     raise ValueError(f"name: {plain} cannot be given at a place: {why_not(number)}; docs/missions.md lists those")
 
 

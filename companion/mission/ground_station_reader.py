@@ -14,7 +14,8 @@ SUFFIXES = (".plan", ".waypoints", ".txt", ".mission", ".wpl")
 def load_ground_station_file(path: Path, *, skip_unknown: bool = False) -> Mission:
     """Read a ``.plan`` (JSON) or, with any other suffix, a QGC WPL file. A file may hold fences without any target.
 
-    ``skip_unknown``: without the items that this rover cannot do. Raises MissionError: one line with file, place and reason.
+    ``skip_unknown``: without the items that this rover cannot do. Raises MissionError: one line with file, place and
+    reason.
     """
     if path.suffix.lower() == ".plan":
         return load_plan(path, skip_unknown=skip_unknown)

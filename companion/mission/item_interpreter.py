@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 
 from companion.core.frames import GeoPoint
 from companion.core.grid import BASE_WEIGHT
@@ -20,7 +21,18 @@ from companion.mission.fence_items import fences_of, is_fence
 from companion.mission.item_walk import ItemWalk
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
 from companion.mission.loiter_circle import corners
-from companion.mission.mission import HERE, Area, Here, HomePoint, Mission, OnBlocked, Patrol, Place, Target, WeightedArea
+from companion.mission.mission import (
+    HERE,
+    Area,
+    Here,
+    HomePoint,
+    Mission,
+    OnBlocked,
+    Patrol,
+    Place,
+    Target,
+    WeightedArea,
+)
 
 MAX_TARGETS = 10_000
 FOR_EVER_S = 1e9
@@ -129,19 +141,8 @@ def _take(item: Item, walk: _Walk) -> None:
         walk.refuse(item, "is not understood")
     elif walk.in_auto:
         _auto_item(item, walk)
-    elif item.command in _TRAVEL:
-        _travel(item, walk)
-    elif item.command == mav.NAV_LOITER_TURNS:
-        _circle(item, walk)
-    elif item.command == mav.NAV_DELAY:
-        _delay(item, walk)
-    elif item.command == mav.DO_CHANGE_SPEED:
-        _change_speed(item, walk)
-    elif item.command in (mav.CONDITION_DELAY, mav.CONDITION_DISTANCE):
-        _condition(item, walk)
-    elif item.command == mav.DO_SET_REVERSE:
-        if item.param(1) == 1.0:
-            walk.refuse(item, "the companion drives forwards, the way that its sensors look")
+    elif item.command in _MEANINGS:
+        _MEANINGS[item.command](item, walk)
     elif item.command in TAKEN:
         _command(item, walk)
     elif item.command in WITHOUT_EFFECT or item.command == mav.NAV_GUIDED_ENABLE:
@@ -149,9 +150,6 @@ def _take(item: Item, walk: _Walk) -> None:
             walk.note(f"{item.label}: {reason}, so it is not used")
     else:
         walk.refuse(item, why_not(item.command))
-
-
-_TRAVEL = (mav.NAV_WAYPOINT, mav.NAV_LOITER_UNLIM, mav.NAV_LOITER_TIME, mav.NAV_RETURN_TO_LAUNCH)
 
 
 def _travel(item: Item, walk: _Walk) -> None:
@@ -321,6 +319,9 @@ def _condition(item: Item, walk: _Walk) -> None:
 
 def _command(item: Item, walk: _Walk) -> None:
     """A command for the autopilot at the last place, or where the mission begins."""
+    if walk.ended_by is not None:
+        walk.note(f"{item.label}: never comes, {walk.ended_by.label} never ends")
+        return
     rest = (item.lat_deg, item.lon_deg, item.altitude_m)
     given = tuple(None if math.isnan(value) else value for value in (*item.params, *rest))
     place, frame = None, 0
@@ -360,3 +361,25 @@ def _change_speed(item: Item, walk: _Walk) -> None:
         walk.speed_m_s = speed_m_s
     if item.param(3) not in (0.0, -1.0):
         walk.note(f"{item.label}: throttle {item.param(3):g} is not used")
+
+
+def _reverse(item: Item, walk: _Walk) -> None:
+    """DO_SET_REVERSE: forwards (p1 0) is how the companion drives anyway."""
+    if item.param(1) == 1.0:
+        walk.refuse(item, "the companion drives forwards, the way that its sensors look")
+
+
+_MEANINGS: Mapping[int, Callable[[Item, _Walk], None]] = MappingProxyType(
+    {
+        mav.NAV_WAYPOINT: _travel,
+        mav.NAV_LOITER_UNLIM: _travel,
+        mav.NAV_LOITER_TIME: _travel,
+        mav.NAV_RETURN_TO_LAUNCH: _travel,
+        mav.NAV_LOITER_TURNS: _circle,
+        mav.NAV_DELAY: _delay,
+        mav.CONDITION_DELAY: _condition,
+        mav.CONDITION_DISTANCE: _condition,
+        mav.DO_CHANGE_SPEED: _change_speed,
+        mav.DO_SET_REVERSE: _reverse,
+    }
+)

@@ -5,7 +5,7 @@ Nouns: mission, target.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -217,3 +217,12 @@ class Mission:
         simulated = () if self.sitl is None else (self.sitl.world, self.sitl.parameters)
         files = (self.source, self.prior_map, *self.also_read, *simulated)
         return tuple(file for file in files if file is not None)
+
+
+def with_laps(mission: Mission, laps: int | None) -> Mission:
+    """The mission with a patrol that ends after so many laps; None leaves it as it is. Raises MissionError."""
+    if laps is None:
+        return mission
+    if mission.in_auto:
+        raise MissionError(f"{mission.source or mission.name}: the autopilot drives this mission, it has no laps")
+    return replace(mission, patrol=Patrol(0 if mission.patrol is None else mission.patrol.first, laps))

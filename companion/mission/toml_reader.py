@@ -16,7 +16,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
-from companion.mission.check import check_mission
+from companion.mission.check import LARGEST, check_mission
+from companion.mission.do_commands import PARAMETERS, TAKEN, WITH_PLACE, DoCommand, command_of_name, padded
 from companion.mission.ground_station_reader import load_ground_station_file
 from companion.mission.mission import (
     Area,
@@ -27,6 +28,7 @@ from companion.mission.mission import (
     MissionError,
     MoverSpec,
     OnBlocked,
+    Patrol,
     Place,
     RoverSpec,
     SitlSpec,
@@ -50,6 +52,11 @@ from companion.mission.tables import (
     named,
 )
 from companion.storage.toml_file import read_table
+
+MAX_COMMANDS = 100
+"""Of one place."""
+ABOVE_HOME = 3
+"""The frame of a command's place: its altitude counts from home."""
 
 
 class PlaceTable(Table):
@@ -80,6 +87,40 @@ class PlaceTable(Table):
         return None
 
 
+class CommandTable(Table):
+    """``[[target.command]]`` and ``[[command]]``: a command for the autopilot."""
+
+    name: Annotated[str, Field(min_length=1, max_length=60)]
+    params: Annotated[list[Annotated[float, Field(ge=-LARGEST, le=LARGEST)]], Field(max_length=PARAMETERS)] = Field(
+        default_factory=list
+    )
+    lat_deg: Lat | None = None
+    lon_deg: Lon | None = None
+    altitude_m: Metres | None = None
+    after_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    delay_s: Annotated[float, Field(ge=0.0, le=1e6)] | None = None
+    within_m: Annotated[float, Field(gt=0.0, le=1e6)] | None = None
+
+    def command(self) -> DoCommand:
+        """The command. Raises ValueError for one that cannot be given, or with values that do not fit it."""
+        number = command_of_name(self.name)
+        params: tuple[float | None, ...] = tuple(self.params)
+        if len(params) > TAKEN[number]:
+            raise ValueError(f"params: {self.name} has at most {TAKEN[number]}, not {len(params)}")
+        given = (self.lat_deg, self.lon_deg, self.altitude_m)
+        if number not in WITH_PLACE and given != (None, None, None):
+            raise ValueError(f"{self.name} has no place; leave out lat_deg, lon_deg and altitude_m")
+        if (self.lat_deg is None) != (self.lon_deg is None):
+            raise ValueError("lat_deg and lon_deg are both needed")
+        if self.after_s > 0.0 and not (self.delay_s is None and self.within_m is None):
+            raise ValueError("after_s counts at the target, delay_s and within_m on the way on; give either")
+        place = None
+        if self.lat_deg is not None and self.lon_deg is not None:
+            place = GeoPoint(self.lat_deg, self.lon_deg)
+            params = (*padded(params)[:6], self.altitude_m or 0.0)
+        return DoCommand(number, padded(params), place, ABOVE_HOME, None, self.after_s, self.delay_s, self.within_m)
+
+
 class TargetTable(PlaceTable):
     """``[[target]]``."""
 
@@ -87,6 +128,7 @@ class TargetTable(PlaceTable):
     hold_s: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
     on_blocked: Literal["skip", "wait", "return", "hold"] = "skip"
     speed_m_s: Positive | None = None
+    command: Annotated[list[CommandTable], Field(default_factory=list, max_length=MAX_COMMANDS)]
 
     def target(self, number: int) -> Target:
         """The target; the default of its name is its number, counted from 1."""
@@ -94,7 +136,8 @@ class TargetTable(PlaceTable):
         if place is None:
             raise ValueError("has no place; use one of field, north_m and east_m, lat_deg and lon_deg")
         name = self.name or f"target {number}"
-        return Target(name, place, self.hold_s, OnBlocked(self.on_blocked), self.speed_m_s)
+        commands = _commands(self.command)
+        return Target(name, place, self.hold_s, OnBlocked(self.on_blocked), self.speed_m_s, commands)
 
 
 class AreaTable(PlaceTable):
@@ -231,6 +274,13 @@ class SitlTable(Table):
     drivetrain: DrivetrainTable | None = None
 
 
+class PatrolTable(Table):
+    """``[patrol]``: the targets from ``first`` on are driven again and again."""
+
+    first: Name | None = None
+    laps: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+
+
 class MissionTable(Table):
     """The whole file."""
 
@@ -240,6 +290,8 @@ class MissionTable(Table):
     grid: GridTable = GridTable()
     rover: RoverTable = RoverTable()
     target: list[TargetTable] = Field(default_factory=list)
+    command: Annotated[list[CommandTable], Field(default_factory=list, max_length=MAX_COMMANDS)]
+    patrol: PatrolTable | None = None
     keep_out: list[AreaTable] = Field(default_factory=list)
     keep_in: list[AreaTable] = Field(default_factory=list)
     corridor: list[CorridorTable] = Field(default_factory=list)
@@ -262,9 +314,12 @@ def _mission(table: MissionTable, path: Path) -> Mission:
     fences = load_ground_station_file(folder / table.fence, skip_unknown=True) if table.fence else None
     keep_out = tuple(_named(path, "keep_out", i, item.area) for i, item in enumerate(table.keep_out, 1))
     keep_in = tuple(_named(path, "keep_in", i, item.area) for i, item in enumerate(table.keep_in, 1))
+    targets = tuple(_named(path, "target", i, partial(item.target, i)) for i, item in enumerate(table.target, 1))
     return Mission(
         name=table.name or path.stem,
-        targets=tuple(_named(path, "target", i, partial(item.target, i)) for i, item in enumerate(table.target, 1)),
+        targets=targets,
+        commands=tuple(_named(path, "command", i, item.command) for i, item in enumerate(table.command, 1)),
+        patrol=None if table.patrol is None else _patrol(table.patrol, targets, path),
         grid=GridSpec(
             table.grid.resolution_m,
             table.grid.size,
@@ -285,6 +340,25 @@ def _mission(table: MissionTable, path: Path) -> Mission:
         notes=(f"fences taken from {table.fence}; its targets, if any, are not used",) if fences else (),
         also_read=tuple(folder / name for name in _also_read(table)),
     )
+
+
+def _commands(tables: list[CommandTable]) -> tuple[DoCommand, ...]:
+    """The commands of one place. Raises ValueError with the number of the one that is wrong."""
+    made = []
+    for number, table in enumerate(tables, 1):
+        try:
+            made.append(table.command())
+        except ValueError as error:
+            raise ValueError(f"command {number}: {error}") from None
+    return tuple(made)
+
+
+def _patrol(table: PatrolTable, targets: tuple[Target, ...], path: Path) -> Patrol:
+    """Raises MissionError if no target has the name of the first one."""
+    names = [target.name for target in targets]
+    if table.first is not None and table.first not in names:
+        raise MissionError(f"{path}: patrol.first: there is no target {table.first!r:.60}")
+    return Patrol(0 if table.first is None else names.index(table.first), table.laps)
 
 
 def _also_read(table: MissionTable) -> tuple[str, ...]:

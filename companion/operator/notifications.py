@@ -67,13 +67,17 @@ class Outcome:
     targets: list[tuple[str, TargetStatus]] = field(default_factory=list)
     tick_seconds: deque[float] = field(default_factory=lambda: deque(maxlen=TICKS_KEPT))
     said: list[str] = field(default_factory=list)
+    missed: int = 0
+    """Targets that were not reached in laps of a patrol that have ended."""
     broken_off: Reason[PowerReason] | None = None
     """Why the mission was broken off; None if it was not."""
 
     @property
     def complete(self) -> bool:
-        """Whether every target has been reached."""
-        return bool(self.targets) and all(status is TargetStatus.REACHED for _, status in self.targets)
+        """Whether every target has been reached, in every lap."""
+        return (
+            not self.missed and bool(self.targets) and all(status is TargetStatus.REACHED for _, status in self.targets)
+        )
 
 
 class Notifier:

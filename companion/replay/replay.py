@@ -17,6 +17,7 @@ from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
 from companion.checkpoint.resume import PreviousRun
 from companion.checkpoint.state_format import MAX_FILE_BYTES, StateError, decode_state
 from companion.core.tick_marks import Mark
+from companion.executive.mission_progress import MissionProgress
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.describe import packet_difference, packet_name
@@ -320,6 +321,10 @@ class _NoStateWriter:
     def problem(self) -> str:
         """Whether the recorded run could not save its state."""
         return "not saved" if self._player.entry.marks & Mark.UNSAVED else ""
+
+    def holds(self, progress: MissionProgress) -> bool:
+        """Whether the recorded run knew in this tick that its state was saved."""
+        return bool(self._player.entry.marks & Mark.SAVED)
 
     def put(self, update: StateUpdate) -> None:
         """Ignored."""

@@ -286,6 +286,7 @@ class Arming:
         origin = vehicle.origin.point
         if self._previous is None or vehicle.position is None:
             layout = lay(mission, mapping, origin, vehicle.home.point, pose, fence)
-            return Cleared(layout, plan_progress(layout.targets, layout.start))
+            progress = plan_progress(layout.targets, layout.start, mission.patrol, mission.commands, now_s)
+            return Cleared(layout, progress)
         same = same_boot(self._previous.state, vehicle.position)
         return Cleared(*resumed_layout(self._previous, mission, mapping, origin, now_s, same=same, fence=fence))

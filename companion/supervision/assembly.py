@@ -77,7 +77,7 @@ def assemble(
     operator_server = OperatorServer(run, autopilot, live, notifier, options.keep_settings)
     requests = (RequestedGoals(run, live, notifier), MissionRequests(run, notifier))
     handlers: tuple[EventHandler, ...]
-    handlers = (operator_server, *monitors.by_precedence, *requests, permission)
+    handlers = (operator_server, *monitors.by_precedence, *requests, run, permission)
     dispatcher = EventDispatcher(run, autopilot, notifier, handlers, monitors.scans, monitors.localization)
 
     limits = MissionLimits(run, monitors.fences, monitors.batteries, monitors.rivals, settings.power, outcome)

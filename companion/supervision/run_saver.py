@@ -6,6 +6,7 @@ Nouns: run saver.
 from __future__ import annotations
 
 from companion.checkpoint.checkpointer import Checkpointer, RunMoment
+from companion.core.tick_marks import Mark
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_run import MissionRun
 from companion.recording.recorder import RunLog
@@ -46,3 +47,14 @@ class RunSaver:
             control = run.latch.control
             moment = RunMoment(now_s, run.vehicle, control, run.executor, doubted, released=released, done=done)
             self._checkpointer.update(moment)
+        if run.executor is not None:
+            self._let_commands_go(run.executor)
+
+    def _let_commands_go(self, executor: MissionExecutor) -> None:
+        """A command goes out once the saved state says that it may have been sent."""
+        progress = executor.progress
+        if not executor.command_sender.awaits_save(progress.commands):
+            return
+        if self._checkpointer is None or self._checkpointer.holds(progress):
+            self._log.mark(Mark.SAVED)
+            executor.command_sender.saved()

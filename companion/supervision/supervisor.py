@@ -8,6 +8,7 @@ from __future__ import annotations
 from companion.core.clock import Clock
 from companion.core.severity import Severity
 from companion.core.tick_marks import Mark
+from companion.executive.command_report import commands_done
 from companion.executive.mission_executor import MissionTask
 from companion.executive.mission_run import MissionRun, Order
 from companion.operator.notifications import Notifier, Outcome
@@ -126,7 +127,8 @@ class Supervisor:
         """The mission has ended, one way or another: say so, and end the run."""
         executor = self._run.executor
         assert executor is not None
-        self._outcome.targets = executor.statuses()
+        self._outcome.targets, self._outcome.missed = executor.statuses(), executor.progress.missed
         text = f"Mission ended: {executor.reached} of {len(executor.progress.targets)} targets reached"
-        self._notifier.tell(text, Severity.INFO)
+        done = commands_done(self._run.mission, executor.progress.commands)
+        self._notifier.tell(f"{text}; commands: {done}" if done else text, Severity.INFO)
         self._shutdown.begin(Reason(EndReason.DONE), now_s)

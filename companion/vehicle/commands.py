@@ -162,6 +162,21 @@ class AnswerRequest:
     reason: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class RunCommand:
+    """A command of the mission (``number``: MAV_CMD), with p1 to p7 (None: not given).
+
+    With a ``place`` (latitude, longitude) it goes as COMMAND_INT in ``frame``, otherwise as COMMAND_LONG.
+    ``repetition`` counts from 0.
+    """
+
+    number: int
+    params: tuple[float | None, ...]
+    place: tuple[float, float] | None = None
+    frame: int = 0
+    repetition: int = 0
+
+
 Setpoint = GuidedPosition | GuidedVelocity | GuidedHeading
 Command = (
     Heartbeat
@@ -182,6 +197,7 @@ Command = (
     | FileRequest
     | StatusText
     | AnswerRequest
+    | RunCommand
     | ParameterValue
     | NamedValue
 )

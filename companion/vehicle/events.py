@@ -243,7 +243,10 @@ class PlanCountSeen:
 
 @dataclass(frozen=True, slots=True)
 class PlanItemSeen:
-    """MISSION_ITEM_INT to the companion: one item. Commands without a place ignore ``lat_deg`` and ``lon_deg``."""
+    """MISSION_ITEM_INT to the companion: one item.
+
+    Of commands without a place the last three are p5 to p7; DO_DIGICAM commands have p5 and p6 as whole numbers.
+    """
 
     time_s: float
     kind: int
@@ -254,6 +257,7 @@ class PlanItemSeen:
     lat_deg: float
     lon_deg: float
     autocontinue: bool
+    altitude_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -114,7 +114,7 @@ class PageRequests:
         progress = executor.progress
         if asked.get("goal") != progress.goal.name:
             return OTHER_GOAL
-        self._station.skip_to(progress.index + (progress.requested is None))
+        self._station.skip_to(progress.following if progress.requested is None else progress.index)
         return ""
 
     def _answer(self, number: int, action: str, text: str, *, ok: bool = False) -> None:

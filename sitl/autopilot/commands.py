@@ -16,7 +16,8 @@ from sitl.autopilot.fence import enable_fence
 from sitl.autopilot.mode_auto import AutoRunner
 from sitl.autopilot.mode_guided import GLOBAL_FRAMES
 from sitl.autopilot.modes import FORCE, arm, arming_faults, disarm, set_mode
-from sitl.autopilot.state import Mode
+from sitl.autopilot.payload import COMMANDS, LOGGED, note, params_of, run_payload
+from sitl.autopilot.state import CommandTrouble, Mode
 from sitl.autopilot.streams import DEFAULT_INTERVAL_US, set_interval
 from sitl.autopilot.telemetry import MESSAGES, streamable
 from sitl.autopilot.vehicle import Vehicle
@@ -29,7 +30,34 @@ Handler = Callable[[Vehicle, Channel, Any], int]
 
 
 def answer(vehicle: Vehicle, channel: Channel, message: Any) -> None:
-    """Carry out a command and acknowledge it."""
+    """Carry out a command and acknowledge it, unless a fault stands in its way."""
+    trouble = _trouble(vehicle, message.command)
+    if trouble is not None and trouble.lost:
+        return
+    if trouble is not None and trouble.result is not None:
+        result = trouble.result
+    else:
+        result = _carried_out(vehicle, channel, message)
+    if message.command in LOGGED:
+        note(vehicle, message.command, params_of(message), result)
+    if trouble is not None and trouble.unanswered:
+        return
+    channel.send(
+        mavlink.MAVLink_command_ack_message(
+            message.command, result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
+        )
+    )
+
+
+def _trouble(vehicle: Vehicle, command: int) -> CommandTrouble | None:
+    """What befalls this command."""
+    if not vehicle.command_troubles or command not in LOGGED:
+        return None
+    return next((one for one in vehicle.command_troubles if one.befalls(command)), None)
+
+
+def _carried_out(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    """MAV_RESULT."""
     if message.command == mavlink.MAV_CMD_DO_REPOSITION:
         result = _reposition(vehicle, message)
     else:
@@ -38,11 +66,7 @@ def answer(vehicle: Vehicle, channel: Channel, message: Any) -> None:
             result = UNSUPPORTED if handler is None else handler(vehicle, channel, message)
         except (ValueError, OverflowError):  # NaN, infinity or out of range
             result = DENIED
-    channel.send(
-        mavlink.MAVLink_command_ack_message(
-            message.command, result, 0, 0, message.get_srcSystem(), message.get_srcComponent()
-        )
-    )
+    return result
 
 
 def _reposition(vehicle: Vehicle, message: Any) -> int:
@@ -196,6 +220,10 @@ def _check_arming(vehicle: Vehicle, channel: Channel, message: Any) -> int:
     return ACCEPTED
 
 
+def _payload(vehicle: Vehicle, channel: Channel, message: Any) -> int:
+    return run_payload(vehicle, message.command, params_of(message), getattr(message, "frame", None))
+
+
 def _reboot(vehicle: Vehicle, channel: Channel, message: Any) -> int:
     if message.param1 not in (1.0, 3.0):
         return UNSUPPORTED
@@ -222,5 +250,6 @@ HANDLERS: dict[int, Handler] = {
     mavlink.MAV_CMD_DO_FENCE_ENABLE: _fence_enable,
     mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: _return,
     mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: _reboot,
+    **dict.fromkeys(COMMANDS, _payload),
 }
 """Everything else is UNSUPPORTED."""

@@ -243,6 +243,8 @@ class Mission:
                     runner.jumped(index, jumps[index], times)
                 index = target
             else:
+                if runner is not None:
+                    jumps[index] = 0  # it counts anew when the mission comes back
                 index += 1
         return None
 

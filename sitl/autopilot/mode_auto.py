@@ -20,6 +20,7 @@ from sitl.autopilot.fence import distance_m, enable_fence
 from sitl.autopilot.mission_items import NAMES, Item
 from sitl.autopilot.mode_rtl import begin_return, run_return
 from sitl.autopilot.modes import set_mode
+from sitl.autopilot.payload import ACCEPTED, COMMANDS, note, run_payload
 from sitl.autopilot.state import GuidedTask, Mode, Submode
 from sitl.autopilot.telemetry import mission_current
 from sitl.autopilot.vehicle import Vehicle
@@ -107,9 +108,19 @@ class AutoRunner:
             self.auto.guided.limit_s, self.auto.guided.limit_m = first, item.params[3]
         elif command == items.FENCE_ENABLE:
             return enable_fence(self.vehicle, int(first), spoken=True)
+        elif command in COMMANDS:
+            return self._payload(item)
         else:
             return command in ELSEWHERE or command in DONE_AT_ONCE
         return True
+
+    def _payload(self, item: Item) -> bool:
+        """A servo, a relay and so on; an item that is refused is passed over without a word."""
+        place = (item.x, item.y) if item.command in items.RAW_PLACES else (item.x / 1e7, item.y / 1e7)
+        params = (*item.params, *(float(value) for value in place), item.z)
+        result = run_payload(self.vehicle, item.command, params)
+        note(self.vehicle, item.command, params, result, in_auto=True)
+        return result == ACCEPTED
 
     def _go(self, index: int, item: Item) -> None:
         """Drive to a place; on to the next without stopping if it is known and there is no time to wait here."""

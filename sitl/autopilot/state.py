@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import Enum, IntEnum
+from typing import Any
 
 from sitl.autopilot.mission_items import Item
 
@@ -48,6 +49,37 @@ class Clocks:
     variance_text_s: float = 0.0
     logging_s: float = -math.inf
     """When arming was last tried, or when it ended; the log is written for some seconds after that."""
+
+
+@dataclass
+class CommandLog:
+    """Commands that were answered (``CommandEvent``), over all boots; ``booted_s``: when the present one began."""
+
+    events: list[Any] = field(default_factory=list)
+    booted_s: float = 0.0
+
+
+@dataclass
+class CommandTrouble:
+    """What befalls commands now, by a fault: ``commands``: their numbers (empty: all that are in the log).
+
+    ``lost``: they do not arrive; ``unanswered``: they are done, and their answer is lost; ``result``: the answer that
+    refuses them. ``left``: so many more of them; None: all.
+    """
+
+    commands: frozenset[int] = frozenset()
+    lost: bool = False
+    unanswered: bool = False
+    result: int | None = None
+    left: int | None = None
+
+    def befalls(self, command: int) -> bool:
+        """Whether it befalls this one; then it has one less left."""
+        if (self.commands and command not in self.commands) or self.left == 0:
+            return False
+        if self.left is not None:
+            self.left -= 1
+        return True
 
 
 @dataclass

@@ -33,6 +33,8 @@ from sitl.autopilot.state import (
     DRIVEN_MODES,
     AutoState,
     Clocks,
+    CommandLog,
+    CommandTrouble,
     FenceState,
     Mode,
     Proximity,
@@ -107,6 +109,9 @@ class Vehicle:
         self.fence = FenceState()
         self.smart_rtl = SmartRtl()
         self.rtl_arrival_said = False
+        self.command_log = CommandLog()
+        self.command_troubles: list[CommandTrouble] = []
+        """What befalls commands now."""
         self.complaints: set[tuple[int, str]] = set()
         """Complaints about a transfer that were made already: type of list, text."""
         self.onboard_controller: tuple[int, int, int] | None = None

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from companion.app import Status
 from companion.cli.entry import StoppedError
-from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
+from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, SkipUnknown, usable_settings
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
 from companion.executive.mission_progress import TargetStatus
@@ -62,6 +62,8 @@ def drive(
     params: options.Params = None,
     faults: options.Faults = None,
     time_limit_s: options.TimeLimitS = 3600.0,
+    skip_unknown: SkipUnknown = False,
+    laps: Laps = None,
     speedup: options.Speedup = None,
     view: options.View = False,
     web: Web = None,
@@ -83,12 +85,12 @@ def drive(
     try:
         painter, page = _painter(view), web_viewer(web, web_token, _warn, actions=web_actions)
         settings = usable_settings(settings_file)
-        mission = mission_to_drive(mission_file, OnWorld(world, start, target, resolution_m, top_left, prior))
-        mission = equipped(mission, sensors, params)
+        where = OnWorld(world, start, target, resolution_m, top_left, prior)
+        chosen = mission_to_drive(mission_file, where, skip_unknown=skip_unknown, laps=laps)
+        mission = equipped(chosen, sensors, params)
         refuse_blind(mission)
         scenario = simulated(mission, faults)
-        refuse_turning_on_the_spot(mission, scenario)
-        _note(scenario)
+        _note(refuse_turning_on_the_spot(mission, scenario))
         files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
         wanted.check((*files.values(), *mission.files))
         folder = context.with_resource(wanted.record_folder())

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.mission.load import load_mission
-from companion.mission.mission import Mission, MissionError
+from companion.mission.mission import Mission, MissionError, with_laps
 from companion.mission.sensor_tables import is_blind
 from sitl.map_mission import field_at, mission_in_world, mission_on_map
 from sitl.scenario import Scenario
@@ -25,15 +25,24 @@ class OnWorld:
     prior: bool
 
 
-def mission_to_drive(mission_file: Path | None, on: OnWorld) -> Mission:
-    """The mission to drive, from a file, from --world with --start and --target, or from both. Raises MissionError."""
+def mission_to_drive(
+    mission_file: Path | None, on: OnWorld, *, skip_unknown: bool = False, laps: int | None = None
+) -> Mission:
+    """The mission to drive, from a file, from --world with --start and --target, or from both. Raises MissionError.
+
+    ``skip_unknown``: without what no rover can do; ``laps``: so often.
+    """
+    return with_laps(_mission_to_drive(mission_file, on, skip_unknown=skip_unknown), laps)
+
+
+def _mission_to_drive(mission_file: Path | None, on: OnWorld, *, skip_unknown: bool) -> Mission:
     world = on.world
     if world is None:
         if mission_file is None:
             raise MissionError("drive: give a MISSION file, or --world MAP with --start X,Y and --target X,Y")
         if on.start or on.target or on.top_left or on.prior or on.resolution_m is not None:
             raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
-        return _driven_here(load_mission(mission_file))
+        return _driven_here(load_mission(mission_file, skip_unknown=skip_unknown))
     if on.prior and world.suffix.lower() == ".toml":
         raise MissionError(f"drive: --prior: {world} consists of shapes; the companion can read maps only")
     ground = ground_grid(world, on.resolution_m)
@@ -41,7 +50,9 @@ def mission_to_drive(mission_file: Path | None, on: OnWorld) -> Mission:
     if mission_file is not None:
         if on.target is not None:
             raise MissionError("drive: --target goes with --world alone; the mission has its own targets")
-        return mission_in_world(_driven_here(load_mission(mission_file)), world, ground, begin, prior=on.prior)
+        return mission_in_world(
+            _driven_here(load_mission(mission_file, skip_unknown=skip_unknown)), world, ground, begin, prior=on.prior
+        )
     if begin is None or on.target is None:
         raise MissionError("drive: --world without a mission needs --start X,Y and --target X,Y")
     end = field_at(ground, on.target, "--target", top_left=on.top_left)
@@ -66,11 +77,12 @@ def refuse_blind(mission: Mission) -> None:
         )
 
 
-def refuse_turning_on_the_spot(mission: Mission, scenario: Scenario) -> None:
-    """Refuse steered wheels that the companion does not know of. Raises MissionError."""
+def refuse_turning_on_the_spot(mission: Mission, scenario: Scenario) -> Scenario:
+    """The scenario, unless it has steered wheels that the companion does not know of. Raises MissionError."""
     if scenario.turning_radius_m > 0.0 and mission.rover.turning_radius_m <= 0.0:
         raise MissionError(
             f"{mission.source or mission.name}: the parameters are those of a rover with steered wheels: "
             f"give the mission [rover] turning_radius_m = {scenario.turning_radius_m:g}, "
             "or the companion would turn it on the spot"
         )
+    return scenario

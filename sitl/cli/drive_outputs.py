@@ -23,6 +23,7 @@ from companion.settings.versions import made_with
 from sitl.lockstep import Drive, Report
 from sitl.view.picture import save_picture
 
+LAPS_SHOWN = 20
 CONTACTS_SHOWN = 3
 """The table shows the first of them; --json has all."""
 
@@ -163,6 +164,10 @@ def print_summary(report: Report, console: Console) -> None:
     table = Table(title=f"outcome: {report.outcome}", show_header=False)
     for name, status in report.targets:
         table.add_row(f"target {name}", status)
+    for number, line in enumerate(report.commands):
+        table.add_row("commands" if number == 0 else "", line)
+    for number, line in enumerate(report.laps[-LAPS_SHOWN:]):
+        table.add_row("laps" if number == 0 else "", line)
     speed = report.distance_m / report.driving_time_s if report.driving_time_s else 0.0
     rows = {
         "collisions": _contacts_text(report),

@@ -52,7 +52,7 @@ def physics(
     clock = WallClock()
     link: ClientLink | None = None
     try:
-        mission = equipped(load_mission(mission_file), sensors, params)
+        mission = equipped(load_mission(mission_file, skip_unknown=True), sensors, params)
         scenario = scenario_from_mission(mission)
         behind = scenario.physics(seed, linked=mavlink is not None)
         _write_parameters(scenario, behind, write_params, (params, *mission.files))

@@ -136,7 +136,7 @@ def _scenario(
     mission_file: Path, sensors: str | None, params: Path | None, faults: Path | None
 ) -> tuple[str, Scenario]:
     """The mission's name and its simulation with the options; remarks are printed."""
-    mission = equipped(load_mission(mission_file), sensors, params)
+    mission = equipped(load_mission(mission_file, skip_unknown=True), sensors, params)
     scenario = simulated(mission, faults)
     for note in scenario.notes:
         typer.echo(note, err=True)

@@ -20,6 +20,7 @@ from rich.table import Table
 from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
 from companion.checkpoint.state_directory import StateDirectory
 from companion.checkpoint.state_writer import StateFile
+from companion.executive.mission_progress import MissionProgress
 from companion.mission.mission import DrivetrainSpec, Mission, SitlSpec
 from companion.recording.recorder import NullRecorder
 from companion.settings import Settings
@@ -128,6 +129,9 @@ class _InlineStateWriter:
     @property
     def problem(self) -> str:
         return self._file.problem
+
+    def holds(self, progress: MissionProgress) -> bool:
+        return self._file.holds(progress)
 
     def put(self, update: StateUpdate) -> None:
         self._file.apply(update)

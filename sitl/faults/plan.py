@@ -141,6 +141,20 @@ class BatteryLow(Fault):
 
 
 @dataclass(frozen=True, slots=True)
+class CommandFault(Fault):
+    """Commands for servos, relays, cameras and so on fail: ``effect`` says how.
+
+    ``commands``: MAV_CMD numbers, empty for all of them; ``result``: MAV_RESULT of a refusal; ``times``: so many of
+    them, None for all.
+    """
+
+    effect: Literal["refused", "lost", "unanswered"] = "refused"
+    commands: tuple[int, ...] = ()
+    result: int = 4
+    times: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class FaultPlan:
     """All faults of a run. ``seed``: combined with the run's own for the random draws of the faults."""
 

@@ -14,11 +14,12 @@ from sitl.autopilot.control.records import Record
 from sitl.autopilot.ekf import STEP_S
 from sitl.autopilot.modes import apply_sticks, report_ekf, set_mode
 from sitl.autopilot.start_up import HOME_S, ORIGIN_S, POSITION_S
-from sitl.autopilot.state import Mode, Sticks
+from sitl.autopilot.state import CommandTrouble, Mode, Sticks
 from sitl.autopilot.vehicle import Vehicle
 from sitl.faults.link_faults import Active, LinkQueue
 from sitl.faults.plan import (
     BatteryLow,
+    CommandFault,
     Fault,
     FaultPlan,
     GpsGlitch,
@@ -60,6 +61,7 @@ class FaultPlayer:
         self._noise_m = {i: (0.0, 0.0) for i, (fault, _) in enumerate(self._faults) if isinstance(fault, GpsNoise)}
         self._glitch_rad: dict[int, float] = {}
         self._mode_before: dict[int, Mode] = {}
+        self._troubles: dict[int, CommandTrouble] = {}
         self._was_started = False
         self.due_s = 0.0
         """Time at which ``step`` must be called next."""
@@ -155,6 +157,7 @@ class FaultPlayer:
         lidar: Defect | None = None
         beams: dict[int, Defect] = {}
         volts = math.inf
+        self._trouble(vehicle)
         for _, fault in self._active_faults():
             match fault:
                 case WheelSlip():
@@ -174,6 +177,23 @@ class FaultPlayer:
         rover["grip_1"], rover["grip_3"] = grips
         sensing.lidar_fault, sensing.beam_faults = lidar, beams
         vehicle.battery.fault_v = volts if math.isfinite(volts) else None
+
+    def _trouble(self, vehicle: Vehicle) -> None:
+        """What befalls commands now; each fault keeps its count over changes of others and over reboots."""
+        vehicle.command_troubles = [
+            self._troubles.setdefault(
+                number,
+                CommandTrouble(
+                    frozenset(fault.commands),
+                    lost=fault.effect == "lost",
+                    unanswered=fault.effect == "unanswered",
+                    result=fault.result if fault.effect == "refused" else None,
+                    left=fault.times,
+                ),
+            )
+            for number, fault in self._active_faults()
+            if isinstance(fault, CommandFault)
+        ]
 
     # GPS -------------------------------------------------------------------------------------------------------------
 

@@ -8,8 +8,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from sitl.autopilot.payload import RESULTS, command_of_name
 from sitl.faults.plan import (
     BatteryLow,
+    CommandFault,
     Direction,
     Fault,
     GpsGlitch,
@@ -243,6 +245,23 @@ class BatteryTable(FaultTable):
         return BatteryLow(**self.window(), volts=self.volts)
 
 
+class CommandTable(FaultTable):
+    """``command``: what befalls the mission's commands at the autopilot."""
+
+    effect: Literal["refused", "lost", "unanswered"]
+    commands: Annotated[list[str], Field(min_length=1, max_length=100)] | None = None
+    result: Literal["failed", "denied", "unsupported", "temporarily rejected"] = "failed"
+    times: Annotated[int, Field(ge=1, le=1_000_000)] | None = None
+
+    def fault(self) -> Fault:
+        """As a value. Raises ValueError for a command that is not known, and for a result of what is not refused."""
+        if self.effect != "refused" and "result" in self.model_fields_set:
+            raise ValueError('result goes with effect = "refused"; leave it out')
+        numbers = tuple(command_of_name(name) for name in self.commands or ())
+        result = next(number for number, name in RESULTS.items() if name == self.result)
+        return CommandFault(**self.window(), effect=self.effect, commands=numbers, result=result, times=self.times)
+
+
 KINDS: dict[str, type[FaultTable]] = {
     "packet_loss": Loss,
     "packet_delay": Delay,
@@ -259,6 +278,7 @@ KINDS: dict[str, type[FaultTable]] = {
     "sensor_silent": Silent,
     "wheel_slip": SlipTable,
     "battery_low": BatteryTable,
+    "command": CommandTable,
 }
 
 

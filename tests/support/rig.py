@@ -21,6 +21,7 @@ from companion.checkpoint.checkpointer import Checkpointer, StateUpdate
 from companion.checkpoint.state_directory import StateDirectory
 from companion.checkpoint.state_writer import StateFile
 from companion.executive.mission_executor import MissionExecutor
+from companion.executive.mission_progress import MissionProgress
 from companion.executive.warm_up import warm_up
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -393,6 +394,9 @@ class InlineStateWriter:
     @property
     def problem(self) -> str:
         return self._file.problem
+
+    def holds(self, progress: MissionProgress) -> bool:
+        return self._file.holds(progress)
 
     def put(self, update: StateUpdate) -> None:
         self._file.apply(update)

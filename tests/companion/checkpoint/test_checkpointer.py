@@ -52,6 +52,9 @@ class Writer:
         self.busy = False
         self.problem = ""
 
+    def holds(self, progress: MissionProgress) -> bool:
+        return True
+
     def put(self, update: StateUpdate) -> None:
         self.updates.append(update)
 
