@@ -19,8 +19,9 @@ import yaml
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
-from companion.core.frames import NedPoint
+from companion.core.frames import NedPoint, wrap_pi_rad
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Grid, Weights
+from companion.mapping.turned_map import turned, turned_size
 from companion.storage.files import open_file, read_bytes, why_no_file, write_whole
 
 MAX_FIELDS = 25_000_000
@@ -29,6 +30,7 @@ MAX_FIELDS = 25_000_000
 LARGEST = 1e9
 """No number in a map file has a reason to be larger."""
 
+NOT_TURNED_RAD = 1e-6
 MAX_TEXT_BYTES = 2 * MAX_FIELDS
 MAX_YAML_BYTES = 100_000
 IMAGE_SUFFIXES = (".png", ".pgm", ".bmp")
@@ -53,7 +55,8 @@ def load_map(path: Path, resolution_m: float | None = None) -> Grid:
     """Read a map; the suffix tells the format.
 
     ``resolution_m`` is the field size of maps that have none of their own (images, MovingAI), 1 m if not given; a ROS
-    yaml's own resolution always counts. ``Grid.south_west`` is the yaml's origin (x east, y north), else (0, 0).
+    yaml's own resolution always counts. ``Grid.south_west`` is the yaml's origin (x east, y north), else (0, 0); a map
+    that is turned there (yaw) is laid on a grid that looks north (``turned``).
     Raises MapError.
     """
     suffix = path.suffix.lower()
@@ -172,15 +175,17 @@ def _load_ros(path: Path) -> Grid:
     if not isinstance(origin, list) or len(origin) != 3:
         raise MapError(f"{path}: origin: expected [x, y, yaw], got {reprlib.repr(origin)}")
     east_m, north_m, yaw_rad = (_number(path, "origin", value) for value in origin)
-    if abs(yaw_rad) > 1e-6:
-        raise MapError(
-            f"{path}: origin: yaw {yaw_rad} rad: turned maps are not read; turn the picture and set yaw to 0"
-        )
     shades = _shades(path, fields)
     picture = path.parent / image
     if fault := why_no_file(picture):
         raise MapError(f"{path}: image: {picture}: {fault}")
-    return Grid(_weights_of(*_read_grey(picture), shades), resolution_m, NedPoint(north_m, east_m))
+    weights, corner = _weights_of(*_read_grey(picture), shades), NedPoint(north_m, east_m)
+    if abs(wrap_pi_rad(yaw_rad)) <= NOT_TURNED_RAD:
+        return Grid(weights, resolution_m, corner)
+    width, height = turned_size(weights.shape[1], weights.shape[0], yaw_rad)
+    if width * height > MAX_FIELDS:
+        raise MapError(f"{path}: origin: turned by {yaw_rad:g} rad it needs more than {MAX_FIELDS} fields")
+    return turned(weights, resolution_m, corner, yaw_rad)
 
 
 def _read_yaml(path: Path) -> dict[object, object]:
