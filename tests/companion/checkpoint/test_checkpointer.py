@@ -27,6 +27,7 @@ from companion.core.frames import GeoPoint, LocalFrame, Pose
 from companion.core.grid import Cell, empty_grid
 from companion.core.tick_marks import Mark
 from companion.executive.goal_driver import Tally
+from companion.executive.laps import LapStart, Odometer
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import MissionLayout, lay
 from companion.executive.mission_progress import MissionPhase, MissionProgress, plan_progress
@@ -92,6 +93,8 @@ class Executor:
     maps_begun: int = 0
     trail: Trail = field(default_factory=Trail)
     estimator: ModelEstimator = field(default_factory=lambda: ModelEstimator(AS_SHIPPED))
+    odometer: Odometer = field(default_factory=Odometer)
+    lap_start: LapStart | None = None
 
     @property
     def evidence(self) -> EvidenceMap:

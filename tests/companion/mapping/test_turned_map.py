@@ -105,7 +105,9 @@ def test_real_maps_keep_their_obstacles(name: str, tmp_path: Path) -> None:
     east, north = (x + 0.5) * plain.resolution_m, (y + 0.5) * plain.resolution_m
     cos, sin = math.cos(0.4), math.sin(0.4)
     there = [
-        grid.cell_at(NedPoint(plain.south_west.north_m + e * sin + n * cos, plain.south_west.east_m + e * cos - n * sin))
+        grid.cell_at(
+            NedPoint(plain.south_west.north_m + e * sin + n * cos, plain.south_west.east_m + e * cos - n * sin)
+        )
         for e, n in zip(east, north, strict=True)
     ]
     assert all(grid.is_obstacle(cell) for cell in there)

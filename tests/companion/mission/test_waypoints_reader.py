@@ -6,7 +6,7 @@ import pytest
 
 from companion.core.frames import GeoPoint
 from companion.mission.load import load_mission
-from companion.mission.mission import Area, HomePoint, Mission, MissionError
+from companion.mission.mission import HERE, Area, HomePoint, Mission, MissionError
 
 HOME = "0 1 0 16 0 0 0 0 53.1 23.1 140 1"
 
@@ -76,8 +76,9 @@ def test_speed_hold_loiter_delay_and_return(tmp_path: Path) -> None:
         ("waypoint 3", 24.0, 1.5),
         ("waypoint 6", 0.0, None),
         ("home", 0.0, None),
+        ("waypoint 8", 0.0, None),
     ]
-    assert mission.targets[-1].place == HomePoint(0.0, 0.0)
+    assert mission.targets[-2].place == HomePoint(0.0, 0.0) and mission.targets[-1].place == HERE
     assert any("NAV_LOITER_UNLIM (17)" in note for note in mission.notes)
 
 
@@ -100,9 +101,9 @@ def test_jumps_are_written_out(tmp_path: Path) -> None:
     ]
 
 
-def test_a_jump_counts_once_for_the_whole_mission(tmp_path: Path) -> None:
+def test_a_jump_that_has_let_the_mission_pass_counts_anew(tmp_path: Path) -> None:
     mission = load_mission(wpl(tmp_path, HOME, waypoint(1), do(2, 177, 1, 1), do(3, 177, 1, 1)))
-    assert len(mission.targets) == 3
+    assert len(mission.targets) == 4
 
 
 def test_a_jump_of_no_repeats_does_nothing_and_forward_jumps_leave_out(tmp_path: Path) -> None:
@@ -139,9 +140,13 @@ def test_fences_may_stand_after_the_items(tmp_path: Path) -> None:
         ([HOME], "target: there is none"),
         ([HOME, do(1, 22, lat=1, lon=1)], "item 1: NAV_TAKEOFF (22)"),
         ([HOME, waypoint(1), do(2, 21)], "item 2: NAV_LAND (21)"),
-        ([HOME, do(1, 18, 1, lat=1, lon=1)], "NAV_LOITER_TURNS (18)"),
+        ([HOME, do(1, 18, -1, lat=1, lon=1)], "item 1: NAV_LOITER_TURNS (18): -1 turns"),
+        ([HOME, do(1, 18, 1)], "item 1: NAV_LOITER_TURNS (18): the centre of its circle"),
+        ([HOME, waypoint(1), do(2, 194, 1)], "item 2: DO_SET_REVERSE (194): the companion drives forwards"),
+        ([HOME, waypoint(1), do(2, 42702)], "item 2: NAV_SCRIPT_TIME (42702): only the autopilot itself"),
         ([HOME, waypoint(1), do(2, 31999)], "item 2: command 31999"),
-        ([HOME, waypoint(1), do(2, 177, 1, -1)], "for ever"),
+        ([HOME, waypoint(1, lat=0, lon=0), do(2, 177, 1, -1)], "item 2: DO_JUMP (177): repeats for ever without"),
+        ([HOME, waypoint(1), do(2, 181, 1, 1), do(3, 177, 2, -1)], "item 3: DO_JUMP (177): repeats for ever without"),
         ([HOME, waypoint(1), do(2, 177, 7, 1)], "no item 7"),
         ([HOME, waypoint(1), do(2, 177, 0, 1)], "no item 0"),
         ([HOME, waypoint(1), do(2, 177, 2, 1)], "no item 2"),
@@ -152,9 +157,10 @@ def test_fences_may_stand_after_the_items(tmp_path: Path) -> None:
         ([HOME, do(1, 178, 2, 3), waypoint(2)], "kind 2"),
         ([HOME, waypoint(1, hold=-1)], "hold of -1"),
         ([HOME, waypoint(1, lat=91)], "91.0, 23.2 is not a latitude"),
-        ([HOME, waypoint(1, lat=0, lon=0)], "has no place"),
         ([HOME, "1 0 1 16 0 0 0 0 5 5 0 1"], "frame 1 (LOCAL_NED)"),
-        ([HOME, do(1, 93, 5), waypoint(2)], "delay before"),
+        ([HOME, waypoint(1), do(2, 112, 5), do(3, 93, 5)], "item 3: NAV_DELAY (93): a delay after a condition"),
+        ([HOME, waypoint(1), do(2, 112, -5)], "a condition of -5"),
+        ([HOME, waypoint(1), do(2, 601, 9, 1)], "no tag 9"),
         ([HOME, waypoint(1), do(2, 93, -1)], "time of day"),
         ([HOME, do(1, 17, lat=1, lon=1), waypoint(2)], "item 2: NAV_WAYPOINT (16): can never begin"),
         ([HOME, waypoint(1), do(2, 5002, 3, lat=1, lon=1)], "1 of its 3 corners"),
@@ -227,6 +233,7 @@ def test_a_leg_without_a_place_is_refused(tmp_path: Path) -> None:
     assert "item 1: NAV_GUIDED_ENABLE (92): has no place" in refusal(wpl(tmp_path, HOME, do(1, 92, 1)))
 
 
-def test_guided_that_is_switched_off_alone_is_not_understood(tmp_path: Path) -> None:
-    text = refusal(wpl(tmp_path, HOME, waypoint(1), guided(2, p1=0)))
-    assert text.startswith("item 2: NAV_GUIDED_ENABLE (92): not understood")
+def test_guided_that_is_switched_off_alone_begins_nothing(tmp_path: Path) -> None:
+    mission = load_mission(wpl(tmp_path, HOME, waypoint(1), guided(2, p1=0)))
+    assert names(mission) == ["waypoint 1"] and not mission.in_auto
+    assert mission.notes == ("item 2: NAV_GUIDED_ENABLE (92): begins nothing with p1 0, so it is not used",)

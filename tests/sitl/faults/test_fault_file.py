@@ -31,6 +31,7 @@ LEAST = {
     "gps_glitch": "metres = 5.0",
     "gps_noise": "metres = 0.5",
     "wheel_slip": "share = 0.5",
+    "command": 'effect = "lost"',
 }
 
 
