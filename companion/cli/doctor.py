@@ -19,10 +19,13 @@ from companion.control.model_estimate import ModelEstimate, described
 from companion.core.clock import WallClock
 from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
+from companion.diagnosis.payload import Command, parameters_of, payload
 from companion.executive.warm_up import kernels_warm
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import LinkError, open_link
+from companion.mission.load import load_mission
+from companion.mission.mission import MissionError
 from companion.settings import SettingsError
 from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
 from companion.vehicle.survey import Survey
@@ -41,18 +44,22 @@ def doctor(
     signing_key: Annotated[
         Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
     ] = None,
+    mission_file: Annotated[
+        Path | None, typer.Option("--mission", metavar="FILE", help="Also what the commands of this mission need.")
+    ] = None,
 ) -> None:
     """Say what would stop a mission. Exit code 0: nothing; 3: something would; 4: no rover heard; 2: bad input."""
     try:
         files = StateFiles(state)
         settings = usable_settings(settings_file)
         signer = files.signer(signing_key)
+        commands = _commands(mission_file)
         link = open_link(connect)
-    except (SettingsError, LinkError, OutputError, SigningKeyError) as error:
+    except (SettingsError, LinkError, MissionError, OutputError, SigningKeyError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     clock = WallClock()
-    examination = Surveyor(link, settings.link, PARAMETERS, signer)
+    examination = Surveyor(link, settings.link, (*PARAMETERS, *parameters_of(commands)), signer)
     now_s = began_s = clock.now_s()
     try:
         while not examination.done and now_s - began_s < seconds:
@@ -63,7 +70,8 @@ def doctor(
     finally:
         link.close()
         files.close()
-    findings = [*diagnose(seen), *kernels(cold=not kernels_warm(settings))]
+    beside = [*payload(seen, commands), *kernels(cold=not kernels_warm(settings))]
+    findings = [*diagnose(seen), *beside]
     estimate = last_estimate(state or default_directory(os.environ))
     if as_json:
         found = [asdict(one) for one in findings]
@@ -73,6 +81,15 @@ def doctor(
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
+
+
+def _commands(mission_file: Path | None) -> list[Command]:
+    """The mission's commands: their numbers and first parameters. Raises MissionError."""
+    if mission_file is None:
+        return []
+    mission = load_mission(mission_file, simulated=False, skip_unknown=True)
+    given = [*mission.commands, *(command for target in mission.targets for command in target.commands)]
+    return [(command.command, command.params[0] or 0.0) for command in given]
 
 
 def _summary(seen: Survey) -> dict[str, object]:

@@ -29,7 +29,14 @@ class Run:
 
 def tables_of(run: Run) -> list[Json]:
     """The tables of one run."""
-    return [_targets(run.tally), _figures(run), _stops(run.tally), _watchdogs(run.tally)]
+    done = (_commands(run.result), _laps(run.result))
+    return [
+        _targets(run.tally),
+        *(table for table in done if table["rows"]),
+        _figures(run),
+        _stops(run.tally),
+        _watchdogs(run.tally),
+    ]
 
 
 def differences(runs: Sequence[Run]) -> Json:
@@ -82,6 +89,23 @@ def _targets(tally: RunTally) -> Json:
         for leg in tally.legs
     ]
     return {"title": "Targets", "head": ["target", "status", "at s", "driven m", "straight m"], "rows": rows}
+
+
+def _commands(result: ReplayResult) -> Json:
+    """What became of each command of the mission."""
+    lines = [] if result.companion is None else result.companion.command_lines()
+    rows = [list(line.rsplit(": ", 1)) for line in lines]
+    return {"title": "Commands", "head": ["command", "result"], "rows": rows}
+
+
+def _laps(result: ReplayResult) -> Json:
+    """The laps of a patrol."""
+    laps = () if result.companion is None else result.companion.laps
+    rows = [
+        [f"{lap.number}", f"{lap.seconds:.0f}", f"{lap.driven_m:.0f}", ", ".join(lap.missed) or "none", f"{lap.failed}"]
+        for lap in laps
+    ]
+    return {"title": "Laps", "head": ["lap", "s", "m", "targets missed", "commands failed"], "rows": rows}
 
 
 def _figures(run: Run) -> Json:

@@ -1,4 +1,4 @@
-"""Log lines of a served simulator: clients that connect and disconnect, and collisions."""
+"""Log lines of a served simulator: clients that connect and disconnect, commands of missions, and collisions."""
 
 from __future__ import annotations
 
@@ -27,6 +27,7 @@ class EventLog:
         self._now_s = now_s
         self._heard_s: dict[tuple[str, str], float] = {}
         self._collisions = CollisionLog(warn or tell, now_s)
+        self._commands = 0
 
     def connected(self, client: str, url: str) -> None:
         """A client has connected."""
@@ -43,13 +44,18 @@ class EventLog:
         self._heard_s[client, url] = self._now_s()
 
     def look(self, simulator: Simulator) -> None:
-        """Report clients that have fallen silent, and collisions since the last look."""
+        """Report clients that have fallen silent, commands that were answered and collisions since the last look."""
         now_s = self._now_s()
         for (client, url), last_s in list(self._heard_s.items()):
             if now_s - last_s > SILENT_S:
                 del self._heard_s[client, url]
                 self._tell(f"{client} has been silent for {SILENT_S:g} s ({url})")
         self._collisions.look(simulator.collisions, simulator.start)
+        commands = simulator.commands
+        for event in commands[self._commands :]:
+            auto = " in AUTO" if event.in_auto else ""
+            self._tell(f"{event.name}{auto}: {event.result_name}")
+        self._commands = len(commands)
 
     def end(self, simulator: Simulator) -> None:
         """The last look: report the collisions that have not been told."""

@@ -133,7 +133,7 @@ def test_every_collision_is_told_of_with_its_place_once_a_second_and_at_the_end(
     simulator = open_ground()
     log.look(simulator)
     touched: list[Collision] = []
-    stand_in = SimpleNamespace(start=simulator.start, collisions=touched)
+    stand_in = SimpleNamespace(start=simulator.start, collisions=touched, commands=())
     start = simulator.start
     touched.append(Collision(61.3, start.north_m + 3.0, start.east_m - 1.5, None, 0.62))
     log.look(cast(Simulator, stand_in))
