@@ -332,13 +332,14 @@ def _command(item: Item, walk: _Walk) -> None:
     if item.command == mav.DO_SET_HOME:
         walk.home = place if place is not None and item.param(1) != 1.0 else _last_place(walk)
     condition, walk.condition = walk.condition, None
+    on_way = condition is not None or any(before.is_conditional for before in _commands_here(walk))
     command = DoCommand(
         item.command,
         given,
         place,
         frame,
         item.index,
-        after_s=walk.targets[-1].hold_s if walk.targets else 0.0,
+        after_s=0.0 if on_way or not walk.targets else walk.targets[-1].hold_s,
         delay_s=condition.delay_s if condition else None,
         within_m=condition.within_m if condition else None,
     )

@@ -17,6 +17,7 @@ from sitl.scenario import scenario_from_mission
 from sitl.simulator import Simulator
 from tests.support.records import recorded
 from tests.support.rig import GATE, GUIDED, HOLD, Rig, yard
+from tests.support.served import finished, mission_path, process, served
 from tests.support.shared_data import SHARED, needs_shared
 
 SERVO, RELAY, SPRAYER, CAMERA, GRIPPER = 183, 181, 216, 203, 211
@@ -156,3 +157,37 @@ def test_a_loop_that_leads_nowhere_does_not_spin(tmp_path: Path) -> None:
     rig.until(lambda: len(rig.companion.laps) == 1, 120.0)
     rig.run_for(8.0)
     assert len(rig.companion.laps) <= 3
+
+
+NEAR = """
+[[target]]
+name = "near"
+field = [4, 7]
+[[target.command]]
+name = "DO_SET_SERVO"
+params = [9, 1900]
+[[target]]
+name = "back"
+field = [2, 7]
+[[target.command]]
+name = "DO_GRIPPER"
+params = [1, 1]
+"""
+
+
+def test_two_programs_with_a_socket_between_them_and_a_state_on_the_disk(tmp_path: Path) -> None:
+    """The thread that saves the state lets each command go; the replay knows when that was."""
+    mission, record = yard(tmp_path, NEAR), tmp_path / "record"
+    with (
+        served(mission) as world,
+        process(
+            "companion", "run", mission_path(mission), "--connect", world.url, "--arm",
+            "--record", record, "--state", tmp_path / "state",
+        ) as run,
+    ):  # fmt: skip
+        code, out, err = finished(run)
+        events = [(event.command, event.result_name) for event in world.simulator.commands]
+    assert code == 0, err
+    assert set(events) == {(SERVO, "accepted"), (GRIPPER, "failed")}
+    assert "DO_SET_SERVO 9 1900 at near: accepted" in out and "DO_GRIPPER 1 1 at back: refused (failed)" in out
+    assert replay(load_record(record)).differences == []

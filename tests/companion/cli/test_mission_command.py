@@ -71,3 +71,27 @@ def test_a_mission_that_could_never_begin_is_refused(tmp_path: Path, north_m: fl
     result = CliRunner().invoke(app, ["mission", "check", str(path)])
     assert result.exit_code == 2 and result.output.count("\n") == 1
     assert str(path) in result.output and reason in result.output
+
+
+def test_commands_patrols_and_what_was_left_out(tmp_path: Path) -> None:
+    path = tmp_path / "m.waypoints"
+    rows = [
+        "0 0 0 16 0 0 0 0 53.1 23.1 0 1",
+        "1 0 3 22 0 0 0 0 53.1 23.1 5 1",
+        "2 0 3 16 3 0 0 0 53.1001 23.1 0 1",
+        "3 0 0 183 9 1900 0 0 0 0 0 1",
+        "4 0 0 114 5 0 0 0 0 0 0 1",
+        "5 0 3 201 0 0 0 0 53.2 23.2 0 1",
+        "6 0 0 177 2 -1 0 0 0 0 0 1",
+    ]
+    path.write_text("\n".join(["QGC WPL 110", *rows]))
+    refused = CliRunner().invoke(app, ["mission", "check", str(path)])
+    assert refused.exit_code == 2 and refused.output.endswith("--skip-unknown drives the rest\n")
+    output = CliRunner().invoke(app, ["mission", "check", str(path), "--skip-unknown"]).output
+    for text in (
+        "command: DO_SET_SERVO 9 1900 3 s after arrival at waypoint 2",
+        "command: DO_SET_ROI 0 0 (53.2000000, 23.2000000) within 5 m of the next target at waypoint 2",
+        "patrol: from waypoint 2 to waypoint 2 until somebody ends it",
+        "note: left out: item 1: NAV_TAKEOFF (22): no rover can do it",
+    ):
+        assert text in output

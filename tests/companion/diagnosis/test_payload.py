@@ -31,7 +31,7 @@ def test_what_would_be_refused_is_found() -> None:
     assert found["SERVO3_FUNCTION"].startswith("The mission sets servo 3")
 
 
-def test_a_rover_that_has_all_and_one_that_says_nothing_are_fine -> None:
+def test_a_rover_that_has_all_and_one_that_says_nothing_are_fine() -> None:
     fitted = {"SERVO9_FUNCTION": 28.0, "RELAY1_FUNCTION": 1.0, "RELAY1_PIN": 54.0, "GRIP_ENABLE": 1.0, "CAM1_TYPE": 1.0}
     assert list(payload(seen(**fitted), [(183, 9.0), (181, 0.0), (211, 0.0), (203, 0.0)])) == []
     assert list(payload(WELL, COMMANDS)) == []
