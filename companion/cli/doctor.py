@@ -25,7 +25,7 @@ from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import LinkError, open_link
 from companion.settings import SettingsError
 from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
-from companion.vehicle.survey import Survey
+from companion.vehicle.survey import RangeSource, Survey
 
 STEP_S = 0.05
 EXIT_FINE, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 3, 4
@@ -108,6 +108,8 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None)
         if estimate is not None and estimate.known > 0.0:
             line = f"last run: the rover followed velocities {described(estimate)}"
             console.print(line, soft_wrap=True, markup=False, highlight=False)
+        for one in seen.sources:
+            console.print(f"sensor: {_described(one)}", soft_wrap=True, markup=False, highlight=False)
     elif seen.unbelieved is not None:
         line = f"rover: system {seen.unbelieved}, on {seen.place}, heard but not believed"
         console.print(line, soft_wrap=True, markup=False)
@@ -119,6 +121,13 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None)
         console.print(table)
     stopping = sum(one.level is Level.STOP for one in findings)
     console.print(f"{stopping} would stop a mission" if stopping else "nothing found that would stop a mission")
+
+
+def _described(one: RangeSource) -> str:
+    """A range sensor in words."""
+    where = "" if one.orientation is None else f" facing {one.orientation}"
+    limits = f"{one.min_m:g} to {one.max_m:g} m, {one.rate_hz:.1f} Hz"
+    return f"{one.message} {one.sensor} of component {one.component}{where}, {limits}"
 
 
 def _plain(text: str) -> str:

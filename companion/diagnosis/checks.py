@@ -24,6 +24,8 @@ UNLIKELY = 4.0
 EKF_UNINITIALISED, EKF_GPS_GLITCH = 1024, 32768
 MAVLINK_SOURCE = 2
 """PRX1_TYPE that takes OBSTACLE_DISTANCE."""
+BODY_FRD = 12
+"""The MAV_FRAME of obstacle points."""
 NEAR_M, SHORT_M, FAR_M, SLOW_HZ = 0.6, 2.0, 120.0, 3.0
 """Limits of unusual range sensors: minimum above NEAR_M, maximum below SHORT_M or above FAR_M, rate below SLOW_HZ."""
 ARMING_COMPLAINTS = ("PreArm:", "Arm:")
@@ -243,9 +245,15 @@ def ranges(seen: Survey) -> Iterator[Finding]:
     for one in sensors:
         name = f"{one.message} {one.sensor} of component {one.component}"
         yield from _limits(name, one.min_m, one.max_m)
-        if one.blind:
+        if one.frame not in (None, BODY_FRD):
+            says = f"{name} is in frame {one.frame}: such points are not used."
+            yield Finding("points-frame", Level.WARN, says, "have its driver send MAV_FRAME_BODY_FRD (12)")
+        elif one.blind:
             yield Finding(
-                "range-unknown", Level.WARN, f"{name} knows nothing: all readings are invalid.", "look at the sensor"
+                "range-unknown",
+                Level.WARN,
+                f"{name} knows nothing: all readings are invalid.",
+                "look at the sensor; of points, at their heights (docs/depth-cameras.md)",
             )
         elif one.rate_hz < SLOW_HZ:
             says = f"{name} comes at {one.rate_hz:.1f} Hz; after a second without, the rover stops."

@@ -13,7 +13,7 @@ class RangeSource:
     """A range sensor, as its messages describe it.
 
     ``sector``: one of the autopilot's own 45 degree sectors. ``orientation`` as in DISTANCE_SENSOR; None for a scanning
-    sensor (OBSTACLE_DISTANCE). ``blind``: no valid reading so far.
+    sensor (OBSTACLE_DISTANCE, or points of OBSTACLE_DISTANCE_3D). ``blind``: no valid reading so far.
     """
 
     message: str
@@ -25,6 +25,8 @@ class RangeSource:
     rate_hz: float
     sector: bool = False
     blind: bool = False
+    frame: int | None = None
+    """MAV_FRAME of obstacle points; None for other messages."""
 
 
 @dataclass(frozen=True, slots=True)
