@@ -108,8 +108,8 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None)
         if estimate is not None and estimate.known > 0.0:
             line = f"last run: the rover followed velocities {described(estimate)}"
             console.print(line, soft_wrap=True, markup=False, highlight=False)
-        for one in seen.sources:
-            console.print(f"sensor: {_described(one)}", soft_wrap=True, markup=False, highlight=False)
+        for source in seen.sources:
+            console.print(f"sensor: {_described(source)}", soft_wrap=True, markup=False, highlight=False)
     elif seen.unbelieved is not None:
         line = f"rover: system {seen.unbelieved}, on {seen.place}, heard but not believed"
         console.print(line, soft_wrap=True, markup=False)
@@ -119,6 +119,8 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None)
         table.add_row(f"[{COLOURS[one.level]}]{one.level}[/]", _plain(f"{one.says}{value}"), _plain(one.remedy))
     if findings:
         console.print(table)
+    if any(one.wanted is not None for one in findings):
+        console.print("`rover-companion params --write FILE` writes a file with all parameters that should be set")
     stopping = sum(one.level is Level.STOP for one in findings)
     console.print(f"{stopping} would stop a mission" if stopping else "nothing found that would stop a mission")
 

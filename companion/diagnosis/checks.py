@@ -19,6 +19,7 @@ FIRMWARE = (4, 7)
 ROVER, BOAT = 10, 11
 ARDUPILOT = 3
 LOST_SHARE = 0.1
+DAMAGED_SHARE, SOME_BYTES = 0.05, 500
 UNLIKELY = 4.0
 """A rover is not driven at less than a fourth of what it could."""
 EKF_UNINITIALISED, EKF_GPS_GLITCH = 1024, 32768
@@ -100,6 +101,23 @@ def others(seen: Survey) -> Iterator[Finding]:
         yield Finding("several-autopilots", Level.WARN, says, remedy)
     if seen.rover_heard and seen.signing:
         yield Finding("signing", Level.WARN, f"{seen.signing}.", "see docs/signing.md")
+
+
+def port(seen: Survey) -> Iterator[Finding]:
+    """Whether another program takes bytes from this port, or something else damages them."""
+    if seen.rivals:
+        who = " and ".join(seen.rivals)
+        says = f"{who} has the same port open: each of the programs takes bytes away from the others."
+        yield Finding("port-shared", Level.STOP, says, "stop it, or let a router share the port: docs/ports.md")
+    elif seen.read_bytes >= SOME_BYTES and seen.bad_bytes > DAMAGED_SHARE * seen.read_bytes:
+        share = round(100.0 * seen.bad_bytes / seen.read_bytes)
+        says = f"{share} % of the {seen.read_bytes} bytes on {seen.place} belong to no valid packet."
+        remedy = (
+            "look at baud rate and cable, and as root whether another program has the port open (docs/ports.md)"
+            if _is_serial(seen)
+            else "look what else sends there, and at the line behind it"
+        )
+        yield Finding("port-damaged", Level.WARN, says, remedy)
 
 
 def identity(seen: Survey) -> Iterator[Finding]:
@@ -402,6 +420,7 @@ def station_of(seen: Survey) -> tuple[str, float] | None:
 
 
 CHECKS = (
+    port,
     others,
     identity,
     firmware,
@@ -422,7 +441,7 @@ CHECKS = (
 def diagnose(seen: Survey) -> list[Finding]:
     """All findings, the gravest first."""
     if not seen.rover_heard:
-        return [*nobody(seen), *others(seen)]
+        return [*port(seen), *nobody(seen), *others(seen)]
     findings = [finding for check in CHECKS for finding in check(seen)]
     order = list(Level)
     return sorted(findings, key=lambda finding: order.index(finding.level))
@@ -432,5 +451,5 @@ def kernels(cold: bool) -> list[Finding]:
     """``cold``: kernels would have to be compiled before a run."""
     if not cold:
         return []
-    remedy = "begin a run once, or `rover-sitl drive`, where a minute's wait does not matter"
+    remedy = "`rover-companion compile`: a minute, several on a Raspberry Pi"
     return [Finding("kernels-cold", Level.WARN, "The planner is not compiled yet on this computer.", remedy)]

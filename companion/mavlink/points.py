@@ -55,7 +55,7 @@ class _Open:
     look: Look
     heard_s: float
     told: bool = False
-    range_m: NDArray[np.float64] = field(default_factory=lambda: np.full(SECTORS, np.nan))
+    range_m: NDArray[np.float64] = field(default_factory=lambda: np.full(SECTORS, np.nan, dtype=np.float64))
 
 
 class PointJoiner:
@@ -123,7 +123,7 @@ def _told(one: _Open, key: tuple[int, int]) -> RangeScan | None:
         return None
     one.told = True
     part = slice(known[0], known[-1] + 1)
-    bearing_rad = (np.arange(SECTORS) + 0.5) * SECTOR_RAD - math.pi
+    bearing_rad = (np.arange(SECTORS, dtype=np.float64) + 0.5) * SECTOR_RAD - math.pi
     limits = (one.look.min_m, one.look.max_m)
     sender, kind = key
     source = f"obstacle points {kind}"

@@ -17,6 +17,7 @@ from companion.mavlink.decode import ROVERS
 from companion.mavlink.framing import AUTOPILOT, Packet
 from companion.mavlink.points import Band
 from companion.mavlink.rates import RateRequester, wanted_rates
+from companion.mavlink.serial_port import rivals_of
 from companion.mavlink.signing import Signer, remedy
 from companion.settings import LinkSettings
 from companion.vehicle.commands import Command, ReadParameter, RequestMessage, RunPrearmChecks
@@ -34,6 +35,8 @@ PARAMETER_S = 0.05
 """The time between parameter requests, so that a slow line is not flooded,"""
 TRIES = 5
 """and how often an unanswered one is repeated."""
+RIVALS_S = 2.0
+"""How often it is looked which other programs have the device open."""
 MOST_TEXTS, MOST_SOURCES, MOST_SYSTEMS = 32, 64, 32
 GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 ASKED = (
@@ -81,7 +84,9 @@ class Surveyor:
         self._version: tuple[int, int, int] | None = None
         self._sources: dict[tuple[int, int, int], _Heard] = {}
         self._texts: dict[str, None] = {}
-        self._packets = 0
+        self._packets = self._bytes = 0
+        self._rivals: dict[int, str] = {}
+        self._rivals_s = -math.inf
         self._unbelieved: int | None = None
         self._now_s = 0.0
 
@@ -93,7 +98,12 @@ class Surveyor:
     def step(self, now_s: float) -> None:
         """Listen, and send the questions that are due."""
         self._now_s = now_s
-        for packet in self._codec.packets(self._link.read()):
+        data = self._link.read()
+        self._bytes += len(data)
+        if now_s >= self._rivals_s:
+            self._rivals_s = now_s + RIVALS_S
+            self._rivals.update((user.pid, str(user)) for user in rivals_of(self._link))
+        for packet in self._codec.packets(data):
             self._packets += 1
             if not self._codec.accepts(packet):
                 self._overhear(packet)
@@ -138,6 +148,9 @@ class Surveyor:
             unbelieved=self._unbelieved,
             lost=counters.lost,
             packets=self._packets,
+            bad_bytes=counters.bad_bytes,
+            read_bytes=self._bytes,
+            rivals=tuple(self._rivals.values()),
         )
 
     # Asking -------------------------------------------------------------------------------------------------------

@@ -78,3 +78,9 @@ class Survey:
     """The system id of a rover whose packets are refused, because they are not signed with the companion's key."""
     lost: int = 0
     packets: int = 0
+    bad_bytes: int = 0
+    """Bytes that belong to no packet,"""
+    read_bytes: int = 0
+    """of so many that were read."""
+    rivals: tuple[str, ...] = ()
+    """Other programs that have the serial device open, in words."""
