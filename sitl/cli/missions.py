@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import shutil
-import sysconfig
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
@@ -13,7 +14,7 @@ import typer
 from companion.cli.inputs import EXIT_BAD_INPUT
 
 SOURCE = Path(__file__).resolve().parents[2] / "missions"
-INSTALLED = ("share", "rover-companion", "missions")
+PACKAGE, ONE = "rover-companion", "rooms.toml"
 
 
 def missions(
@@ -31,13 +32,19 @@ def missions(
     for file in sorted((*folder.glob("*.toml"), *folder.glob("first-drive/*.toml"))):
         if "target" in tomllib.loads(file.read_text(encoding="utf-8")):
             typer.echo(f"  {file.relative_to(folder)}")
-    typer.echo(f"rover-sitl drive {folder / 'rooms.toml'} drives one")
+    typer.echo(f"rover-sitl drive {folder / ONE} drives one")
 
 
 def shipped() -> Path | None:
-    """The folder of the shipped missions: beside the sources, or installed with a wheel; None if there is none."""
-    places = (SOURCE, Path(sysconfig.get_path("data")).joinpath(*INSTALLED))
-    return next((place for place in places if (place / "rooms.toml").is_file()), None)
+    """The folder of the shipped missions: beside the sources, or where a wheel has put it; None if there is none."""
+    return next((file.parent for file in _places() if file.is_file()), None)
+
+
+def _places() -> Iterator[Path]:
+    yield SOURCE / ONE
+    for file in importlib.metadata.files(PACKAGE) or ():
+        if file.name == ONE:
+            yield Path(str(file.locate())).resolve()
 
 
 def _copy(folder: Path, place: Path) -> None:
@@ -47,4 +54,4 @@ def _copy(folder: Path, place: Path) -> None:
         what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         typer.echo(f"{place}: cannot be made: {what}; name a folder that is not there yet", err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    typer.echo(f"copied to {place}; rover-sitl drive {place / 'rooms.toml'} drives one")
+    typer.echo(f"copied to {place}; rover-sitl drive {place / ONE} drives one")
