@@ -136,8 +136,7 @@ def run(
                 if record
                 else NullRecorder()
             )
-            link = source.link()
-            _tell_rivals(link, say)
+            link = _opened(source, say)
             with console.status("loading the planner ..."):
                 _load_planner(settings, mission, say)
             link.read()  # drop what has piled up meanwhile
@@ -165,10 +164,12 @@ def _told_place(recorder: Recorder | NullRecorder, asked: Path | None, say: Call
     return place
 
 
-def _tell_rivals(link: ByteLink, say: Callable[[str], None]) -> None:
-    """Name the other programs that have the same serial port open."""
+def _opened(source: Source, say: Callable[[str], None]) -> ByteLink:
+    """The link; names the other programs that have the same serial port open. Raises LinkError."""
+    link = source.link()
     for user in rivals_of(link):
         say(f"{link.description}: {user} has this port open too, and takes bytes away; see docs/ports.md")
+    return link
 
 
 def _load_planner(settings: Settings, mission: Mission, say: Callable[[str], None]) -> None:

@@ -63,6 +63,8 @@ class WantedParameter:
 
     def accepts(self, value: float) -> bool:
         """Whether the rover's value will do."""
+        if not math.isfinite(value):
+            return False
         match self.rule:
             case Rule.EQUAL:
                 return math.isclose(value, self.judged_by, rel_tol=SAME, abs_tol=SAME)

@@ -91,7 +91,9 @@ def test_our_own_ports_and_what_is_no_port_have_no_users(tmp_path: Path) -> None
     with socket.socket(type=socket.SOCK_DGRAM) as own:
         own.bind(("127.0.0.1", 0))
         assert port_users.of_port("udp", own.getsockname()[1]) == ()
-    assert port_users.of_device(str(tmp_path)) == port_users.of_device("/dev/none") == port_users.of_device("a\0b") == ()
+    assert (
+        port_users.of_device(str(tmp_path)) == port_users.of_device("/dev/none") == port_users.of_device("a\0b") == ()
+    )
 
 
 @pytest.mark.parametrize(
