@@ -80,7 +80,7 @@ def test_compared_with_the_rover(tmp_path: Path) -> None:
         check = ["--check", "--connect", served.url, "--state", tmp_path / "state"]
         answer = params(*check)
         assert answer.exit_code == 0 and answer.output.endswith("all 11 are as wanted\n"), answer.output
-        served.simulator._vehicle.parameters["GUID_OPTIONS"] = 64.0
+        assert served.simulator._vehicle.parameters.set("GUID_OPTIONS", 64.0)
         answer = params(*check, "--guard", "--json")
     finally:
         served.close()

@@ -1,4 +1,4 @@
-"""Obstacle points end to end: the simulated sensor publishes them, the companion drives by them, replays repeat them."""
+"""Obstacle points end to end: the simulator publishes them, the companion drives by them, replays repeat them."""
 
 from __future__ import annotations
 
