@@ -13,6 +13,7 @@ from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE, full_throttl
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
 from companion.vehicle.survey import Survey
+from companion.vehicle.wanted_parameters import S_CURVES
 
 FIRMWARE = (4, 7)
 """The version of ArduRover that this was written for and measured with."""
@@ -31,8 +32,6 @@ NEAR_M, SHORT_M, FAR_M, SLOW_HZ = 0.6, 2.0, 120.0, 3.0
 """Limits of unusual range sensors: minimum above NEAR_M, maximum below SHORT_M or above FAR_M, rate below SLOW_HZ."""
 ARMING_COMPLAINTS = ("PreArm:", "Arm:")
 """How ArduPilot's texts about arming begin; MAVLink has no other sign of what a STATUSTEXT is about."""
-S_CURVES = 64
-"""Bit of GUID_OPTIONS."""
 RADIUS_M = 2.0
 STICKS = {"RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0}
 """The channels that the companion reads."""

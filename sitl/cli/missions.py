@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.metadata
 import shutil
 import tomllib
@@ -42,9 +43,10 @@ def shipped() -> Path | None:
 
 def _places() -> Iterator[Path]:
     yield SOURCE / ONE
-    for file in importlib.metadata.files(PACKAGE) or ():
-        if file.name == ONE:
-            yield Path(str(file.locate())).resolve()
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        for file in importlib.metadata.files(PACKAGE) or ():
+            if file.name == ONE:
+                yield Path(str(file.locate())).resolve()
 
 
 def _copy(folder: Path, place: Path) -> None:

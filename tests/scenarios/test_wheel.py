@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import sysconfig
+import tomllib
 from importlib.metadata import version
 from pathlib import Path
 from zipfile import ZipFile
@@ -53,7 +54,8 @@ def test_a_wheel_installs_and_drives(tmp_path: Path) -> None:
         assert done.returncode == 0, done.stderr
         return done.stdout
 
-    assert said("rover-companion", "--version") == f"rover-companion {version('rover-companion')}\n"
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"]
+    assert said("rover-companion", "--version") == f"rover-companion {told}\n"
     listed = said("rover-sitl", "missions")
     assert listed.startswith(f"in {place / 'share' / 'rover-companion' / 'missions'}:")
     mission = place / "share" / "rover-companion" / "missions" / "first-drive" / "five-metres.toml"
