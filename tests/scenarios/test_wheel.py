@@ -10,6 +10,7 @@ import sysconfig
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
+from venv import create
 from zipfile import ZipFile
 
 import pytest
@@ -41,13 +42,18 @@ def test_a_wheel_installs_and_drives(tmp_path: Path) -> None:
         names = set(packed.namelist())
     assert {"companion/vehicle/guard.lua", "companion/viewer/page/index.html", "companion/py.typed"} <= names
     assert not any("tests" in name.split("/")[:1] for name in names)
-    subprocess.run([*pip, "install", "--no-deps", "--no-index", "--prefix", place, wheel], check=True, timeout=300)
-    packages = Path(sysconfig.get_path("purelib", vars={"base": str(place), "platbase": str(place)}))
-    # The kernels of the sources serve: a kernel counts by its text. Then only what the wheel brings is missing.
-    environment = {**os.environ, "PYTHONPATH": str(packages), "PYTHONSAFEPATH": "1"}
+    # An environment of its own: pip would take the program that is under test out of this one.
+    create(place, with_pip=False)
+    python = place / "bin" / "python"
+    install = [*pip, "--python", python, "install", "--no-deps", "--no-index", wheel]
+    subprocess.run(install, check=True, timeout=300)
+    ours = sysconfig.get_path("purelib", vars={"base": str(place), "platbase": str(place)})
+    # What it needs is that of this environment; what the wheel brings comes before it.
+    (Path(ours) / "needs.pth").write_text(f"{sysconfig.get_path('purelib')}\n", encoding="utf-8")
+    environment = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
 
     def said(script: str, *words: str) -> str:
-        command = [sys.executable, place / "bin" / script, *words]
+        command = [place / "bin" / script, *words]
         done = subprocess.run(
             command, env=environment, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
         )
