@@ -8,9 +8,11 @@ import typer
 
 from companion.cli import mission
 from companion.cli.bench import bench
+from companion.cli.compile import compile_kernels
 from companion.cli.doctor import doctor
 from companion.cli.guard import guard
 from companion.cli.inputs import version_option
+from companion.cli.params import params
 from companion.cli.plan import plan
 from companion.cli.replay import replay
 from companion.cli.report import report
@@ -25,6 +27,8 @@ app = typer.Typer(
 
 app.command()(run)
 app.command()(doctor)
+app.command("compile")(compile_kernels)
+app.command()(params)
 app.command()(guard)
 app.command()(plan)
 app.command()(replay)

@@ -28,7 +28,7 @@ from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.settings import SettingsError
 from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
-from companion.vehicle.survey import Survey
+from companion.vehicle.survey import RangeSource, Survey
 
 STEP_S = 0.05
 EXIT_FINE, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 3, 4
@@ -125,6 +125,8 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None)
         if estimate is not None and estimate.known > 0.0:
             line = f"last run: the rover followed velocities {described(estimate)}"
             console.print(line, soft_wrap=True, markup=False, highlight=False)
+        for source in seen.sources:
+            console.print(f"sensor: {_described(source)}", soft_wrap=True, markup=False, highlight=False)
     elif seen.unbelieved is not None:
         line = f"rover: system {seen.unbelieved}, on {seen.place}, heard but not believed"
         console.print(line, soft_wrap=True, markup=False)
@@ -134,8 +136,17 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None)
         table.add_row(f"[{COLOURS[one.level]}]{one.level}[/]", _plain(f"{one.says}{value}"), _plain(one.remedy))
     if findings:
         console.print(table)
+    if any(one.wanted is not None for one in findings):
+        console.print("`rover-companion params --write FILE` writes a file with all parameters that should be set")
     stopping = sum(one.level is Level.STOP for one in findings)
     console.print(f"{stopping} would stop a mission" if stopping else "nothing found that would stop a mission")
+
+
+def _described(one: RangeSource) -> str:
+    """A range sensor in words."""
+    where = "" if one.orientation is None else f" facing {one.orientation}"
+    limits = f"{one.min_m:g} to {one.max_m:g} m, {one.rate_hz:.1f} Hz"
+    return f"{one.message} {one.sensor} of component {one.component}{where}, {limits}"
 
 
 def _plain(text: str) -> str:

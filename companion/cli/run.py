@@ -30,6 +30,7 @@ from companion.executive.warm_up import COMPILING, kernels_warm, settle, warm_up
 from companion.mapping.map_files import MapError
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
+from companion.mavlink.serial_port import rivals_of
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError
 from companion.mission.mission import Mission, MissionError, with_laps
@@ -137,7 +138,7 @@ def run(
                 if record
                 else NullRecorder()
             )
-            link = source.link()
+            link = _opened(source, say)
             with console.status("loading the planner ..."):
                 _load_planner(settings, mission, say)
             link.read()  # drop what has piled up meanwhile
@@ -163,6 +164,14 @@ def _told_place(recorder: Recorder | NullRecorder, asked: Path | None, say: Call
     if place != asked:
         say(f"{asked} has a record already; this one goes to {place}")
     return place
+
+
+def _opened(source: Source, say: Callable[[str], None]) -> ByteLink:
+    """The link; names the other programs that have the same serial port open. Raises LinkError."""
+    link = source.link()
+    for user in rivals_of(link):
+        say(f"{link.description}: {user} has this port open too, and takes bytes away; see docs/ports.md")
+    return link
 
 
 def _load_planner(settings: Settings, mission: Mission, say: Callable[[str], None]) -> None:

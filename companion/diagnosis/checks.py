@@ -13,23 +13,25 @@ from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE, full_throttl
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
 from companion.vehicle.survey import Survey
+from companion.vehicle.wanted_parameters import S_CURVES
 
 FIRMWARE = (4, 7)
 """The version of ArduRover that this was written for and measured with."""
 ROVER, BOAT = 10, 11
 ARDUPILOT = 3
 LOST_SHARE = 0.1
+DAMAGED_SHARE, SOME_BYTES = 0.05, 500
 UNLIKELY = 4.0
 """A rover is not driven at less than a fourth of what it could."""
 EKF_UNINITIALISED, EKF_GPS_GLITCH = 1024, 32768
 MAVLINK_SOURCE = 2
 """PRX1_TYPE that takes OBSTACLE_DISTANCE."""
+BODY_FRD = 12
+"""The MAV_FRAME of obstacle points."""
 NEAR_M, SHORT_M, FAR_M, SLOW_HZ = 0.6, 2.0, 120.0, 3.0
 """Limits of unusual range sensors: minimum above NEAR_M, maximum below SHORT_M or above FAR_M, rate below SLOW_HZ."""
 ARMING_COMPLAINTS = ("PreArm:", "Arm:")
 """How ArduPilot's texts about arming begin; MAVLink has no other sign of what a STATUSTEXT is about."""
-S_CURVES = 64
-"""Bit of GUID_OPTIONS."""
 RADIUS_M = 2.0
 STICKS = {"RCMAP_ROLL": 1.0, "RCMAP_THROTTLE": 3.0}
 """The channels that the companion reads."""
@@ -98,6 +100,23 @@ def others(seen: Survey) -> Iterator[Finding]:
         yield Finding("several-autopilots", Level.WARN, says, remedy)
     if seen.rover_heard and seen.signing:
         yield Finding("signing", Level.WARN, f"{seen.signing}.", "see docs/signing.md")
+
+
+def port(seen: Survey) -> Iterator[Finding]:
+    """Whether another program takes bytes from this port, or something else damages them."""
+    if seen.rivals:
+        who = " and ".join(seen.rivals)
+        says = f"{who} has the same port open: each of the programs takes bytes away from the others."
+        yield Finding("port-shared", Level.STOP, says, "stop it, or let a router share the port: docs/ports.md")
+    elif seen.read_bytes >= SOME_BYTES and seen.bad_bytes > DAMAGED_SHARE * seen.read_bytes:
+        share = round(100.0 * seen.bad_bytes / seen.read_bytes)
+        says = f"{share} % of the {seen.read_bytes} bytes on {seen.place} belong to no valid packet."
+        remedy = (
+            "look at baud rate and cable, and as root whether another program has the port open (docs/ports.md)"
+            if _is_serial(seen)
+            else "look what else sends there, and at the line behind it"
+        )
+        yield Finding("port-damaged", Level.WARN, says, remedy)
 
 
 def identity(seen: Survey) -> Iterator[Finding]:
@@ -243,9 +262,15 @@ def ranges(seen: Survey) -> Iterator[Finding]:
     for one in sensors:
         name = f"{one.message} {one.sensor} of component {one.component}"
         yield from _limits(name, one.min_m, one.max_m)
-        if one.blind:
+        if one.frame not in (None, BODY_FRD):
+            says = f"{name} is in frame {one.frame}: such points are not used."
+            yield Finding("points-frame", Level.WARN, says, "have its driver send MAV_FRAME_BODY_FRD (12)")
+        elif one.blind:
             yield Finding(
-                "range-unknown", Level.WARN, f"{name} knows nothing: all readings are invalid.", "look at the sensor"
+                "range-unknown",
+                Level.WARN,
+                f"{name} knows nothing: all readings are invalid.",
+                "look at the sensor; of points, at their heights (docs/depth-cameras.md)",
             )
         elif one.rate_hz < SLOW_HZ:
             says = f"{name} comes at {one.rate_hz:.1f} Hz; after a second without, the rover stops."
@@ -394,6 +419,7 @@ def station_of(seen: Survey) -> tuple[str, float] | None:
 
 
 CHECKS = (
+    port,
     others,
     identity,
     firmware,
@@ -414,7 +440,7 @@ CHECKS = (
 def diagnose(seen: Survey) -> list[Finding]:
     """All findings, the gravest first."""
     if not seen.rover_heard:
-        return [*nobody(seen), *others(seen)]
+        return [*port(seen), *nobody(seen), *others(seen)]
     findings = [finding for check in CHECKS for finding in check(seen)]
     order = list(Level)
     return sorted(findings, key=lambda finding: order.index(finding.level))
@@ -424,5 +450,5 @@ def kernels(cold: bool) -> list[Finding]:
     """``cold``: kernels would have to be compiled before a run."""
     if not cold:
         return []
-    remedy = "begin a run once, or `rover-sitl drive`, where a minute's wait does not matter"
+    remedy = "`rover-companion compile`: a minute, several on a Raspberry Pi"
     return [Finding("kernels-cold", Level.WARN, "The planner is not compiled yet on this computer.", remedy)]

@@ -13,6 +13,7 @@ from companion.core.tick_marks import Mark
 from companion.mavlink.decode import MISSION_ACK_COMMAND, Decoder
 from companion.mavlink.encode import EncodeError, Encoder, command_number
 from companion.mavlink.framing import AUTOPILOT, MAGIC_V2, SIGNED, Framer, Packet
+from companion.mavlink.points import Band
 from companion.mavlink.signing import Recorded, Refused, Signer, trouble
 from companion.settings import LinkSettings
 from companion.vehicle.commands import Command
@@ -54,7 +55,8 @@ class Codec:
     ) -> None:
         """``companion``: the component whose guard is listened for; None: this one itself."""
         self._framer = Framer()
-        self._decoder = Decoder(system_id, settings.component_id, companion)
+        band = Band(settings.points_above_m, settings.points_below_m)
+        self._decoder = Decoder(system_id, settings.component_id, band, companion)
         self._encoder = Encoder(settings.setpoint, settings.component_id, signer)
         self._signer = signer
         self._recorded = recorded

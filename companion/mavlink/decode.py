@@ -11,6 +11,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from companion.core.frames import GeoPoint
 from companion.mavlink import positions, ranges, requests
 from companion.mavlink.framing import AUTOPILOT, Packet
+from companion.mavlink.points import Band
 from companion.mavlink.positions import point_of
 from companion.mavlink.ranges import RangeDecoder
 from companion.mavlink.statustext import TextAssembler
@@ -69,8 +70,11 @@ MIN_GUARD_MS, MAX_GUARD_MS = 50.0, 5000.0
 class Decoder:
     """Turns packets into events; keeps the vehicle's id, its clock and the last packets."""
 
-    def __init__(self, system_id: int, component_id: int, companion: int | None = None) -> None:
-        """``companion``: the component whose guard counts; None: this one itself."""
+    def __init__(self, system_id: int, component_id: int, band: Band, companion: int | None = None) -> None:
+        """``band``: the heights of obstacle points that count.
+
+        ``companion``: the component whose guard counts; None: this one itself.
+        """
         self.system_id = system_id
         self.component_id = component_id
         self.vehicle_known = False
@@ -87,7 +91,7 @@ class Decoder:
         self.lost = 0
         self._newest_ms: dict[int, int] = {}
         self._texts = TextAssembler()
-        self._ranges = RangeDecoder()
+        self._ranges = RangeDecoder(band)
         self._guards_name = guard.name_of(component_id if companion is None else companion)
         self._readers: dict[int, Callable[[Any, float], Event | None]] = {
             mavlink.MAVLINK_MSG_ID_BATTERY_STATUS: _battery_status,
@@ -116,7 +120,14 @@ class Decoder:
         }
 
     def decode(self, packet: Packet, time_s: float) -> list[Event]:
-        """The events of one packet; none if it is of no interest, from another system, repeated or too old."""
+        """The events of one packet, after those of obstacle points that are complete with earlier bytes.
+
+        None of its own if it is of no interest, from another system, repeated or too old.
+        """
+        whole = [RangeSeen(scan.time_s, scan) for scan in self._ranges.complete(time_s)]
+        return [*whole, *self._of_packet(packet, time_s)]
+
+    def _of_packet(self, packet: Packet, time_s: float) -> list[Event]:
         if packet.message_id == mavlink.MAVLINK_MSG_ID_HEARTBEAT and not self.vehicle_known:
             self._learn_vehicle(packet)
         if packet.message_id in requests.PARAMETER_REQUESTS and self.vehicle_known:
@@ -217,7 +228,7 @@ class Decoder:
 
     def _range(self, packet: Packet, time_s: float) -> list[Event]:
         scan = self._ranges.scan(self._message(packet), time_s, packet.component_id)
-        return [] if scan is None else [RangeSeen(time_s, scan)]
+        return [] if scan is None else [RangeSeen(scan.time_s, scan)]
 
     def _rangefinder(self, message: Any, time_s: float) -> Event | None:
         scan = self._ranges.rangefinder(message, time_s)

@@ -1,4 +1,6 @@
-"""Range messages as RangeScan: DISTANCE_SENSOR, OBSTACLE_DISTANCE and RANGEFINDER, without the autopilot's echoes.
+"""Range messages as RangeScan, without the autopilot's echoes.
+
+Those are DISTANCE_SENSOR, OBSTACLE_DISTANCE, RANGEFINDER, and through ``points`` OBSTACLE_DISTANCE_3D.
 
 Rules (ArduRover's behaviour and the MAVLink definitions; where these are ambiguous, the safe interpretation):
 
@@ -25,10 +27,12 @@ import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.scan import RangeScan
+from companion.mavlink import points
 from companion.mavlink.framing import AUTOPILOT
+from companion.mavlink.points import Band, PointJoiner
 from companion.perception.scan_filter import MOST_SCANS, Sensor, sensor_of
 
-MESSAGES = (mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE)
+MESSAGES = (mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE, points.MESSAGE)
 FORGOTTEN_S = 5.0
 """At most MOST_SCANS sensors are used, first come, first served; one that is silent for this long loses its place."""
 ECHO_S = 2.0
@@ -51,7 +55,9 @@ RANGEFINDER_MIN_M, RANGEFINDER_TRUST_M = 0.2, 5.0
 class RangeDecoder:
     """Decodes range messages and leaves out echoes; remembers when each source was heard last."""
 
-    def __init__(self) -> None:
+    def __init__(self, band: Band) -> None:
+        """``band``: the heights of points that count."""
+        self._points = PointJoiner(band)
         self._first_s: float | None = None
         self._lidar_s = -math.inf
         self._other_range_s = -math.inf
@@ -67,22 +73,41 @@ class RangeDecoder:
             self._first_s = time_s
 
     def scan(self, message: Any, time_s: float, sender: int) -> RangeScan | None:
-        """The scan of one of ``MESSAGES``; None when it is an echo, useless, or from one sensor too many."""
-        cells = message.get_msgId() == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
-        sector = not cells and sender == AUTOPILOT and is_sector(message)
-        scan = obstacle_distance(message, time_s) if cells else distance_sensor(message, time_s, sector=sector)
+        """The scan of one of ``MESSAGES``; None when it is an echo, useless, or from one sensor too many.
+
+        Of points it is the scan of the look before; ``complete`` gives those that no other point has ended.
+        """
+        number = message.get_msgId()
+        if number == points.MESSAGE:
+            return self._with_place(self._points.add(message, time_s, sender), finer=True)
+        if number == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
+            return self._with_place(_from(sender, obstacle_distance(message, time_s)), finer=True)
+        sector = sender == AUTOPILOT and is_sector(message)
+        scan = _from(sender, distance_sensor(message, time_s, sector=sector))
         if scan is None or (sector and self._is_echo(message.orientation, scan)):
             return None
-        scan = replace(scan, sender=sender)
-        if not self._has_place(sensor_of(scan), time_s):
-            return None
-        self._other_range_s = time_s
-        if cells:
-            self._lidar_s = time_s
-        elif not sector:
+        scan = self._with_place(scan, coarse=sector)
+        if scan is not None and not sector:
             self._beam_s[message.orientation] = time_s
-        if not sector:
-            self._seen_s.update((octant, time_s) for octant in _octants(scan))
+        return scan
+
+    def complete(self, time_s: float) -> list[RangeScan]:
+        """The scans of points whose look is complete at the first bytes of a later time."""
+        whole = [self._with_place(scan, finer=True) for scan in self._points.complete(time_s)]
+        return [scan for scan in whole if scan is not None]
+
+    def _with_place(self, scan: RangeScan | None, *, finer: bool = False, coarse: bool = False) -> RangeScan | None:
+        """The scan, if there is a place for its sensor; notes what it tells about echoes.
+
+        ``finer``: it is as fine as a lidar's; ``coarse``: it is a sector.
+        """
+        if scan is None or not self._has_place(sensor_of(scan), scan.time_s):
+            return None
+        self._other_range_s = scan.time_s
+        if finer:
+            self._lidar_s = scan.time_s
+        if not coarse:
+            self._seen_s.update((octant, scan.time_s) for octant in _octants(scan))
         return scan
 
     def _is_echo(self, orientation: int, sector: RangeScan) -> bool:
@@ -208,6 +233,10 @@ def _scan(
         bearing_rad = (bearing_rad[:, None] + offsets).ravel()
         range_m = np.repeat(range_m, beams)
     return RangeScan(time_s, bearing_rad, range_m, min_range_m, max_range_m, width_rad / beams, source)
+
+
+def _from(sender: int, scan: RangeScan | None) -> RangeScan | None:
+    return None if scan is None else replace(scan, sender=sender)
 
 
 def _octants(scan: RangeScan) -> set[int]:

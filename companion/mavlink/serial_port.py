@@ -8,17 +8,19 @@ import termios
 import serial
 
 from companion.core.clock import Clock
-from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, LinkError, OutBuffer
+from companion.mavlink import port_users
+from companion.mavlink.byte_link import MAX_READ_BYTES, BackOff, ByteLink, LinkError, OutBuffer
+from companion.mavlink.port_users import PortUser, in_words
 
 REASONS = {
     errno.ENOENT: "there is no such device; check the cable and `ls /dev/tty*`",
     errno.EISDIR: "it is a directory, no serial port; see `ls /dev/tty*`",
     errno.EACCES: "no permission; add yourself to the group 'dialout'",
     errno.EPERM: "no permission; add yourself to the group 'dialout'",
-    errno.EAGAIN: "another program uses it; stop that one",
-    errno.EBUSY: "another program uses it; stop that one",
 }
 """Why a port cannot be opened, and the remedy."""
+IN_USE = (errno.EAGAIN, errno.EBUSY)
+SHARE = "docs/ports.md says how several programs share one port"
 
 
 class SerialLink:
@@ -38,7 +40,7 @@ class SerialLink:
         try:
             self._port = self._open()
         except (OSError, ValueError, OverflowError) as error:
-            raise LinkError(f"{self._name}: cannot be opened: {_reason(error)}") from error
+            raise LinkError(f"{self._name}: cannot be opened: {_reason(error, device)}") from error
 
     @property
     def _name(self) -> str:
@@ -48,6 +50,11 @@ class SerialLink:
     def description(self) -> str:
         """The link in words."""
         return self._name if self._port is not None else f"{self._name} (not there)"
+
+    @property
+    def rivals(self) -> tuple[PortUser, ...]:
+        """The other programs that have the device open now: each takes bytes away from the others."""
+        return port_users.of_device(self._device)
 
     def read(self) -> bytes:
         """The bytes that have arrived; opens the port again if it was lost."""
@@ -105,8 +112,15 @@ class SerialLink:
             self._port = None
 
 
-def _reason(error: Exception) -> str:
+def rivals_of(link: ByteLink) -> tuple[PortUser, ...]:
+    """The other programs that have the link's device open; none for links without a device."""
+    return link.rivals if isinstance(link, SerialLink) else ()
+
+
+def _reason(error: Exception, device: str) -> str:
     """pyserial's error in words, with the remedy."""
+    if isinstance(error, OSError) and error.errno in IN_USE:
+        return f"{in_words(port_users.of_device(device))} uses it; stop that one ({SHARE})"
     if isinstance(error, OSError) and error.errno in REASONS:
         return REASONS[error.errno]
     if isinstance(error, ValueError | OverflowError):

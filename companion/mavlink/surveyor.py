@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from companion.core.severity import Severity
-from companion.mavlink import ranges
+from companion.mavlink import points, ranges
 from companion.mavlink.byte_link import ByteLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.decode import ROVERS
 from companion.mavlink.framing import AUTOPILOT, Packet
+from companion.mavlink.points import Band
 from companion.mavlink.rates import RateRequester, wanted_rates
+from companion.mavlink.serial_port import rivals_of
 from companion.mavlink.signing import Signer, remedy
 from companion.settings import LinkSettings
 from companion.vehicle.commands import Command, ReadParameter, RequestMessage, RunPrearmChecks
@@ -32,6 +35,8 @@ PARAMETER_S = 0.05
 """The time between parameter requests, so that a slow line is not flooded,"""
 TRIES = 5
 """and how often an unanswered one is repeated."""
+RIVALS_S = 2.0
+"""How often it is looked which other programs have the device open."""
 MOST_TEXTS, MOST_SOURCES, MOST_SYSTEMS = 32, 64, 32
 GEOFENCE = mavlink.MAV_SYS_STATUS_GEOFENCE
 ASKED = (
@@ -39,6 +44,16 @@ ASKED = (
     mavlink.MAVLINK_MSG_ID_GPS_GLOBAL_ORIGIN,
     mavlink.MAVLINK_MSG_ID_HOME_POSITION,
 )
+
+
+@dataclass(slots=True)
+class _Heard:
+    """What was heard of a range sensor: since when, its newest message, and how many of them."""
+
+    first_s: float
+    message: Any
+    count: int = 0
+    blind: bool = True
 
 
 class Surveyor:
@@ -53,6 +68,7 @@ class Surveyor:
         self._codec = Codec(
             settings.model_copy(update={"component_id": other}), signer=signer, companion=self._companion
         )
+        self._band = Band(settings.points_above_m, settings.points_below_m)
         self._rates = RateRequester(wanted_rates(settings))
         self._mav: Any = mavlink.MAVLink(None)
         self._names = tuple(names)
@@ -66,9 +82,11 @@ class Surveyor:
         self._systems: set[int] = set()
         self._companion_heard = self._breached = False
         self._version: tuple[int, int, int] | None = None
-        self._sources: dict[tuple[int, int, int], list[Any]] = {}
+        self._sources: dict[tuple[int, int, int], _Heard] = {}
         self._texts: dict[str, None] = {}
-        self._packets = 0
+        self._packets = self._bytes = 0
+        self._rivals: dict[int, str] = {}
+        self._rivals_s = -math.inf
         self._unbelieved: int | None = None
         self._now_s = 0.0
 
@@ -80,7 +98,12 @@ class Surveyor:
     def step(self, now_s: float) -> None:
         """Listen, and send the questions that are due."""
         self._now_s = now_s
-        for packet in self._codec.packets(self._link.read()):
+        data = self._link.read()
+        self._bytes += len(data)
+        if now_s >= self._rivals_s:
+            self._rivals_s = now_s + RIVALS_S
+            self._rivals.update((user.pid, str(user)) for user in rivals_of(self._link))
+        for packet in self._codec.packets(data):
             self._packets += 1
             if not self._codec.accepts(packet):
                 self._overhear(packet)
@@ -125,6 +148,9 @@ class Surveyor:
             unbelieved=self._unbelieved,
             lost=counters.lost,
             packets=self._packets,
+            bad_bytes=counters.bad_bytes,
+            read_bytes=self._bytes,
+            rivals=tuple(self._rivals.values()),
         )
 
     # Asking -------------------------------------------------------------------------------------------------------
@@ -168,7 +194,7 @@ class Surveyor:
         if packet.system_id != self._codec.system_id or not self._codec.vehicle_known:
             return
         match packet.message_id:
-            case mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR | mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
+            case number if number in ranges.MESSAGES:
                 self._range(packet)
             case mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION if packet.component_id == AUTOPILOT:
                 number = self._message(packet).flight_sw_version
@@ -195,34 +221,47 @@ class Surveyor:
         self._companion_heard |= packet.component_id == self._companion and packet.system_id == self._codec.system_id
 
     def _range(self, packet: Packet) -> None:
+        """Notes a range message; of points with the same time stamp the first counts as the message."""
         message = self._message(packet)
-        cells = packet.message_id == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
-        key = (packet.message_id, packet.component_id, message.sensor_type if cells else message.id)
+        beams = packet.message_id == mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR
+        key = (packet.message_id, packet.component_id, message.id if beams else message.sensor_type)
         if key not in self._sources and len(self._sources) >= MOST_SOURCES:
             return
-        scan = (
-            ranges.obstacle_distance(message, self._now_s)
-            if cells
-            else ranges.distance_sensor(message, self._now_s, sector=False)
+        seen = self._sources.setdefault(key, _Heard(self._now_s, message))
+        new = (
+            seen.count == 0 or packet.message_id != points.MESSAGE or message.time_boot_ms != seen.message.time_boot_ms
         )
-        seen = self._sources.setdefault(key, [self._now_s, 0, True, message])
-        seen[1] += 1
-        seen[2] = seen[2] and scan is None
-        seen[3] = message
+        seen.count += new
+        seen.blind = seen.blind and not self._says_something(message)
+        seen.message = message
 
-    def _source(self, key: tuple[int, int, int], seen: list[Any]) -> RangeSource:
-        first_s, count, blind, message = seen
-        cells = key[0] == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE
+    def _says_something(self, message: Any) -> bool:
+        """Whether a range message holds a reading."""
+        match message.get_msgId():
+            case points.MESSAGE:
+                look = points.look_of(message)
+                return look is not None and points.seen_at(message, look, self._band) is not None
+            case mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
+                return ranges.obstacle_distance(message, self._now_s) is not None
+            case _:
+                return ranges.distance_sensor(message, self._now_s, sector=False) is not None
+
+    def _source(self, key: tuple[int, int, int], seen: _Heard) -> RangeSource:
+        number, component, sensor = key
+        message = seen.message
+        beam = number == mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR
+        unit_m = 1.0 if number == points.MESSAGE else 0.01
         return RangeSource(
-            message="OBSTACLE_DISTANCE" if cells else "DISTANCE_SENSOR",
-            component=key[1],
-            sensor=key[2],
-            orientation=None if cells else message.orientation,
-            min_m=message.min_distance / 100.0,
-            max_m=message.max_distance / 100.0,
-            rate_hz=(count - 1) / max(self._now_s - first_s, 1e-3),
-            sector=not cells and key[1] == AUTOPILOT and ranges.is_sector(message),
-            blind=blind,
+            message=message.get_type(),
+            component=component,
+            sensor=sensor,
+            orientation=message.orientation if beam else None,
+            min_m=message.min_distance * unit_m,
+            max_m=message.max_distance * unit_m,
+            rate_hz=(seen.count - 1) / max(self._now_s - seen.first_s, 1e-3),
+            sector=beam and component == AUTOPILOT and ranges.is_sector(message),
+            blind=seen.blind,
+            frame=message.frame if number == points.MESSAGE else None,
         )
 
     def _message(self, packet: Packet) -> Any:

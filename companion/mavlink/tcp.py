@@ -155,7 +155,7 @@ class TcpServerLink:
             self._listener.listen(1)
         except OSError as error:
             self._listener.close()
-            raise cannot_listen(self._name, error) from error
+            raise cannot_listen(self._name, error, "tcp", port) from error
 
     @property
     def description(self) -> str:

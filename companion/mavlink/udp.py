@@ -7,6 +7,7 @@ import socket
 from typing import Any
 
 from companion.mavlink.byte_link import MAX_READ_BYTES, LinkError
+from companion.mavlink.port_users import in_words, of_port
 
 Address = tuple[Any, ...]
 MAX_PEERS = 8
@@ -25,11 +26,13 @@ def resolve(host: str, port: int, kind: socket.SocketKind, what: str) -> tuple[s
     return family, address
 
 
-def cannot_listen(what: str, error: OSError) -> LinkError:
-    """The error for an address that is in use or is not this computer's."""
+def cannot_listen(what: str, error: OSError, kind: str, port: int) -> LinkError:
+    """The error for an address that is in use or is not this computer's; ``kind``: tcp or udp."""
     remedy = "stop the other program or choose another port"
     if error.errno == errno.EADDRNOTAVAIL:
         remedy = "this computer has no such address, 0.0.0.0 listens on all it has"
+    elif error.errno == errno.EADDRINUSE and (users := of_port(kind, port)):
+        remedy = f"{in_words(users)} has it; stop that one or choose another port (docs/ports.md)"
     return LinkError(f"{what}: cannot listen: {error.strerror}; {remedy}")
 
 
@@ -52,7 +55,7 @@ class UdpLink:
                 self._socket.bind(address)
             except OSError as error:
                 self._socket.close()
-                raise cannot_listen(self._name, error) from error
+                raise cannot_listen(self._name, error, "udp", port) from error
 
     @property
     def description(self) -> str:

@@ -54,6 +54,7 @@ class LidarTable(SensorTable):
     increment_deg: Annotated[float, Field(gt=0.0, le=180.0)]
     sectors: Annotated[int, Field(ge=1, le=72)] = 72
     rays: Annotated[int, Field(ge=1, le=20)] = 1
+    message: Literal["sectors", "points"] = "sectors"
 
     @model_validator(mode="after")
     def _round(self) -> LidarTable:

@@ -346,6 +346,15 @@ class LinkSettings(Section):
     range_rate_hz: float = Field(
         10.0, gt=0.0, le=50.0, description="requested: DISTANCE_SENSOR and RANGEFINDER, if there are any"
     )
+    points_above_m: float = Field(
+        1.0, gt=0.0, le=10.0, description="OBSTACLE_DISTANCE_3D: points higher above the rover's origin say nothing"
+    )
+    points_below_m: float = Field(
+        0.1,
+        ge=-10.0,
+        le=10.0,
+        description="the same for points lower than this below it: the ground; negative: a height above it",
+    )
     figures_hz: float = Field(
         1.0,
         ge=0.0,

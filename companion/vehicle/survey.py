@@ -13,7 +13,7 @@ class RangeSource:
     """A range sensor, as its messages describe it.
 
     ``sector``: one of the autopilot's own 45 degree sectors. ``orientation`` as in DISTANCE_SENSOR; None for a scanning
-    sensor (OBSTACLE_DISTANCE). ``blind``: no valid reading so far.
+    sensor (OBSTACLE_DISTANCE, or points of OBSTACLE_DISTANCE_3D). ``blind``: no valid reading so far.
     """
 
     message: str
@@ -25,6 +25,8 @@ class RangeSource:
     rate_hz: float
     sector: bool = False
     blind: bool = False
+    frame: int | None = None
+    """MAV_FRAME of obstacle points; None for other messages."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,3 +78,9 @@ class Survey:
     """The system id of a rover whose packets are refused, because they are not signed with the companion's key."""
     lost: int = 0
     packets: int = 0
+    bad_bytes: int = 0
+    """Bytes that belong to no packet,"""
+    read_bytes: int = 0
+    """of so many that were read."""
+    rivals: tuple[str, ...] = ()
+    """Other programs that have the serial device open, in words."""

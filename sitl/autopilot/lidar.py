@@ -14,14 +14,17 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.channel import new_codec, packed
 from sitl.autopilot.framing import Framer
-from sitl.autopilot.proximity import take_in
+from sitl.autopilot.proximity import BODY_FRAME, take_in
 from sitl.autopilot.routing import AUTOPILOT
 from sitl.autopilot.vehicle import Vehicle
-from sitl.sensors.range_sensors import Defect, Lidar, RangeSensing
+from sitl.sensors.range_sensors import UNKNOWN, Defect, Lidar, RangeSensing
 
 OBSTACLE_AVOIDANCE = 196
 
 HEARTBEAT_US = 1_000_000
+
+NO_NUMBER = 65535
+"""Points are not tracked."""
 
 
 class Scanner:
@@ -53,8 +56,25 @@ class Scanner:
             if self._sensing.lidar_fault is not Defect.SILENT:
                 self._waiting.append((time_us + self._late_us, cells))
         while self._waiting and self._waiting[0][0] <= time_us + 0.5:
-            messages.append(self._message(time_us, self._waiting.popleft()[1]))
+            cells = self._waiting.popleft()[1]
+            messages += self._points(time_us, cells) if self._lidar.as_points else [self._message(time_us, cells)]
         return messages
+
+    def _points(self, time_us: int, cells: list[int]) -> list[Any]:
+        """A scan as points at the sensor's own height; where nothing was seen, at its maximum."""
+        lidar, points = self._lidar, []
+        for number, cell in enumerate(cells):
+            if cell == UNKNOWN:
+                continue
+            range_m = min(cell / 100.0, lidar.max_m)
+            bearing_rad = math.radians(lidar.offset_deg + number * lidar.increment_deg)
+            place = (range_m * math.cos(bearing_rad), range_m * math.sin(bearing_rad), 0.0)
+            points.append(
+                mavlink.MAVLink_obstacle_distance_3d_message(
+                    time_us // 1000, 0, BODY_FRAME, NO_NUMBER, *place, lidar.min_m, lidar.max_m
+                )
+            )
+        return points
 
     def _message(self, time_us: int, cells: list[int]) -> Any:
         """A delayed scan carries the time at which it is sent: few drivers know how old a scan is."""

@@ -9,6 +9,7 @@ import typer
 from companion.cli.inputs import version_option
 from sitl.cli.drive import drive
 from sitl.cli.experiment import experiment
+from sitl.cli.missions import missions
 from sitl.cli.physics import physics
 from sitl.cli.serve import serve
 
@@ -28,4 +29,5 @@ def options(version: Annotated[bool, version_option("rover-sitl")] = False) -> N
 app.command()(drive)
 app.command()(serve)
 app.command()(physics)
+app.command()(missions)
 app.command()(experiment)

@@ -56,6 +56,8 @@ class Lidar:
     """Rays spread over a sector; the shortest counts."""
     sectors: int = SECTORS
     flaws: Flaws = NO_FLAWS
+    as_points: bool = False
+    """Whether it publishes a point for each sector, as depth cameras do (OBSTACLE_DISTANCE_3D)."""
 
     def bearings_rad(self) -> NDArray[np.float64]:
         """Shape (sectors, rays): every ray's bearing from straight ahead."""

@@ -29,7 +29,7 @@ def _flaws(table: SensorTable) -> Flaws:
 def _lidar(table: LidarTable) -> Lidar:
     return Lidar(
         table.increment_deg, table.first_deg, table.min_m, table.max_m, table.rate_hz, table.rays, table.sectors,
-        _flaws(table),
+        _flaws(table), table.message == "points",
     )  # fmt: skip
 
 

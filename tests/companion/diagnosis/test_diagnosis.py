@@ -26,11 +26,13 @@ from companion.vehicle.events import (
 )
 from companion.vehicle.state import VehicleState
 from companion.vehicle.survey import Autopilot, RangeSource, SlowMessage, Survey
+from companion.vehicle.wanted_parameters import wanted_parameters
 
 HERE = GeoPoint(53.0, 23.0)
 SCAN = RangeSeen(0.0, RangeScan(0.0, np.array([0.0]), np.array([3.0]), 0.1, 8.0, 0.1, "x"))
 LIDAR = RangeSource("OBSTACLE_DISTANCE", 196, 0, None, 0.1, 8.0, 10.0)
 BEAM = RangeSource("DISTANCE_SENSOR", 1, 0, 0, 0.2, 20.0, 10.0)
+CAMERA = RangeSource("OBSTACLE_DISTANCE_3D", 196, 4, None, 0.3, 6.0, 10.0, frame=12)
 WELL_SET = {
     "OA_TYPE": 0.0, "AVOID_ENABLE": 0.0, "GUID_OPTIONS": 0.0, "GUID_TIMEOUT": 3.0, "WP_RADIUS": 1.0, "WP_SPEED": 2.0,
     "WP_JERK": 3.0, "PRX1_TYPE": 0.0, "RNGFND1_TYPE": 0.0, "FS_GCS_ENABLE": 1.0, "FENCE_ENABLE": 0.0,
@@ -90,6 +92,11 @@ CASES: list[tuple[str, Level, Survey]] = [
     ("cruise-throttle", W, with_set(CRUISE_SPEED=1.0, CRUISE_THROTTLE=75.0)),
     ("cruise-throttle", W, with_set(CRUISE_SPEED=3.0, CRUISE_THROTTLE=0.0)),
     ("guard", N, with_state(guard=None)),
+    ("port-shared", S, replace(WELL, rivals=("cat (process 7)",), bad_bytes=900, read_bytes=1000)),
+    ("port-damaged", W, replace(WELL, bad_bytes=60, read_bytes=1000)),
+    ("points-frame", W, replace(WELL, sources=(replace(CAMERA, frame=1, blind=True),))),
+    ("range-unknown", W, replace(WELL, sources=(replace(CAMERA, blind=True),))),
+    ("range-slow", W, replace(WELL, sources=(replace(CAMERA, rate_hz=1.0),))),
     ("wp-speed", W, with_set(WP_SPEED=0.0)),
     ("echo", N, with_set(PRX1_TYPE=2.0)),
     ("gcs-failsafe", N, with_set(FS_GCS_ENABLE=0.0)),
@@ -161,6 +168,23 @@ def test_one_fault_is_one_finding(name: str, level: Level, seen: Survey) -> None
     if finding.wanted is not None:
         assert finding.remedy == f"set {finding.parameter} to {finding.wanted:g}"
         assert finding.value == seen.parameters[finding.parameter] != finding.wanted
+
+
+def test_few_bytes_or_few_of_them_bad_are_no_finding() -> None:
+    assert diagnose(replace(WELL, bad_bytes=49, read_bytes=1000)) == []
+    assert diagnose(replace(WELL, bad_bytes=100, read_bytes=400)) == []
+
+
+def test_a_port_that_is_shared_is_told_though_no_rover_is_heard() -> None:
+    names = [one.name for one in diagnose(Survey("serial:/dev/ttyACM0:115200", rivals=("cat (process 7)",)))]
+    assert names == ["port-shared", "no-autopilot"]
+
+
+@pytest.mark.parametrize("name", ["OA_TYPE", "AVOID_ENABLE", "GUID_TIMEOUT", "WP_RADIUS", "WP_JERK", "RCMAP_ROLL"])
+def test_the_doctor_and_the_table_of_wanted_parameters_agree(name: str) -> None:
+    (wanted,) = (one for one in wanted_parameters(2.0) if one.name == name)
+    for value in (0.0, 1.0, 2.0, 2.5, 3.0, 3.5, 7.0):
+        assert wanted.accepts(value) == (diagnose(with_set(**{name: value})) == []), f"{name} {value}"
 
 
 def test_what_is_to_be_set_keeps_the_other_bits() -> None:

@@ -230,6 +230,8 @@ OPENED_OTHERWISE = {
     "companion/viewer/server.py": "the program's own files",
     "sitl/experiments/experiment.py": "the program's own files",
     "sitl/scenario.py": "World.open",
+    "companion/mavlink/port_users.py": "/proc",
+    "sitl/cli/missions.py": "the program's own files",
 }
 
 

@@ -1,0 +1,59 @@
+"""``rover-sitl missions``: where the shipped missions are, and a copy of them to change."""
+
+from __future__ import annotations
+
+import contextlib
+import importlib.metadata
+import shutil
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from companion.cli.inputs import EXIT_BAD_INPUT
+
+SOURCE = Path(__file__).resolve().parents[2] / "missions"
+PACKAGE, ONE = "rover-companion", "rooms.toml"
+
+
+def missions(
+    copy: Annotated[Path | None, typer.Option(help="Copy them, with all that they need, to this new folder.")] = None,
+) -> None:
+    """List the shipped missions, or copy them. Exit code 2: they are not there, or cannot be copied."""
+    folder = shipped()
+    if folder is None:
+        typer.echo("the shipped missions are not installed; they are in the folder missions of the sources", err=True)
+        raise typer.Exit(EXIT_BAD_INPUT)
+    if copy is not None:
+        _copy(folder, copy)
+        return
+    typer.echo(f"in {folder}:")
+    for file in sorted((*folder.glob("*.toml"), *folder.glob("first-drive/*.toml"))):
+        if "target" in tomllib.loads(file.read_text(encoding="utf-8")):
+            typer.echo(f"  {file.relative_to(folder)}")
+    typer.echo(f"rover-sitl drive {folder / ONE} drives one")
+
+
+def shipped() -> Path | None:
+    """The folder of the shipped missions: beside the sources, or where a wheel has put it; None if there is none."""
+    return next((file.parent for file in _places() if file.is_file()), None)
+
+
+def _places() -> Iterator[Path]:
+    yield SOURCE / ONE
+    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
+        for file in importlib.metadata.files(PACKAGE) or ():
+            if file.name == ONE:
+                yield Path(str(file.locate())).resolve()
+
+
+def _copy(folder: Path, place: Path) -> None:
+    try:
+        shutil.copytree(folder, place, ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    except (OSError, shutil.Error) as error:
+        what = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+        typer.echo(f"{place}: cannot be made: {what}; name a folder that is not there yet", err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+    typer.echo(f"copied to {place}; rover-sitl drive {place / ONE} drives one")
