@@ -32,3 +32,5 @@ class Mark(IntFlag):
     """Some packets had been refused by then because their signature was too old or had been seen before."""
     UNSAVED = 512
     """The last attempt to save the state of the run failed."""
+    LIDAR = 1024
+    """Bytes of a lidar that is wired to the companion were heard; they stand in a file of their own."""

@@ -71,8 +71,8 @@ def _chord(scan, i, share):
 
 
 @njit(cache=True, nogil=True)
-def cast_scan(log_odds, stamps, stamp, scan, model, protected, radius_cells):
-    """Add one scan to the evidence, and free the cells within ``radius_cells`` of the sensor, where the rover stands.
+def cast_scan(log_odds, stamps, stamp, scan, model, protected, stands):
+    """Add one scan to the evidence, and free the cells where the rover ``stands``: its place, x and y, and its radius.
 
     The cells ``protected`` are not freed: shape (n, 2), x and y, all of them on the map.
     """
@@ -112,6 +112,7 @@ def cast_scan(log_odds, stamps, stamp, scan, model, protected, radius_cells):
                 if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
                     stamps[y, x] = stamp
                     log_odds[y, x] = max(log_odds[y, x] - model.miss, -model.free_limit)
+    x0, y0, radius_cells = stands
     r = int(math.ceil(radius_cells))
     for y in range(max(0, int(y0) - r), min(height, int(y0) + r + 1)):
         for x in range(max(0, int(x0) - r), min(width, int(x0) + r + 1)):

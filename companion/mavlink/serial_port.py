@@ -38,7 +38,7 @@ class SerialLink:
         try:
             self._port = self._open()
         except (OSError, ValueError, OverflowError) as error:
-            raise LinkError(f"{self._name}: cannot be opened: {_reason(error)}") from error
+            raise LinkError(f"{self._name}: cannot be opened: {open_reason(error)}") from error
 
     @property
     def _name(self) -> str:
@@ -105,7 +105,7 @@ class SerialLink:
             self._port = None
 
 
-def _reason(error: Exception) -> str:
+def open_reason(error: Exception) -> str:
     """pyserial's error in words, with the remedy."""
     if isinstance(error, OSError) and error.errno in REASONS:
         return REASONS[error.errno]
