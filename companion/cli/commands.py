@@ -11,6 +11,7 @@ from companion.cli.bench import bench
 from companion.cli.doctor import doctor
 from companion.cli.guard import guard
 from companion.cli.inputs import version_option
+from companion.cli.lidar import lidar
 from companion.cli.plan import plan
 from companion.cli.replay import replay
 from companion.cli.report import report
@@ -26,6 +27,7 @@ app = typer.Typer(
 app.command()(run)
 app.command()(doctor)
 app.command()(guard)
+app.command()(lidar)
 app.command()(plan)
 app.command()(replay)
 app.command()(report)

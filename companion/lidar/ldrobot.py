@@ -76,5 +76,5 @@ def _points(packet: bytes) -> Points | None:
     if start_deg >= 360.0 or span_deg > MOST_SPAN_DEG:
         return None
     samples = np.frombuffer(packet, SAMPLE, POINTS, 6)
-    angle_deg = (start_deg + span_deg / (POINTS - 1) * np.arange(POINTS)) % 360.0
-    return Points(angle_deg, samples["range_mm"] / 1000.0, samples["intensity"].astype(np.float64))
+    angle_deg = np.linspace(start_deg, start_deg + span_deg, POINTS, dtype=np.float64) % 360.0
+    return Points(np.asarray(angle_deg), samples["range_mm"] / 1000.0, samples["intensity"].astype(np.float64))

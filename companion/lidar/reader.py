@@ -106,6 +106,11 @@ class LidarReader:
             self._port.write(self.spec.model.start)
         return scans
 
+    def drop(self) -> None:
+        """Forget what has piled up; points begin anew with what comes next."""
+        self._port.read()
+        self._begin()
+
     def close(self) -> None:
         """Stop the lidar and close its port."""
         self._port.close()
@@ -142,6 +147,11 @@ class Lidars:
     def poll(self, now_s: float) -> list[RangeSeen]:
         """The scans since the last call."""
         return [RangeSeen(scan.time_s, scan) for one in self.readers for scan in one.poll(now_s, self._log)]
+
+    def drop(self) -> None:
+        """Forget what has piled up."""
+        for one in self.readers:
+            one.drop()
 
     def close(self) -> None:
         """Stop all."""

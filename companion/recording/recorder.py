@@ -122,10 +122,10 @@ class Recorder:
         worker: BackgroundWorker | None = None,
         lidars: Sequence[str] = (),
     ) -> None:
-        """``lidars``: those on the companion's own ports, as they were given; ``files``: further input files by kind; they are copied. None: there is no file of that kind.
+        """``files``: further input files by kind; they are copied. None: there is no file of that kind.
 
-        ``start_us``: the start in microseconds since 1970, by default now. Raises RecordError if the directory cannot
-        be written.
+        ``start_us``: the start in microseconds since 1970, by default now. ``lidars``: those on the companion's own
+        ports, as they were given. Raises RecordError if the directory cannot be written.
         """
         self.directory = unused(directory)
         self.problem = ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import typer
@@ -17,7 +17,7 @@ from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
-from companion.lidar.spec import LidarError, parsed
+from companion.lidar.spec import LidarError, LidarSpec, parsed
 from companion.mapping.map_files import MapError
 from companion.mission.mission import Mission, MissionError
 from companion.recording.record_format import RecordError
@@ -91,17 +91,20 @@ def drive(
         mission = mission_to_drive(mission_file, OnWorld(world, start, target, resolution_m, top_left, prior))
         lidars = tuple(parsed(text, SIMULATED) for text in lidar or ())
         mission = equipped(mission, "none" if lidars and sensors is None else sensors, params)
-        refuse_blind(mission, lidars)
-        scenario = with_lidars(simulated(mission, faults), lidars)
-        refuse_turning_on_the_spot(mission, scenario)
-        _note(scenario)
+        scenario = _simulated(mission, faults, lidars)
         files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
         wanted.check((*files.values(), *mission.files))
         folder = context.with_resource(wanted.record_folder())
         if folder is not None:
-            given = tuple(one.text for one in lidars)
             recorder = Recorder(
-                folder, mission, settings, seed, arm=True, files=files, start_us=RECORD_START_US, lidars=given
+                folder,
+                mission,
+                settings,
+                seed,
+                arm=True,
+                files=files,
+                start_us=RECORD_START_US,
+                lidars=[one.text for one in lidars],
             )
         with console.status("loading the planner ..."):
             _say_if_compiling(settings, mission)
@@ -180,9 +183,14 @@ def _print_last(painter: Painter | None, rows_below: int) -> None:
         painter.print_last(rows_below)
 
 
-def _note(scenario: Scenario) -> None:
+def _simulated(mission: Mission, faults: Path | None, lidars: Sequence[LidarSpec]) -> Scenario:
+    """The simulation of a mission that can be driven here; remarks are printed."""
+    refuse_blind(mission, lidars)
+    scenario = with_lidars(simulated(mission, faults), lidars)
+    refuse_turning_on_the_spot(mission, scenario)
     for note in scenario.notes:
         typer.echo(note, err=True)
+    return scenario
 
 
 def _say_if_compiling(settings: Settings, mission: Mission) -> None:

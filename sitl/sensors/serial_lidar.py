@@ -108,7 +108,7 @@ class SerialLidar:
         share = np.clip(((self._measured + 1 + np.arange(count)) / make.points_hz - since_s) / (time_s - since_s), 0, 1)
         self._measured += count
         step_deg = 0.0 if self.faults.stalled else 360.0 * make.turns_hz / make.points_hz
-        angle_deg = (self._angle_deg + step_deg * np.arange(1, count + 1)) % 360.0
+        angle_deg: Floats = (self._angle_deg + step_deg * np.arange(1, count + 1, dtype=np.float64)) % 360.0
         self._angle_deg = float(angle_deg[-1])
         range_m = self._measure(angle_deg, share, before, pose, time_s)
         angle_deg, range_m = self._as_told(angle_deg, range_m)
