@@ -4,8 +4,9 @@ A point: quality (six bits), inverted start flag, start flag; angle in 1/64 degr
 distance in 1/4 mm. Angle and distance are little endian, two bytes each.
 
 One point in eight of garbage looks valid. So points count only in rows: each must look valid, and its angle must go on
-from the one before. A row ends where a point does not, and its last point is not used: if a byte was lost in it, its
-distance is wrong and only the next point shows it.
+from the one before. Rows must be long, because points that are read one byte aside look much alike, too. A row ends
+where a point does not fit, and its last three points are not used: if a byte was lost in one of them, its distance is
+wrong, and only the next ones show it.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ from numpy.typing import NDArray
 from companion.lidar.points import NO_POINTS, Points, joined
 
 POINT_BYTES = 5
-ROW = 5
+ROW = 12
 """This many points in a row are needed before one is believed."""
+HELD = 3
+"""The last of a row, which are not used; while it goes on, they wait."""
 LEAST_STEP_DEG, MOST_STEP_DEG = -2.0, 6.0
 """From one point to the next: 2000 to 5000 points a second and 5 to 12 turns are 0.4 to 2.2 degrees apart."""
 
@@ -35,7 +38,7 @@ class RplidarDecoder:
         """Whether the rest begins with points that were found to be in a row."""
 
     def feed(self, data: bytes) -> Points:
-        """The points completed by these bytes; the last one always waits for the one behind it."""
+        """The points completed by these bytes; the last ones always wait for those behind them."""
         buffer = np.frombuffer(self._rest + data, np.uint8)
         found: list[Points] = []
         at = 0
@@ -54,8 +57,8 @@ class RplidarDecoder:
             if not ended:
                 break
             self._in_row = False
-            at += POINT_BYTES  # the last of the row
-            self.bad_bytes += POINT_BYTES
+            at += POINT_BYTES * HELD
+            self.bad_bytes += POINT_BYTES * HELD
         self._rest = buffer[at:].tobytes()
         return joined(found)
 
@@ -79,9 +82,9 @@ def _row_begins(buffer: Bytes) -> int | None:
 
 
 def _row(buffer: Bytes) -> tuple[Points, bool]:
-    """The points in a row from the start of these bytes on, without the last; and whether the row has ended."""
+    """The points in a row from the start of these bytes on, without the last three; and whether the row has ended."""
     count = len(buffer) // POINT_BYTES
-    if count == 0:
+    if count < HELD:
         return NO_POINTS, False
     table = buffer[: count * POINT_BYTES].reshape(count, POINT_BYTES)
     words = table.astype(np.int32)
@@ -90,7 +93,7 @@ def _row(buffer: Bytes) -> tuple[Points, bool]:
     good[1:] &= _goes_on(angle_deg[:-1], angle_deg[1:])
     bad = np.flatnonzero(~good)
     ended = bool(len(bad))
-    last = max((int(bad[0]) if ended else count) - 1, 0)
+    last = max((int(bad[0]) if ended else count) - HELD, 0)
     range_m = (words[:last, 3] + 256 * words[:last, 4]) / 4000.0
     return Points(angle_deg[:last], range_m, (words[:last, 0] >> 2).astype(np.float64)), ended
 

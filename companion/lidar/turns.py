@@ -55,12 +55,13 @@ class TurnJoiner:
         before_deg = np.concatenate(([since_deg[0] if self._last_deg is None else self._last_deg], since_deg[:-1]))
         begins = np.flatnonzero(before_deg - since_deg > 180.0)
         self._last_deg = float(since_deg[-1])
+        swept_deg = np.cumsum((since_deg - before_deg + 180.0) % 360.0 - 180.0)
         turns: list[Turn] = []
         at = 0
-        for number, begin in enumerate(begins.tolist(), 1):
+        for begin in begins.tolist():
             self._add(_part(points, at, begin))
-            further = len(begins) - number + self._last_deg / 360.0  # turns that the lidar has made since
-            turns += self._ended(time_s - further * self._turn_s)
+            further_deg = float(swept_deg[-1] - swept_deg[begin] + since_deg[begin])  # since the cut
+            turns += self._ended(time_s - further_deg / 360.0 * self._turn_s)
             at = begin
         self._add(_part(points, at, len(points)))
         return turns
