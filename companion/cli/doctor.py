@@ -18,7 +18,7 @@ from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.state import StateFiles
 from companion.control.model_estimate import ModelEstimate, described
-from companion.core.clock import WallClock
+from companion.core.clock import Clock, WallClock
 from companion.core.scan import RangeScan
 from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
@@ -29,7 +29,7 @@ from companion.lidar.serial_port import open_ports
 from companion.lidar.spec import LidarError, LidarSpec
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
-from companion.mavlink.transport import LinkError, open_link
+from companion.mavlink.transport import ByteLink, LinkError, open_link
 from companion.settings import SettingsError
 from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
 from companion.vehicle.survey import Survey
@@ -58,8 +58,7 @@ def doctor(
         settings = usable_settings(settings_file)
         signer = files.signer(signing_key)
         clock, specs = WallClock(), lidars_given(lidar)
-        link = open_link(connect)
-        wired = _Wired(lidars_on(specs, open_ports(specs, clock)), specs)
+        link, wired = _opened(connect, specs, clock)
     except (SettingsError, LinkError, OutputError, SigningKeyError, LidarError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
@@ -90,6 +89,16 @@ def doctor(
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
+
+
+def _opened(connect: str, specs: Sequence[LidarSpec], clock: Clock) -> tuple[ByteLink, _Wired]:
+    """Link and lidars. Raises LinkError or LidarError."""
+    wired = _Wired(lidars_on(specs, open_ports(specs, clock)), specs)
+    try:
+        return open_link(connect), wired
+    except LinkError:
+        wired.lidars.close()
+        raise
 
 
 def _summary(seen: Survey) -> dict[str, object]:

@@ -148,7 +148,7 @@ def run(
                 if record
                 else NullRecorder()
             )
-            link, lidars = source.link(), _opened(specs, recorder, ends)
+            lidars, link = _opened(specs, recorder, ends), source.link()
             with console.status("loading the planner ..."):
                 _load_planner(settings, mission, say)
             _drop(link, lidars)

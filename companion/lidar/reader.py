@@ -119,6 +119,7 @@ class LidarReader:
         if not chunk.data:
             self._bad_bytes += self._decoder.bad_bytes
             self._incomplete += self._joiner.incomplete
+            self._woken_s = None
             self._begin()
             return []
         self._bytes += len(chunk.data)

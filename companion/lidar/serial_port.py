@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections import deque
+from collections.abc import Sequence
 
 import serial
 
@@ -110,7 +111,7 @@ class SerialLidarPort:
                 port.close()
 
 
-def open_ports(specs: list[LidarSpec], clock: Clock) -> list[LidarPort]:
+def open_ports(specs: Sequence[LidarSpec], clock: Clock) -> list[LidarPort]:
     """Open the ports of all; raises LidarError if one of them fails, or two share one."""
     ports: list[LidarPort] = []
     try:

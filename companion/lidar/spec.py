@@ -13,6 +13,7 @@ from companion.lidar.models import NAMES, LidarModel, model_named
 FORM = "MODEL:PORT[:yaw=DEG,x=M,y=M,flip,mask=FROM..TO,min=M,max=M,intensity=N,empty=M]"
 EMPTY_M = 5.0
 """Beyond this a dark surface may well give no echo though nothing is wrong."""
+LONGEST = 500
 FARTHEST_M = 10.0
 """No lidar is mounted farther from the middle of a rover."""
 
@@ -55,6 +56,8 @@ class LidarSpec:
 
 def parsed(text: str, port: str = "") -> LidarSpec:
     """The lidar that a text describes. ``port``: where it is, if the text has none. Raises LidarError."""
+    if not text.isprintable() or len(text) > LONGEST:
+        raise LidarError(f"lidar {text!a:.60}: has characters that no option has, or too many; write {FORM}")
     name, _, rest = text.partition(":")
     model = model_named(name)
     if model is None:

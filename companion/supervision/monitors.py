@@ -51,8 +51,8 @@ def make_monitors(
     fences = FenceMonitor(autopilot, settings.fence, notifier)
     by_precedence = (
         SticksMonitor(),
-        DataMonitor(live),
         LidarMonitor(lidars, live),
+        DataMonitor(live),
         localization,
         LoopMonitor(loop, worker, settings.safety.planner_s),
         scans,

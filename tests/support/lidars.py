@@ -3,7 +3,13 @@
 from __future__ import annotations
 
 import math
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +17,7 @@ from companion.core.scan import RangeScan
 from companion.lidar.points import Decoder, Points, joined
 from companion.lidar.reader import Chunk, LidarReader
 from companion.lidar.spec import parsed
+from sitl.network.lidar_pty import LidarTerminal
 from sitl.sensors.lidar_bytes import MAKES
 from sitl.sensors.serial_lidar import LineFaults, MountedLidar, RoverPose, SerialLidar
 from sitl.world.world import World
@@ -121,3 +128,39 @@ def desk(name: str, options: str = "", noise_m: float = 0.0, **mounted: object) 
 def faulty(**faults: object) -> LineFaults:
     """What is wrong with a line."""
     return LineFaults(**faults)  # type: ignore[arg-type]
+
+
+class Spinning:
+    """A lidar in the room on a pseudo-terminal, in a thread and in real time."""
+
+    def __init__(self, path: Path, name: str = "LD19") -> None:
+        self.device = room(0.01, name)
+        self.path = path
+        self._running = True
+        self._terminal = LidarTerminal(self.device, str(path), lambda text: None)
+        self._thread = threading.Thread(target=self._turn, daemon=True)
+        self._thread.start()
+
+    def _turn(self) -> None:
+        began_s = time.monotonic()
+        simulator: Any = None  # the terminal needs none
+        while self._running:
+            self.device.advance(time.monotonic() - began_s, MIDDLE)
+            self._terminal.exchange(simulator, 0.0)
+            time.sleep(0.01)
+
+    def close(self) -> None:
+        """Take it away."""
+        self._running = False
+        self._thread.join()
+        self._terminal.close()
+
+
+@contextmanager
+def spinning(path: Path, name: str = "LD19") -> Iterator[Spinning]:
+    """The same, taken away in the end."""
+    lidar = Spinning(path, name)
+    try:
+        yield lidar
+    finally:
+        lidar.close()
