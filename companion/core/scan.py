@@ -40,9 +40,14 @@ class RangeScan:
     age_s: NDArray[np.float64] | None = None
     """How long before ``time_s`` each reading was taken, shape (n,); None: all at once, or nobody knows."""
     empty_m: float = math.inf
-    """So far a ray that met nothing is known to be free, if that is less than ``max_range_m``."""
+    """So far a ray that met nothing is known to be free, if that is less than ``max_range_m``; 0: there are none."""
     origin_m: tuple[float, float] = (0.0, 0.0)
     """Where the rays begin: metres forward and right of the rover's middle. Readings still count from the middle."""
+
+    @property
+    def sight_m(self) -> float:
+        """How far ground that is free is known to be so."""
+        return min(self.max_range_m, self.empty_m) if self.empty_m > 0.0 else self.max_range_m
 
     @property
     def voice(self) -> tuple[int, str]:

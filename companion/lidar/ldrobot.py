@@ -8,14 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from companion.lidar.points import Points, joined
+from companion.lidar.points import NO_POINTS, Points
 
 HEADER = b"\x54\x2c"
 PACKET_BYTES, POINTS = 47, 12
 POLYNOMIAL = 0x4D
-MOST_SPAN_DEG = 30.0
-"""A packet that covers more than this is none: eight bits of check sum let one damaged packet in 256 pass."""
+TURN, MOST_SPAN = 36000, 3000
+"""In 1/100 degree. A packet that covers more than the second is none: eight bits of check sum let one damaged packet in
+256 pass."""
 SAMPLE = np.dtype([("range_mm", "<u2"), ("intensity", "u1")])
+PACKET = np.dtype(
+    [("head", "<u2", 2), ("start", "<u2"), ("samples", SAMPLE, POINTS), ("end", "<u2"), ("time", "<u2"), ("crc", "u1")]
+)
 
 
 def _table() -> bytes:
@@ -48,7 +52,7 @@ class LdrobotDecoder:
     def feed(self, data: bytes) -> Points:
         """The points completed by these bytes."""
         buffer, at = self._rest + data, 0
-        found: list[Points] = []
+        found: list[bytes] = []
         while True:
             begin = buffer.find(HEADER, at)
             if begin < 0:
@@ -58,23 +62,29 @@ class LdrobotDecoder:
             if at + PACKET_BYTES > len(buffer):
                 break
             packet = buffer[at : at + PACKET_BYTES]
-            points = _points(packet) if crc8(packet[:-1]) == packet[-1] else None
-            if points is None:
+            if _is_valid(packet):
+                found.append(packet)
+                at += PACKET_BYTES
+            else:
                 self.bad_bytes += 1
                 at += 1
-            else:
-                found.append(points)
-                at += PACKET_BYTES
         self._rest = buffer[at:]
-        return joined(found)
+        return _points(b"".join(found)) if found else NO_POINTS
 
 
-def _points(packet: bytes) -> Points | None:
-    """The points of a packet whose check sum is right; None if its angles are impossible."""
-    start_deg = int.from_bytes(packet[4:6], "little") / 100.0
-    span_deg = (int.from_bytes(packet[42:44], "little") / 100.0 - start_deg) % 360.0
-    if start_deg >= 360.0 or span_deg > MOST_SPAN_DEG:
-        return None
-    samples = np.frombuffer(packet, SAMPLE, POINTS, 6)
-    angle_deg = np.linspace(start_deg, start_deg + span_deg, POINTS, dtype=np.float64) % 360.0
-    return Points(np.asarray(angle_deg), samples["range_mm"] / 1000.0, samples["intensity"].astype(np.float64))
+def _is_valid(packet: bytes) -> bool:
+    """Whether the check sum is right and the angles are possible."""
+    if crc8(packet[:-1]) != packet[-1]:
+        return False
+    start, end = (int.from_bytes(packet[at : at + 2], "little") for at in (4, 42))
+    return start < TURN and (end - start) % TURN <= MOST_SPAN
+
+
+def _points(packets: bytes) -> Points:
+    """The points of packets that are valid."""
+    table = np.frombuffer(packets, PACKET)
+    start = table["start"].astype(np.float64)
+    span = (table["end"] - start) % TURN
+    angle_deg = (start[:, None] + span[:, None] * np.arange(POINTS) / (POINTS - 1)) / 100.0 % 360.0
+    samples = table["samples"].ravel()
+    return Points(angle_deg.ravel(), samples["range_mm"] / 1000.0, samples["intensity"].astype(np.float64))

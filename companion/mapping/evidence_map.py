@@ -103,7 +103,7 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
             pose.heading_rad,
             bearing_rad,
             range_m * frame.cells(1.0),
-            frame.cells(min(scan.max_range_m, scan.empty_m)),
+            frame.cells(scan.sight_m),
             scan.beam_width_rad,
         ),
         InverseSensorModel(
@@ -118,7 +118,7 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
         (x, y, frame.cells(evidence.rover_radius_m)),
     )
     evidence.agreement.note(scan, _hit_cells(evidence, pose, scan))
-    reach = math.ceil(evidence.base.fields(scan.max_range_m)) + 1 + _soft_reach(evidence)
+    reach = math.ceil(evidence.base.fields(scan.max_range_m + math.hypot(*scan.origin_m))) + 1 + _soft_reach(evidence)
     cell = evidence.base.cell_at(pose.point)
     _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
 

@@ -63,7 +63,7 @@ class ObstaclePublisher:
                 cells_cm(scan),
                 round(360 / CELLS),
                 max(1, round(100.0 * scan.min_range_m)),
-                round(100.0 * reach_m(scan)),
+                round(100.0 * scan.sight_m),
                 360.0 / CELLS,
                 0.0,
                 mavlink.MAV_FRAME_BODY_FRD,
@@ -78,17 +78,12 @@ class ObstaclePublisher:
         return raw
 
 
-def reach_m(scan: RangeScan) -> float:
-    """How far the message speaks: no farther than a ray that met nothing is known to be free."""
-    return min(scan.max_range_m, scan.empty_m) if scan.empty_m > 0.0 else scan.max_range_m
-
-
 def cells_cm(scan: RangeScan) -> list[int]:
     """The nearest reading of each cell in cm: one more than the maximum where nothing was seen, 65535 where unknown.
 
     A reading nearer than the minimum is told as the minimum, since receivers ignore nearer ones.
     """
-    most_cm = round(100.0 * reach_m(scan))
+    most_cm = round(100.0 * scan.sight_m)
     cells = np.rint(np.degrees(scan.bearing_rad) / (360.0 / CELLS)).astype(np.int64) % CELLS
     known = ~np.isnan(scan.range_m)
     nearest_m = np.full(CELLS, np.nan)
