@@ -3,7 +3,7 @@
 A decoder takes bytes in blocks of any size and keeps incomplete packets for the next block. The same bytes give the
 same points however they are cut. No bytes raise an error.
 
-Nouns: lidar point, lidar decoder.
+Nouns: points, decoder.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """A lidar's serial port, read by a thread, with reconnection of a cable that was pulled.
 
-Nouns: lidar port.
+Nouns: serial port.
 """
 
 from __future__ import annotations

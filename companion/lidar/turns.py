@@ -4,7 +4,7 @@ So the newest readings of every scan are those ahead, where the rover drives, an
 of a turn would tell of the ground ahead no sooner, and of the rest in pieces that repeated, partly unseen or moving
 things cannot be told from.
 
-Nouns: lidar turn.
+Nouns: turn.
 """
 
 from __future__ import annotations
