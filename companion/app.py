@@ -18,6 +18,7 @@ from companion.executive.goal_driver import GoalDriver
 from companion.executive.laps import LapSummary
 from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_progress import MissionProgress, TargetStatus
+from companion.lidar.reader import Lidars
 from companion.mapping.evidence_map import EvidenceMap
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.mission import Mission
@@ -50,8 +51,10 @@ class Companion:
         arm: bool,
         checkpointer: Checkpointer | None = None,
         keep_settings: Callable[[Settings], None] | None = None,
+        lidars: Lidars | None = None,
     ) -> None:
-        options = Options(seed, arm, checkpointer, keep_settings)
+        """``lidars``: those that are wired to the companion itself."""
+        options = Options(seed, arm, checkpointer, keep_settings, lidars or Lidars())
         made = assemble(autopilot, clock, mission, settings, runner, log, options)
         self._autopilot = autopilot
         self._clock = clock

@@ -19,6 +19,8 @@ from companion.control.model_estimate import described
 from companion.core.clock import stopwatch_s
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import warm_up
+from companion.lidar.reader import Chunk, lidars_on
+from companion.lidar.spec import LidarSpec
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.local_station import LocalStation
@@ -29,6 +31,7 @@ from companion.operator.notifications import News
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from sitl.scenario import Scenario
+from sitl.sensors.serial_lidar import SerialLidar
 from sitl.sim_link import SimLink
 from sitl.simulator import Simulator
 
@@ -83,6 +86,29 @@ class LockstepClock:
             # The autopilot has rebooted: connect again at once.
             self._vehicle_end = self._simulator.connect(name="companion")
         self._now_s = time_s
+
+
+class DevicePort:
+    """A serial port within the process: the companion reads what a simulated lidar has sent."""
+
+    def __init__(self, device: SerialLidar, clock: LockstepClock) -> None:
+        self._device = device
+        self._clock = clock
+        self._cuts = device.cuts
+
+    def read(self) -> list[Chunk]:
+        """What has come since the last call."""
+        now_s, cut = self._clock.now_s(), self._device.cuts != self._cuts
+        self._cuts = self._device.cuts
+        data = self._device.take()
+        return [*([Chunk(now_s, b"")] if cut else []), *([Chunk(now_s, data)] if data else [])]
+
+    def write(self, data: bytes) -> None:
+        """Commands."""
+        self._device.hear(data)
+
+    def close(self) -> None:
+        """Nothing to close."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +197,8 @@ class Drive:
     """So long each message takes over the link, each way."""
     station: LocalStation | None = None
     """Heard by the companion beside its link."""
+    lidars: tuple[LidarSpec, ...] = ()
+    """On serial ports of the companion; the scenario has the same ones, in this order."""
 
     def __post_init__(self) -> None:
         self.report = Report(self.seed)
@@ -186,6 +214,7 @@ class Drive:
         self._link = self.simulator.connect(name="companion")
         self.clock = LockstepClock(self.simulator, self._link, far, self.late_s)
         codec = Codec(self.settings.link)
+        ports = [DevicePort(device, self.clock) for device in self.simulator.lidars]
         autopilot = AutopilotLink(near, codec, self.settings.link, self.recorder, self.station)
         self.companion = Companion(
             autopilot,
@@ -197,6 +226,7 @@ class Drive:
             seed=self.seed,
             arm=True,
             checkpointer=self.checkpointer,
+            lidars=lidars_on(self.lidars, ports, self.recorder),
         )
 
     def kill_companion(self, absent_s: float, resumed: Checkpointer) -> None:

@@ -6,23 +6,27 @@ Nouns: Scenario.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
+from companion.lidar.spec import LidarSpec
 from companion.mission.mission import Mission, RoverSpec, SitlSpec
 from companion.mission.sensor_tables import sensors_from, sensors_given
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from sitl.autopilot.parameters import DEFAULTS, REAL32, steered_wheels
 from sitl.faults.fault_file import load_faults
-from sitl.faults.plan import FaultPlan, SensorFault
+from sitl.faults.plan import FaultPlan, LidarFault, SensorFault
 from sitl.firmware.parameter_files import ParameterFile, ParameterFileError, load_parameters
 from sitl.firmware.physics import Physics
 from sitl.plant.closed_loop import NoiseSettings
 from sitl.plant.outline import DISC, Outline, OutlinePose, mover_room_m, room_m
 from sitl.plant.rover import SIM_ROVER, Drivetrain, two_wheels
+from sitl.sensors.lidar_bytes import MAKES
 from sitl.sensors.range_sensors import SensorSuite, suite_named
+from sitl.sensors.serial_lidar import MountedLidar
 from sitl.sensors.suites import suite_of
 from sitl.simulator import Simulator
 from sitl.world.truth import SimStart
@@ -57,6 +61,8 @@ class Scenario:
     drivetrain: Drivetrain = SIM_ROVER
     parameter_file: ParameterFile | None = None
     """The file from which some of the parameters come."""
+    lidars: tuple[MountedLidar, ...] = ()
+    """On serial lines of their own."""
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -77,6 +83,7 @@ class Scenario:
             faults=self.faults,
             kept=self.kept,
             drivetrain=self.drivetrain,
+            lidars=self.lidars,
         )
 
     def physics(self, seed: int, *, linked: bool = False) -> Physics:
@@ -250,6 +257,28 @@ def with_faults(scenario: Scenario, plan: FaultPlan | None) -> Scenario:
                 f"{beams} beams; leave beams out to mean all sensors"
             )
     return replace(scenario, faults=plan)
+
+
+def with_lidars(scenario: Scenario, specs: Sequence[LidarSpec]) -> Scenario:
+    """The scenario with lidars on serial lines, mounted as the companion is told. Raises ScenarioError.
+
+    A fault of a lidar that is not there is one.
+    """
+    plan = scenario.faults
+    for number, fault in enumerate(plan.faults if plan else (), 1):
+        missing = [one for one in fault.lidars if one > len(specs)] if isinstance(fault, LidarFault) else []
+        if missing or (isinstance(fault, LidarFault) and not specs):
+            raise ScenarioError(
+                f"{plan.source if plan else ''}: fault {number}: there are {len(specs)} lidars on serial lines; "
+                "give them with --lidar (drive) or --lidar-pty (serve)"
+            )
+    return replace(scenario, lidars=tuple(_mounted(one) for one in specs))
+
+
+def _mounted(spec: LidarSpec) -> MountedLidar:
+    where = spec.mounting
+    yaw_rad = math.radians(where.yaw_deg)
+    return MountedLidar(MAKES[spec.model.name], yaw_rad, where.forward_m, where.right_m, where.flipped)
 
 
 def with_sensors(mission: Mission, sensors: str) -> Mission:

@@ -8,7 +8,7 @@ Nouns: Simulator.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -29,6 +29,7 @@ from sitl.plant.closed_loop import NOISE_COLUMNS, NoiseSettings, run_loops
 from sitl.plant.outline import DISC, Outline, OutlinePose, mover_room_m, room_m
 from sitl.plant.rover import SIM_ROVER, Drivetrain, new_rover, outline_of
 from sitl.sensors.range_sensors import RangeSensing, SensorSuite, suite_named
+from sitl.sensors.serial_lidar import MountedLidar, RoverPose, SerialLidar
 from sitl.sim_link import SimLink
 from sitl.world import geodesy
 from sitl.world.truth import Collision, SimStart, Truth, collision_of
@@ -36,6 +37,8 @@ from sitl.world.world import World
 
 NOISE_ROWS = 500
 ROOM_REACH_M = 5.0
+LIDAR_STREAM = 0x4C494441
+"""Separates the random draws of lidars on serial lines from all others with the same seed."""
 REHEARSAL_S = 4.0
 """After this time every range sensor has measured."""
 
@@ -57,12 +60,15 @@ class Simulator:
         faults: FaultPlan | None = None,
         kept: Mapping[str, int] | None = None,
         drivetrain: Drivetrain = SIM_ROVER,
+        lidars: Sequence[MountedLidar] = (),
     ) -> None:
         """``sensors``: a suite or its name; ``parameters``: ArduRover's, where they differ from the defaults.
 
         ``kept``: types of those parameters that have no effect here, but can be read and set. ``turning_radius_m``: 0
         for skid steering, else the plant has steered wheels; the autopilot learns that from its parameters
         (``autopilot.parameters.steered_wheels``), as on a real rover.
+
+        ``lidars``: on serial lines of their own, which are not the autopilot's.
 
         Raises ValueError for an unknown suite, KeyError for an unknown parameter.
         """
@@ -79,6 +85,12 @@ class Simulator:
         self._noise = settings.as_array()
         self._rng = np.random.default_rng(motion_seed)
         self._sensing = RangeSensing(suite, world, settings.range_m, np.random.default_rng(range_seed))
+        streams = np.random.SeedSequence([LIDAR_STREAM, seed]).spawn(len(lidars))
+        self.lidars = tuple(
+            SerialLidar(mounted, world, settings.range_m, np.random.default_rng(stream))
+            for mounted, stream in zip(lidars, streams, strict=True)
+        )
+        """On serial lines of their own, which are not the autopilot's."""
         self._rover = new_rover(start.north_m, start.east_m, start.heading_rad, outline, turning_radius_m, drivetrain)
         self._geo_start = (geodesy.to_units(start.home.lat_deg), geodesy.to_units(start.home.lon_deg))
         # Noise is drawn in blocks of fixed size, so that it does not depend on the batches of loops.
@@ -91,7 +103,7 @@ class Simulator:
         self._command_log = CommandLog()
         self._surroundings, self._doors_move_s = world.surroundings(0.0), world.next_change_s(0.0)
         self._traffic = Traffic(world, self._geo_start, (start.north_m, start.east_m))
-        self._player = FaultPlayer(faults or FaultPlan(), seed)
+        self._player = FaultPlayer(faults or FaultPlan(), seed, self.lidars)
         self._has_faults = faults is not None and bool(faults.faults)
         self._off_until_s = 0.0
         self.boots = 0
@@ -265,6 +277,8 @@ class Simulator:
             self._doors_move_s = self.world.next_change_s(self.time_s)
 
     def _loops_until_due(self) -> int:
+        if self.lidars:
+            return 1  # they turn all the time
         due_us = self._autopilot.next_due_us()
         if self.world.doors:
             due_us = min(due_us, self._vehicle.time_us + 1e6 * (self._doors_move_s - self.time_s))
@@ -301,6 +315,9 @@ class Simulator:
         self._row += done
         self._tick += done
         self._sensing.time_s = self.time_s
+        for lidar in self.lidars:
+            pose = RoverPose(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
+            lidar.advance(self.time_s, pose)
         if int(rover["contacts"]) > contacts:
             self._collisions.append(collision_of(rover, self.world, self.time_s))
 

@@ -12,6 +12,7 @@ from companion.cli.compile import compile_kernels
 from companion.cli.doctor import doctor
 from companion.cli.guard import guard
 from companion.cli.inputs import version_option
+from companion.cli.lidar import lidar
 from companion.cli.params import params
 from companion.cli.plan import plan
 from companion.cli.replay import replay
@@ -30,6 +31,7 @@ app.command()(doctor)
 app.command("compile")(compile_kernels)
 app.command()(params)
 app.command()(guard)
+app.command()(lidar)
 app.command()(plan)
 app.command()(replay)
 app.command()(report)

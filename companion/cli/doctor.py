@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Annotated
 
@@ -14,16 +15,22 @@ from rich.table import Table
 
 from companion.checkpoint.state_directory import default_directory, last_estimate
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
+from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.state import StateFiles
 from companion.control.model_estimate import ModelEstimate, described
-from companion.core.clock import WallClock
+from companion.core.clock import Clock, WallClock
+from companion.core.scan import RangeScan
 from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
 from companion.diagnosis.payload import Command, parameters_of, payload
 from companion.executive.warm_up import kernels_warm
+from companion.lidar.examination import LidarHeard, lidar_findings
+from companion.lidar.reader import Lidars, lidars_on
+from companion.lidar.serial_port import open_ports
+from companion.lidar.spec import LidarError, LidarSpec
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
-from companion.mavlink.transport import LinkError, open_link
+from companion.mavlink.transport import ByteLink, LinkError, open_link
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
 from companion.settings import SettingsError
@@ -31,6 +38,8 @@ from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
 from companion.vehicle.survey import RangeSource, Survey
 
 STEP_S = 0.05
+LISTEN_S = 4.0
+"""So long at least to lidars."""
 EXIT_FINE, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 3, 4
 COLOURS = {Level.STOP: "red", Level.WARN: "yellow", Level.NOTE: "cyan"}
 
@@ -40,6 +49,7 @@ def doctor(
     seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Listen no longer than this.")] = 15.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
+    lidar: LidarOption = None,
     state: Annotated[Path | None, typer.Option(help="Directory where this rover's state is kept.")] = None,
     signing_key: Annotated[
         Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
@@ -53,31 +63,35 @@ def doctor(
         files = StateFiles(state)
         settings = usable_settings(settings_file)
         signer = files.signer(signing_key)
-        commands = _commands(mission_file)
-        link = open_link(connect)
-    except (SettingsError, LinkError, MissionError, OutputError, SigningKeyError) as error:
+        commands, clock, specs = _commands(mission_file), WallClock(), lidars_given(lidar)
+        link, wired = _opened(connect, specs, clock)
+    except (SettingsError, LinkError, MissionError, OutputError, SigningKeyError, LidarError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    clock = WallClock()
     examination = Surveyor(link, settings.link, (*PARAMETERS, *parameters_of(commands)), signer)
     now_s = began_s = clock.now_s()
     try:
-        while not examination.done and now_s - began_s < seconds:
+        while (not examination.done or wired.wants(now_s - began_s)) and now_s - began_s < seconds:
             examination.step(now_s)
+            wired.listen(now_s)
             clock.sleep_until_s(now_s + STEP_S)
             now_s = clock.now_s()
-        seen = examination.result()
+        seen = replace(examination.result(), wired=bool(specs))
     finally:
         link.close()
+        wired.lidars.close()
         files.close()
-    beside = [*payload(seen, commands), *kernels(cold=not kernels_warm(settings))]
-    findings = [*diagnose(seen), *beside]
+    heard = wired.heard(now_s - began_s)
+    of_lidars = lidar_findings(heard, others_look_ahead=seen.vehicle.scan_ahead is not None)
+    beside = [*of_lidars, *payload(seen, commands), *kernels(cold=not kernels_warm(settings))]
+    findings = sorted([*diagnose(seen), *beside], key=lambda one: list(Level).index(one.level))
     estimate = last_estimate(state or default_directory(os.environ))
     if as_json:
         found = [asdict(one) for one in findings]
-        typer.echo(json.dumps({"heard": _summary(seen), "followed": _followed(estimate), "findings": found}, indent=2))
+        summary = {**_summary(seen), "lidars": [one.described for one in heard]}
+        typer.echo(json.dumps({"heard": summary, "followed": _followed(estimate), "findings": found}, indent=2))
     else:
-        _show(seen, findings, estimate)
+        _show(seen, findings, estimate, [one.described for one in heard])
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
@@ -90,6 +104,16 @@ def _commands(mission_file: Path | None) -> list[Command]:
     mission = load_mission(mission_file, simulated=False, skip_unknown=True)
     given = [*mission.commands, *(command for target in mission.targets for command in target.commands)]
     return [(command.command, command.params[0] or 0.0) for command in given]
+
+
+def _opened(connect: str, specs: Sequence[LidarSpec], clock: Clock) -> tuple[ByteLink, _Wired]:
+    """Link and lidars. Raises LinkError or LidarError."""
+    wired = _Wired(lidars_on(specs, open_ports(specs, clock)), specs)
+    try:
+        return open_link(connect), wired
+    except LinkError:
+        wired.lidars.close()
+        raise
 
 
 def _summary(seen: Survey) -> dict[str, object]:
@@ -113,8 +137,34 @@ def _followed(estimate: ModelEstimate | None) -> dict[str, float] | None:
     return {"known": round(estimate.known, 3), **figures}
 
 
-def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None) -> None:
+class _Wired:
+    """The lidars on serial ports of this computer, and what was heard of them."""
+
+    def __init__(self, lidars: Lidars, specs: Sequence[LidarSpec]) -> None:
+        self.lidars = lidars
+        self._specs = specs
+        self._newest: dict[str, RangeScan] = {}
+
+    def wants(self, elapsed_s: float) -> bool:
+        """Whether to go on listening: a motor takes a while to get up to speed."""
+        return bool(self._specs) and elapsed_s < LISTEN_S
+
+    def listen(self, now_s: float) -> None:
+        """Take in what has come."""
+        self._newest |= {seen.scan.source: seen.scan for seen in self.lidars.poll(now_s)}
+
+    def heard(self, seconds: float) -> list[LidarHeard]:
+        """What was heard of each."""
+        return [
+            LidarHeard(one.name, one.spec.port, seconds, one.counters, self._newest.get(one.name))
+            for one in self.lidars.readers
+        ]
+
+
+def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None, lidars: list[str]) -> None:
     console = Console()
+    for line in lidars:
+        console.print(line, soft_wrap=True, markup=False, highlight=False)
     if seen.rover_heard:
         version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"
         console.print(f"rover: system {seen.system}{version}, on {seen.place}", soft_wrap=True, markup=False)

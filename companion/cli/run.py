@@ -16,6 +16,7 @@ import typer
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
 from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, SkipUnknown, usable_settings
+from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.live import STDERR, Live, Reader, error_console, levelled, reader_of
 from companion.cli.live_view import LiveView, View, painter_for
 from companion.cli.service import Service
@@ -27,6 +28,9 @@ from companion.core.clock import WallClock
 from companion.core.severity import Severity
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm, settle, warm_up
+from companion.lidar.reader import Lidars, lidars_on
+from companion.lidar.serial_port import open_ports
+from companion.lidar.spec import LidarError, LidarSpec
 from companion.mapping.map_files import MapError
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -53,6 +57,7 @@ BAD_INPUT = (
     OutputError,
     SigningKeyError,
     WebError,
+    LidarError,
 )
 UNHURRIED_S = 10.0
 """A run that ends by itself waits this long for a slow disk, and for who reads its output."""
@@ -78,6 +83,7 @@ def run(
     seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
     record: Annotated[Path | None, typer.Option(help="Directory for the record and the map of this run.")] = None,
     state: Annotated[Path | None, typer.Option(help="Directory where this rover's state is kept.")] = None,
+    lidar: LidarOption = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Go on where the run that kept its state there ended.")
     ] = False,
@@ -114,7 +120,7 @@ def run(
             budget = ShutdownBudget()
             files = StateFiles(state, budget)
             ends.callback(files.close)
-            settings = files.settings(usable_settings(settings_file), say)
+            settings, specs = files.settings(usable_settings(settings_file), say), lidars_given(lidar)
             signer = files.signer(signing_key)
             painter = painter_for(view=view, say=say)
             page = web_viewer(web, web_token, warn, actions=web_actions, signer=signer)
@@ -133,22 +139,31 @@ def run(
             given = {"settings": settings_file, STATE: keeping.file if keeping.previous else None}
             recorder = (
                 Recorder(
-                    record, mission, settings, seed, arm=arm, files=given, worker=BackgroundWorker("record", budget)
+                    record,
+                    mission,
+                    settings,
+                    seed,
+                    arm=arm,
+                    files=given,
+                    worker=BackgroundWorker("record", budget),
+                    lidars=[one.text for one in specs],
                 )
                 if record
                 else NullRecorder()
             )
-            link = _opened(source, say)
+            lidars, link = _lidars(specs, recorder, ends), _opened(source, say)
             with console.status("loading the planner ..."):
                 _load_planner(settings, mission, say)
-            link.read()  # drop what has piled up meanwhile
+            _drop(link, lidars)
             place = _told_place(recorder, record, say)
             keeping.start(budget)
             codec, station = Codec(settings.link, signer=signer), None if page is None else page.station
             autopilot = AutopilotLink(link, codec, settings.link, recorder, station)
             lines = Live(console, mission.name, reader)
             live = lines if painter is None else LiveView(painter, lines, mission.name)
-            rig = _Rig(mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget, page)
+            rig = _Rig(
+                mission, settings, link, autopilot, recorder, place, keeping, files, live, stop, budget, page, lidars
+            )
             code = _drive(rig, seed=seed, arm=arm)
     except BAD_INPUT as error:
         typer.echo(levelled(str(error), Severity.ERROR, reader) if reader is Reader.JOURNAL else str(error), err=True)
@@ -156,6 +171,19 @@ def run(
     if stop.asked:
         raise SystemExit(EXIT_STOPPED)  # it has reported that itself
     raise typer.Exit(code)
+
+
+def _lidars(specs: list[LidarSpec], recorder: Recorder | NullRecorder, ends: contextlib.ExitStack) -> Lidars:
+    """The lidars, closed in the end. Raises LidarError."""
+    lidars = lidars_on(specs, open_ports(specs, WallClock()), recorder)
+    ends.callback(lidars.close)
+    return lidars
+
+
+def _drop(link: ByteLink, lidars: Lidars) -> None:
+    """Forget what has piled up meanwhile."""
+    link.read()
+    lidars.drop()
 
 
 def _told_place(recorder: Recorder | NullRecorder, asked: Path | None, say: Callable[[str], None]) -> Path | None:
@@ -197,6 +225,7 @@ class _Rig:
     stop: _StopSignals
     budget: ShutdownBudget
     page: LiveViewer | None
+    lidars: Lidars
 
 
 def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
@@ -213,6 +242,7 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
         arm=arm,
         checkpointer=rig.keeping.checkpointer,
         keep_settings=rig.files.keep,
+        lidars=rig.lidars,
     )
     rig.stop.listener = companion
     service = Service(os.environ)
@@ -241,6 +271,7 @@ def _drive(rig: _Rig, *, seed: int, arm: bool) -> int:
             rig.keeping.close()
             runner.close()
             rig.link.close()
+            rig.lidars.close()
             rig.recorder.close()
     return _ended(companion, rig)
 

@@ -5,6 +5,7 @@ Nouns: scan.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from numpy.typing import NDArray
 AHEAD_RAD = np.radians(20.0)
 NARROW_RAD = np.radians(30.0)
 """A scan that covers less is a beam, not a view."""
+WIRED = 0
+"""The sender of scans that came over no link: of a lidar on a serial port of the companion's own."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -33,7 +36,18 @@ class RangeScan:
     source: str
     """What it came in: the kind of message, and the number of the sensor if that bears one."""
     sender: int = 1
-    """Component id of who sent it; 1 is the autopilot."""
+    """Component id of who sent it; 1 is the autopilot, WIRED a lidar of the companion's own."""
+    age_s: NDArray[np.float64] | None = None
+    """How long before ``time_s`` each reading was taken, shape (n,); None: all at once, or nobody knows."""
+    empty_m: float = math.inf
+    """So far a ray that met nothing is known to be free, if that is less than ``max_range_m``; 0: there are none."""
+    origin_m: tuple[float, float] = (0.0, 0.0)
+    """Where the rays begin: metres forward and right of the rover's middle. Readings still count from the middle."""
+
+    @property
+    def sight_m(self) -> float:
+        """How far ground that is free is known to be so."""
+        return min(self.max_range_m, self.empty_m) if self.empty_m > 0.0 else self.max_range_m
 
     @property
     def voice(self) -> tuple[int, str]:

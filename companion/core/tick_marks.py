@@ -34,3 +34,5 @@ class Mark(IntFlag):
     """The last attempt to save the state of the run failed."""
     SAVED = 1024
     """The announcement of a command was in the saved state, or there is no saved state: it may go out."""
+    LIDAR = 2048
+    """Bytes of a lidar that is wired to the companion were heard; they stand in a file of their own."""

@@ -247,16 +247,21 @@ def ranges(seen: Survey) -> Iterator[Finding]:
     if seen.parameters.get("PRX1_TYPE") == MAVLINK_SOURCE:
         says = "The autopilot sends obstacles that it receives back as its own sensors (an echo); they are left out."
         yield to_set("echo", Level.NOTE, says, "PRX1_TYPE", MAVLINK_SOURCE, 0.0)
+    if seen.wired and not seen.sources:
+        return
     if not seen.sources and seen.vehicle.scan is None:
         says = "No range data: the rover would be blind, and a run waits."
-        remedy = "switch the lidar's driver on, or set RNGFND1_TYPE for a sensor that is wired to the autopilot"
+        remedy = (
+            "give a lidar on a serial port of this computer with --lidar, or set RNGFND1_TYPE for a sensor that is "
+            "wired to the autopilot"
+        )
         value = seen.parameters.get("RNGFND1_TYPE")
         yield Finding("no-range-sensor", Level.STOP, says, remedy, "RNGFND1_TYPE" if value == 0.0 else "", value)
         return
     if not sensors and seen.vehicle.scan is not None:
         says = "Range data comes only as the autopilot's sectors or as RANGEFINDER, which are coarse."
-        yield Finding("coarse-range", Level.WARN, says, "have the lidar's driver send OBSTACLE_DISTANCE")
-    if seen.vehicle.scan_ahead is None:
+        yield Finding("coarse-range", Level.WARN, says, "wire the lidar to this computer (--lidar)")
+    if seen.vehicle.scan_ahead is None and not seen.wired:
         says = "No range sensor tells what is straight ahead (within 20 degrees)."
         yield Finding("not-ahead", Level.STOP, says, "turn a sensor forward: RNGFNDn_ORIENT 0")
     for one in sensors:

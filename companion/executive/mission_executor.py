@@ -140,7 +140,7 @@ class MissionExecutor:
         self._limits = RoverLimits(
             rover.radius_m + margin_m,
             rover.cruise_speed_m_s,
-            scan.max_range_m,
+            scan.sight_m,
             scan.is_narrow,
             scan.beam_width_rad,
             rover.turning_radius_m,

@@ -71,8 +71,30 @@ def _chord(scan, i, share):
 
 
 @njit(cache=True, nogil=True)
-def cast_scan(log_odds, stamps, stamp, scan, model, protected, radius_cells):
-    """Add one scan to the evidence, and free the cells within ``radius_cells`` of the sensor, where the rover stands.
+def _free_cells(log_odds, stamps, stamp, ray, model):
+    """Free the cells along a ``ray``, that this scan has not touched: its beginning, its direction and its length.
+
+    Inside the map whole numbers need no floor and places no check: most of the time of a scan is spent here.
+    """
+    height, width = log_odds.shape
+    x0, y0, dx, dy, free = ray
+    end_x, end_y = x0 + free * dx, y0 + free * dy
+    inside = min(x0, end_x) >= 0.0 and min(y0, end_y) >= 0.0 and max(x0, end_x) < width and max(y0, end_y) < height
+    d = 0.0
+    while d < free:
+        if inside:
+            x, y = int(x0 + d * dx), int(y0 + d * dy)
+        else:
+            x, y = int(math.floor(x0 + d * dx)), int(math.floor(y0 + d * dy))
+        d += 0.7
+        if (inside or (0 <= x < width and 0 <= y < height)) and stamps[y, x] != stamp:
+            stamps[y, x] = stamp
+            log_odds[y, x] = max(log_odds[y, x] - model.miss, -model.free_limit)
+
+
+@njit(cache=True, nogil=True)
+def cast_scan(log_odds, stamps, stamp, scan, model, protected, stands):
+    """Add one scan to the evidence, and free the cells where the rover ``stands``: its place, x and y, and its radius.
 
     The cells ``protected`` are not freed: shape (n, 2), x and y, all of them on the map.
     """
@@ -104,14 +126,8 @@ def cast_scan(log_odds, stamps, stamp, scan, model, protected, radius_cells):
             dx = math.sin(angle)
             dy = math.cos(angle)
             free = min(reach, _chord(scan, i, share) - 0.5)
-            d = 0.0
-            while d < free:
-                x = int(math.floor(x0 + d * dx))
-                y = int(math.floor(y0 + d * dy))
-                d += 0.7
-                if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
-                    stamps[y, x] = stamp
-                    log_odds[y, x] = max(log_odds[y, x] - model.miss, -model.free_limit)
+            _free_cells(log_odds, stamps, stamp, (x0, y0, dx, dy, free), model)
+    x0, y0, radius_cells = stands
     r = int(math.ceil(radius_cells))
     for y in range(max(0, int(y0) - r), min(height, int(y0) + r + 1)):
         for x in range(max(0, int(x0) - r), min(width, int(x0) + r + 1)):

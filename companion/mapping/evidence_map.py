@@ -92,18 +92,18 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
     """
     settings, frame = evidence.settings, evidence.frame
     x, y = frame.xy(pose.point)
+    begin, bearing_rad, range_m = _rays(pose, scan)
     kept_m = settings.narrow_kept_m if scan.is_narrow else 0.0
     cast_scan(
         evidence.log_odds,
         evidence.stamps,
         np.int32(stamp),
         ScanInCells(
-            x,
-            y,
+            *frame.xy(begin),
             pose.heading_rad,
-            scan.bearing_rad,
-            scan.range_m * frame.cells(1.0),
-            frame.cells(scan.max_range_m),
+            bearing_rad,
+            range_m * frame.cells(1.0),
+            frame.cells(scan.sight_m),
             scan.beam_width_rad,
         ),
         InverseSensorModel(
@@ -115,10 +115,10 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
             frame.cells(kept_m),
         ),
         evidence.agreement.others(scan),
-        frame.cells(evidence.rover_radius_m),
+        (x, y, frame.cells(evidence.rover_radius_m)),
     )
     evidence.agreement.note(scan, _hit_cells(evidence, pose, scan))
-    reach = math.ceil(evidence.base.fields(scan.max_range_m)) + 1 + _soft_reach(evidence)
+    reach = math.ceil(evidence.base.fields(scan.max_range_m + math.hypot(*scan.origin_m))) + 1 + _soft_reach(evidence)
     cell = evidence.base.cell_at(pose.point)
     _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
 
@@ -206,6 +206,20 @@ def _hit_cells(evidence: EvidenceMap, pose: Pose, scan: RangeScan) -> NDArray[np
     cells = np.floor(evidence.frame.xys(ends)).astype(np.int64)
     height, width = evidence.log_odds.shape
     return cells[np.all((cells >= 0) & (cells < (width, height)), axis=1)]
+
+
+def _rays(pose: Pose, scan: RangeScan) -> tuple[NedPoint, NDArray[np.float64], NDArray[np.float64]]:
+    """Where the rays of a scan begin, and bearings and ranges from there; of rays without an end the bearing stays."""
+    forward_m, right_m = scan.origin_m
+    if scan.origin_m == (0.0, 0.0):
+        return pose.point, scan.bearing_rad, scan.range_m
+    place = pose.point.moved(pose.heading_rad, forward_m).moved(pose.heading_rad + 0.5 * math.pi, right_m)
+    hit = np.isfinite(scan.range_m)
+    seen_m = np.where(hit, scan.range_m, 0.0)
+    ahead_m = seen_m * np.cos(scan.bearing_rad) - forward_m
+    aside_m = seen_m * np.sin(scan.bearing_rad) - right_m
+    bearing_rad = np.where(hit, np.arctan2(aside_m, ahead_m), scan.bearing_rad)
+    return place, bearing_rad, np.where(hit, np.hypot(ahead_m, aside_m), scan.range_m)
 
 
 def _soft_reach(evidence: EvidenceMap) -> int:

@@ -40,7 +40,7 @@ class SerialLink:
         try:
             self._port = self._open()
         except (OSError, ValueError, OverflowError) as error:
-            raise LinkError(f"{self._name}: cannot be opened: {_reason(error, device)}") from error
+            raise LinkError(f"{self._name}: cannot be opened: {open_reason(error, device)}") from error
 
     @property
     def _name(self) -> str:
@@ -117,7 +117,7 @@ def rivals_of(link: ByteLink) -> tuple[PortUser, ...]:
     return link.rivals if isinstance(link, SerialLink) else ()
 
 
-def _reason(error: Exception, device: str) -> str:
+def open_reason(error: Exception, device: str) -> str:
     """pyserial's error in words, with the remedy."""
     if isinstance(error, OSError) and error.errno in IN_USE:
         return f"{in_words(port_users.of_device(device))} uses it; stop that one ({SHARE})"

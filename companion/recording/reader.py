@@ -16,6 +16,7 @@ from typing import IO, NamedTuple
 
 from pydantic import ValidationError
 
+from companion.core.tick_marks import Mark
 from companion.mavlink.framing import first_packet
 from companion.mission.mission import Mission, MissionError
 from companion.mission.serialization import from_json
@@ -23,12 +24,16 @@ from companion.recording.record_format import (
     CHECKED_TICK,
     DECISIONS,
     FORMAT,
+    LIDAR_HEAD,
+    LIDARS,
     META,
     MISSION,
     PACKETS,
     STAMP,
     TICKS,
+    WITH_LIDARS,
     InputFile,
+    LidarEntry,
     RecordError,
     RecordMeta,
     TickEntry,
@@ -45,15 +50,17 @@ MAX_META_BYTES = 10_000_000
 MAX_BYTES = 200_000_000
 """Of the ticks or the decisions: more than a day of driving."""
 MAX_PACKET_BYTES = 280
+MAX_LIDAR_BYTES = 1 << 20
 CHUNK_BYTES = 1 << 20
 
 
 class RecordedTick(NamedTuple):
-    """A tick with its packets."""
+    """A tick with its packets, and with what lidars sent."""
 
     entry: TickEntry
     heard: list[bytes]
     said: list[bytes]
+    lidars: tuple[LidarEntry, ...] = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -78,19 +85,24 @@ class Record:
         Raises RecordError if packets are damaged. If packets are missing at the end, that is added to ``notes``.
         """
         ticks, _ = unpacked_ticks(read_at_most(self.directory / TICKS, MAX_BYTES))
-        with open_file(self.directory / PACKETS) as file:
+        lidars = _Lidars(self.directory / LIDARS, given=bool(self.meta.lidars))
+        with open_file(self.directory / PACKETS) as file, lidars:
             for number, entry in enumerate(ticks):
                 packets = list(_packets(file, entry.heard + entry.said, self.directory / PACKETS))
-                if len(packets) < entry.heard + entry.said:
+                sent = lidars.of_tick(number)
+                cut = PACKETS if len(packets) < entry.heard + entry.said else ""
+                if not sent and entry.marks & Mark.LIDAR:
+                    cut = LIDARS
+                if cut:
                     after_s = entry.time_s - ticks[0].time_s
-                    self.notes.append(f"{self.directory / PACKETS}: ends after {after_s:.2f} s ({number} ticks)")
+                    self.notes.append(f"{self.directory / cut}: ends after {after_s:.2f} s ({number} ticks)")
                     return
-                yield RecordedTick(entry, packets[: entry.heard], packets[entry.heard :])
+                yield RecordedTick(entry, packets[: entry.heard], packets[entry.heard :], sent)
 
 
 def files_of(record: Record) -> list[Path]:
     """The files that make up a record; whoever writes over one has lost it."""
-    names = (META, PACKETS, TICKS, DECISIONS, *(entry.name for entry in record.meta.inputs))
+    names = (META, *_logs(record.meta), *(entry.name for entry in record.meta.inputs))
     return [record.directory / name for name in names]
 
 
@@ -103,7 +115,7 @@ def load_record(directory: Path) -> Record:
         if entry.name != MISSION and _has_changed(Path(entry.source), entry.sha256):
             notes.append(f"{entry.source}: changed since the run; its copy in the record is used")
     mission, settings = _mission_and_settings(directory, meta)
-    cut = [line for name in (PACKETS, TICKS, DECISIONS) if (line := _check_length(directory / name, meta))]
+    cut = [line for name in _logs(meta) if (line := _check_length(directory / name, meta))]
     if meta.end is None:
         reason = "killed, power lost or the disk full"
         cut = [f"{directory}: the record was not closed ({reason}); what there is of it is replayed"]
@@ -128,9 +140,9 @@ def _meta(directory: Path) -> RecordMeta:
     if not isinstance(values, dict):
         raise RecordError(f"{file}: damaged, not what a run writes there; take the record from a copy that is whole")
     found = values.get("format", 1)
-    if found != FORMAT:
+    if found not in (FORMAT, WITH_LIDARS):
         raise RecordError(
-            f"{file}: a record of format {found!r:.20}, this program replays format {FORMAT}; "
+            f"{file}: a record of format {found!r:.20}, this program replays formats {FORMAT} and {WITH_LIDARS}; "
             "use the version it was made with"
         )
     try:
@@ -150,11 +162,17 @@ def _mission_and_settings(directory: Path, meta: RecordMeta) -> tuple[Mission, S
         raise RecordError(str(error)) from error
     if settings_sum(meta.settings) != meta.settings_sha256:
         raise RecordError(f"{directory / META}: settings changed since the run; a replay needs them as they were")
-    if run_sum(meta.seed, meta.settings_sha256, arm=meta.arm) != meta.run_sha256:
-        raise RecordError(f"{directory / META}: seed or arm changed since the run; a replay needs them as they were")
+    if run_sum(meta.seed, meta.settings_sha256, meta.lidars, arm=meta.arm) != meta.run_sha256:
+        what = "seed, arm or lidars changed since the run"
+        raise RecordError(f"{directory / META}: {what}; a replay needs them as they were")
     if mission.prior_map is not None:
         mission = replace(mission, prior_map=directory / mission.prior_map)
     return mission, settings
+
+
+def _logs(meta: RecordMeta) -> tuple[str, ...]:
+    """The files that grew while the run went on."""
+    return (*((LIDARS,) if meta.lidars else ()), PACKETS, TICKS, DECISIONS)
 
 
 def _check_ticks(file: Path) -> None:
@@ -244,3 +262,45 @@ def _packets(file: IO[bytes], count: int, name: Path) -> Iterator[bytes]:
             raise RecordError(f"{name}: damaged at byte {at}; take the record from a copy that is whole")
         file.seek(at + STAMP.size + len(packet))
         yield packet
+
+
+class _Lidars:
+    """What lidars sent, tick by tick."""
+
+    def __init__(self, file: Path, *, given: bool) -> None:
+        self._name = file
+        self._file = open_file(file) if given else None
+        self._next = self._read()
+
+    def __enter__(self) -> _Lidars:
+        """The file is open already."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close the file."""
+        if self._file is not None:
+            self._file.close()
+
+    def of_tick(self, number: int) -> tuple[LidarEntry, ...]:
+        """What was read in this tick. Raises RecordError if it is damaged."""
+        found: list[LidarEntry] = []
+        while self._next is not None and self._next.tick <= number:
+            found.append(self._next)
+            self._next = self._read()
+        return tuple(found)
+
+    def _read(self) -> LidarEntry | None:
+        """The next entry; None at the end. Raises RecordError."""
+        if self._file is None:
+            return None
+        at = self._file.tell()
+        head = self._file.read(LIDAR_HEAD.size)
+        if len(head) < LIDAR_HEAD.size:
+            return None
+        tick, time_s, number, count, crc = LIDAR_HEAD.unpack(head)
+        data = self._file.read(min(count, MAX_LIDAR_BYTES))
+        if zlib.crc32(data) != crc:
+            if self._file.read(1) or count > MAX_LIDAR_BYTES:
+                raise RecordError(f"{self._name}: damaged at byte {at}; take the record from a copy that is whole")
+            return None
+        return LidarEntry(tick, time_s, number, data)

@@ -9,16 +9,18 @@ import hashlib
 import json
 import struct
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from pydantic import BaseModel, ConfigDict
 
 from companion.navigation.field_step import Decision
 
-FORMAT = 3
-"""Of the whole directory. A reader refuses others."""
+FORMAT, WITH_LIDARS = 3, 4
+"""Of the whole directory, without and with lidars on the companion's own ports. A reader refuses others."""
 META, MISSION, PACKETS, TICKS, DECISIONS = "meta.json", "mission.json", "link.tlog", "rounds.bin", "decisions.jsonl"
+LIDARS = "lidars.bin"
+"""What lidars on the companion's own ports have sent; there only if there were any."""
 INPUTS = "inputs"
 STATE = "state"
 """The kind of the input file that an interrupted run has left."""
@@ -26,6 +28,9 @@ STAMP = struct.Struct(">Q")
 """Before each packet in ``link.tlog``: microseconds since 1970, as ground stations write it."""
 TICK = struct.Struct("<dIII")
 CHECKED_TICK = struct.Struct("<dIIII")
+LIDAR_HEAD = struct.Struct("<IdBII")
+"""Before the bytes in ``lidars.bin``: number of the tick, time by the companion's clock, number of the lidar, how many
+bytes, and their check sum."""
 
 
 class RecordError(Exception):
@@ -49,7 +54,7 @@ class FileLength(BaseModel):
 
 
 class RecordMeta(BaseModel):
-    """``meta.json``. ``end``: by file name; None until the record is closed."""
+    """``meta.json``. ``end``: by file name; None until the record is closed. ``lidars``: as they were given."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -60,10 +65,20 @@ class RecordMeta(BaseModel):
     settings: dict[str, object]
     settings_sha256: str
     run_sha256: str
+    lidars: list[str] = []
     start_unix_us: int = 0
     versions: dict[str, str]
     inputs: list[InputFile]
     end: dict[str, FileLength] | None
+
+
+class LidarEntry(NamedTuple):
+    """Bytes of a lidar. ``tick``: in which they were read, from 0; ``number``: of the lidar, from 1."""
+
+    tick: int
+    time_s: float
+    number: int
+    data: bytes
 
 
 class TickEntry(NamedTuple):
@@ -96,6 +111,12 @@ def unpacked_ticks(data: bytes) -> tuple[list[TickEntry], int]:
     return ticks, len(ticks) * CHECKED_TICK.size
 
 
+def packed_lidar(entry: LidarEntry) -> bytes:
+    """As it stands in the file."""
+    head = entry.tick, entry.time_s, entry.number, len(entry.data), zlib.crc32(entry.data)
+    return LIDAR_HEAD.pack(*head) + entry.data
+
+
 def decision_line(time_s: float, target: str, decision: Decision) -> str:
     """A decision as one line of JSON."""
     return json.dumps(
@@ -118,6 +139,7 @@ def settings_sum(settings: Mapping[str, object]) -> str:
     return hashlib.sha256(json.dumps(settings, sort_keys=True).encode()).hexdigest()
 
 
-def run_sum(seed: int, settings_sha256: str, *, arm: bool) -> str:
+def run_sum(seed: int, settings_sha256: str, lidars: Sequence[str] = (), *, arm: bool) -> str:
     """SHA-256 of the inputs of a run that are not files."""
-    return hashlib.sha256(f"{seed} {arm} {settings_sha256}".encode()).hexdigest()
+    given = "".join(f" {one}" for one in lidars)
+    return hashlib.sha256(f"{seed} {arm} {settings_sha256}{given}".encode()).hexdigest()

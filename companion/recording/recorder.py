@@ -9,7 +9,7 @@ import hashlib
 import json
 import os
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,17 +25,21 @@ from companion.recording.record_format import (
     DECISIONS,
     FORMAT,
     INPUTS,
+    LIDARS,
     META,
     MISSION,
     PACKETS,
     STAMP,
     TICKS,
+    WITH_LIDARS,
     FileLength,
     InputFile,
+    LidarEntry,
     RecordError,
     RecordMeta,
     TickEntry,
     decision_line,
+    packed_lidar,
     packed_tick,
     run_sum,
     settings_sum,
@@ -81,6 +85,9 @@ class NullRecorder:
     def said(self, time_s: float, raw: bytes) -> None:
         """Ignored."""
 
+    def lidar_heard(self, number: int, time_s: float, data: bytes) -> None:
+        """Ignored."""
+
     def write_decision(self, time_s: float, target: str, decision: Decision) -> None:
         """Ignored."""
 
@@ -113,11 +120,12 @@ class Recorder:
         files: Mapping[str, Path | None] | None = None,
         start_us: int | None = None,
         worker: BackgroundWorker | None = None,
+        lidars: Sequence[str] = (),
     ) -> None:
         """``files``: further input files by kind; they are copied. None: there is no file of that kind.
 
-        ``start_us``: the start in microseconds since 1970, by default now. Raises RecordError if the directory cannot
-        be written.
+        ``start_us``: the start in microseconds since 1970, by default now. ``lidars``: those on the companion's own
+        ports, as they were given. Raises RecordError if the directory cannot be written.
         """
         self.directory = unused(directory)
         self.problem = ""
@@ -131,6 +139,7 @@ class Recorder:
         self._clock_at_start_s: float | None = None
         self._flushed_s = 0.0
         self._tick: TickEntry | None = None
+        self._ticks = 0
         try:
             self.directory.mkdir(parents=True, exist_ok=True)
             inputs = _copied_inputs(self.directory, mission, files or {})
@@ -138,20 +147,21 @@ class Recorder:
                 inputs.append(_written_mission(self.directory, mission, inputs))
             values = settings.model_dump(mode="json")
             self._meta = RecordMeta(
-                format=FORMAT,
+                format=WITH_LIDARS if lidars else FORMAT,
                 mission=None if mission is None else mission.name,
                 seed=seed,
                 arm=arm,
                 settings=values,
                 settings_sha256=settings_sum(values),
-                run_sha256=run_sum(seed, settings_sum(values), arm=arm),
+                run_sha256=run_sum(seed, settings_sum(values), lidars, arm=arm),
+                lidars=list(lidars),
                 start_unix_us=unix_time_us() if start_us is None else start_us,
                 versions=versions(),
                 inputs=inputs,
                 end=None,
             )
             self._write_meta()
-            for name in (PACKETS, TICKS, DECISIONS):
+            for name in (*([LIDARS] if lidars else []), PACKETS, TICKS, DECISIONS):  # before the ticks that need them
                 refuse_pipe(self.directory / name)
                 self._files[name] = (self.directory / name).open("wb", buffering=0)
                 self._waiting[name], self._sums[name] = bytearray(), (0, 0)
@@ -182,6 +192,11 @@ class Recorder:
         if self._tick is not None:
             self._tick = self._tick._replace(said=self._tick.said + 1)
         self._packet(time_s, raw)
+
+    def lidar_heard(self, number: int, time_s: float, data: bytes) -> None:
+        """Bytes of a lidar on a port of the companion's own, in this tick; no bytes: its line was opened anew."""
+        self.mark(Mark.LIDAR)
+        self._write(LIDARS, packed_lidar(LidarEntry(self._ticks, time_s, number, data)))
 
     def mark(self, mark: Mark) -> None:
         """Something happened in this tick that does not follow from bytes."""
@@ -214,6 +229,7 @@ class Recorder:
         ended, self._tick = self._tick, None
         if ended is not None:
             self._write(TICKS, packed_tick(ended))
+            self._ticks += 1
 
     def _write(self, name: str, data: bytes) -> None:
         if self._closed or self.problem:

@@ -18,6 +18,8 @@ from companion.checkpoint.resume import PreviousRun
 from companion.checkpoint.state_format import MAX_FILE_BYTES, StateError, decode_state
 from companion.core.tick_marks import Mark
 from companion.executive.mission_progress import MissionProgress
+from companion.lidar.reader import Chunk, Lidars, lidars_on
+from companion.lidar.spec import LidarError, parsed
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
 from companion.mavlink.describe import packet_difference, packet_name
@@ -26,7 +28,7 @@ from companion.mission.mission import MissionError
 from companion.navigation.field_step import Decision, NavState
 from companion.navigation.step_runner import StepCall
 from companion.recording.reader import Record, RecordedTick
-from companion.recording.record_format import STATE, RecordError, TickEntry, decision_line
+from companion.recording.record_format import STATE, LidarEntry, RecordError, TickEntry, decision_line
 from companion.storage.files import read_at_most
 
 Answer = tuple[NavState, Decision]
@@ -70,6 +72,7 @@ class RecordPlayer:
         self._current = RecordedTick(TickEntry(0.0), [], [])
         self._began_s: float | None = None
         self._unread: list[bytes] = []
+        self._lidar_ports = [_RecordedPort(number) for number, _ in enumerate(record.meta.lidars, 1)]
         self._said: list[bytes] = []
         self._on_decision = on_decision
         self._on_said = on_said
@@ -92,9 +95,18 @@ class RecordPlayer:
         self._current, self._next = self._next, next(self._ticks, None)
         self.signatures.set_marks(self.entry.marks)
         self._unread, self._said = list(self._current.heard), []
+        for port in self._lidar_ports:
+            port.advance(self._current.lidars)
         self._began_s = self.entry.time_s if self._began_s is None else self._began_s
         self.result.ticks += 1
         self.result.seconds = self.entry.time_s - self._began_s
+
+    def lidars(self) -> Lidars:
+        """The lidars of the run, which read what was recorded. Raises RecordError."""
+        try:
+            return lidars_on([parsed(text) for text in self._record.meta.lidars], self._lidar_ports)
+        except LidarError as error:
+            raise RecordError(f"{self._record.directory}: {error}") from error
 
     def differs(self, what: str) -> None:
         """Note a difference."""
@@ -176,6 +188,29 @@ class RecordPlayer:
             self.differs(f"{packet_name(raw)} was said in the run, not in the replay")
         for raw in () if last else now[len(recorded) :]:
             self.differs(f"{packet_name(raw)} is said in the replay, not in the run")
+
+
+class _RecordedPort:
+    """The port of a lidar in a record."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._chunks: list[Chunk] = []
+
+    def advance(self, entries: tuple[LidarEntry, ...]) -> None:
+        """A new tick, and what was heard in it."""
+        self._chunks = [Chunk(one.time_s, one.data) for one in entries if one.number == self._number]
+
+    def read(self) -> list[Chunk]:
+        """What was heard in this tick."""
+        chunks, self._chunks = self._chunks, []
+        return chunks
+
+    def write(self, data: bytes) -> None:
+        """Nobody is there."""
+
+    def close(self) -> None:
+        """Nothing to close."""
 
 
 class ReplayStepRunner:
@@ -283,6 +318,7 @@ def replay(record: Record, observer: ReplayObserver | None = None) -> ReplayResu
         seed=record.meta.seed,
         arm=record.meta.arm,
         checkpointer=_checkpointer(record, player),
+        lidars=player.lidars(),
     )
     player.result.companion = companion
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from companion.checkpoint.checkpointer import Checkpointer
 from companion.core.clock import Clock
@@ -11,6 +11,7 @@ from companion.core.tick_marks import Mark
 from companion.executive.mission_requests import MissionRequests
 from companion.executive.mission_run import MissionRun, new_run
 from companion.executive.requested_goals import RequestedGoals
+from companion.lidar.reader import Lidars
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.mission import Mission
 from companion.navigation.step_runner import NotedRunner, StepRunner
@@ -21,7 +22,7 @@ from companion.settings import Settings
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.arming import Arming
 from companion.supervision.drive_permission import DrivePermission
-from companion.supervision.event_dispatcher import EventDispatcher, EventHandler
+from companion.supervision.event_dispatcher import EventDispatcher, EventHandler, Heard
 from companion.supervision.mission_limits import MissionLimits
 from companion.supervision.monitors import make_monitors
 from companion.supervision.pace import Pace
@@ -53,6 +54,7 @@ class Options:
     arm: bool
     checkpointer: Checkpointer | None = None
     keep_settings: Callable[[Settings], None] | None = None
+    lidars: Lidars = field(default_factory=Lidars)
 
 
 def assemble(
@@ -72,13 +74,14 @@ def assemble(
     log.begin(clock.now_s(), Mark.BEGIN)
 
     pace = Pace(clock, live)
-    monitors = make_monitors(run, autopilot, live, notifier, pace, noted)
+    monitors = make_monitors(run, autopilot, live, notifier, pace, noted, options.lidars.names)
     permission = DrivePermission(run, monitors.by_precedence, live, notifier)
     operator_server = OperatorServer(run, autopilot, live, notifier, options.keep_settings)
     requests = (RequestedGoals(run, live, notifier), MissionRequests(run, notifier))
     handlers: tuple[EventHandler, ...]
     handlers = (operator_server, *monitors.by_precedence, *requests, run, permission)
-    dispatcher = EventDispatcher(run, autopilot, notifier, handlers, monitors.scans, monitors.localization)
+    heard = Heard(autopilot, options.lidars)
+    dispatcher = EventDispatcher(run, heard, notifier, handlers, monitors.scans, monitors.localization)
 
     limits = MissionLimits(run, monitors.fences, monitors.batteries, monitors.rivals, settings.power, outcome)
     previous = checkpointer.previous if checkpointer else None

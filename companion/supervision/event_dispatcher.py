@@ -5,13 +5,16 @@ Nouns: event dispatcher.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Protocol
 
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan, MissionRun
+from companion.lidar.reader import Lidars
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.operator.notifications import Notifier
-from companion.perception.scan_filter import newest_ranges
+from companion.perception.deskew import deskewed
+from companion.perception.scan_filter import NEAREST_OF_ALL, newest_ranges
 from companion.safety.watchdogs import ScanMonitor
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.vehicle.events import Event, RangeSeen, TextSeen
@@ -26,20 +29,39 @@ class EventHandler(Protocol):
         ...
 
 
+class Heard:
+    """All that the companion hears: over the link, and from lidars of its own."""
+
+    def __init__(self, autopilot: AutopilotLink, lidars: Lidars) -> None:
+        self._autopilot = autopilot
+        self._lidars = lidars
+
+    def poll(self, now_s: float) -> list[Event]:
+        """The events since the last call. RANGEFINDER is the last resort: beside a lidar it is left out."""
+        events = self._autopilot.poll(now_s)
+        if not self._lidars.readers:
+            return events
+        return [*filter(_is_no_last_resort, events), *self._lidars.poll(now_s)]
+
+
+def _is_no_last_resort(event: Event) -> bool:
+    return not isinstance(event, RangeSeen) or event.scan.source != NEAREST_OF_ALL
+
+
 class EventDispatcher:
     """``handlers``: in this order."""
 
     def __init__(
         self,
         run: MissionRun,
-        autopilot: AutopilotLink,
+        heard: Heard,
         notifier: Notifier,
         handlers: tuple[EventHandler, ...],
         scans: ScanMonitor,
         localization: LocalizationMonitor,
     ) -> None:
         self._run = run
-        self._autopilot = autopilot
+        self._heard = heard
         self._notifier = notifier
         self._handlers = handlers
         self._scans = scans
@@ -49,13 +71,13 @@ class EventDispatcher:
         """Dispatch everything that has come in since the last tick; return the scans that may go on the map."""
         self._notifier.news.clear()
         run, found = self._run, []
-        for event in newest_ranges(self._autopilot.poll(now_s)):
+        for event in newest_ranges(self._heard.poll(now_s)):
             run.vehicle = fold(run.vehicle, event)
             self._note_text(event)
             for handler in self._handlers:
                 handler.take(event, run.vehicle)
             if run.executor is not None and isinstance(event, RangeSeen):
-                located = self._located(event)
+                located = self._located(event, now_s)
                 found += [] if located is None else [located]
         return found
 
@@ -64,11 +86,18 @@ class EventDispatcher:
         if isinstance(event, TextSeen) and event.severity <= Severity.WARNING:
             self._notifier.note(f"autopilot: {event.text}", Severity(event.severity))
 
-    def _located(self, event: RangeSeen) -> LocatedScan | None:
-        """The scan where it was taken; None when that is doubtful."""
+    def _located(self, event: RangeSeen, now_s: float) -> LocatedScan | None:
+        """The scan where it was taken; None when that is doubtful.
+
+        One whose readings have ages is brought to the rover's place of now; any other was taken as it came.
+        """
         if not self._scans.fits or self._localization.position_doubted:
             return None
-        pose, attitude = self._run.vehicle.pose_at(event.time_s), self._run.vehicle.attitude
+        vehicle, scan, at_s = self._run.vehicle, event.scan, event.time_s
+        if scan.age_s is not None:
+            scan, at_s = replace(scan, age_s=scan.age_s + (now_s - event.time_s)), now_s
+        pose, attitude = vehicle.pose_at(at_s), vehicle.attitude
         if pose is None or attitude is None:
             return None
-        return LocatedScan(pose, attitude.yaw_rate_rad_s, event.scan)
+        rate_rad_s = attitude.yaw_rate_rad_s
+        return LocatedScan(pose, rate_rad_s, deskewed(scan, vehicle.forward_m_s, rate_rad_s))

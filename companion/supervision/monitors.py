@@ -13,6 +13,7 @@ from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.battery_monitor import BatteryMonitor
 from companion.safety.guard_monitor import GuardMonitor
+from companion.safety.lidar_monitor import LidarMonitor
 from companion.safety.watchdogs import DataMonitor, Loop, LoopMonitor, Monitor, ScanMonitor, SticksMonitor, Worker
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.fence_monitor import FenceMonitor
@@ -35,15 +36,22 @@ class Monitors:
 
 
 def make_monitors(
-    run: MissionRun, autopilot: AutopilotLink, live: LiveSettings, notifier: TextSink, loop: Loop, worker: Worker
+    run: MissionRun,
+    autopilot: AutopilotLink,
+    live: LiveSettings,
+    notifier: TextSink,
+    loop: Loop,
+    worker: Worker,
+    lidars: tuple[str, ...] = (),
 ) -> Monitors:
-    """The monitors of a run that has not begun."""
+    """The monitors of a run that has not begun. ``lidars``: names of those wired to the companion."""
     settings = live.current
     localization, scans = LocalizationMonitor(run, autopilot, live, notifier), ScanMonitor()
     rivals, batteries = RivalMonitor(autopilot), BatteryMonitor(settings.power)
     fences = FenceMonitor(autopilot, settings.fence, notifier)
     by_precedence = (
         SticksMonitor(),
+        LidarMonitor(lidars, live),
         DataMonitor(live),
         localization,
         LoopMonitor(loop, worker, settings.safety.planner_s),

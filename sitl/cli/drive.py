@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import typer
@@ -17,6 +17,7 @@ from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
+from companion.lidar.spec import LidarError, LidarSpec, parsed
 from companion.mapping.map_files import MapError
 from companion.mission.mission import Mission, MissionError
 from companion.recording.record_format import RecordError
@@ -32,12 +33,15 @@ from sitl.cli.drive_view import run_with_view
 from sitl.faults.fault_file import FaultFileError
 from sitl.lockstep import Drive
 from sitl.network.collision_log import CollisionLog
-from sitl.scenario import Scenario, ScenarioError, equipped, simulated
+from sitl.scenario import Scenario, ScenarioError, equipped, simulated, with_lidars
 
 BAD_INPUT = (
     SettingsError, MissionError, MapError, RecordError, ScenarioError, OutputError, FaultFileError, ViewError, WebError,
+    LidarError,
 )  # fmt: skip
 WEB_EVERY_S = 0.1
+SIMULATED = "simulated"
+"""The port of a lidar in the simulator."""
 RECORD_START_US = 1_577_836_800_000_000
 """2020-01-01: simulated time has no date, and the same run must give the same record."""
 
@@ -53,6 +57,7 @@ def drive(
     map_stem: options.MapStem = None,
     json_file: options.JsonFile = None,
     sensors: options.Sensors = None,
+    lidar: options.Lidars = None,
     world: options.World = None,
     start: options.Start = None,
     target: options.Target = None,
@@ -87,20 +92,29 @@ def drive(
         settings = usable_settings(settings_file)
         where = OnWorld(world, start, target, resolution_m, top_left, prior)
         chosen = mission_to_drive(mission_file, where, skip_unknown=skip_unknown, laps=laps)
-        mission = equipped(chosen, sensors, params)
-        refuse_blind(mission)
-        scenario = simulated(mission, faults)
-        _note(refuse_turning_on_the_spot(mission, scenario))
+        lidars = tuple(parsed(text, SIMULATED) for text in lidar or ())
+        mission = equipped(chosen, "none" if lidars and sensors is None else sensors, params)
+        scenario = _simulated(mission, faults, lidars)
         files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
         wanted.check((*files.values(), *mission.files))
         folder = context.with_resource(wanted.record_folder())
         if folder is not None:
-            recorder = Recorder(folder, mission, settings, seed, arm=True, files=files, start_us=RECORD_START_US)
+            recorder = Recorder(
+                folder,
+                mission,
+                settings,
+                seed,
+                arm=True,
+                files=files,
+                start_us=RECORD_START_US,
+                lidars=[one.text for one in lidars],
+            )
         with console.status("loading the planner ..."):
             _say_if_compiling(settings, mission)
             run = Drive(
-                mission, scenario, settings, seed, recorder, time_limit_s, station=page.station if page else None
-            )
+                mission, scenario, settings, seed, recorder, time_limit_s, station=page.station if page else None,
+                lidars=lidars,
+            )  # fmt: skip
         also = Also() if page is None else _shown(run, page, settings)
         if painter is None:
             report = run_with_progress(run, console, pace, also)
@@ -172,9 +186,14 @@ def _print_last(painter: Painter | None, rows_below: int) -> None:
         painter.print_last(rows_below)
 
 
-def _note(scenario: Scenario) -> None:
+def _simulated(mission: Mission, faults: Path | None, lidars: Sequence[LidarSpec]) -> Scenario:
+    """The simulation of a mission that can be driven here; remarks are printed."""
+    refuse_blind(mission, lidars)
+    scenario = with_lidars(simulated(mission, faults), lidars)
+    refuse_turning_on_the_spot(mission, scenario)
     for note in scenario.notes:
         typer.echo(note, err=True)
+    return scenario
 
 
 def _say_if_compiling(settings: Settings, mission: Mission) -> None:

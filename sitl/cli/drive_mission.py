@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from companion.lidar.spec import LidarSpec
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError, with_laps
 from companion.mission.sensor_tables import is_blind
@@ -69,9 +71,9 @@ def _driven_here(mission: Mission) -> Mission:
     return mission
 
 
-def refuse_blind(mission: Mission) -> None:
+def refuse_blind(mission: Mission, lidars: Sequence[LidarSpec] = ()) -> None:
     """Refuse a mission without range sensors. Raises MissionError."""
-    if mission.sitl is not None and is_blind(mission.sitl.sensors):
+    if not lidars and mission.sitl is not None and is_blind(mission.sitl.sensors):
         raise MissionError(
             "sensors none: the companion does not drive without range data; none is for rover-sitl serve"
         )

@@ -31,6 +31,14 @@ Sensors = Annotated[
     str | None,
     typer.Option(help="lidar-90, lidar-360, beams or a TOML file (none: only for serve); default: the mission's."),
 ]
+Lidars = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--lidar",
+        metavar="MODEL[:KEY=VALUE,...]",
+        help="A lidar that the companion reads itself, see docs/lidars.md; takes the place of the mission's sensors.",
+    ),
+]
 World = Annotated[Path | None, typer.Option(help="The ground: image, ROS yaml, MovingAI .map or TOML world.")]
 Start = Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to start from.")]
 Target = Annotated[str | None, typer.Option(metavar="X,Y", help="With --world: the field to reach.")]

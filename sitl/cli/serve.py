@@ -15,6 +15,7 @@ from rich.console import Console
 
 from companion.cli.web import Token, Web, WebError, asked_place, served
 from companion.core.clock import WallClock
+from companion.lidar.spec import LidarError, LidarSpec, parsed
 from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
 from companion.mission.mission import MissionError
@@ -23,8 +24,9 @@ from companion.viewer.web_process import WebProcess
 from sitl.faults.fault_file import FaultFileError
 from sitl.network import FORMS, Endpoint, ListenError, open_endpoint
 from sitl.network.event_log import EventLog
+from sitl.network.lidar_pty import LidarTerminal
 from sitl.network.server import serve as run_server
-from sitl.scenario import Scenario, ScenarioError, equipped, simulated
+from sitl.scenario import Scenario, ScenarioError, equipped, simulated, with_lidars
 from sitl.simulator import Simulator
 from sitl.view.watching import Watching
 from sitl.view.web_feed import WebFeed
@@ -32,7 +34,9 @@ from sitl.view.web_feed import WebFeed
 DEFAULT_LISTEN = ["udpout:127.0.0.1:14550", "tcp:127.0.0.1:5760"]
 HOW_TO_CONNECT = "a companion connects with --connect udpin:127.0.0.1:14550 or --connect tcp:127.0.0.1:5760"
 BAD_INPUT = 2
-BAD_INPUTS = (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ViewError, WebError)
+BAD_INPUTS = (MissionError, MapError, ScenarioError, ListenError, FaultFileError, ViewError, WebError, LidarError)
+NO_PATH = "pty"
+"""The port of a lidar for which no path was given."""
 
 
 def serve(
@@ -48,6 +52,14 @@ def serve(
     seed: Annotated[int, typer.Option(min=0, help="For all noise.")] = 0,
     quiet: Annotated[bool, typer.Option("--quiet", help="Say nothing but errors.")] = False,
     sensors: Annotated[str | None, typer.Option(help="A suite's name or a TOML file; default: the mission's.")] = None,
+    lidar_pty: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="MODEL[:PATH][:KEY=VALUE,...]",
+            help="A lidar on a pseudo-terminal, with a symbolic link at PATH, mounted as for --lidar of `run`; it "
+            "takes the place of the mission's sensors. Repeatable.",
+        ),
+    ] = None,
     params: Annotated[Path | None, typer.Option(help="ArduRover's parameters: NAME,VALUE or NAME VALUE.")] = None,
     faults: Annotated[Path | None, typer.Option(help="TOML file with a fault plan.")] = None,
     view: Annotated[bool, typer.Option("--view", help="Show map, rover and rates on this terminal.")] = False,
@@ -63,7 +75,10 @@ def serve(
         try:
             console = terminal(sys.stdout) if view else None
             place = asked_place(web, web_token)
+            lidars = [terminal_of(text) for text in lidar_pty or ()]
+            sensors = "none" if lidars and sensors is None else sensors
             name, scenario = _scenario(mission_file, sensors, params, faults)
+            scenario = with_lidars(scenario, lidars)
             page = None if place is None else WebProcess(place)
             if page is not None:
                 ends.callback(page.close)
@@ -78,6 +93,9 @@ def serve(
             endpoints: list[Endpoint] = []
             for serial_port, url in enumerate(listen or DEFAULT_LISTEN):
                 endpoints.append(open_endpoint(url, simulator, log, serial_port))
+                ends.callback(endpoints[-1].close)
+            for device, spec in zip(simulator.lidars, lidars, strict=True):
+                endpoints.append(LidarTerminal(device, "" if spec.port == NO_PATH else spec.port, told.tell))
                 ends.callback(endpoints[-1].close)
         except BAD_INPUTS as error:
             typer.echo(str(error), err=True)
@@ -101,6 +119,17 @@ def serve(
     if not quiet:
         touched = len(simulator.collisions)
         say(f"stopped after {simulator.time_s:.0f} s of the rover's time and {touched} collision{'s' * (touched != 1)}")
+
+
+def terminal_of(text: str) -> LidarSpec:
+    """A lidar of ``--lidar-pty``, whose port is the path of the link. Raises LidarError."""
+    name, _, rest = text.partition(":")
+    path, colon, options = rest.rpartition(":")
+    if not colon and ("=" in rest or rest in ("", "flip")):
+        path, options = "", rest
+    elif not colon:
+        path, options = rest, ""
+    return parsed(f"{name}:{options}".rstrip(":"), path or NO_PATH)
 
 
 class Told:

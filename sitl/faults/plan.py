@@ -126,6 +126,22 @@ class SensorFault(Fault):
 
 
 @dataclass(frozen=True, slots=True)
+class LidarFault(Fault):
+    """Something is wrong with lidars on serial lines, or with the lines. ``lidars``: numbers from 1, empty for all.
+
+    ``lost``, ``damaged``: probability of each byte; ``noise_m``: standard deviation of further noise; ``stalled``: the
+    motor stands; ``unplugged``: the cable is pulled.
+    """
+
+    lidars: tuple[int, ...] = ()
+    lost: float = 0.0
+    damaged: float = 0.0
+    noise_m: float = 0.0
+    stalled: bool = False
+    unplugged: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class WheelSlip(Fault):
     """Wheels slip: ``share`` of the motor output is lost, on one side or both."""
 

@@ -6,7 +6,7 @@ Everything is a function of plan, seed and simulated time; each fault has its ow
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from sitl.faults.plan import (
     GpsGlitch,
     GpsLoss,
     GpsNoise,
+    LidarFault,
     LinkFault,
     PilotTakesOver,
     Reboot,
@@ -32,6 +33,7 @@ from sitl.faults.plan import (
     WheelSlip,
 )
 from sitl.sensors.range_sensors import Defect, RangeSensing
+from sitl.sensors.serial_lidar import LineFaults, SerialLidar
 
 DRIVING_M = 0.1
 """The rover counts as driving from this distance on."""
@@ -44,8 +46,9 @@ OWN_STREAM = 0x4641554C
 class FaultPlayer:
     """The active faults, and their effects on vehicle, sensors and wheels; links ask it for link faults."""
 
-    def __init__(self, plan: FaultPlan, seed: int) -> None:
-        """``seed``: the simulator's own."""
+    def __init__(self, plan: FaultPlan, seed: int, lidars: Sequence[SerialLidar] = ()) -> None:
+        """``seed``: the simulator's own; ``lidars``: those on serial lines of their own."""
+        self._lidars = tuple(lidars)
         seeds = np.random.SeedSequence([OWN_STREAM, seed, plan.seed]).spawn(len(plan.faults) + 1)
         self._faults = [(fault, np.random.default_rng(one)) for fault, one in zip(plan.faults, seeds, strict=False)]
         self._ekf_rng = np.random.default_rng(seeds[-1])
@@ -176,6 +179,8 @@ class FaultPlayer:
             grips = [1.0, 0.5 * (grips[0] + grips[1])]
         rover["grip_1"], rover["grip_3"] = grips
         sensing.lidar_fault, sensing.beam_faults = lidar, beams
+        for number, one in enumerate(self._lidars, 1):
+            one.faults = self._line_faults(number)
         vehicle.battery.fault_v = volts if math.isfinite(volts) else None
 
     def _trouble(self, vehicle: Vehicle) -> None:
@@ -194,6 +199,23 @@ class FaultPlayer:
             for number, fault in self._active_faults()
             if isinstance(fault, CommandFault)
         ]
+
+    def _line_faults(self, number: int) -> LineFaults:
+        """What is wrong with the lidar on serial line ``number``."""
+        found = LineFaults()
+        for _, fault in self._active_faults():
+            match fault:
+                case SensorFault() if not fault.beams:
+                    found.defect = fault.defect
+                case LidarFault() if not fault.lidars or number in fault.lidars:
+                    found.lost = 1.0 - (1.0 - found.lost) * (1.0 - fault.lost)
+                    found.damaged = 1.0 - (1.0 - found.damaged) * (1.0 - fault.damaged)
+                    found.noise_m = math.hypot(found.noise_m, fault.noise_m)
+                    found.stalled |= fault.stalled
+                    found.unplugged |= fault.unplugged
+                case _:
+                    pass
+        return found
 
     # GPS -------------------------------------------------------------------------------------------------------------
 

@@ -17,6 +17,7 @@ from sitl.faults.plan import (
     GpsGlitch,
     GpsLoss,
     GpsNoise,
+    LidarFault,
     LinkEffect,
     LinkFault,
     PilotTakesOver,
@@ -224,6 +225,62 @@ class Silent(FaultTable):
         return SensorFault(**self.window(), defect=Defect.SILENT, beams=tuple(self.beams or ()))
 
 
+class OnLidar(FaultTable):
+    """Keys of faults of lidars on serial lines."""
+
+    lidars: Numbers | None = None
+
+    def lidar_fault(self, **strength: Any) -> LidarFault:
+        """The fault of the lidars that it concerns."""
+        return LidarFault(**self.window(), lidars=tuple(self.lidars or ()), **strength)
+
+
+class LidarLoss(OnLidar):
+    """``lidar_loss``."""
+
+    probability: Share
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.lidar_fault(lost=self.probability)
+
+
+class LidarDamage(OnLidar):
+    """``lidar_corrupt``."""
+
+    probability: Share
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.lidar_fault(damaged=self.probability)
+
+
+class LidarNoise(OnLidar):
+    """``lidar_noise``."""
+
+    metres: Metres
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.lidar_fault(noise_m=self.metres)
+
+
+class LidarStalled(OnLidar):
+    """``lidar_stalled``."""
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.lidar_fault(stalled=True)
+
+
+class LidarUnplugged(OnLidar):
+    """``lidar_unplugged``."""
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return self.lidar_fault(unplugged=True)
+
+
 class SlipTable(FaultTable):
     """``wheel_slip``."""
 
@@ -276,6 +333,11 @@ KINDS: dict[str, type[FaultTable]] = {
     "gps_noise": GpsNoiseTable,
     "sensor_stuck": Stuck,
     "sensor_silent": Silent,
+    "lidar_loss": LidarLoss,
+    "lidar_corrupt": LidarDamage,
+    "lidar_noise": LidarNoise,
+    "lidar_stalled": LidarStalled,
+    "lidar_unplugged": LidarUnplugged,
     "wheel_slip": SlipTable,
     "battery_low": BatteryTable,
     "command": CommandTable,

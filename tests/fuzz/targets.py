@@ -10,8 +10,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from companion.checkpoint.state_format import SUM_BYTES, StateError, decode_state, encode_state
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
+from companion.lidar.models import MODELS, LidarModel
+from companion.lidar.reader import Chunk, LidarReader
+from companion.lidar.spec import LidarError, parsed
 from companion.mapping.map_files import MapError, load_map
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mavlink.codec import Codec
@@ -33,7 +38,7 @@ from tests.support.states import a_state
 MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 A_MISSION = b'{"name": "m", "targets": [{"name": "t", "place": [1, 2]}]}'
 LONGEST_LINE = 1000
-REFUSALS = (MissionError, MapError, SettingsError, RecordError, StateError, SigningKeyError)
+REFUSALS = (MissionError, MapError, SettingsError, RecordError, StateError, SigningKeyError, LidarError)
 HEADER_BYTES = 10
 ROVER, STATION = 0, 5
 """Senders as ``_packets`` reads them."""
@@ -171,6 +176,50 @@ def link(data: bytes) -> None:
         vehicle.pose_at(time_s)
 
 
+def lidar(name: str) -> Callable[[bytes], None]:
+    """The reader of a lidar: whatever comes, in pieces, no reading lies outside the limits."""
+
+    def read(data: bytes) -> None:
+        spec = parsed(f"{name}:fuzz:min=0.1,max=9")
+        port = FuzzedPort()
+        reader = LidarReader(spec, port, 1)
+        for number, at in enumerate(range(0, len(data), 512)):
+            port.chunks.append(Chunk(0.02 * number, data[at : at + 512]))
+            for scan in reader.poll(0.02 * number, port):
+                hit = scan.range_m[np.isfinite(scan.range_m)]
+                assert np.all((hit >= 0.1) & (hit < 9.0))
+                assert scan.age_s is not None and np.all(scan.age_s >= 0.0)
+
+    return read
+
+
+class FuzzedPort:
+    """A port that gives what it is given."""
+
+    def __init__(self) -> None:
+        self.chunks: list[Chunk] = []
+
+    def read(self) -> list[Chunk]:
+        """All at once."""
+        chunks, self.chunks = self.chunks, []
+        return chunks
+
+    def write(self, data: bytes) -> None:
+        """Nobody is there."""
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+    def lidar_heard(self, number: int, time_s: float, data: bytes) -> None:
+        """Nothing is logged."""
+
+
+def lidar_spec(data: bytes) -> None:
+    """The text of ``--lidar``."""
+    with refusing():
+        parsed(data.decode(errors="replace"))
+
+
 def _packets(data: bytes) -> bytes:
     """Packets whose frame is right, of any contents: number of the message, sender, length, then its contents."""
     from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -251,11 +300,20 @@ def targets() -> dict[str, Target]:
         "record": Target(record, record_examples()),
         "recorded-mission": Target(recorded_mission, (A_MISSION,)),
         "link": Target(link, (talk,)),
+        **{f"lidar-{one.name.lower()}": Target(lidar(one.name), (lidar_example(one),)) for one in MODELS},
+        "lidar-spec": Target(lidar_spec, (b"LD19:/dev/ttyUSB0:yaw=-90,x=0.2,flip,mask=170..190,min=0.3",)),
         "driving": Target(driving, driving_examples(), most_s=DRIVE_S),
         "link-contents": Target(
             link_contents, (b"\0\0\0\x09" + bytes(9), b"\x1e\0\0\x1c" + bytes(28), b"\x5a\0\1\x22" + bytes(34))
         ),
     }
+
+
+def lidar_example(model: LidarModel) -> bytes:
+    """What it sends in a third of a second."""
+    from tests.support.lidars import room, started, stream
+
+    return stream(started(room(name=model.name), model.start), 0.35)
 
 
 def driving_examples() -> tuple[bytes, ...]:

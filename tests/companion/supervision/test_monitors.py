@@ -17,6 +17,7 @@ def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None
     monitors = make_monitors(desk.run, link, desk.settings, desk.notices, Loop(), InlineRunner())
     assert [type(monitor).__name__ for monitor in monitors.by_precedence] == [
         "SticksMonitor",
+        "LidarMonitor",
         "DataMonitor",
         "LocalizationMonitor",
         "LoopMonitor",

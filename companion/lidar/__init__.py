@@ -1,0 +1,1 @@
+"""Lidars on serial ports of the companion's own: bytes, points, scans."""

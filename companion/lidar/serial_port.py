@@ -1,0 +1,126 @@
+"""A lidar's serial port, read by a thread, with reconnection of a cable that was pulled.
+
+Nouns: serial port.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections import deque
+from collections.abc import Sequence
+
+import serial
+
+from companion.core.clock import Clock
+from companion.lidar.reader import Chunk, LidarPort
+from companion.lidar.spec import LidarError, LidarSpec
+from companion.mavlink.serial_port import open_reason
+
+QUEUE_BYTES = 65_536
+"""More than a second of the fastest lidar. What is older is dropped: nobody has come to read it."""
+READ_BYTES = 4096
+WAIT_S = 0.02
+"""A read waits no longer than this, so that bytes are stamped soon after they came."""
+PAUSE_S = 0.005
+"""Between two reads, so that the thread does not wake for every few bytes."""
+RETRY_S = 0.5
+CUT = b""
+
+
+class SerialLidarPort:
+    """Opens the port at once; raises LidarError if that fails. Later it opens it again by itself."""
+
+    def __init__(self, spec: LidarSpec, clock: Clock) -> None:
+        self._spec = spec
+        self._clock = clock
+        self._queue: deque[Chunk] = deque()
+        self._queued = 0
+        self._lock = threading.Lock()
+        self._closing = threading.Event()
+        try:
+            self._port: serial.Serial | None = self._opened()
+        except (OSError, ValueError) as error:
+            raise LidarError(
+                f"lidar '{spec.text}': {spec.port} cannot be opened: {open_reason(error, spec.port)}"
+            ) from error
+        self._thread = threading.Thread(target=self._run, name=f"lidar {spec.port}", daemon=True)
+        self._thread.start()
+
+    def read(self) -> list[Chunk]:
+        """What has come since the last call."""
+        with self._lock:
+            chunks, self._queued = list(self._queue), 0
+            self._queue.clear()
+        return chunks
+
+    def write(self, data: bytes) -> None:
+        """Send a command; dropped while the port is not there."""
+        port = self._port
+        if port is not None:
+            with contextlib.suppress(OSError, TypeError):  # the thread notices what is wrong
+                port.write(data)
+
+    def close(self) -> None:
+        """Stop the lidar and close the port."""
+        if not self._closing.is_set():
+            self.write(self._spec.model.stop)
+        self._closing.set()
+        self._thread.join(1.0)
+
+    def _opened(self) -> serial.Serial:
+        model = self._spec.model
+        port = serial.Serial(None, model.baud, timeout=WAIT_S, write_timeout=0.1, exclusive=True)
+        port.port, port.dtr = self._spec.port, model.dtr
+        port.open()
+        port.write(model.start)
+        return port
+
+    def _run(self) -> None:
+        """The thread: reads until it is to end, and opens the port again when it was lost."""
+        while not self._closing.is_set():
+            if self._port is None:
+                self._closing.wait(RETRY_S)
+                with contextlib.suppress(OSError, ValueError):
+                    self._port = self._opened()
+                    self._put(CUT)
+                continue
+            try:
+                data = self._port.read(1)
+                data += self._port.read(min(self._port.in_waiting, READ_BYTES))
+            except (OSError, TypeError):  # pyserial fails with a TypeError if the port is lost between two calls
+                self._lose()
+                continue
+            if data:
+                self._put(data)
+                self._closing.wait(PAUSE_S)
+        self._lose()
+
+    def _put(self, data: bytes) -> None:
+        chunk = Chunk(self._clock.now_s(), data)
+        with self._lock:
+            if self._queued + len(data) > QUEUE_BYTES:
+                self._queue.clear()
+                self._queued = 0
+                self._queue.append(Chunk(chunk.time_s, CUT))
+            self._queue.append(chunk)
+            self._queued += len(data)
+
+    def _lose(self) -> None:
+        port, self._port = self._port, None
+        if port is not None:
+            with contextlib.suppress(OSError):
+                port.close()
+
+
+def open_ports(specs: Sequence[LidarSpec], clock: Clock) -> list[LidarPort]:
+    """Open the ports of all; raises LidarError if one of them fails, or two share one."""
+    ports: list[LidarPort] = []
+    try:
+        for spec in specs:
+            ports.append(SerialLidarPort(spec, clock))
+    except LidarError:
+        for port in ports:
+            port.close()
+        raise
+    return ports

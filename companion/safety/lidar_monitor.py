@@ -1,0 +1,39 @@
+"""Lidar monitor: the lidars that are wired to the companion, each of which must be heard.
+
+A sensor on the autopilot's network may come and go. A lidar that a person gave on the command line is one that the
+rover needs, also if another one still looks ahead.
+
+Nouns: lidar monitor.
+"""
+
+from __future__ import annotations
+
+from companion.core.scan import WIRED
+from companion.safety.reasons import Doubt, Reason
+from companion.safety.watchdogs import Monitor
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.events import Event, RangeSeen
+from companion.vehicle.state import VehicleState
+
+
+class LidarMonitor(Monitor):
+    """``names``: as the scans of the lidars bear them."""
+
+    def __init__(self, names: tuple[str, ...], settings: LiveSettings) -> None:
+        self._settings = settings
+        self._heard_s: dict[str, float | None] = dict.fromkeys(names)
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event."""
+        if isinstance(event, RangeSeen) and event.scan.sender == WIRED:
+            self._heard_s[event.scan.source] = event.time_s
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """The first lidar that is silent."""
+        limit_s = self._settings.current.safety.stale_s
+        for name, heard_s in self._heard_s.items():
+            if heard_s is None:
+                return Reason(Doubt.DATA_MISSING, (name,))
+            if now_s - heard_s > limit_s:
+                return Reason(Doubt.DATA_OLD, (name, limit_s))
+        return None

@@ -1,0 +1,50 @@
+"""Each lidar that is wired to the companion must be heard."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from companion.core.scan import WIRED, RangeScan
+from companion.safety.lidar_monitor import LidarMonitor
+from companion.safety.reasons import Doubt, Reason
+from companion.settings import Settings
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.events import RangeSeen
+from companion.vehicle.state import VehicleState
+
+FRONT, REAR = "lidar 1 (LD19)", "lidar 2 (LD19)"
+
+
+def monitor(*names: str) -> LidarMonitor:
+    return LidarMonitor(names, LiveSettings(Settings()))
+
+
+def seen(source: str, time_s: float, sender: int = WIRED) -> RangeSeen:
+    return RangeSeen(time_s, RangeScan(time_s, np.zeros(1), np.ones(1), 0.1, 8.0, 0.1, source, sender))
+
+
+def test_without_lidars_there_is_no_doubt() -> None:
+    assert monitor().doubt(5.0) is None
+
+
+def test_one_that_was_never_heard_is_missing() -> None:
+    watch = monitor(FRONT, REAR)
+    watch.take(seen(FRONT, 1.0), VehicleState())
+    assert watch.doubt(1.0) == Reason(Doubt.DATA_MISSING, (REAR,))
+
+
+def test_one_that_falls_silent_is_doubted_though_another_is_heard() -> None:
+    watch = monitor(FRONT, REAR)
+    watch.take(seen(REAR, 1.0), VehicleState())
+    for time_s in (1.0, 1.9, 2.1):
+        watch.take(seen(FRONT, time_s), VehicleState())
+    assert watch.doubt(2.0) is None
+    assert watch.doubt(2.1) == Reason(Doubt.DATA_OLD, (REAR, 1.0))
+    watch.take(seen(REAR, 2.2), VehicleState())
+    assert watch.doubt(2.2) is None
+
+
+def test_a_sensor_on_the_link_does_not_count_for_it() -> None:
+    watch = monitor(FRONT)
+    watch.take(seen(FRONT, 1.0, sender=196), VehicleState())
+    assert watch.doubt(1.0) == Reason(Doubt.DATA_MISSING, (FRONT,))
