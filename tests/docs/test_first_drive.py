@@ -42,7 +42,7 @@ def test_what_other_pages_say_of_parameters_is_in_the_table() -> None:
     safety = (ROOT / "docs" / "safety.md").read_text(encoding="utf-8").split("## About the tables")[0]
     named = set(re.findall(r"`([A-Z][A-Z0-9]*_[A-Z0-9_]+)`", readme + safety))
     assert {"WP_JERK", "OA_TYPE", "WP_SPEED", "FS_GCS_ENABLE"} <= named
-    assert named - set(re.findall(r"^\| `([A-Z0-9_]+)`", table, re.MULTILINE)) == {"OBSTACLE_DISTANCE"}
+    assert named - set(re.findall(r"^\| `([A-Z0-9_]+)`", table, re.MULTILINE)) <= {"OBSTACLE_DISTANCE"}
 
 
 def test_each_step_says_what_to_do_to_watch_what_must_happen_and_when_to_stop() -> None:
