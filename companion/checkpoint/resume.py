@@ -27,7 +27,7 @@ from companion.executive.goal_driver import Tally
 from companion.executive.mission_executor import ORIGIN_MOVED_M, MissionExecutor
 from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
 from companion.executive.mission_progress import MissionPhase, MissionProgress
-from companion.mapping.evidence_map import restore
+from companion.mapping.evidence_map import restore, shifted
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedTarget
@@ -133,8 +133,8 @@ def resumed_layout(
         return layout, progress, "without its map (the settings of the map have changed)"
     same = same and apart_m(origin, saved_origin) <= ORIGIN_MOVED_M
     cell_shift = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
-    log_odds = _shifted(previous.rasters["log_odds"], evidence.log_odds.shape, cell_shift)
-    penalty = _shifted(previous.rasters["penalty"], evidence.penalty.shape, shift)
+    log_odds = shifted(previous.rasters["log_odds"], evidence.log_odds.shape, cell_shift)
+    penalty = shifted(previous.rasters["penalty"], evidence.penalty.shape, shift)
     if not same:
         log_odds = np.where(log_odds >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
         penalty = np.zeros_like(penalty)
@@ -218,17 +218,6 @@ def _progress(layout: MissionLayout, state: SavedState, saved_origin: GeoPoint, 
 def _in_frame(place: SavedPlace, saved_origin: GeoPoint, origin: GeoPoint) -> NedPoint:
     """A saved place in the present frame."""
     return LocalFrame(origin).to_ned(LocalFrame(saved_origin).to_geo(NedPoint(place.north_m, place.east_m)))
-
-
-def _shifted(raster: Raster, shape: tuple[int, ...], shift: Cell) -> Raster:
-    """The raster on another one of this shape, moved by ``shift`` to the east and north; zero where it says nothing."""
-    result = np.zeros(shape, np.float32)
-    height, width = shape
-    y0, x0 = max(0, shift.y), max(0, shift.x)
-    y1, x1 = min(height, raster.shape[0] + shift.y), min(width, raster.shape[1] + shift.x)
-    if y0 < y1 and x0 < x1:
-        result[y0:y1, x0:x1] = raster[y0 - shift.y : y1 - shift.y, x0 - shift.x : x1 - shift.x]
-    return result
 
 
 def _map_newest_scan(executor: MissionExecutor, vehicle: VehicleState) -> None:

@@ -6,6 +6,7 @@ Nouns: mission executor, mission task.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from enum import Enum, auto
 from pathlib import Path
 
@@ -23,7 +24,7 @@ from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
 from companion.executive.controller_choice import settings_in_force
 from companion.executive.goal_driver import GoalDriver, controller_for
-from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, from_home, lay_again
+from companion.executive.mission_layout import MissionLayout, apart_m, carried, fenced_again, from_home, lay_again
 from companion.executive.mission_progress import (
     MissionPhase,
     MissionProgress,
@@ -33,13 +34,14 @@ from companion.executive.mission_progress import (
     on_time,
     on_unreachable,
     parked,
+    relaid,
     returning,
     sent_to,
     skipped,
     with_requested,
 )
 from companion.executive.return_path import Refuge, Trail, refuges
-from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again
+from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again, move
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import Mission
@@ -102,7 +104,7 @@ class MissionExecutor:
         self.progress = progress
         self.phase = RunPhase.DRIVING
         self.maps_begun = 0
-        """Grows whenever what had been mapped is worth nothing any more."""
+        """Grows whenever what had been mapped is worth nothing any more, or lies elsewhere."""
         self._mission = mission
         self._settings = settings
         self._counted_for: tuple[int, float, float | None] | None = None
@@ -115,6 +117,8 @@ class MissionExecutor:
         self.trail = Trail()
         """The way back to where the mission began."""
         self._refuges: list[Refuge] = []
+        self._unmoved_m = (0.0, 0.0)
+        """By how much the map should have been moved farther: it moves by whole cells."""
         self._rolls_until_s: float | None = None
         rover, asked = mission.rover, settings.current.guidance.controller
         self._scan = scan
@@ -204,7 +208,7 @@ class MissionExecutor:
         self.driver = GoalDriver(self._controller(rng), searcher, self._runner, seed)
         self.driver.go_on(before.tally, before.epoch)
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
-        self._tracker = ObjectTracker(self.evidence)
+        self._tracker, self._unmoved_m = ObjectTracker(self.evidence), (0.0, 0.0)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         return True
 
@@ -212,7 +216,28 @@ class MissionExecutor:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
         self.maps_begun += 1
-        self._tracker = ObjectTracker(self.evidence)
+        self._tracker, self._unmoved_m = ObjectTracker(self.evidence), (0.0, 0.0)
+        self.driver.leave()
+        self.driver.forget_places()
+        self.driver.give_up_no_target_before(now_s + VERDICT_S)
+
+    def move_map(self, north_m: float, east_m: float, now_s: float) -> None:
+        """The position has stepped, the rover has not: what was seen and driven keeps its place beside the rover.
+
+        What has a place on earth stays: targets, goals that people ask for, rally points, fences, known ground.
+        """
+        evidence, left = self.evidence, self._unmoved_m
+        done_n, done_e = move(evidence, left[0] + north_m, left[1] + east_m)
+        self._unmoved_m = left[0] + north_m - done_n, left[1] + east_m - done_e
+        self.maps_begun += 1
+        start = self.layout.start
+        moved = carried(start, north_m, east_m, evidence.base)
+        self.layout = replace(self.layout, start=moved)
+        self._refuges = [replace(one, place=moved) if one.place == start else one for one in self._refuges]
+        if self.progress.home == start:
+            self.progress = relaid(self.progress, self.progress.targets, moved, self.progress.requested)
+        self.trail = self.trail.carried(north_m, east_m, evidence.base)
+        self._tracker = ObjectTracker(evidence)
         self.driver.leave()
         self.driver.forget_places()
         self.driver.give_up_no_target_before(now_s + VERDICT_S)

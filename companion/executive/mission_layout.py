@@ -82,6 +82,12 @@ def fenced_again(layout: MissionLayout, mission: Mission, fence: AutopilotFence)
     return replace(layout, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
 
 
+def carried(place: ResolvedTarget, north_m: float, east_m: float, grid: Grid) -> ResolvedTarget:
+    """The same place on the ground, after the position has stepped by so much."""
+    point = NedPoint(place.point.north_m + north_m, place.point.east_m + east_m)
+    return replace(place, point=point, cell=grid.cell_at(point))
+
+
 def from_home(layout: MissionLayout) -> Grid:
     """The map as it is, with its place in metres from home: what ``prior_map`` expects of a saved map."""
     grid = layout.evidence.grid

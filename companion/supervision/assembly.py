@@ -80,7 +80,9 @@ def assemble(
     handlers = (operator_server, *monitors.by_precedence, *requests, permission)
     dispatcher = EventDispatcher(run, autopilot, notifier, handlers, monitors.scans, monitors.localization)
 
-    limits = MissionLimits(run, monitors.fences, monitors.batteries, monitors.rivals, settings.power, outcome)
+    limits = MissionLimits(
+        run, monitors.fences, monitors.batteries, monitors.rivals, monitors.gate, settings.power, outcome
+    )
     previous = checkpointer.previous if checkpointer else None
     shutdown = Shutdown(run, autopilot, live, notifier)
     supervisor = Supervisor(
