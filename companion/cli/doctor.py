@@ -63,7 +63,7 @@ def doctor(
     finally:
         link.close()
         files.close()
-    findings = [*diagnose(seen), *kernels(cold=not kernels_warm(settings))]
+    findings = [*diagnose(seen, settings.safety.gps_fix), *kernels(cold=not kernels_warm(settings))]
     estimate = last_estimate(state or default_directory(os.environ))
     if as_json:
         found = [asdict(one) for one in findings]

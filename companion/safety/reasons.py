@@ -30,7 +30,7 @@ class Doubt(Enum):
     POSITION_WANDERED = "position wandered"
     POSITION_JUMPED = "position jumped"
     ORIGIN_MOVED = "EKF origin moved"
-    FIX_CHANGED = "position steps from GPS fix {} to {}"
+    FIX_CHANGED = "position steps with the GPS fix"
     GPS_POOR = "GPS fix {}, {} needed"
     GPS_SILENT = "GPS fix not told for over {:g} s"
     GPS_SETTLES = "GPS fix {}, not yet for {:g} s"

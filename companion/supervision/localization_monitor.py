@@ -69,8 +69,6 @@ class LocalizationMonitor(Monitor):
         """Why the rover must not move now; None when it may."""
         if now_s < self._unsure_until_s:
             return Reason(Doubt.POSITION_WANDERS)
-        if self._doubt is Doubt.FIX_CHANGED:
-            return Reason(self._doubt, (self._fix.before.text, self._fix.after.text))
         return None if self._doubt is None else Reason(self._doubt)
 
     def tick(self, now_s: float) -> None:
