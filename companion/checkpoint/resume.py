@@ -115,6 +115,7 @@ def resumed_layout(
     *,
     same: bool,
     fence: AutopilotFence = NO_FENCE,
+    narrow_sight: bool = False,
 ) -> tuple[MissionLayout, MissionProgress, str]:
     """The mission in the present frame with the saved map, the saved progress, and a text about the map for people.
 
@@ -126,7 +127,8 @@ def resumed_layout(
     state, saved_origin = previous.state, GeoPoint(*previous.state.origin)
     start = _in_frame(state.progress.start, saved_origin, origin)
     start_pose = Pose(start.north_m, start.east_m, 0.0, now_s)
-    layout = lay(mission, settings, origin, GeoPoint(*state.home), start_pose, fence)
+    home = GeoPoint(*state.home)
+    layout = lay(mission, settings, origin, home, start_pose, fence, narrow_sight=narrow_sight)
     progress = _progress(layout, state, saved_origin, now_s)
     evidence, shift = layout.evidence, grid_shift(state, layout)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:

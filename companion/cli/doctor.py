@@ -17,13 +17,20 @@ from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.state import StateFiles
 from companion.control.model_estimate import ModelEstimate, described
 from companion.core.clock import WallClock
+from companion.core.frames import LocalFrame, NedPoint
 from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
 from companion.executive.warm_up import kernels_warm
+from companion.mapping.map_files import MapError
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import LinkError, open_link
-from companion.settings import SettingsError
+from companion.mission.doubtful_places import doubtful_places
+from companion.mission.field_size import field_size, finer_evidence, sure_gap_m
+from companion.mission.load import load_mission
+from companion.mission.mission import Mission, MissionError
+from companion.mission.resolve import resolve
+from companion.settings import Settings, SettingsError
 from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
 from companion.vehicle.survey import Survey
 
@@ -34,6 +41,10 @@ COLOURS = {Level.STOP: "red", Level.WARN: "yellow", Level.NOTE: "cyan"}
 
 def doctor(
     connect: Annotated[str, typer.Option(help="The autopilot, as for `run`.")],
+    mission_file: Annotated[
+        Path | None,
+        typer.Argument(metavar="MISSION", help="A mission to be looked at where the rover is.", show_default=False),
+    ] = None,
     seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Listen no longer than this.")] = 15.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
@@ -47,8 +58,9 @@ def doctor(
         files = StateFiles(state)
         settings = usable_settings(settings_file)
         signer = files.signer(signing_key)
+        mission = None if mission_file is None else load_mission(mission_file, simulated=False)
         link = open_link(connect)
-    except (SettingsError, LinkError, OutputError, SigningKeyError) as error:
+    except (SettingsError, LinkError, OutputError, SigningKeyError, MissionError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
     clock = WallClock()
@@ -63,16 +75,40 @@ def doctor(
     finally:
         link.close()
         files.close()
-    findings = [*diagnose(seen, settings.safety.gps_fix), *kernels(cold=not kernels_warm(settings))]
+    findings = [
+        *diagnose(seen, settings.safety.gps_fix),
+        *([] if mission is None else of_mission(mission, seen, settings)),
+        *kernels(cold=not kernels_warm(settings)),
+    ]
     estimate = last_estimate(state or default_directory(os.environ))
     if as_json:
         found = [asdict(one) for one in findings]
         typer.echo(json.dumps({"heard": _summary(seen), "followed": _followed(estimate), "findings": found}, indent=2))
     else:
-        _show(seen, findings, estimate)
+        _show(seen, findings, estimate, settings.safety.gps_fix)
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
+
+
+def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Finding]:
+    """What would stop this mission where the rover's home is, and which targets are doubtful from there."""
+    home = seen.vehicle.home
+    if home is None:
+        return []
+    rover, mapping = mission.rover, settings.mapping
+    size = field_size(rover, mapping)
+    try:
+        side_m = resolve(mission, LocalFrame(home.point), NedPoint(0.0, 0.0), size=size).ground.resolution_m
+    except (MissionError, MapError) as error:
+        return [Finding("mission", Level.STOP, f"{error}.", "change the mission as it says")]
+    doubtful = doubtful_places(mission, home.point)
+    found = [Finding("far-target", Level.WARN, line, "look at the mission's places") for line in doubtful]
+    if size is not None and mission.grid.by_footprint:
+        gap_m = sure_gap_m(rover, finer_evidence(mapping, side_m), side_m)
+        says = f"The mission's fields are {side_m:.2g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
+        found.append(Finding("fields", Level.NOTE, says, "for narrower ones: resolution_m, docs/missions.md"))
+    return found
 
 
 def _summary(seen: Survey) -> dict[str, object]:
@@ -83,6 +119,7 @@ def _summary(seen: Survey) -> dict[str, object]:
         "unbelieved": seen.unbelieved,
         "system": seen.system if seen.rover_heard else None,
         "version": None if seen.version is None else ".".join(map(str, seen.version)),
+        "gps_fix": None if seen.vehicle.gps is None else seen.vehicle.gps.fix.text,
         "parameters": dict(seen.parameters),
         "sensors": [asdict(one) for one in seen.sources],
     }
@@ -96,7 +133,7 @@ def _followed(estimate: ModelEstimate | None) -> dict[str, float] | None:
     return {"known": round(estimate.known, 3), **figures}
 
 
-def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None) -> None:
+def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None, gps_fix: str) -> None:
     console = Console()
     if seen.rover_heard:
         version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"
@@ -105,6 +142,8 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None)
         if known := {name: seen.parameters[name] for name in names if name in seen.parameters}:
             limits = ", ".join(f"{name} {value:g}" for name, value in known.items())
             console.print(f"limits: {limits}", soft_wrap=True, markup=False)
+        fix = "not told" if seen.vehicle.gps is None else seen.vehicle.gps.fix.text
+        console.print(f"GPS fix: {fix}; safety.gps_fix asks for {gps_fix}", soft_wrap=True, highlight=False)
         if estimate is not None and estimate.known > 0.0:
             line = f"last run: the rover followed velocities {described(estimate)}"
             console.print(line, soft_wrap=True, markup=False, highlight=False)

@@ -197,17 +197,15 @@ def gps(seen: Survey, gps_fix: str) -> Iterator[Finding]:
     """Whether the GPS fix is the one that ``safety.gps_fix`` asks for."""
     needed, told = NEEDED.get(gps_fix), seen.vehicle.gps
     if needed is not None and told is None:
-        says = f"The GPS fix is not told (GPS_RAW_INT does not come); safety.gps_fix asks for {gps_fix}, and a run waits."
+        says = (
+            f"The GPS fix is not told (GPS_RAW_INT does not come); safety.gps_fix asks for {gps_fix}, and a run waits."
+        )
         yield Finding("gps-fix", Level.STOP, says, "look at the GPS and at the rates of this port")
     elif needed is not None and told is not None and told.fix < needed:
         says = f"The GPS fix is {told.fix.text}; safety.gps_fix asks for {gps_fix}, and a run waits."
         better = "corrections (RTCM) that reach the receiver, and " if needed >= GpsFix.RTK_FLOAT else ""
         remedy = f"see to {better}open sky; or ask for less in the settings"
         yield Finding("gps-fix", Level.STOP, says, remedy)
-    elif needed is None and told is not None and told.fix >= GpsFix.RTK_FLOAT:
-        says = f"The GPS fix is {told.fix.text}; if it gets worse the rover drives on, for safety.gps_fix is any."
-        remedy = 'if the mission needs RTK, set safety.gps_fix to "rtk-float" or "rtk-fixed"'
-        yield Finding("gps-fix", Level.NOTE, says, remedy)
 
 
 def arming(seen: Survey) -> Iterator[Finding]:

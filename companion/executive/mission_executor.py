@@ -44,6 +44,7 @@ from companion.executive.return_path import Refuge, Trail, refuges
 from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again, move
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
+from companion.mission.field_size import field_size, sure_gap_m
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
@@ -200,7 +201,9 @@ class MissionExecutor:
         self._notifier.tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", Severity.WARNING)
         self.maps_begun += 1
         mapping = self._given.mapping
-        self.layout, self.progress = lay_again(self.layout, self.progress, self._mission, mapping, origin)
+        self.layout, self.progress = lay_again(
+            self.layout, self.progress, self._mission, mapping, origin, narrow_sight=self._scan.is_narrow
+        )
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
@@ -411,6 +414,16 @@ class MissionExecutor:
         way, here = self.trail.back(), self.evidence.base.cell_at(pose.point)
         return way if way[0] == here and way[-1] == self._refuges[0].place.cell else ()
 
+    def _tell_of_gaps(self) -> None:
+        """Where fields could be smaller: which gaps count as closed because they are not."""
+        rover, evidence = self._mission.rover, self.evidence
+        size = field_size(rover, evidence.settings, narrow_sight=self._scan.is_narrow)
+        side_m = evidence.base.resolution_m
+        if size is not None and side_m > 1.01 * size.fine_m:
+            gap_m = sure_gap_m(rover, evidence.settings, side_m)
+            text = f"Fields of {side_m:.2g} m may close gaps below {gap_m:.1f} m; smaller ones open more"
+            self._notifier.tell(text, Severity.INFO)
+
     def _take_decision(self, decision: Decision, now_s: float) -> None:
         goal = self.progress.goal
         self.decisions += 1
@@ -420,6 +433,7 @@ class MissionExecutor:
             self.progress = on_reached(self.progress, now_s)
         elif decision.action is Action.UNREACHABLE:
             self._notifier.tell(f"Unreachable: {goal.name} ({decision.reason})", Severity.WARNING)
+            self._tell_of_gaps()
             navigator = self._settings.current.navigator
             if len(self._refuges) > 1:
                 self._refuges.pop(0)

@@ -103,7 +103,7 @@ class GuidanceSettings(Section):
         0.15, ge=0.0, description="room beside the rover's radius that the choice of speed keeps"
     )
     clearances: tuple[Annotated[tuple[NonNegativeFloat, NonNegativeFloat], Field(strict=False)], ...] = Field(
-        ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5), (0.12, 0.3)),
+        ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5), (0.12, 0.3), (0.06, 0.1)),
         min_length=1,
         description="room beside the rover's radius, tried in turn; the next one if the reach is less than the second "
         "figure, metres",

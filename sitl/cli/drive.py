@@ -12,6 +12,7 @@ from rich.console import Console
 
 from companion.app import Status
 from companion.cli.entry import StoppedError
+from companion.cli.given import RadiusM, SpeedMS
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, usable_settings
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
@@ -58,6 +59,8 @@ def drive(
     target: options.Target = None,
     top_left: options.TopLeft = False,
     resolution_m: options.ResolutionM = None,
+    radius_m: RadiusM = None,
+    speed_m_s: SpeedMS = None,
     prior: options.Prior = False,
     params: options.Params = None,
     faults: options.Faults = None,
@@ -83,7 +86,9 @@ def drive(
     try:
         painter, page = _painter(view), web_viewer(web, web_token, _warn, actions=web_actions)
         settings = usable_settings(settings_file)
-        mission = mission_to_drive(mission_file, OnWorld(world, start, target, resolution_m, top_left, prior))
+        mission = mission_to_drive(
+            mission_file, OnWorld(world, start, target, resolution_m, top_left, prior), radius_m, speed_m_s, _warn
+        )
         mission = equipped(mission, sensors, params)
         refuse_blind(mission)
         scenario = simulated(mission, faults)

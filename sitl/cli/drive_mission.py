@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from companion.cli.source import warn_of_places, warning
+from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError
 from companion.mission.sensor_tables import is_blind
@@ -25,14 +28,31 @@ class OnWorld:
     prior: bool
 
 
-def mission_to_drive(mission_file: Path | None, on: OnWorld) -> Mission:
-    """The mission to drive, from a file, from --world with --start and --target, or from both. Raises MissionError."""
+def mission_to_drive(
+    mission_file: Path | None,
+    on: OnWorld,
+    radius_m: float | None = None,
+    speed_m_s: float | None = None,
+    say: Callable[[str], None] = lambda line: None,
+) -> Mission:
+    """The mission to drive, from a file, from --world with --start and --target, or from both.
+
+    ``radius_m``, ``speed_m_s``: of the rover, where the file does not say them. Doubtful places are told. Raises
+    MissionError.
+    """
+    resolution_m = on.resolution_m if on.world is None else None
+    mission = with_given(_mission(mission_file, on), Given(resolution_m, radius_m, speed_m_s))
+    warn_of_places(mission, lambda line: say(warning(line)))
+    return mission
+
+
+def _mission(mission_file: Path | None, on: OnWorld) -> Mission:
     world = on.world
     if world is None:
         if mission_file is None:
             raise MissionError("drive: give a MISSION file, or --world MAP with --start X,Y and --target X,Y")
-        if on.start or on.target or on.top_left or on.prior or on.resolution_m is not None:
-            raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
+        if on.start or on.target or on.top_left or on.prior:
+            raise MissionError("drive: --start, --target, --top-left and --prior go with --world")
         return _driven_here(load_mission(mission_file))
     if on.prior and world.suffix.lower() == ".toml":
         raise MissionError(f"drive: --prior: {world} consists of shapes; the companion can read maps only")
