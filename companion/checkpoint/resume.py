@@ -30,7 +30,7 @@ from companion.executive.laps import LapStart
 from companion.executive.mission_executor import ORIGIN_MOVED_M, MissionExecutor
 from companion.executive.mission_layout import MissionLayout, apart_m, from_home, lay
 from companion.executive.mission_progress import MissionPhase, MissionProgress
-from companion.mapping.evidence_map import restore
+from companion.mapping.evidence_map import restore, shifted
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.do_commands import DoCommand
 from companion.mission.mission import Mission, OnBlocked, Patrol
@@ -119,6 +119,7 @@ def resumed_layout(
     *,
     same: bool,
     fence: AutopilotFence = NO_FENCE,
+    narrow_sight: bool = False,
 ) -> tuple[MissionLayout, MissionProgress, str]:
     """The mission in the present frame with the saved map, the saved progress, and a text about the map for people.
 
@@ -130,15 +131,16 @@ def resumed_layout(
     state, saved_origin = previous.state, GeoPoint(*previous.state.origin)
     start = _in_frame(state.progress.start, saved_origin, origin)
     start_pose = Pose(start.north_m, start.east_m, 0.0, now_s)
-    layout = lay(mission, settings, origin, GeoPoint(*state.home), start_pose, fence)
+    home = GeoPoint(*state.home)
+    layout = lay(mission, settings, origin, home, start_pose, fence, narrow_sight=narrow_sight)
     progress = _progress(layout, state, saved_origin, now_s, mission.patrol, mission.commands)
     evidence, shift = layout.evidence, grid_shift(state, layout)
     if evidence.subdivisions != state.ground.subdivisions or evidence.base.resolution_m != state.ground.resolution_m:
         return layout, progress, "without its map (the settings of the map have changed)"
     same = same and apart_m(origin, saved_origin) <= ORIGIN_MOVED_M
     cell_shift = Cell(shift.x * evidence.subdivisions, shift.y * evidence.subdivisions)
-    log_odds = _shifted(previous.rasters["log_odds"], evidence.log_odds.shape, cell_shift)
-    penalty = _shifted(previous.rasters["penalty"], evidence.penalty.shape, shift)
+    log_odds = shifted(previous.rasters["log_odds"], evidence.log_odds.shape, cell_shift)
+    penalty = shifted(previous.rasters["penalty"], evidence.penalty.shape, shift)
     if not same:
         log_odds = np.where(log_odds >= settings.occupied_at, np.float32(settings.occupied_at), np.float32(0.0))
         penalty = np.zeros_like(penalty)
@@ -258,17 +260,6 @@ def _commands(saved: SavedCommands, commands: Mapping[int, tuple[DoCommand, ...]
 def _in_frame(place: SavedPlace, saved_origin: GeoPoint, origin: GeoPoint) -> NedPoint:
     """A saved place in the present frame."""
     return LocalFrame(origin).to_ned(LocalFrame(saved_origin).to_geo(NedPoint(place.north_m, place.east_m)))
-
-
-def _shifted(raster: Raster, shape: tuple[int, ...], shift: Cell) -> Raster:
-    """The raster on another one of this shape, moved by ``shift`` to the east and north; zero where it says nothing."""
-    result = np.zeros(shape, np.float32)
-    height, width = shape
-    y0, x0 = max(0, shift.y), max(0, shift.x)
-    y1, x1 = min(height, raster.shape[0] + shift.y), min(width, raster.shape[1] + shift.x)
-    if y0 < y1 and x0 < x1:
-        result[y0:y1, x0:x1] = raster[y0 - shift.y : y1 - shift.y, x0 - shift.x : x1 - shift.x]
-    return result
 
 
 def _map_newest_scan(executor: MissionExecutor, vehicle: VehicleState) -> None:

@@ -19,6 +19,7 @@ from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.state import StateFiles
 from companion.control.model_estimate import ModelEstimate, described
 from companion.core.clock import Clock, WallClock
+from companion.core.frames import LocalFrame, NedPoint
 from companion.core.scan import RangeScan
 from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Finding, Level
@@ -28,12 +29,16 @@ from companion.lidar.examination import LidarHeard, lidar_findings
 from companion.lidar.reader import Lidars, lidars_on
 from companion.lidar.serial_port import open_ports
 from companion.lidar.spec import LidarError, LidarSpec
+from companion.mapping.map_files import MapError
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
 from companion.mavlink.transport import ByteLink, LinkError, open_link
+from companion.mission.doubtful_places import doubtful_places
+from companion.mission.field_size import field_size, finer_evidence, sure_gap_m
 from companion.mission.load import load_mission
-from companion.mission.mission import MissionError
-from companion.settings import SettingsError
+from companion.mission.mission import Mission, MissionError
+from companion.mission.resolve import resolve
+from companion.settings import Settings, SettingsError
 from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE
 from companion.vehicle.survey import RangeSource, Survey
 
@@ -46,6 +51,10 @@ COLOURS = {Level.STOP: "red", Level.WARN: "yellow", Level.NOTE: "cyan"}
 
 def doctor(
     connect: Annotated[str, typer.Option(help="The autopilot, as for `run`.")],
+    mission_file: Annotated[
+        Path | None,
+        typer.Argument(metavar="MISSION", help="A mission to be looked at where the rover is.", show_default=False),
+    ] = None,
     seconds: Annotated[float, typer.Option(min=1.0, max=600.0, help="Listen no longer than this.")] = 15.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print the findings as JSON.")] = False,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
@@ -54,16 +63,16 @@ def doctor(
     signing_key: Annotated[
         Path | None, typer.Option(help="File with the passphrase, or 64 hexadecimal digits.")
     ] = None,
-    mission_file: Annotated[
-        Path | None, typer.Option("--mission", metavar="FILE", help="Also what the commands of this mission need.")
-    ] = None,
 ) -> None:
     """Say what would stop a mission. Exit code 0: nothing; 3: something would; 4: no rover heard; 2: bad input."""
     try:
         files = StateFiles(state)
         settings = usable_settings(settings_file)
         signer = files.signer(signing_key)
-        commands, clock, specs = _commands(mission_file), WallClock(), lidars_given(lidar)
+        mission = None
+        if mission_file is not None:
+            mission = load_mission(mission_file, simulated=False, skip_unknown=True)
+        commands, clock, specs = commands_of(mission), WallClock(), lidars_given(lidar)
         link, wired = _opened(connect, specs, clock)
     except (SettingsError, LinkError, MissionError, OutputError, SigningKeyError, LidarError) as error:
         typer.echo(str(error), err=True)
@@ -82,26 +91,30 @@ def doctor(
         wired.lidars.close()
         files.close()
     heard = wired.heard(now_s - began_s)
-    of_lidars = lidar_findings(heard, others_look_ahead=seen.vehicle.scan_ahead is not None)
-    beside = [*of_lidars, *payload(seen, commands), *kernels(cold=not kernels_warm(settings))]
-    findings = sorted([*diagnose(seen), *beside], key=lambda one: list(Level).index(one.level))
+    findings = [
+        *lidar_findings(heard, others_look_ahead=seen.vehicle.scan_ahead is not None),
+        *diagnose(seen, settings.safety.gps_fix),
+        *payload(seen, commands),
+        *([] if mission is None else of_mission(mission, seen, settings)),
+        *kernels(cold=not kernels_warm(settings)),
+    ]
+    findings.sort(key=lambda one: list(Level).index(one.level))
     estimate = last_estimate(state or default_directory(os.environ))
     if as_json:
         found = [asdict(one) for one in findings]
         summary = {**_summary(seen), "lidars": [one.described for one in heard]}
         typer.echo(json.dumps({"heard": summary, "followed": _followed(estimate), "findings": found}, indent=2))
     else:
-        _show(seen, findings, estimate, [one.described for one in heard])
+        _show(seen, findings, estimate, settings.safety.gps_fix, [one.described for one in heard])
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
 
 
-def _commands(mission_file: Path | None) -> list[Command]:
-    """The mission's commands: their numbers and first parameters. Raises MissionError."""
-    if mission_file is None:
+def commands_of(mission: Mission | None) -> list[Command]:
+    """The mission's commands: their numbers and first parameters."""
+    if mission is None:
         return []
-    mission = load_mission(mission_file, simulated=False, skip_unknown=True)
     given = [*mission.commands, *(command for target in mission.targets for command in target.commands)]
     return [(command.command, command.params[0] or 0.0) for command in given]
 
@@ -116,6 +129,26 @@ def _opened(connect: str, specs: Sequence[LidarSpec], clock: Clock) -> tuple[Byt
         raise
 
 
+def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Finding]:
+    """What would stop this mission where the rover's home is, and which targets are doubtful from there."""
+    home = seen.vehicle.home
+    if home is None:
+        return []
+    rover, mapping = mission.rover, settings.mapping
+    size = field_size(rover, mapping)
+    try:
+        side_m = resolve(mission, LocalFrame(home.point), NedPoint(0.0, 0.0), size=size).ground.resolution_m
+    except (MissionError, MapError) as error:
+        return [Finding("mission", Level.STOP, f"{error}.", "change the mission as it says")]
+    doubtful = doubtful_places(mission, home.point)
+    found = [Finding("far-target", Level.WARN, line, "look at the mission's places") for line in doubtful]
+    if size is not None and mission.grid.by_footprint:
+        gap_m = sure_gap_m(rover, finer_evidence(mapping, side_m), side_m)
+        says = f"The mission's fields are {side_m:.2g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
+        found.append(Finding("fields", Level.NOTE, says, "for narrower ones: resolution_m, docs/missions.md"))
+    return found
+
+
 def _summary(seen: Survey) -> dict[str, object]:
     """The survey as JSON values."""
     return {
@@ -124,6 +157,7 @@ def _summary(seen: Survey) -> dict[str, object]:
         "unbelieved": seen.unbelieved,
         "system": seen.system if seen.rover_heard else None,
         "version": None if seen.version is None else ".".join(map(str, seen.version)),
+        "gps_fix": None if seen.vehicle.gps is None else seen.vehicle.gps.fix.text,
         "parameters": dict(seen.parameters),
         "sensors": [asdict(one) for one in seen.sources],
     }
@@ -161,7 +195,9 @@ class _Wired:
         ]
 
 
-def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None, lidars: list[str]) -> None:
+def _show(
+    seen: Survey, findings: list[Finding], estimate: ModelEstimate | None, gps_fix: str, lidars: list[str]
+) -> None:
     console = Console()
     for line in lidars:
         console.print(line, soft_wrap=True, markup=False, highlight=False)
@@ -172,6 +208,8 @@ def _show(seen: Survey, findings: list[Finding], estimate: ModelEstimate | None,
         if known := {name: seen.parameters[name] for name in names if name in seen.parameters}:
             limits = ", ".join(f"{name} {value:g}" for name, value in known.items())
             console.print(f"limits: {limits}", soft_wrap=True, markup=False)
+        fix = "not told" if seen.vehicle.gps is None else seen.vehicle.gps.fix.text
+        console.print(f"GPS fix: {fix}; safety.gps_fix asks for {gps_fix}", soft_wrap=True, highlight=False)
         if estimate is not None and estimate.known > 0.0:
             line = f"last run: the rover followed velocities {described(estimate)}"
             console.print(line, soft_wrap=True, markup=False, highlight=False)

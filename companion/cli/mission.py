@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -10,14 +11,19 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from companion.cli.given import RadiusM, ResolutionM, SpeedMS
 from companion.cli.inputs import EXIT_BAD_INPUT, SkipUnknown
+from companion.cli.source import warn_of_places, warning
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.mapping.map_files import MapError, load_map
 from companion.mission.do_commands import DoCommand
+from companion.mission.field_size import FieldSize, field_size, finer_evidence, sure_gap_m
+from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, Here, Mission, MissionError, MoverSpec, Place
-from companion.mission.resolve import resolve
+from companion.mission.resolve import ResolvedMission, resolve
+from companion.settings import MappingSettings
 from companion.storage.toml_file import read_toml
 
 app = typer.Typer(name="mission", help="Mission files: `mission check FILE` says what is understood of one.")
@@ -31,28 +37,42 @@ def group() -> None:
 @app.command()
 def check(
     mission_file: Annotated[Path, typer.Argument(metavar="FILE", help="TOML, .plan or .waypoints file.")],
+    resolution_m: ResolutionM = None,
+    radius_m: RadiusM = None,
+    speed_m_s: SpeedMS = None,
     skip_unknown: SkipUnknown = False,
 ) -> None:
     """Print what was understood of FILE. Exit code 0, or 2 with one line of reason."""
     try:
         mission = load_mission(mission_file, skip_unknown=skip_unknown)
+        mission = with_given(mission, Given(resolution_m, radius_m, speed_m_s))
         maps = _maps(mission)
-        _try_resolve(mission)
+        resolved = _try_resolve(mission)
     except (MissionError, MapError) as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    show(mission, maps, Console(highlight=False))
+    show(mission, maps, Console(highlight=False), resolved)
+    warn_of_places(mission, lambda line: typer.echo(warning(line)))
 
 
-def _try_resolve(mission: Mission) -> None:
-    """Resolve the mission as at the start of a run, if the file alone says where home is.
+def _try_resolve(mission: Mission) -> ResolvedMission | None:
+    """The mission as at the start of a run, if the file alone says where home is.
 
     This finds targets inside a fence, and a grid that is too large. A rover's home may differ from the planned home, so
-    a mission in degrees cannot be resolved here. Raises MissionError.
+    a mission in degrees is resolved only where the file has one, and then nothing is refused. Raises MissionError.
     """
-    degrees = any(isinstance(place, GeoPoint) for place in _all_places(mission))
+    degrees, size = any(isinstance(place, GeoPoint) for place in _all_places(mission)), _size_of(mission)
     if not degrees:
-        resolve(mission, LocalFrame(GeoPoint(0.0, 0.0)), NedPoint(0.0, 0.0))
+        return resolve(mission, LocalFrame(GeoPoint(0.0, 0.0)), NedPoint(0.0, 0.0), size=size)
+    if mission.planned_home is None:
+        return None
+    with contextlib.suppress(MissionError, MapError):
+        return resolve(mission, LocalFrame(mission.planned_home), NedPoint(0.0, 0.0), size=size)
+    return None
+
+
+def _size_of(mission: Mission) -> FieldSize | None:
+    return field_size(mission.rover, MappingSettings())
 
 
 def _all_places(mission: Mission) -> list[Place]:
@@ -60,13 +80,13 @@ def _all_places(mission: Mission) -> list[Place]:
     return [*(target.place for target in mission.targets), *(place for area in areas for place in area.places)]
 
 
-def show(mission: Mission, maps: list[str], console: Console) -> None:
-    """Print the mission."""
+def show(mission: Mission, maps: list[str], console: Console, resolved: ResolvedMission | None = None) -> None:
+    """Print the mission. ``resolved``: where it lies, if that is known."""
     console.print(f"[bold]{escape(mission.name)}[/bold]", soft_wrap=True)
     console.print(_targets(mission))
     for line in (
         *_commands(mission),
-        *_ground(mission),
+        *_ground(mission, resolved),
         *_vehicle(mission),
         *maps,
         *(f"note: {note}" for note in mission.notes),
@@ -110,9 +130,9 @@ def command_text(command: DoCommand) -> str:
     return " ".join([*parts, "once" if not command.repeatable else ""]).strip()
 
 
-def _ground(mission: Mission) -> list[str]:
+def _ground(mission: Mission, resolved: ResolvedMission | None) -> list[str]:
     grid = mission.grid
-    size = f"fields of {grid.resolution_m:g} m"
+    size = f"fields of {grid.resolution_m:g} m" if not grid.by_footprint else _fields_by_rover(mission, resolved)
     if grid.size is not None and grid.home is not None:
         lines = [f"grid: {grid.size[0]} x {grid.size[1]} {size}, home is the middle of {place_text(grid.home)}"]
     else:
@@ -122,6 +142,23 @@ def _ground(mission: Mission) -> list[str]:
     lines += [f"keep inside {area_text(area)}" for area in mission.keep_in]
     lines += [f"weight {weighted.weight:g} in {area_text(weighted.area)}" for weighted in mission.weighted]
     return lines
+
+
+def _fields_by_rover(mission: Mission, resolved: ResolvedMission | None) -> str:
+    """How large fields are where the file does not say, and what narrow ground that leaves open."""
+    rover, size = mission.rover, _size_of(mission)
+    if size is None:
+        return f"fields of {mission.grid.resolution_m:g} m (the default where the rover turns in arcs)"
+    if resolved is None:
+        return f"fields of {size.fine_m:g} m (by the rover's size; larger on ground with more than {size.most})"
+    side_m = resolved.ground.resolution_m
+    gap_m = sure_gap_m(rover, finer_evidence(MappingSettings(), side_m), side_m)
+    size_of = f"fields of {side_m:.2g} m (by the rover's size"
+    if side_m > size.fine_m:
+        of_ours = mission.source is not None and mission.source.suffix.lower() == ".toml"
+        smaller = "[grid] resolution_m or a smaller margin_m" if of_ours else "--resolution-m"
+        size_of += f", and no more than {size.most}; for narrower gaps give {smaller}"
+    return f"{size_of}), for gaps of {gap_m:.1f} m or more"
 
 
 def _maps(mission: Mission) -> list[str]:

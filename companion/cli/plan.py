@@ -18,7 +18,7 @@ from companion.cli.bends import tightest_radius, too_tight
 from companion.cli.images import save_plan
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, apart, picture, usable_settings
 from companion.core.clock import stopwatch_s
-from companion.core.grid import Cell, Grid
+from companion.core.grid import Cell, Grid, inflated
 from companion.mapping.map_files import MapError, load_map
 from companion.navigation.search_budget import budget_of
 from companion.planning.problem import KinematicConstraints, PlanningProblem, PlanResult, PlanStatus
@@ -193,6 +193,12 @@ def plan(
         str | None, typer.Option(help=f"One of: {', '.join(PLANNERS)}; default: the settings', hybrid.")
     ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
+    resolution_m: Annotated[
+        float | None, typer.Option(min=0.01, max=1000.0, help="Field size of MAP, if it has none; default 1.")
+    ] = None,
+    radius_m: Annotated[
+        float, typer.Option(min=0.0, max=20.0, help="The rover's: its middle keeps so far from obstacles.")
+    ] = 0.0,
     turning_radius_m: Annotated[
         float, typer.Option(min=0.0, help="The tightest turn; 0: it turns on the spot. For bspline-ga, hybrid.")
     ] = 0.0,
@@ -208,7 +214,7 @@ def plan(
     try:
         settings = usable_settings(settings_file)
         name = settings.navigator.planner if planner is None else planner
-        grid = load_map(map_file)
+        grid = _ground(map_file, resolution_m, radius_m)
         problem = PlanningProblem(
             grid.weights,
             place_of("--start", start, grid, top_left),
@@ -228,6 +234,14 @@ def plan(
     if image is not None:
         typer.echo(f"picture: {image}", err=as_json)
     raise typer.Exit(EXIT_FOUND if answer.result.status is PlanStatus.FOUND else EXIT_NO_PATH)
+
+
+def _ground(map_file: Path, resolution_m: float | None, radius_m: float) -> Grid:
+    """The map for a rover of this radius. Raises MapError."""
+    if resolution_m is not None and map_file.suffix.lower() in (".yaml", ".yml"):
+        raise MapError(f"{map_file}: --resolution-m: a ROS map says this itself: resolution")
+    grid = load_map(map_file, resolution_m)
+    return grid.with_weights(inflated(grid.weights, grid.fields(radius_m)))
 
 
 def search(grid: Grid, problem: PlanningProblem, name: str, settings: Settings, seed: int, top_left: bool) -> Answer:

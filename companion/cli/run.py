@@ -7,20 +7,23 @@ import os
 import signal
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
 
 import typer
+from rich.console import Console
 
 from companion.app import Companion, Status
 from companion.checkpoint.state_directory import StateDirectoryError
+from companion.cli.given import RadiusM, ResolutionM, SpeedMS
 from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, SkipUnknown, usable_settings
 from companion.cli.lidars import LidarOption, lidars_given
 from companion.cli.live import STDERR, Live, Reader, error_console, levelled, reader_of
 from companion.cli.live_view import LiveView, View, painter_for
 from companion.cli.service import Service
-from companion.cli.source import Source, Stoppable, refuse_arming
+from companion.cli.source import Source, Stoppable, refuse_arming, warning
 from companion.cli.state import RunState, StateFiles
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.control.model_estimate import described
@@ -37,6 +40,7 @@ from companion.mavlink.codec import Codec
 from companion.mavlink.serial_port import rivals_of
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError
+from companion.mission.given import Given
 from companion.mission.mission import Mission, MissionError, with_laps
 from companion.navigation.step_runner import ThreadRunner
 from companion.recording.record_format import STATE, RecordError
@@ -78,6 +82,9 @@ def run(
     from_autopilot: Annotated[
         bool, typer.Option("--from-autopilot", help="Drive the mission that the autopilot has stored.")
     ] = False,
+    resolution_m: ResolutionM = None,
+    radius_m: RadiusM = None,
+    speed_m_s: SpeedMS = None,
     arm: Annotated[bool, typer.Option("--arm", help="Arm the motors; otherwise wait for a person to do it.")] = False,
     settings_file: Annotated[Path | None, typer.Option("--settings", help="TOML file, see docs/settings.md.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Of planners that draw random numbers.")] = 0,
@@ -127,8 +134,14 @@ def run(
             if page is not None:
                 ends.callback(page.close)
                 say(served(page.web.place, to_person=reader is Reader.PERSON))
-            source = Source(mission_file, connect, from_autopilot=from_autopilot, skip_unknown=skip_unknown)
-            mission = source.mission(settings, signer, stop, say)
+            source = Source(
+                mission_file,
+                connect,
+                from_autopilot=from_autopilot,
+                skip_unknown=skip_unknown,
+                given=Given(resolution_m, radius_m, speed_m_s),
+            )
+            mission = source.mission(settings, signer, stop, say, partial(_caution, console, reader))
             if mission is None:
                 raise SystemExit(EXIT_STOPPED)
             mission = refuse_arming(with_laps(mission, laps), arm=arm)
@@ -184,6 +197,11 @@ def _drop(link: ByteLink, lidars: Lidars) -> None:
     """Forget what has piled up meanwhile."""
     link.read()
     lidars.drop()
+
+
+def _caution(console: Console, reader: Reader, line: str) -> None:
+    text = warning(line) if reader is Reader.PERSON else levelled(line, Severity.WARNING, reader)
+    console.print(text, soft_wrap=True, markup=False, highlight=False)
 
 
 def _told_place(recorder: Recorder | NullRecorder, asked: Path | None, say: Callable[[str], None]) -> Path | None:

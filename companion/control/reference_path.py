@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, Grid
 from companion.mapping.evidence_map import EvidenceMap
-from companion.mapping.map_queries import look_along
+from companion.mapping.map_queries import clearance_m, look_along
 from companion.planning.problem import Path
 
 Points = NDArray[np.float64]
 """Shape (n, 2): columns north_m and east_m in the local frame."""
 
 STEP_M = 0.25
+ASIDE_M, ASIDE_STEP_M = 0.3, 0.025
+"""In narrow places a path is moved aside by so much at most, in such steps."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -91,8 +93,32 @@ def reference_path(
         path = path_along_curve(grid, planned.curve, start, end)
         if path_is_clear(path, evidence, half_width_m):
             return with_planned_speeds(path, planned, grid.resolution_m)
-    path = path_along_fields(grid, cells, start, end)
+    path = centred(path_along_fields(grid, cells, start, end), evidence, half_width_m)
     return path if planned is None else with_planned_speeds(path, planned, grid.resolution_m)
+
+
+def centred(path: ReferencePath, evidence: EvidenceMap, half_width_m: float) -> ReferencePath:
+    """The path, moved aside in narrow places, by no more than a field's side, to where there is most room.
+
+    A path leads through the middles of fields; a gap that a rover of this half width just fits through lies between.
+    Fields that are wider than the rover's radius are too coarse for such gaps, and their paths stay as they are.
+    """
+    if evidence.base.resolution_m > evidence.rover_radius_m:
+        return path
+    points = path.points.copy()
+    most_m = min(evidence.base.resolution_m, ASIDE_M)
+    sides = np.arange(-round(most_m / ASIDE_STEP_M), round(most_m / ASIDE_STEP_M) + 1) * ASIDE_STEP_M
+    sides = sides[np.argsort(np.abs(sides), kind="stable")]
+    wanted_m = half_width_m + evidence.evidence_m
+    for i in range(1, len(points) - 1):
+        if clearance_m(evidence, path.point(i), wanted_m) >= wanted_m:
+            continue
+        way = path.points[min(i + 2, len(points) - 1)] - path.points[max(i - 2, 0)]
+        normal = np.array((-way[1], way[0])) / max(float(np.hypot(*way)), 1e-9)
+        places = path.points[i] + sides[:, None] * normal
+        rooms_m = [clearance_m(evidence, NedPoint(float(n), float(e)), wanted_m) for n, e in places]
+        points[i] = places[int(np.argmax(rooms_m))]
+    return ReferencePath(points, path.progress, path.speeds_m_s)
 
 
 def path_is_clear(path: ReferencePath, evidence: EvidenceMap, half_width_m: float) -> bool:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.vehicle.events import RoverMode
+from companion.vehicle.gps_fix import NEEDED, GpsFix
 from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE, full_throttle_m_s
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
@@ -209,6 +210,21 @@ def position(seen: Survey) -> Iterator[Finding]:
         yield Finding("origin", Level.STOP, says, "wait for GPS, or set the EKF origin at the ground station's map")
     if vehicle.position is None and vehicle.ekf_ok:
         yield Finding("no-position", Level.STOP, "LOCAL_POSITION_NED does not come.", "look at the rates of this port")
+
+
+def gps(seen: Survey, gps_fix: str) -> Iterator[Finding]:
+    """Whether the GPS fix is the one that ``safety.gps_fix`` asks for."""
+    needed, told = NEEDED.get(gps_fix), seen.vehicle.gps
+    if needed is not None and told is None:
+        says = (
+            f"The GPS fix is not told (GPS_RAW_INT does not come); safety.gps_fix asks for {gps_fix}, and a run waits."
+        )
+        yield Finding("gps-fix", Level.STOP, says, "look at the GPS and at the rates of this port")
+    elif needed is not None and told is not None and told.fix < needed:
+        says = f"The GPS fix is {told.fix.text}; safety.gps_fix asks for {gps_fix}, and a run waits."
+        better = "corrections (RTCM) that reach the receiver, and " if needed >= GpsFix.RTK_FLOAT else ""
+        remedy = f"see to {better}open sky; or ask for less in the settings"
+        yield Finding("gps-fix", Level.STOP, says, remedy)
 
 
 def arming(seen: Survey) -> Iterator[Finding]:
@@ -442,11 +458,11 @@ CHECKS = (
 )
 
 
-def diagnose(seen: Survey) -> list[Finding]:
-    """All findings, the gravest first."""
+def diagnose(seen: Survey, gps_fix: str = "any") -> list[Finding]:
+    """All findings, the gravest first. ``gps_fix``: the setting ``safety.gps_fix``."""
     if not seen.rover_heard:
         return [*port(seen), *nobody(seen), *others(seen)]
-    findings = [finding for check in CHECKS for finding in check(seen)]
+    findings = [*(finding for check in CHECKS for finding in check(seen)), *gps(seen, gps_fix)]
     order = list(Level)
     return sorted(findings, key=lambda finding: order.index(finding.level))
 

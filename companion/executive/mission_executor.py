@@ -28,7 +28,7 @@ from companion.executive.command_sender import CommandSender, place_name
 from companion.executive.controller_choice import settings_in_force
 from companion.executive.goal_driver import GoalDriver, controller_for
 from companion.executive.laps import LapStart, LapSummary, Odometer, lap_summary
-from companion.executive.mission_layout import MissionLayout, apart_m, fenced_again, from_home, lay_again
+from companion.executive.mission_layout import MissionLayout, apart_m, carried, fenced_again, from_home, lay_again
 from companion.executive.mission_progress import (
     MissionPhase,
     MissionProgress,
@@ -39,6 +39,7 @@ from companion.executive.mission_progress import (
     on_time,
     on_unreachable,
     parked,
+    relaid,
     returning,
     sent_to,
     skipped,
@@ -46,10 +47,11 @@ from companion.executive.mission_progress import (
     with_requested,
 )
 from companion.executive.return_path import Refuge, Trail, refuges
-from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again
+from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again, move
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.do_commands import DoCommand
+from companion.mission.field_size import field_size, sure_gap_m
 from companion.mission.mission import Mission
 from companion.mission.resolve import ResolvedTarget
 from companion.navigation.field_step import Action, Decision
@@ -117,7 +119,7 @@ class MissionExecutor:
         self.progress = progress
         self.phase = RunPhase.DRIVING
         self.maps_begun = 0
-        """Grows whenever what had been mapped is worth nothing any more."""
+        """Grows whenever what had been mapped is worth nothing any more, or lies elsewhere."""
         self._mission = mission
         self._settings = settings
         self._counted_for: tuple[int, float, float | None] | None = None
@@ -130,6 +132,8 @@ class MissionExecutor:
         self.trail = Trail()
         """The way back to where the mission began."""
         self._refuges: list[Refuge] = []
+        self._unmoved_m = (0.0, 0.0)
+        """By how much the map should have been moved farther: it moves by whole cells."""
         self._rolls_until_s: float | None = None
         rover, asked = mission.rover, settings.current.guidance.controller
         self._scan = scan
@@ -154,8 +158,7 @@ class MissionExecutor:
             why = "single beams see too little" if scan.is_narrow else "the rover turns in arcs"
             text = f"guidance.controller: driving with {self.controller}, not {asked}: {why}"
             notifier.tell(text, Severity.WARNING)
-        planner = make_planner(given.navigator.planner, given.planner)
-        searcher = PathSearcher(planner, rng)
+        searcher = PathSearcher(make_planner(given.navigator.planner, given.planner), rng)
         self.driver = GoalDriver(self._controller(rng), searcher, runner)
         self._tracker = ObjectTracker(layout.evidence)
         self.decisions = 0
@@ -218,7 +221,9 @@ class MissionExecutor:
         self._notifier.tell(f"EKF origin moved {moved_m:.1f} m: mission laid out anew", Severity.WARNING)
         self.maps_begun += 1
         mapping = self._given.mapping
-        self.layout, self.progress = lay_again(self.layout, self.progress, self._mission, mapping, origin)
+        self.layout, self.progress = lay_again(
+            self.layout, self.progress, self._mission, mapping, origin, narrow_sight=self._scan.is_narrow
+        )
         before = self.driver
         # A step of the one before may be drawing from the generator in its thread at this moment: the seed stays.
         searcher, seed = before.searcher, before.seed
@@ -226,7 +231,7 @@ class MissionExecutor:
         self.driver = GoalDriver(self._controller(rng), searcher, self._runner, seed)
         self.driver.go_on(before.tally, before.epoch)
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
-        self._tracker = ObjectTracker(self.evidence)
+        self._tracker, self._unmoved_m = ObjectTracker(self.evidence), (0.0, 0.0)
         self.trail, self._refuges = Trail(), self._refuges[-1:]
         self.odometer.forget_place()
         return True
@@ -235,7 +240,28 @@ class MissionExecutor:
         """What has been seen lies elsewhere now."""
         forget(self.evidence)
         self.maps_begun += 1
-        self._tracker = ObjectTracker(self.evidence)
+        self._tracker, self._unmoved_m = ObjectTracker(self.evidence), (0.0, 0.0)
+        self.driver.leave()
+        self.driver.forget_places()
+        self.driver.give_up_no_target_before(now_s + VERDICT_S)
+
+    def move_map(self, north_m: float, east_m: float, now_s: float) -> None:
+        """The position has stepped, the rover has not: what was seen and driven keeps its place beside the rover.
+
+        What has a place on earth stays: targets, goals that people ask for, rally points, fences, known ground.
+        """
+        evidence, left = self.evidence, self._unmoved_m
+        done_n, done_e = move(evidence, left[0] + north_m, left[1] + east_m)
+        self._unmoved_m = left[0] + north_m - done_n, left[1] + east_m - done_e
+        self.maps_begun += 1
+        start = self.layout.start
+        moved = carried(start, north_m, east_m, evidence.base)
+        self.layout = replace(self.layout, start=moved)
+        self._refuges = [replace(one, place=moved) if one.place == start else one for one in self._refuges]
+        if self.progress.home == start:
+            self.progress = relaid(self.progress, self.progress.targets, moved, self.progress.requested)
+        self.trail = self.trail.carried(north_m, east_m, evidence.base)
+        self._tracker = ObjectTracker(evidence)
         self.driver.leave()
         self.driver.forget_places()
         self.driver.give_up_no_target_before(now_s + VERDICT_S)
@@ -501,6 +527,16 @@ class MissionExecutor:
         way, here = self.trail.back(), self.evidence.base.cell_at(pose.point)
         return way if way[0] == here and way[-1] == self._refuges[0].place.cell else ()
 
+    def _tell_of_gaps(self) -> None:
+        """Where fields could be smaller: which gaps count as closed because they are not."""
+        rover, evidence = self._mission.rover, self.evidence
+        size = field_size(rover, evidence.settings, narrow_sight=self._scan.is_narrow)
+        side_m = evidence.base.resolution_m
+        if size is not None and side_m > 1.01 * size.fine_m:
+            gap_m = sure_gap_m(rover, evidence.settings, side_m)
+            text = f"Fields of {side_m:.2g} m may close gaps below {gap_m:.1f} m; smaller ones open more"
+            self._notifier.tell(text, Severity.INFO)
+
     def _take_decision(self, decision: Decision, now_s: float) -> None:
         goal = self.progress.goal
         self.decisions += 1
@@ -510,6 +546,7 @@ class MissionExecutor:
             self._advance(on_reached(self.progress, now_s), now_s)
         elif decision.action is Action.UNREACHABLE:
             self._notifier.tell(f"Unreachable: {goal.name} ({decision.reason})", Severity.WARNING)
+            self._tell_of_gaps()
             navigator = self._settings.current.navigator
             if len(self._refuges) > 1:
                 self._refuges.pop(0)

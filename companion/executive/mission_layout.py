@@ -5,7 +5,6 @@ Nouns: mission layout.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -15,11 +14,11 @@ from companion.executive.mission_progress import MissionProgress, relaid
 from companion.mapping.evidence_map import EvidenceMap, new_map, rebase
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bounds
+from companion.mission.check import MAX_GRID_FIELDS
+from companion.mission.field_size import FieldSize, field_size, finer_evidence, map_radius_m
 from companion.mission.mission import Mission, OnBlocked
 from companion.mission.resolve import ResolvedMission, ResolvedTarget, resolve
 from companion.settings import MappingSettings
-
-FIELD_STEP_M = 0.05
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -45,21 +44,27 @@ def lay(
     home: GeoPoint,
     pose: Pose,
     fence: AutopilotFence = NO_FENCE,
+    *,
+    narrow_sight: bool = False,
 ) -> MissionLayout:
     """Lay the mission out; the rover returns to ``pose`` when it has to. Raises MissionError."""
-    frame = LocalFrame(origin)
-    resolved = resolve(mission, frame, frame.to_ned(home), fence, _fine_m(mission, settings))
+    resolved, evidence = _laid(mission, settings, LocalFrame(origin), home, fence, narrow_sight)
     start = _start(pose.point, resolved.ground)
-    evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), _mapping(mission, settings))
     return MissionLayout(origin, home, resolved.targets, start, evidence, fence, resolved.bounds, resolved.refused)
 
 
 def lay_again(
-    layout: MissionLayout, progress: MissionProgress, mission: Mission, settings: MappingSettings, origin: GeoPoint
+    layout: MissionLayout,
+    progress: MissionProgress,
+    mission: Mission,
+    settings: MappingSettings,
+    origin: GeoPoint,
+    *,
+    narrow_sight: bool = False,
 ) -> tuple[MissionLayout, MissionProgress]:
     """The same places on earth in a local frame with another origin, and an empty map. Raises MissionError."""
     frame = LocalFrame(origin)
-    resolved = resolve(mission, frame, frame.to_ned(layout.home), layout.fence, _fine_m(mission, settings))
+    resolved, evidence = _laid(mission, settings, frame, layout.home, layout.fence, narrow_sight)
     before = LocalFrame(layout.origin)
     back = _start(frame.to_ned(before.to_geo(progress.home.point)), resolved.ground)
     start = _start(frame.to_ned(before.to_geo(layout.start.point)), resolved.ground)
@@ -67,7 +72,6 @@ def lay_again(
     if requested is not None:
         point = frame.to_ned(before.to_geo(requested.point))
         requested = replace(requested, point=point, cell=resolved.ground.cell_at(point))
-    evidence = new_map(_base(mission, resolved), _map_radius_m(mission, settings), _mapping(mission, settings))
     again = MissionLayout(
         origin, layout.home, resolved.targets, start, evidence, layout.fence, resolved.bounds, resolved.refused
     )
@@ -77,9 +81,16 @@ def lay_again(
 def fenced_again(layout: MissionLayout, mission: Mission, fence: AutopilotFence) -> MissionLayout:
     """The same ground and all that has been seen of it, with another fence of the autopilot. Raises MissionError."""
     frame = LocalFrame(layout.origin)
-    resolved = resolve(mission, frame, frame.to_ned(layout.home), fence, layout.evidence.base.resolution_m)
+    same = FieldSize(layout.evidence.base.resolution_m, MAX_GRID_FIELDS)
+    resolved = resolve(mission, frame, frame.to_ned(layout.home), fence, same)
     rebase(layout.evidence, _base(mission, resolved))
     return replace(layout, fence=fence, bounds=resolved.bounds, refused=resolved.refused)
+
+
+def carried(place: ResolvedTarget, north_m: float, east_m: float, grid: Grid) -> ResolvedTarget:
+    """The same place on the ground, after the position has stepped by so much."""
+    point = NedPoint(place.point.north_m + north_m, place.point.east_m + east_m)
+    return replace(place, point=point, cell=grid.cell_at(point))
 
 
 def from_home(layout: MissionLayout) -> Grid:
@@ -104,19 +115,16 @@ def _map_radius_m(mission: Mission, settings: MappingSettings) -> float:
     return rover.radius_m if settings.keeps == "circle" else rover.footprint.discs()[1] + settings.beside_m
 
 
-def _fine_m(mission: Mission, settings: MappingSettings) -> float | None:
-    """How large fields should be for planned motions: no obstacle fits between two places of one that are free."""
-    if settings.keeps == "circle":
-        return None
-    steps = math.floor(_map_radius_m(mission, settings) / math.sqrt(2.0) / FIELD_STEP_M + 1e-9)
-    return max(steps, 1) * FIELD_STEP_M
-
-
-def _mapping(mission: Mission, settings: MappingSettings) -> MappingSettings:
-    """With small fields evidence is finer, too: it decides which gaps are wide enough."""
-    if _fine_m(mission, settings) is None or not mission.grid.by_footprint:
-        return settings
-    return settings.model_copy(update={"evidence_m": min(settings.evidence_m, FIELD_STEP_M)})
+def _laid(
+    mission: Mission, settings: MappingSettings, frame: LocalFrame, home: GeoPoint, fence: AutopilotFence, narrow: bool
+) -> tuple[ResolvedMission, EvidenceMap]:
+    """The mission in a frame, and an empty map of its ground. ``narrow``: the rover sees with single thin beams."""
+    rover = mission.rover
+    size = field_size(rover, settings, narrow_sight=narrow)
+    resolved = resolve(mission, frame, frame.to_ned(home), fence, size)
+    if mission.grid.by_footprint and size is not None:
+        settings = finer_evidence(settings, resolved.ground.resolution_m)
+    return resolved, new_map(_base(mission, resolved), map_radius_m(rover, settings), settings)
 
 
 def _base(mission: Mission, resolved: ResolvedMission) -> Grid:

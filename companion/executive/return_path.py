@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from companion.core.frames import NedPoint
-from companion.core.grid import OBSTACLE, Cell
+from companion.core.grid import OBSTACLE, Cell, Grid
 from companion.mapping.evidence_map import EvidenceMap
 from companion.mapping.map_queries import clearance_m
 from companion.mission.mission import OnBlocked
@@ -57,6 +57,16 @@ class Trail:
             points = self._points.setdefault(cell, [])
             if not points or points[-1].distance_m(point) >= POINTS_M:
                 points.append(point)
+
+    def carried(self, north_m: float, east_m: float, grid: Grid) -> Trail:
+        """The same way on the ground, after the position has stepped by so much."""
+        trail = Trail()
+        for cell in self._cells:
+            points = self._points.get(cell, [])
+            for point in points or [grid.centre_of(cell)]:
+                there = NedPoint(point.north_m + north_m, point.east_m + east_m)
+                trail.enter(grid.cell_at(there), there if points else None)
+        return trail
 
     def driven(self, evidence: EvidenceMap) -> Steps:
         """Steps of this way, either way, that the map bars although the track that the rover left there is clear on it.

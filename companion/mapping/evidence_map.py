@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,6 +138,32 @@ def forget(evidence: EvidenceMap) -> None:
     evidence.penalty.fill(0.0)
     evidence.agreement.clear()
     _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+
+
+def move(evidence: EvidenceMap, north_m: float, east_m: float) -> tuple[float, float]:
+    """Move all that was seen by whole cells; fences and prior knowledge stay. Returns how far, metres north and east.
+
+    What leaves the grid is lost, and what comes in is unknown. Penalties belong to fields and move by whole ones.
+    """
+    side_m = evidence.evidence_m
+    by = Cell(round(east_m / side_m), round(north_m / side_m))
+    by_fields = Cell(round(by.x / evidence.subdivisions), round(by.y / evidence.subdivisions))
+    for raster, shift in ((evidence.log_odds, by), (evidence.stamps, by), (evidence.penalty, by_fields)):
+        raster[:] = shifted(raster, raster.shape, shift)
+    evidence.agreement.clear()
+    _refresh(evidence, 0, 0, evidence.base.width, evidence.base.height)
+    return by.y * side_m, by.x * side_m
+
+
+def shifted(raster: NDArray[Any], shape: tuple[int, ...], by: Cell) -> NDArray[Any]:
+    """A raster on another one of this shape, moved by ``by`` to the east and north; zero where it says nothing."""
+    result = np.zeros(shape, raster.dtype)
+    height, width = shape
+    y0, x0 = max(0, by.y), max(0, by.x)
+    y1, x1 = min(height, raster.shape[0] + by.y), min(width, raster.shape[1] + by.x)
+    if y0 < y1 and x0 < x1:
+        result[y0:y1, x0:x1] = raster[y0 - by.y : y1 - by.y, x0 - by.x : x1 - by.x]
+    return result
 
 
 def rebase(evidence: EvidenceMap, base: Grid) -> None:

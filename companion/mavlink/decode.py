@@ -43,6 +43,7 @@ from companion.vehicle.events import (
     TextSeen,
     ThrottleSeen,
 )
+from companion.vehicle.gps_fix import gps_fix_of
 from companion.vehicle.link_latency import TimeAnswered
 from companion.vehicle.rc_input import SticksSeen
 
@@ -60,8 +61,6 @@ NOT_TOLD = 0xFFFF
 """``total`` of MISSION_CURRENT."""
 NO_CELL_MV = 65535
 NO_SATELLITES = 255
-GPS_FIXES = {0: "no GPS", 1: "no fix", 2: "2D", 3: "3D", 4: "3D DGPS", 5: "RTK float", 6: "RTK fixed"}
-"""By GPS_FIX_TYPE."""
 OF_SYS_STATUS = -1
 MIN_GUARD_MS, MAX_GUARD_MS = 50.0, 5000.0
 """Another script may use the guard's name for something else."""
@@ -329,7 +328,7 @@ def _ekf(message: Any, time_s: float) -> Event:
 
 def _gps(message: Any, time_s: float) -> Event:
     satellites = None if message.satellites_visible == NO_SATELLITES else message.satellites_visible
-    return GpsSeen(time_s, GPS_FIXES.get(message.fix_type, f"fix {message.fix_type}"), satellites)
+    return GpsSeen(time_s, gps_fix_of(message.fix_type), satellites, message.time_usec)
 
 
 def _sticks(message: Any, time_s: float) -> Event:

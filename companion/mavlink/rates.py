@@ -17,6 +17,8 @@ ENOUGH = 0.6
 LONGEST_WAIT_S = 30.0
 EKF_HZ = 5.0
 """A second without stops the rover: so several in a row may be lost."""
+GPS_HZ = 5.0
+"""As often as most receivers have a fix: the position follows a change of fix within a second."""
 SLOW_HZ = 2.0
 STICKS_HZ = 5.0
 THROTTLE_HZ = 10.0
@@ -72,6 +74,7 @@ def wanted_rates(settings: LinkSettings) -> tuple[WantedRate, ...]:
         WantedRate(mavlink.MAVLINK_MSG_ID_ATTITUDE, settings.attitude_rate_hz),
         WantedRate(mavlink.MAVLINK_MSG_ID_GLOBAL_POSITION_INT, SLOW_HZ),
         WantedRate(mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT, EKF_HZ),
+        WantedRate(mavlink.MAVLINK_MSG_ID_GPS_RAW_INT, GPS_HZ, always=False, told=False),
         WantedRate(mavlink.MAVLINK_MSG_ID_VFR_HUD, THROTTLE_HZ, told=False, silence=THROTTLE_UNSEEN),
         WantedRate(mavlink.MAVLINK_MSG_ID_RC_CHANNELS, STICKS_HZ, told=False, silence=STICKS_UNSEEN),
         WantedRate(mavlink.MAVLINK_MSG_ID_DISTANCE_SENSOR, settings.range_rate_hz, always=False),

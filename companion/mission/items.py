@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from companion.core.frames import GeoPoint
 from companion.mission import mav_commands as mav
+from companion.mission.tables import swapped_hint
 
 MAX_ITEMS = 100_000
 
@@ -59,5 +60,6 @@ def geo_point(lat_deg: float, lon_deg: float, what: str) -> GeoPoint:
     if not (math.isfinite(lat_deg) and math.isfinite(lon_deg)):
         raise ItemError(f"{what}: latitude and longitude are missing")
     if not (-90.0 <= lat_deg <= 90.0 and -180.0 <= lon_deg <= 180.0):
-        raise ItemError(f"{what}: {lat_deg}, {lon_deg} is not a latitude and longitude")
+        hint = swapped_hint(lat_deg, lon_deg)
+        raise ItemError(f"{what}: {lat_deg}, {lon_deg} is not a latitude and longitude{hint}")
     return GeoPoint(lat_deg, lon_deg)

@@ -16,12 +16,12 @@ from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bound, Bounds, autopilot_bounds, mission_bounds
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.mission.do_commands import DoCommand
+from companion.mission.doubtful_places import doubtful_places
+from companion.mission.field_size import FieldSize
 from companion.mission.mission import Here, Mission, MissionError, OnBlocked
 from companion.mission.prior_map import stamp_prior
 
 MIN_MARGIN_M = 25.0
-ENOUGH_FIELDS = 1_000_000
-"""Fields that may be small are so large that there are no more of them: searches take time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,11 +74,15 @@ class _Shut:
 
 
 def resolve(
-    mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence = NO_FENCE, fine_m: float | None = None
+    mission: Mission,
+    frame: LocalFrame,
+    home: NedPoint,
+    fence: AutopilotFence = NO_FENCE,
+    size: FieldSize | None = None,
 ) -> ResolvedMission:
     """Resolve the mission. ``home``: the origin of its metres, in the autopilot's local frame.
 
-    ``fine_m``: how small fields should be where the mission does not say.
+    ``size``: of fields where the mission does not say; None: its default.
 
     A grid with a size is placed with the middle of the field ``grid.home`` on home. Otherwise it encloses home,
     targets, fences and prior map, with home in the middle of a field. Weights, by precedence: fences, obstacles of
@@ -91,13 +95,13 @@ def resolve(
     MissionError: file, place, reason.
     """
     try:
-        return _resolved(mission, frame, home, fence, fine_m)
+        return _resolved(mission, frame, home, fence, size)
     except (MissionError, MapError) as error:
         raise MissionError(f"{mission.source or mission.name}: {error}") from error
 
 
 def _resolved(
-    mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence, fine_m: float | None
+    mission: Mission, frame: LocalFrame, home: NedPoint, fence: AutopilotFence, size: FieldSize | None
 ) -> ResolvedMission:
     if not mission.targets:
         raise MissionError("target: there is none to go to")
@@ -110,7 +114,7 @@ def _resolved(
         here = isinstance(target.place, Here)
         points.append(points[-1] if here and points else places.point(target.place))
     if grid is None:
-        grid = _enclosing_grid(mission, places, points, prior, fine_m)
+        grid = _enclosing_grid(mission, places, points, prior, size)
     if prior is not None:
         grid = stamp_prior(grid, prior)
     weights = grid.weights.copy()
@@ -172,12 +176,12 @@ def _fixed_grid(mission: Mission, home: NedPoint) -> Grid | None:
     if spec.size is None or spec.home is None:
         return None
     width, height = spec.size
-    _refuse_large(width, height, spec.resolution_m, mission)
+    _refuse_large(width, height, spec.resolution_m, mission, [])
     return empty_grid(width, height, spec.resolution_m, _south_west(home, spec.home, spec.resolution_m))
 
 
 def _enclosing_grid(
-    mission: Mission, places: Places, points: list[NedPoint], prior: Grid | None, fine_m: float | None
+    mission: Mission, places: Places, points: list[NedPoint], prior: Grid | None, size: FieldSize | None
 ) -> Grid:
     """A grid that encloses everything in the mission, with a margin."""
     home, size_m = places.home, mission.grid.resolution_m
@@ -194,9 +198,8 @@ def _enclosing_grid(
     margin_m = mission.grid.margin_m
     if margin_m is None:
         margin_m = max(MIN_MARGIN_M, float(np.max(high - low)) / 2.0)
-    if fine_m is not None and mission.grid.by_footprint:
-        area_m2 = float(np.prod(high - low + 2.0 * margin_m))
-        size_m = min(size_m, max(fine_m, math.sqrt(area_m2 / ENOUGH_FIELDS)))
+    if size is not None and mission.grid.by_footprint:
+        size_m = size.side_m(float(np.prod(high - low + 2.0 * margin_m)), size_m)
     west, south = (
         math.ceil((at - edge + margin_m) / size_m) for at, edge in zip((home.east_m, home.north_m), low, strict=True)
     )
@@ -204,20 +207,20 @@ def _enclosing_grid(
         math.ceil((edge - at + margin_m) / size_m) for at, edge in zip((home.east_m, home.north_m), high, strict=True)
     )
     width, height = west + east + 1, south + north + 1
-    _refuse_large(width, height, size_m, mission)
+    _refuse_large(width, height, size_m, mission, doubtful_places(mission, places.frame.to_geo(home)))
     return empty_grid(width, height, size_m, _south_west(home, Cell(west, south), size_m))
 
 
-def _refuse_large(width: int, height: int, resolution_m: float, mission: Mission) -> None:
+def _refuse_large(width: int, height: int, resolution_m: float, mission: Mission, doubtful: list[str]) -> None:
+    """Raises MissionError for too many fields. ``doubtful``: what is to be said of places that may be wrong."""
     if width * height > MAX_GRID_FIELDS:
         enough_m = resolution_m * math.sqrt(width * height / MAX_GRID_FIELDS)
         of_ours = not mission.stored and (mission.source is None or mission.source.suffix.lower() == ".toml")
-        remedy = f"use resolution_m = {math.ceil(enough_m * 10.0) / 10.0:g} or larger, or a smaller margin_m"
-        if not of_ours:  # a ground station's mission has no resolution
-            remedy = "write a TOML mission with a larger resolution_m"
+        coarser = f"{'resolution_m =' if of_ours else '--resolution-m'} {math.ceil(enough_m * 10.0) / 10.0:g} or larger"
+        remedy = f"use {coarser}, or a smaller margin_m" if of_ours else f"use {coarser}"
+        near = f"{doubtful[0]} If it is" if doubtful else "are all places near home? If they are"
         raise MissionError(
-            f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; "
-            f"are all places near home? If they are, {remedy}"
+            f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; {near}, {remedy}"
         )
 
 

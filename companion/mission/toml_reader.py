@@ -50,6 +50,7 @@ from companion.mission.tables import (
     T,
     Table,
     named,
+    refuse_swapped,
 )
 from companion.storage.toml_file import read_table
 
@@ -67,6 +68,13 @@ class PlaceTable(Table):
     east_m: Metres | None = None
     lat_deg: Lat | None = None
     lon_deg: Lon | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _not_swapped(cls, values: object) -> object:
+        if isinstance(values, dict):
+            refuse_swapped(values.get("lat_deg"), values.get("lon_deg"))
+        return values
 
     def place(self) -> Place | None:
         """The place, or None if none is given. Raises ValueError when it is given twice or incompletely."""

@@ -9,7 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from enum import Enum, StrEnum, auto
 
-from companion.safety.reasons import Doubt, LatchReason, Reason, WaitReason
+from companion.safety.reasons import WAITED_OUT, Doubt, LatchReason, Reason, WaitReason
 from companion.safety.watchdogs import data_doubt
 from companion.settings import SafetySettings
 from companion.vehicle.state import VehicleState
@@ -69,7 +69,8 @@ def check(
     """One tick of the latch. ``doubt``: what the monitors say; None when the rover may move.
 
     Setpoints may be sent only on DRIVE and STOP. After ``hold_after_s`` of doubt, and at once when the sticks were
-    moved, it answers HOLD once; then it is silent until a person puts the vehicle back into GUIDED.
+    moved, it answers HOLD once; then it is silent until a person puts the vehicle back into GUIDED. Doubts that are
+    waited out never lead to HOLD.
     """
     control = latched(latch.control, vehicle)
     heartbeat = vehicle.heartbeat
@@ -85,6 +86,8 @@ def check(
         return replace(latch, unsafe_since_s=None), Verdict(Reaction.SILENT, Reason(LatchReason.DISARMED))
     if doubt is None:
         return replace(latch, unsafe_since_s=None), Verdict(Reaction.DRIVE)
+    if doubt.kind in WAITED_OUT:
+        return replace(latch, unsafe_since_s=None), Verdict(Reaction.STOP, doubt)
     since_s = now_s if latch.unsafe_since_s is None else latch.unsafe_since_s
     if doubt.kind is Doubt.STICKS_MOVED or now_s - since_s >= settings.hold_after_s:
         return LatchState(Control.PERSON, hold_sent=True, hold_s=now_s), Verdict(Reaction.HOLD, doubt)

@@ -30,6 +30,10 @@ class Doubt(Enum):
     POSITION_WANDERED = "position wandered"
     POSITION_JUMPED = "position jumped"
     ORIGIN_MOVED = "EKF origin moved"
+    FIX_CHANGED = "position steps with the GPS fix"
+    GPS_POOR = "GPS fix {}, {} needed"
+    GPS_SILENT = "GPS fix not told for over {:g} s"
+    GPS_SETTLES = "GPS fix {}, not yet for {:g} s"
     LOOP_STOOD_STILL = "the companion stood still"
     LOOP_LATE = "the companion is too slow"
     PLANNING_LONG = "planning has taken over {:g} s"
@@ -39,6 +43,10 @@ class Doubt(Enum):
     BEYOND_BORDER = "the rover is beyond the border of {}"
     WAITED_TOO_LONG = "waited too long for {}"
     """Of a rover that an earlier run left armed in GUIDED."""
+
+
+WAITED_OUT = frozenset((Doubt.FIX_CHANGED, Doubt.GPS_POOR, Doubt.GPS_SILENT, Doubt.GPS_SETTLES))
+"""The rover stands as long as these last, and HOLD does not follow: it goes on by itself."""
 
 
 class SetpointFault(Enum):

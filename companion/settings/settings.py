@@ -103,7 +103,7 @@ class GuidanceSettings(Section):
         0.15, ge=0.0, description="room beside the rover's radius that the choice of speed keeps"
     )
     clearances: tuple[Annotated[tuple[NonNegativeFloat, NonNegativeFloat], Field(strict=False)], ...] = Field(
-        ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5), (0.12, 0.3)),
+        ((0.6, 3.0), (0.4, 1.5), (0.2, 0.5), (0.12, 0.3), (0.06, 0.1)),
         min_length=1,
         description="room beside the rover's radius, tried in turn; the next one if the reach is less than the second "
         "figure, metres",
@@ -262,6 +262,17 @@ class SafetySettings(Section):
     latency_s: float = Field(1.0, gt=0.0, description="round trip to the autopilot longer than this: stop")
     planner_s: float = Field(30.0, gt=0.0, description="a step of the navigator that takes this long: stop")
     settle_s: float = Field(0.5, ge=0.0, description="how long the rover stands after a jump of the autopilot's clock")
+    gps_fix: Literal["any", "3d", "dgps", "rtk-float", "rtk-fixed"] = Field(
+        "any", description="the rover stands while the GPS fix is worse than this; `any`: it is not looked at"
+    )
+    gps_lost_s: float = Field(
+        1.0,
+        ge=0.3,
+        description="... so long after the last fix that was good enough (single worse ones do not stop it)",
+    )
+    gps_settle_s: float = Field(
+        3.0, ge=0.0, description="... and until it has been good enough for so long without a break"
+    )
     requested_goal_m: float = Field(
         300.0,
         gt=0.0,

@@ -17,6 +17,7 @@ from companion.executive.mission_progress import MissionProgress, plan_progress
 from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.mission.bounds import Bounds
+from companion.mission.doubtful_places import doubtful_places
 from companion.mission.mission import MissionError
 from companion.operator.notifications import Notifier
 from companion.safety.mode_latch import Control
@@ -265,6 +266,8 @@ class Arming:
             mission, reason = self._run.mission, next(iter(cleared.layout.refused.values()))
             raise MissionError(f"{mission.source or mission.name}: {reason}")
         self._checked, self._bounds = ground, cleared.layout.bounds
+        for line in doubtful_places(self._run.mission, cleared.layout.home):
+            self._notifier.tell(f"Warning: {line}", Severity.WARNING)
 
     def _too_near(self, vehicle: VehicleState, now_s: float) -> Reason[WaitReason] | None:
         pose = vehicle.pose_at(now_s)
@@ -283,10 +286,14 @@ class Arming:
         seen, settings = vehicle.scan_ahead or vehicle.scan, self._settings.current
         scan = None if seen is None else seen.scan
         mapping = settings_in_force(settings, scan, mission.rover.turning_radius_m).mapping
-        origin = vehicle.origin.point
+        origin, narrow = vehicle.origin.point, scan is not None and scan.is_narrow
         if self._previous is None or vehicle.position is None:
-            layout = lay(mission, mapping, origin, vehicle.home.point, pose, fence)
+            layout = lay(mission, mapping, origin, vehicle.home.point, pose, fence, narrow_sight=narrow)
             progress = plan_progress(layout.targets, layout.start, mission.patrol, mission.commands, now_s)
             return Cleared(layout, progress)
         same = same_boot(self._previous.state, vehicle.position)
-        return Cleared(*resumed_layout(self._previous, mission, mapping, origin, now_s, same=same, fence=fence))
+        return Cleared(
+            *resumed_layout(
+                self._previous, mission, mapping, origin, now_s, same=same, fence=fence, narrow_sight=narrow
+            )
+        )

@@ -83,7 +83,9 @@ def assemble(
     heard = Heard(autopilot, options.lidars)
     dispatcher = EventDispatcher(run, heard, notifier, handlers, monitors.scans, monitors.localization)
 
-    limits = MissionLimits(run, monitors.fences, monitors.batteries, monitors.rivals, settings.power, outcome)
+    limits = MissionLimits(
+        run, monitors.fences, monitors.batteries, monitors.rivals, monitors.gate, settings.power, outcome
+    )
     previous = checkpointer.previous if checkpointer else None
     shutdown = Shutdown(run, autopilot, live, notifier)
     supervisor = Supervisor(

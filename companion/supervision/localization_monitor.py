@@ -1,4 +1,4 @@
-"""The localization monitor: doubts the position when it jumps or wanders, or when the frame's origin moves.
+"""The localization monitor: doubts the position when it jumps, wanders or follows another GPS fix, or its origin moves.
 
 Nouns: localization monitor.
 """
@@ -13,11 +13,13 @@ from companion.executive.mission_executor import MissionExecutor
 from companion.executive.mission_layout import apart_m
 from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
+from companion.safety.fix_jump import FixJump, JumpPhase
 from companion.safety.reasons import Doubt, Reason
 from companion.safety.watchdogs import Monitor
 from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events import (
     Event,
+    GpsSeen,
     HomeSeen,
     LocalPositionSeen,
     OriginSeen,
@@ -39,7 +41,11 @@ CALM_S = 10.0
 
 
 class LocalizationMonitor(Monitor):
-    """Keeps the doubt until it is settled. From a jump on the map is worthless, and begun anew."""
+    """Keeps the doubt until it is settled. From a jump on the map is worthless, and begun anew.
+
+    Only where the position steps because the GPS fix has changed, and by no more than ``safety.jump_m``, the rover
+    stands until the step is over, and then the map is moved by it.
+    """
 
     def __init__(self, run: MissionRun, autopilot: AutopilotLink, settings: LiveSettings, notifier: TextSink) -> None:
         self._run = run
@@ -52,6 +58,7 @@ class LocalizationMonitor(Monitor):
         self._home_told = False
         self._wandered_s: deque[float] = deque(maxlen=WANDERINGS)
         self._unsure_until_s = -math.inf
+        self._fix = FixJump()
 
     @property
     def position_doubted(self) -> bool:
@@ -65,18 +72,28 @@ class LocalizationMonitor(Monitor):
         return None if self._doubt is None else Reason(self._doubt)
 
     def tick(self, now_s: float) -> None:
-        """While there is a doubt, have the origin told again and again until the run ends."""
-        if self._doubt is not None and self._run.end is None and now_s - self._asked_s >= ASK_PLACES_S:
+        """While a frame is doubted, have its origin told again and again until the run ends."""
+        if (
+            self._doubt not in (None, Doubt.FIX_CHANGED)
+            and self._run.end is None
+            and now_s - self._asked_s >= ASK_PLACES_S
+        ):
             self._asked_s = now_s
             self._autopilot.ask_places()
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event; before the mission has begun there is no map that could be wrong."""
+        if isinstance(event, GpsSeen):
+            self._fix.take_fix(event)
+        elif isinstance(event, LocalPositionSeen):
+            self._fix.take_report(event)
         if (executor := self._run.executor) is None:
             return
         match event:
             case LocalPositionSeen() if vehicle.jump_m > self._settings.current.safety.jump_m:
                 self._begin(Doubt.POSITION_JUMPED, event.time_s, f"Position jumped {vehicle.jump_m:.1f} m")
+            case LocalPositionSeen() if self._fix.watching and self._doubt in (None, Doubt.FIX_CHANGED):
+                self._follow_fix(event.time_s, executor)
             case LocalPositionSeen() if vehicle.wander.noticed:
                 self._begin(Doubt.POSITION_WANDERED, event.time_s, f"Position wandered {vehicle.wander.off_m:.1f} m")
                 self._count_wandering(event.time_s)
@@ -89,9 +106,23 @@ class LocalizationMonitor(Monitor):
                 pass
 
     def _begin(self, doubt: Doubt, now_s: float, text: str) -> None:
-        if self._doubt is None:
+        if self._doubt in (None, Doubt.FIX_CHANGED):
             self._notifier.tell(f"{text}: map forgotten", Severity.WARNING)
         self._doubt, self._doubt_s = doubt, now_s
+
+    def _follow_fix(self, now_s: float, executor: MissionExecutor) -> None:
+        """The rover stands while the position steps with the fix; then the map is moved. In doubt it is forgotten."""
+        fix, limit_m = self._fix, self._settings.current.safety.jump_m
+        if fix.off_m > limit_m or fix.phase is JumpPhase.LOST:
+            self._begin(Doubt.POSITION_WANDERED, now_s, f"Position left by {fix.off_m:.1f} m after a change of GPS fix")
+        elif fix.phase is JumpPhase.STEPPING:
+            self._doubt, self._doubt_s = Doubt.FIX_CHANGED, now_s
+        elif self._doubt is Doubt.FIX_CHANGED:
+            text = f"GPS {fix.before.text} to {fix.after.text}: the map is moved by {fix.off_m:.2f} m"
+            self._notifier.tell(text, Severity.WARNING)
+            executor.move_map(fix.north_m, fix.east_m, now_s)
+            self._doubt = None
+            self._run.start_afresh()
 
     def _count_wandering(self, now_s: float) -> None:
         """Once in a while the map begins anew; again and again, nothing that is mapped is true for long."""
@@ -104,7 +135,8 @@ class LocalizationMonitor(Monitor):
         """The origin as it is now: after a jump it tells whether the frame has moved, or only the rover in it."""
         if executor.follow_origin(event.point, event.time_s):
             self._doubt, self._doubt_s = Doubt.ORIGIN_MOVED, event.time_s
-        elif self._doubt is not None and event.time_s - self._doubt_s >= SETTLED_S:
+        elif self._doubt not in (None, Doubt.FIX_CHANGED) and event.time_s - self._doubt_s >= SETTLED_S:
+            self._fix.begin_anew()
             executor.forget_map(event.time_s)
             self._doubt = None
             self._run.start_afresh()

@@ -10,6 +10,7 @@ from companion.executive.mission_run import MissionRun
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.operator.notifications import Outcome
 from companion.safety.battery_monitor import BatteryLevel, BatteryMonitor
+from companion.safety.gps_gate import GpsGate
 from companion.safety.reasons import Doubt, PowerReason, Reason, WaitReason
 from companion.safety.watchdogs import Monitor
 from companion.settings import PowerSettings
@@ -39,6 +40,7 @@ class MissionLimits:
         fences: FenceMonitor,
         batteries: BatteryMonitor,
         rivals: RivalMonitor,
+        gate: GpsGate,
         settings: PowerSettings,
         outcome: Outcome,
     ) -> None:
@@ -47,6 +49,7 @@ class MissionLimits:
         self._fences = fences
         self._batteries = batteries
         self._rivals = rivals
+        self._gate = gate
         self._to_rally = settings.to_rally
 
     @property
@@ -63,12 +66,15 @@ class MissionLimits:
         """What is awaited before the rover may be driven; None if nothing is.
 
         ``left_driving``: an earlier run left it armed in GUIDED, perhaps far from any person. Then only the fence is
-        awaited: no other companion drives the rover, and a low battery is a reason to return, not to wait.
+        awaited: no other companion drives the rover, a low battery is a reason to return, not to wait, and for a better
+        GPS fix it can stand where it is.
         """
         fence = self._fences.awaited()
         if fence is not None or left_driving:
             return fence
-        return self._rivals.awaited(now_s) or self._batteries.awaited(now_s)
+        poor = self._gate.doubt(now_s)
+        fix = None if poor is None else Reason(WaitReason.GOOD_DATA, (poor,))
+        return self._rivals.awaited(now_s) or fix or self._batteries.awaited(now_s)
 
     def must_stop(self, now_s: float) -> Reason[PowerReason] | None:
         """Why the rover must stop for good wherever it is; None while it need not."""

@@ -12,6 +12,7 @@ from companion.executive.autopilot_mission import MissionChangeMonitor
 from companion.executive.mission_run import MissionRun
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.battery_monitor import BatteryMonitor
+from companion.safety.gps_gate import GpsGate
 from companion.safety.guard_monitor import GuardMonitor
 from companion.safety.lidar_monitor import LidarMonitor
 from companion.safety.watchdogs import DataMonitor, Loop, LoopMonitor, Monitor, ScanMonitor, SticksMonitor, Worker
@@ -33,6 +34,7 @@ class Monitors:
     rivals: RivalMonitor
     fences: FenceMonitor
     batteries: BatteryMonitor
+    gate: GpsGate
 
 
 def make_monitors(
@@ -48,7 +50,7 @@ def make_monitors(
     settings = live.current
     localization, scans = LocalizationMonitor(run, autopilot, live, notifier), ScanMonitor()
     rivals, batteries = RivalMonitor(autopilot), BatteryMonitor(settings.power)
-    fences = FenceMonitor(autopilot, settings.fence, notifier)
+    fences, gate = FenceMonitor(autopilot, settings.fence, notifier), GpsGate(live)
     by_precedence = (
         SticksMonitor(),
         LidarMonitor(lidars, live),
@@ -59,9 +61,10 @@ def make_monitors(
         rivals,
         fences,
         BorderMonitor(run),
+        gate,
         batteries,
         GuardMonitor(notifier),
         LimitsMonitor(autopilot, live, notifier),
         MissionChangeMonitor(run.mission.stored, autopilot.downloads, notifier),
     )
-    return Monitors(by_precedence, localization, scans, rivals, fences, batteries)
+    return Monitors(by_precedence, localization, scans, rivals, fences, batteries, gate)

@@ -12,6 +12,7 @@ from enum import IntEnum, StrEnum
 
 from companion.core.frames import GeoPoint
 from companion.core.scan import RangeScan
+from companion.vehicle.gps_fix import GpsFix
 from companion.vehicle.link_latency import TimeAnswered
 from companion.vehicle.rc_input import SticksSeen
 
@@ -106,11 +107,15 @@ class EkfStatusSeen:
 
 @dataclass(frozen=True, slots=True)
 class GpsSeen:
-    """GPS_RAW_INT: what the receiver says of itself. ``fix``: as in ``GPS_FIXES``; ``satellites``: None if unknown."""
+    """GPS_RAW_INT: what the receiver says of itself. ``satellites``: None if unknown.
+
+    ``fix_us``: the autopilot's time of the fix; 0 if it is not told.
+    """
 
     time_s: float
-    fix: str
+    fix: GpsFix
     satellites: int | None
+    fix_us: int = 0
 
 
 @dataclass(frozen=True, slots=True)

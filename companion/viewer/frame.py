@@ -358,4 +358,4 @@ def _battery(vehicle: VehicleState) -> Json | None:
 
 def _gps(vehicle: VehicleState) -> Json | None:
     seen = vehicle.gps
-    return None if seen is None else {"fix": seen.fix, "satellites": seen.satellites}
+    return None if seen is None else {"fix": seen.fix.text, "satellites": seen.satellites}

@@ -45,6 +45,10 @@ GOOD, NO_POSITION, CONSTANT_POSITION, GLITCH = 831, 37, 167, 32768
 glitches."""
 
 
+NO_FIX, RTK_FIXED = 1, 6
+"""GPS_FIX_TYPE."""
+
+
 class Source(Enum):
     """The estimator whose position the autopilot uses."""
 
@@ -65,9 +69,14 @@ class Change(Enum):
 
 @dataclass
 class Gps:
-    """The GPS receiver: whether it sends, and its error in metres north and east."""
+    """The GPS receiver: whether it has a position, its error in metres north and east, and what it says of its fix.
+
+    ``fix_type``: by GPS_FIX_TYPE. ``told``: whether GPS_RAW_INT is sent.
+    """
 
     talks: bool = True
+    fix_type: int = RTK_FIXED
+    told: bool = True
     error_m: tuple[float, float] = (0.0, 0.0)
     heard_s: float = 0.0
 

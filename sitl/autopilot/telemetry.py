@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sitl.autopilot.control.records import LEG
+from sitl.autopilot.ekf import NO_FIX
 from sitl.autopilot.fence import fence_status
 from sitl.autopilot.modes import NOT_ARMABLE, arming_faults, base_mode
 from sitl.autopilot.proximity import echoes
@@ -153,7 +154,13 @@ def _ekf_status(vehicle: Vehicle) -> list[Any]:
 
 
 def _gps_raw(vehicle: Vehicle) -> list[Any]:
-    if vehicle.has_home and vehicle.ekf.gps_has_fix and not vehicle.ekf.gps.talks:
+    gps = vehicle.ekf.gps
+    if not gps.told:
+        return []
+    searching = gps.fix_type == NO_FIX
+    if vehicle.has_home and searching:
+        return [mavlink.MAVLink_gps_raw_int_message(vehicle.time_us, NO_FIX, 0, 0, 0, 65535, 65535, 0, 0, 3)]
+    if vehicle.has_home and vehicle.ekf.gps_has_fix and not gps.talks:
         return []  # while the receiver counts as present, only new fixes are sent
     if not vehicle.has_home or not vehicle.ekf.gps_has_fix:
         return [mavlink.MAVLink_gps_raw_int_message(0, 0, 0, 0, 0, 65535, 65535, 0, 0, 0)]
@@ -163,8 +170,8 @@ def _gps_raw(vehicle: Vehicle) -> list[Any]:
     altitude = round(ALTITUDE_M * 1000)
     return [
         mavlink.MAVLink_gps_raw_int_message(
-            vehicle.time_us, 6, lat, lon, altitude, 121, 200, round(math.hypot(north, east) * 100), course, 10,
-            altitude, 300, 300, 0, 0,
+            vehicle.time_us, gps.fix_type, lat, lon, altitude, 121, 200, round(math.hypot(north, east) * 100), course,
+            10, altitude, 300, 300, 0, 0,
         )
     ]  # fmt: skip
 

@@ -12,13 +12,16 @@ from rich.console import Console
 
 from companion.app import Status
 from companion.cli.entry import StoppedError
+from companion.cli.given import RadiusM, SpeedMS
 from companion.cli.inputs import EXIT_BAD_INPUT, Laps, OutputError, SkipUnknown, usable_settings
+from companion.cli.source import warn_of_places, warning
 from companion.cli.web import Actions, Token, Web, WebError, served, web_viewer
 from companion.core.clock import WallClock
 from companion.executive.mission_progress import TargetStatus
 from companion.executive.warm_up import COMPILING, kernels_warm
 from companion.lidar.spec import LidarError, LidarSpec, parsed
 from companion.mapping.map_files import MapError
+from companion.mission.given import Given
 from companion.mission.mission import Mission, MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
@@ -63,6 +66,8 @@ def drive(
     target: options.Target = None,
     top_left: options.TopLeft = False,
     resolution_m: options.ResolutionM = None,
+    radius_m: RadiusM = None,
+    speed_m_s: SpeedMS = None,
     prior: options.Prior = False,
     params: options.Params = None,
     faults: options.Faults = None,
@@ -91,7 +96,8 @@ def drive(
         painter, page = _painter(view), web_viewer(web, web_token, _warn, actions=web_actions)
         settings = usable_settings(settings_file)
         where = OnWorld(world, start, target, resolution_m, top_left, prior)
-        chosen = mission_to_drive(mission_file, where, skip_unknown=skip_unknown, laps=laps)
+        given = Given(resolution_m if world is None else None, radius_m, speed_m_s)
+        chosen = mission_to_drive(mission_file, where, given, skip_unknown=skip_unknown, laps=laps)
         lidars = tuple(parsed(text, SIMULATED) for text in lidar or ())
         mission = equipped(chosen, "none" if lidars and sensors is None else sensors, params)
         scenario = _simulated(mission, faults, lidars)
@@ -188,6 +194,7 @@ def _print_last(painter: Painter | None, rows_below: int) -> None:
 
 def _simulated(mission: Mission, faults: Path | None, lidars: Sequence[LidarSpec]) -> Scenario:
     """The simulation of a mission that can be driven here; remarks are printed."""
+    warn_of_places(mission, lambda line: _warn(warning(line)))
     refuse_blind(mission, lidars)
     scenario = with_lidars(simulated(mission, faults), lidars)
     refuse_turning_on_the_spot(mission, scenario)

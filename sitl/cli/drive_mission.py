@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from companion.lidar.spec import LidarSpec
+from companion.mission.given import NOTHING_GIVEN, Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Mission, MissionError, with_laps
 from companion.mission.sensor_tables import is_blind
@@ -28,13 +29,19 @@ class OnWorld:
 
 
 def mission_to_drive(
-    mission_file: Path | None, on: OnWorld, *, skip_unknown: bool = False, laps: int | None = None
+    mission_file: Path | None,
+    on: OnWorld,
+    given: Given = NOTHING_GIVEN,
+    *,
+    skip_unknown: bool = False,
+    laps: int | None = None,
 ) -> Mission:
     """The mission to drive, from a file, from --world with --start and --target, or from both. Raises MissionError.
 
-    ``skip_unknown``: without what no rover can do; ``laps``: so often.
+    ``given``: what the file does not say; ``skip_unknown``: without what no rover can do; ``laps``: so often.
     """
-    return with_laps(_mission_to_drive(mission_file, on, skip_unknown=skip_unknown), laps)
+    mission = with_given(_mission_to_drive(mission_file, on, skip_unknown=skip_unknown), given)
+    return with_laps(mission, laps)
 
 
 def _mission_to_drive(mission_file: Path | None, on: OnWorld, *, skip_unknown: bool) -> Mission:
@@ -42,8 +49,8 @@ def _mission_to_drive(mission_file: Path | None, on: OnWorld, *, skip_unknown: b
     if world is None:
         if mission_file is None:
             raise MissionError("drive: give a MISSION file, or --world MAP with --start X,Y and --target X,Y")
-        if on.start or on.target or on.top_left or on.prior or on.resolution_m is not None:
-            raise MissionError("drive: --start, --target, --top-left, --prior and --resolution-m go with --world")
+        if on.start or on.target or on.top_left or on.prior:
+            raise MissionError("drive: --start, --target, --top-left and --prior go with --world")
         return _driven_here(load_mission(mission_file, skip_unknown=skip_unknown))
     if on.prior and world.suffix.lower() == ".toml":
         raise MissionError(f"drive: --prior: {world} consists of shapes; the companion can read maps only")

@@ -114,6 +114,30 @@ class GpsNoise(Fault):
     time_s: float = 10.0
 
 
+class FixName(Enum):
+    """A GPS fix, as fault plans name it."""
+
+    NONE = "none"
+    FIX_3D = "3d"
+    DGPS = "dgps"
+    RTK_FLOAT = "rtk-float"
+    RTK_FIXED = "rtk-fixed"
+
+
+@dataclass(frozen=True, slots=True)
+class GpsFixChange(Fault):
+    """The receiver has another fix, and its position is wrong by ``metres`` towards ``bearing_deg`` (None: random)."""
+
+    fix: FixName = FixName.RTK_FLOAT
+    metres: float = 0.0
+    bearing_deg: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class GpsFixUntold(Fault):
+    """GPS_RAW_INT is not sent; the EKF goes on with the receiver."""
+
+
 @dataclass(frozen=True, slots=True)
 class SensorFault(Fault):
     """Range sensors with a defect.

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from sitl.autopilot.control.records import Record
-from sitl.autopilot.ekf import STEP_S
+from sitl.autopilot.ekf import NO_FIX, RTK_FIXED, STEP_S
 from sitl.autopilot.modes import apply_sticks, report_ekf, set_mode
 from sitl.autopilot.start_up import HOME_S, ORIGIN_S, POSITION_S
 from sitl.autopilot.state import CommandTrouble, Mode, Sticks
@@ -22,6 +22,9 @@ from sitl.faults.plan import (
     CommandFault,
     Fault,
     FaultPlan,
+    FixName,
+    GpsFixChange,
+    GpsFixUntold,
     GpsGlitch,
     GpsLoss,
     GpsNoise,
@@ -39,6 +42,10 @@ DRIVING_M = 0.1
 """The rover counts as driving from this distance on."""
 ALIGN_S = 10.0
 """Time for which the EKF must have seen a good GPS before it uses it."""
+GPS_FAULTS = (GpsLoss, GpsGlitch, GpsNoise, GpsFixChange, GpsFixUntold)
+FIX_TYPES = {
+    FixName.NONE: NO_FIX, FixName.FIX_3D: 3, FixName.DGPS: 4, FixName.RTK_FLOAT: 5, FixName.RTK_FIXED: RTK_FIXED
+}  # fmt: skip
 OWN_STREAM = 0x4641554C
 """Separates the random draws of the faults from all others with the same seed."""
 
@@ -55,7 +62,7 @@ class FaultPlayer:
         self._links: list[Active] = [(fault, rng) for fault, rng in self._faults if isinstance(fault, LinkFault)]
         self.touches_links = bool(self._links)
         """Whether any link fault is planned."""
-        self._has_gps = any(isinstance(fault, GpsLoss | GpsGlitch | GpsNoise) for fault in plan.faults)
+        self._has_gps = any(isinstance(fault, GPS_FAULTS) for fault in plan.faults)
         self._awaits_driving = any(fault.since == "driving" for fault in plan.faults)
         self._driving_s = math.inf
         self._active: set[int] = set()
@@ -123,7 +130,7 @@ class FaultPlayer:
                 self.reboot_until_s = end_s
             case PilotTakesOver():
                 self._take_over(number, fault, vehicle)
-            case GpsGlitch():
+            case GpsGlitch() | GpsFixChange():
                 drawn_rad = float(rng.uniform(0.0, 2.0 * math.pi))
                 given = fault.bearing_deg
                 self._glitch_rad[number] = drawn_rad if given is None else math.radians(given)
@@ -220,14 +227,21 @@ class FaultPlayer:
     # GPS -------------------------------------------------------------------------------------------------------------
 
     def _move_gps(self, vehicle: Vehicle) -> None:
-        """Set the GPS error of this moment: the sum of all glitches and noise."""
+        """Set the GPS of this moment: the sum of all errors, the worst of all fixes."""
         north_m = east_m = 0.0
-        talks = True
+        talks = told = True
+        fix_type = RTK_FIXED
         for number, fault in self._active_faults():
             match fault:
                 case GpsLoss():
                     talks = False
-                case GpsGlitch():
+                case GpsFixUntold():
+                    told = False
+                case GpsFixChange(fix=FixName.NONE):
+                    talks, fix_type = False, NO_FIX
+                case GpsGlitch() | GpsFixChange():
+                    if isinstance(fault, GpsFixChange):
+                        fix_type = min(fix_type, FIX_TYPES[fault.fix])
                     north_m += fault.metres * math.cos(self._glitch_rad[number])
                     east_m += fault.metres * math.sin(self._glitch_rad[number])
                 case GpsNoise():
@@ -235,8 +249,9 @@ class FaultPlayer:
                     north_m, east_m = north_m + off_n, east_m + off_e
                 case _:
                     pass
-        vehicle.ekf.gps.talks = talks
-        vehicle.ekf.gps.error_m = (north_m, east_m)
+        gps = vehicle.ekf.gps
+        gps.talks, gps.fix_type, gps.told = talks, fix_type, told
+        gps.error_m = (north_m, east_m)
 
     def _wander(self, number: int, fault: GpsNoise) -> tuple[float, float]:
         keep = math.exp(-STEP_S / fault.time_s)

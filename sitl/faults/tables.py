@@ -14,6 +14,9 @@ from sitl.faults.plan import (
     CommandFault,
     Direction,
     Fault,
+    FixName,
+    GpsFixChange,
+    GpsFixUntold,
     GpsGlitch,
     GpsLoss,
     GpsNoise,
@@ -192,6 +195,32 @@ class GpsGlitchTable(FaultTable):
         return GpsGlitch(**self.window(), metres=self.metres, bearing_deg=self.bearing_deg)
 
 
+class GpsFixTable(FaultTable):
+    """``gps_fix``."""
+
+    fix: str
+    metres: Annotated[float, Field(ge=0.0, le=1e5)] = 0.0
+    bearing_deg: Annotated[float, Field(ge=-360.0, le=360.0)] | None = None
+
+    def fault(self) -> Fault:
+        """As a value. Raises ValueError for a fix that is none, and for an error of a position that is not there."""
+        names = [name.value for name in FixName]
+        if self.fix not in names:
+            raise ValueError(f"fix: unknown fix {self.fix!r:.40}; fixes are {', '.join(names)}")
+        if self.fix == FixName.NONE.value and self.metres:
+            raise ValueError('metres has no effect without a position; leave it out, or use fix = "rtk-float"')
+        bearing_deg = self.bearing_deg
+        return GpsFixChange(**self.window(), fix=FixName(self.fix), metres=self.metres, bearing_deg=bearing_deg)
+
+
+class GpsFixUntoldTable(FaultTable):
+    """``gps_fix_untold``."""
+
+    def fault(self) -> Fault:
+        """As a value."""
+        return GpsFixUntold(**self.window())
+
+
 class GpsNoiseTable(FaultTable):
     """``gps_noise``."""
 
@@ -331,6 +360,8 @@ KINDS: dict[str, type[FaultTable]] = {
     "gps_loss": GpsLossTable,
     "gps_glitch": GpsGlitchTable,
     "gps_noise": GpsNoiseTable,
+    "gps_fix": GpsFixTable,
+    "gps_fix_untold": GpsFixUntoldTable,
     "sensor_stuck": Stuck,
     "sensor_silent": Silent,
     "lidar_loss": LidarLoss,

@@ -41,7 +41,7 @@ DRIVES = {
     Mode.GUIDED: "companion or ground station",
 }
 """Who drives in these modes; in all others it is the autopilot."""
-RTK_FIXED, NO_GPS, SATELLITES = "RTK fixed", "no GPS", 10
+FIXES, SATELLITES = {1: "no fix", 3: "3D", 4: "3D DGPS", 5: "RTK float", 6: "RTK fixed"}, 10
 """As GPS_RAW_INT says it."""
 
 Json = dict[str, Any]
@@ -206,5 +206,5 @@ def _battery(vehicle: Vehicle) -> Json | None:
 
 def _gps(vehicle: Vehicle) -> Json:
     if vehicle.has_home and vehicle.ekf.gps_has_fix:
-        return {"fix": RTK_FIXED, "satellites": SATELLITES}
-    return {"fix": NO_GPS, "satellites": None}
+        return {"fix": FIXES[vehicle.ekf.gps.fix_type], "satellites": SATELLITES}
+    return {"fix": "no GPS", "satellites": None}

@@ -16,13 +16,16 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
+from companion.cli.doctor import of_mission
 from companion.control.following import Following
 from companion.control.model_estimate import ModelEstimate
+from companion.core.frames import LocalFrame, NedPoint
 from companion.diagnosis.checks import PARAMETERS, diagnose
 from companion.diagnosis.finding import Level
 from companion.mavlink.byte_link import MemoryLink
 from companion.mavlink.signing import Signer
 from companion.mavlink.surveyor import Surveyor
+from companion.mission.load import load_mission
 from companion.settings import Settings
 from sitl.scenario import scenario_from_mission
 from tests.sitl.network.test_server import free_port
@@ -347,3 +350,22 @@ def test_kernels_that_are_not_compiled_are_told_of(monkeypatch: pytest.MonkeyPat
 def test_a_link_that_is_none() -> None:
     answer = CliRunner().invoke(app, ["doctor", "--connect", "bluetooth:1"])
     assert answer.exit_code == 2 and "udpin:HOST:PORT" in answer.output
+
+
+def test_a_mission_is_looked_at_from_where_the_rovers_home_is(tmp_path: Path) -> None:
+    case = Case(tmp_path)
+    case.findings()
+    home = case.result.vehicle.home
+    assert home is not None
+    far = LocalFrame(home.point).to_geo(NedPoint(0.0, 1200.0))
+    place = f"lat_deg = {far.lat_deg}\nlon_deg = {far.lon_deg}\n"
+    for text, found in (
+        ("[[target]]\nnorth_m = 30\neast_m = 0\n", [("fields", N)]),
+        (f"[[target]]\n{place}", [("far-target", W), ("fields", N)]),
+        (f"[[target]]\n{place}[grid]\nresolution_m = 0.2\n", [("mission", S)]),
+        ("[[target]]\nnorth_m = 30\neast_m = 0\n[grid]\nresolution_m = 1\n", []),
+    ):
+        (tmp_path / "m.toml").write_text(text)
+        findings = of_mission(load_mission(tmp_path / "m.toml"), case.result, Settings())
+        assert [(one.name, one.level) for one in findings] == found
+        assert all("\n" not in one.says and one.remedy for one in findings)

@@ -36,12 +36,19 @@ Change = Callable[[Path], None]
 """Changes a record."""
 
 
-def recorded(folder: Path, mission: Mission, faults: str | Path | None = None, limit_s: float = 200.0) -> Path:
+def recorded(
+    folder: Path,
+    mission: Mission,
+    faults: str | Path | None = None,
+    limit_s: float = 200.0,
+    settings: Settings | None = None,
+) -> Path:
     """A drive in lock-step with a record. ``faults``: a shipped plan by its name, or a file."""
+    settings = settings or Settings()
     file = MISSIONS / "faults" / f"{faults}.toml" if isinstance(faults, str) else faults
     plan = None if file is None else load_faults(file)
-    recorder = Recorder(folder, mission, Settings(), 0, arm=True, start_us=START_US)
-    Drive(mission, with_faults(scenario_from_mission(mission), plan), Settings(), 0, recorder, limit_s).run()
+    recorder = Recorder(folder, mission, settings, 0, arm=True, start_us=START_US)
+    Drive(mission, with_faults(scenario_from_mission(mission), plan), settings, 0, recorder, limit_s).run()
     recorder.close()
     return folder
 

@@ -36,7 +36,8 @@ from companion.safety.reasons import Activity, Doubt, RunPhase, WaitReason
 from companion.settings import Settings
 from companion.storage.files import OsDisk
 from companion.vehicle.commands import GuidedPosition
-from sitl.scenario import scenario_from_mission
+from sitl.faults.plan import Fault, FaultPlan
+from sitl.scenario import scenario_from_mission, with_faults
 from sitl.simulator import Simulator
 
 MANUAL, HOLD, AUTO, RTL, GUIDED = 0, 4, 10, 11, 15
@@ -140,6 +141,7 @@ class Rig:
         port: int = 0,
         signer: Signer | None = None,
         prepare: Callable[[Simulator], None] = lambda simulator: None,
+        faults: tuple[Fault, ...] = (),
     ) -> None:
         """``late_s``: how long the vehicle has been switched on when the companion starts.
 
@@ -149,7 +151,7 @@ class Rig:
         settings = settings or Settings()
         warm_up(settings, mission.rover.turning_radius_m)
         self.settings = settings
-        self.simulator = scenario_from_mission(mission).simulator(seed)
+        self.simulator = with_faults(scenario_from_mission(mission), FaultPlan(faults)).simulator(seed)
         self.simulator.advance_to_s(late_s)
         prepare(self.simulator)
         self.change: Change | None = None

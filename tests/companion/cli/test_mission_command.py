@@ -95,3 +95,63 @@ def test_commands_patrols_and_what_was_left_out(tmp_path: Path) -> None:
         "note: left out: item 1: NAV_TAKEOFF (22): no rover can do it",
     ):
         assert text in output
+
+
+FAR = """QGC WPL 110
+0\t1\t0\t16\t0\t0\t0\t0\t53.1325\t23.1688\t150\t1
+1\t0\t3\t16\t0\t0\t0\t0\t53.1330\t23.1690\t0\t1
+2\t0\t3\t16\t0\t0\t0\t0\t23.1700\t53.1330\t0\t1
+3\t0\t3\t16\t0\t0\t0\t0\t53.2330\t23.1690\t0\t1
+"""
+WARNED = (
+    "warning: target 2 'waypoint 2' is 4177 km from home; latitude and longitude seem swapped "
+    "(the other way round it is 97 m away), is that meant?\n"
+    "warning: target 3 'waypoint 3' is 11.2 km from home; is that meant?\n"
+)
+
+
+def checked(path: Path, *options: str) -> str:
+    result = CliRunner().invoke(app, ["mission", "check", str(path), *options])
+    assert result.exit_code == 0, result.output
+    return result.output
+
+
+def test_it_warns_of_places_that_seem_wrong(tmp_path: Path) -> None:
+    path = tmp_path / "far.waypoints"
+    path.write_text(FAR)
+    assert checked(path).endswith(WARNED)
+    assert "warning" not in checked(MISSIONS / "field.plan")
+
+
+def test_run_warns_in_the_same_words_before_it_opens_the_link(tmp_path: Path) -> None:
+    path = tmp_path / "far.waypoints"
+    path.write_text(FAR)
+    result = CliRunner().invoke(app, ["run", str(path), "--connect", "nowhere", "--state", str(tmp_path / "state")])
+    assert result.exit_code == 2 and WARNED in result.output
+
+
+def test_it_says_how_large_fields_become_and_which_gaps_that_opens(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text("[[target]]\nnorth_m = 30\neast_m = 0\n")
+    assert "grid: fields of 0.15 m (by the rover's size), for gaps of 1.0 m or more, laid round" in checked(path)
+    path.write_text("[[target]]\nnorth_m = 300\neast_m = 0\n")
+    assert "no more than 250000; for narrower gaps give [grid] resolution_m or a smaller margin_m" in checked(path)
+    path.write_text("[rover]\nturning_radius_m = 2\n[[target]]\nnorth_m = 30\neast_m = 0\n")
+    assert "fields of 1 m" in checked(path)
+
+
+def test_options_say_what_a_ground_stations_file_cannot() -> None:
+    output = checked(MISSIONS / "field.plan", "--resolution-m", "0.5", "--radius-m", "0.6", "--speed", "1.5")
+    assert "fields of 0.5 m, laid round" in output and "rover: radius 0.6 m, cruises at 1.5 m/s" in output
+    toml = MISSIONS / "rooms.toml"
+    result = CliRunner().invoke(app, ["mission", "check", str(toml), "--radius-m", "0.6"])
+    assert result.exit_code == 2
+    assert result.output == f"{toml}: --radius-m: a TOML mission says this itself: [rover] radius_m\n"
+
+
+def test_a_grid_that_is_too_large_names_the_place_that_makes_it_so(tmp_path: Path) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text("[[target]]\nnorth_m = 30\neast_m = 0\n[[target]]\nnorth_m = 4000\neast_m = 0\n")
+    result = CliRunner().invoke(app, ["mission", "check", str(path)])
+    assert result.exit_code == 2 and result.output.count("\n") == 1
+    assert "target 2 'target 2' is 4.0 km from home; is that meant? If it is, use resolution_m = " in result.output

@@ -224,3 +224,18 @@ def test_a_bend_that_is_too_tight_is_counted_once_at_its_sharpest():
     assert len(too_tight(circle, 3.0)) == 1 and len(too_tight(circle, 2.0)) == 0
     doubled = np.repeat(right, 2, axis=0)
     assert too_tight(doubled, 3.0).tolist() == [[9.0, 0.0]]
+
+
+def test_the_rovers_radius_and_the_size_of_fields_count(map_file):
+    ends = (map_file, "--start", "0,0", "--target", "7,0", "--planner", "dijkstra", "--json")
+    plain = json.loads(run(*ends).stdout)
+    wide = json.loads(run(*ends, "--resolution-m", "0.5", "--radius-m", "0.6").stdout)
+    assert wide["length_m"] < plain["length_m"] and wide["length_fields"] > plain["length_fields"]
+    assert run(*ends, "--radius-m", "5").exit_code == 2, "the start would be too near to the wall"
+
+
+def test_a_ros_map_says_its_field_size_itself(tmp_path):
+    file = tmp_path / "m.yaml"
+    result = run(file, "--start", "0,0", "--target", "7,0", "--resolution-m", "0.5")
+    assert result.exit_code == 2
+    assert result.output == f"{file}: --resolution-m: a ROS map says this itself: resolution\n"

@@ -15,6 +15,7 @@ from companion.diagnosis.checks import PARAMETERS, diagnose, kernels
 from companion.diagnosis.finding import Level
 from companion.vehicle.events import (
     EkfStatusSeen,
+    GpsSeen,
     GuardSeen,
     HeartbeatSeen,
     HomeSeen,
@@ -24,6 +25,7 @@ from companion.vehicle.events import (
     RangeSeen,
     RoverMode,
 )
+from companion.vehicle.gps_fix import GpsFix
 from companion.vehicle.state import VehicleState
 from companion.vehicle.survey import Autopilot, RangeSource, SlowMessage, Survey
 from companion.vehicle.wanted_parameters import wanted_parameters
@@ -228,3 +230,24 @@ def test_the_page_explains_every_finding() -> None:
         assert f"| `{name}` |" in page
     for name in PARAMETERS:
         assert f"`{name}`" in page
+
+
+@pytest.mark.parametrize(
+    ("gps_fix", "told", "stops"),
+    [
+        ("any", None, False),
+        ("any", GpsFix.NO_GPS, False),
+        ("3d", None, True),
+        ("rtk-fixed", GpsFix.RTK_FLOAT, True),
+        ("rtk-fixed", GpsFix.RTK_FIXED, False),
+        ("3d", GpsFix.FIX_2D, True),
+        ("rtk-float", GpsFix.RTK_FIXED, False),
+    ],
+)
+def test_a_fix_that_is_worse_than_asked_for_or_not_told_would_stop_a_mission(
+    gps_fix: str, told: GpsFix | None, stops: bool
+) -> None:
+    seen = None if told is None else GpsSeen(0.0, told, 10)
+    found = diagnose(replace(WELL, vehicle=replace(WELL.vehicle, gps=seen)), gps_fix)
+    assert [(one.name, one.level) for one in found] == ([("gps-fix", Level.STOP)] if stops else [])
+    assert all(one.remedy and gps_fix in one.says for one in found)

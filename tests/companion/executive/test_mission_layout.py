@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 
 import pytest
 
 from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
-from companion.executive.mission_layout import apart_m, from_home, lay, lay_again
+from companion.executive.mission_layout import apart_m, fenced_again, from_home, lay, lay_again
 from companion.executive.mission_progress import MissionPhase, on_reached, on_time, plan_progress
+from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import HomePoint, Mission, RoverSpec, Target
 from companion.settings import MappingSettings
 from tests.support.rig import yard
@@ -53,14 +53,22 @@ def test_laid_again_everything_is_where_it_was_on_earth_and_progress_is_kept(mis
     assert not again.evidence.log_odds.any()
 
 
-def test_fields_follow_from_the_outline_where_motions_are_planned() -> None:
+def test_fields_and_evidence_follow_from_the_rover() -> None:
     rover = RoverSpec(0.6, rectangle=Footprint.rectangle(0.9, 0.7))
     wanted = Mission("m", (Target("goal", HomePoint(0.0, 9.0)),), rover=rover)
-    for keeps, side_m in (("circle", 1.0), ("outline", 0.25)):
-        evidence = lay(wanted, MappingSettings(keeps=keeps, evidence_m=0.05), ORIGIN, HOME, POSE).evidence
+    for keeps, side_m, evidence_m in (("circle", 0.25, 0.083), ("outline", 0.25, 0.05)):
+        evidence = lay(wanted, MappingSettings(keeps=keeps), ORIGIN, HOME, POSE).evidence
         assert evidence.base.resolution_m == pytest.approx(side_m)
-        # No obstacle fits between two places of one field that are free.
-        assert keeps == "circle" or math.sqrt(2.0) * side_m <= evidence.rover_radius_m
+        assert evidence.evidence_m == pytest.approx(evidence_m, abs=0.001)
+    with_beams = lay(wanted, MappingSettings(), ORIGIN, HOME, POSE, narrow_sight=True).evidence
+    assert with_beams.base.resolution_m == 1.0 and with_beams.evidence_m == 0.125
+
+
+def test_another_fence_leaves_small_fields_as_they_are() -> None:
+    wanted = Mission("m", (Target("goal", HomePoint(0.0, 9.0)),))
+    layout = lay(wanted, MappingSettings(), ORIGIN, HOME, POSE)
+    again = fenced_again(layout, wanted, AutopilotFence(circle_m=40.0, home=HOME))
+    assert again.evidence is layout.evidence and again.evidence.base.resolution_m == pytest.approx(0.15)
 
 
 def test_distance_between_places() -> None:

@@ -11,6 +11,7 @@ from companion.core.frames import GeoPoint, LocalFrame, NedPoint
 from companion.core.grid import BASE_WEIGHT, OBSTACLE, Cell, Grid, empty_grid
 from companion.mapping.map_files import save_ros_map
 from companion.mission.areas import covered, touched
+from companion.mission.field_size import FieldSize
 from companion.mission.mission import (
     Area,
     GridSpec,
@@ -85,12 +86,15 @@ def test_the_margin_grows_with_the_mission_and_can_be_given() -> None:
     assert 204 <= near.width <= 207 and 4 <= near.height <= 7
 
 
+FINE = FieldSize(0.25, 1_000_000)
+
+
 def test_fields_that_the_mission_says_nothing_of_may_be_small_but_not_too_many() -> None:
     unsaid, said = mission(HomePoint(0.0, 20.0)), mission(HomePoint(0.0, 20.0), grid=GridSpec())
-    assert resolve(unsaid, FRAME, HOME, fine_m=0.25).grid.resolution_m == 0.25
-    assert resolve(said, FRAME, HOME, fine_m=0.25).grid.resolution_m == 1.0
+    assert resolve(unsaid, FRAME, HOME, size=FINE).grid.resolution_m == 0.25
+    assert resolve(said, FRAME, HOME, size=FINE).grid.resolution_m == 1.0
     assert resolve(unsaid, FRAME, HOME).grid.resolution_m == 1.0
-    grids = [resolve(mission(HomePoint(0.0, far_m)), FRAME, HOME, fine_m=0.25).grid for far_m in (400.0, 1300.0)]
+    grids = [resolve(mission(HomePoint(0.0, far_m)), FRAME, HOME, size=FINE).grid for far_m in (400.0, 1300.0)]
     assert 0.25 < grids[0].resolution_m < 1.0 and grids[0].width * grids[0].height < 1_100_000
     assert grids[1].resolution_m == 1.0
 

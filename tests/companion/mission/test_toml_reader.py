@@ -149,7 +149,7 @@ def test_the_least_that_is_a_mission(tmp_path: Path) -> None:
         (GRID + "[[target]]\nnorth_m = 1\n", "target 1: north_m and east_m are both needed"),
         (GRID + "[[target]]\nlat_deg = 1\n", "target 1: lat_deg and lon_deg are both needed"),
         (GRID + TARGET + "north_m = 1\neast_m = 1\n", "target 1: a place is given twice"),
-        (GRID + "[[target]]\nlat_deg = 91\nlon_deg = 0\n", "target 1.lat_deg"),
+        (GRID + "[[target]]\nlat_deg = 91\nlon_deg = 0\n", "target 1: 91, 0 is not a latitude"),
         (GRID + "[[target]]\nfield = [1.5, 2]\n", "target 1.field 1"),
         (GRID + "[[target]]\nfield = [1, 2, 3]\n", "target 1.field"),
         (GRID + "[[target]]\nfield = [100, 24]\n", "target 1 'target 1': field 100, 24 is outside"),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from companion.core.frames import GeoPoint
 from companion.core.scan import RangeScan
 from companion.safety.mode_latch import Control, LatchState, Reaction, Verdict, awaited, check, latched
-from companion.safety.reasons import Doubt, LatchReason, Reason, WaitReason
+from companion.safety.reasons import WAITED_OUT, Doubt, LatchReason, Reason, WaitReason
 from companion.safety.watchdogs import DataMonitor, SticksMonitor, first_doubt
 from companion.settings import SafetySettings, Settings
 from companion.settings.live_settings import LiveSettings
@@ -242,3 +242,15 @@ def test_a_mode_that_is_not_ours_is_named(seen, reason):
 
 def test_before_anybody_has_had_the_rover_there_is_nothing_to_name():
     assert check(NOBODY, vehicle(mode=HOLD), 10.0, SETTINGS, None) == (NOBODY, Verdict(Reaction.SILENT))
+
+
+@pytest.mark.parametrize("kind", sorted(WAITED_OUT, key=lambda kind: kind.name))
+def test_what_is_waited_out_stops_the_rover_for_as_long_as_it_lasts_and_never_leads_to_hold(kind: Doubt) -> None:
+    latch = OURS
+    for now_s in (10.0, 11.0, 60.0, 600.0):
+        latch, verdict = check(latch, vehicle(now_s), now_s, SETTINGS, Reason(kind))
+        assert verdict.reaction is Reaction.STOP
+    latch, verdict = check(latch, vehicle(601.0), 601.0, SETTINGS, JUMPED)
+    assert verdict.reaction is Reaction.STOP, "another doubt has its whole time from when it arose"
+    assert check(latch, vehicle(603.1), 603.1, SETTINGS, JUMPED)[1].reaction is Reaction.HOLD
+    assert check(OURS, vehicle(mode=MANUAL), 10.0, SETTINGS, Reason(kind))[1].reaction is Reaction.SILENT

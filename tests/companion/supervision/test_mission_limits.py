@@ -11,8 +11,9 @@ from companion.executive.mission_progress import MissionPhase
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.operator.notifications import Outcome
 from companion.safety.battery_monitor import BatteryMonitor
+from companion.safety.gps_gate import GpsGate
 from companion.safety.reasons import Doubt, PowerReason, Reason, WaitReason
-from companion.settings import FenceSettings, PowerSettings
+from companion.settings import FenceSettings, PowerSettings, Settings
 from companion.supervision.fence_monitor import FenceMonitor
 from companion.supervision.mission_limits import BorderMonitor, MissionLimits
 from companion.supervision.rival_monitor import RivalMonitor
@@ -47,7 +48,8 @@ class Limited(Desk):
         link: Any = self.autopilot
         self.outcome, self.batteries, self.rivals = Outcome(), BatteryMonitor(POWER), RivalMonitor(link)
         self.fences = FenceMonitor(link, FenceSettings(heed="never"), self.notices)
-        self.limits = MissionLimits(self.run, self.fences, self.batteries, self.rivals, POWER, self.outcome)
+        self.gate = GpsGate(self.settings)
+        self.limits = MissionLimits(self.run, self.fences, self.batteries, self.rivals, self.gate, POWER, self.outcome)
         if begun:
             self.begin()
             self.executor.decide(self.stand(0.0, 0.0), self.now_s)
@@ -85,3 +87,15 @@ def test_a_low_battery_breaks_a_mission_off(tmp_path: Path, percent: int) -> Non
     assert limited.outcome.broken_off == why
     assert (limited.executor.progress.phase is MissionPhase.HOME) is not stops
     assert len([text for text in limited.notices.texts if text.startswith("Returning: ")]) == (0 if stops else 1)
+
+
+def test_a_rover_does_not_begin_with_a_poor_fix_and_one_that_is_taken_up_may_stand_with_it(tmp_path: Path) -> None:
+    limited = Limited(tmp_path, begun=False)
+    limited.run.vehicle = limited.stand(0.0, 0.0, armed=False)
+    limited.rivals.take(HeartbeatSeen(limited.now_s, HOLD, False, 1), limited.run.vehicle)
+    assert limited.limits.awaited(limited.now_s, left_driving=False) is None
+    limited.settings.replace(Settings.model_validate({"safety": {"gps_fix": "rtk-fixed"}}))
+    awaited = limited.limits.awaited(limited.now_s, left_driving=False)
+    assert awaited is not None and awaited.kind is WaitReason.GOOD_DATA
+    assert str(awaited) == "good data (GPS fix not told for over 1 s)"
+    assert limited.limits.awaited(limited.now_s, left_driving=True) is None

@@ -25,6 +25,7 @@ def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None
         "RivalMonitor",
         "FenceMonitor",
         "BorderMonitor",
+        "GpsGate",
         "BatteryMonitor",
         "GuardMonitor",
         "LimitsMonitor",

@@ -30,6 +30,7 @@ LEAST = {
     "pilot": 'mode = "HOLD"',
     "gps_glitch": "metres = 5.0",
     "gps_noise": "metres = 0.5",
+    "gps_fix": 'fix = "3d"',
     "wheel_slip": "share = 0.5",
     "command": 'effect = "lost"',
 }

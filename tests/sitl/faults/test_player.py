@@ -14,6 +14,9 @@ from sitl.faults.plan import (
     BatteryLow,
     Fault,
     FaultPlan,
+    FixName,
+    GpsFixChange,
+    GpsFixUntold,
     GpsGlitch,
     GpsLoss,
     GpsNoise,
@@ -550,3 +553,26 @@ def test_driving_begins_when_the_rover_has_moved() -> None:
     assert client.simulator._vehicle.mode == GUIDED
     client.run_to(moved_s + 3.15)
     assert client.simulator._vehicle.mode == HOLD
+
+
+@pytest.mark.parametrize(("fix", "number"), [(FixName.FIX_3D, 3), (FixName.DGPS, 4), (FixName.RTK_FLOAT, 5)])
+def test_another_fix_is_told_and_its_error_is_followed_by_the_ekf(fix: FixName, number: int) -> None:
+    fault = GpsFixChange(50.0, 60.0, fix=fix, metres=0.8, bearing_deg=90.0)
+    client, seen = driven(fault, until_s=70.0)
+    assert {m.fix_type for _, m in of(seen, "GPS_RAW_INT", 50.2, 60.0)} == {number}
+    assert {m.fix_type for _, m in of(seen, "GPS_RAW_INT", 60.2)} == {6}
+    assert {m.flags for _, m in of(seen, "EKF_STATUS_REPORT", 45.0)} == {831}
+    assert driven(fault, until_s=59.0)[0].simulator.vehicle.ekf.offset_m == pytest.approx((0.0, 0.8), abs=0.01)
+    assert client.simulator.vehicle.ekf.offset_m == pytest.approx((0.0, 0.0), abs=0.01)
+
+
+def test_without_a_fix_the_receiver_says_so_and_the_ekf_goes_on_alone() -> None:
+    _, seen = driven(GpsFixChange(50.0, 60.0, fix=FixName.NONE), until_s=70.0)
+    assert {(m.fix_type, m.lat) for _, m in of(seen, "GPS_RAW_INT", 50.2, 60.0)} == {(1, 0)}
+    assert {flag for t, m in of(seen, "EKF_STATUS_REPORT") if 57.2 < t <= 60.0 for flag in (m.flags,)} == {37}
+
+
+def test_a_fix_that_is_not_told_is_one_all_the_same() -> None:
+    _, seen = driven(GpsFixUntold(50.0, 60.0), until_s=70.0)
+    assert of(seen, "GPS_RAW_INT", 50.2, 60.0) == [] and of(seen, "GPS_RAW_INT", 60.2)
+    assert {m.flags for _, m in of(seen, "EKF_STATUS_REPORT", 45.0)} == {831}

@@ -1,0 +1,72 @@
+"""Field size: how large fields are where the mission does not say, by the rover and the extent of the ground.
+
+Nouns: field size.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from companion.mission.mission import RoverSpec
+from companion.settings import MappingSettings
+
+STEP_M = 0.05
+"""Sides of fields are whole multiples of this."""
+RADII = 0.43
+"""Where the rover keeps the circle round it clear, the middle of a field must lie in every gap that it should fit
+through. With fields of so many radii a rover of 0.7 m drives through 1.0 m."""
+MOST_FINE, MOST_FINE_PLANNED = 250_000, 1_000_000
+"""Fields that may be small are so large that there are no more of them: searches take time. The second is for planned
+motions, which search less often."""
+FINER_M, FINER_SHARE = 0.05, 1.0 / 3.0
+"""With small fields evidence is finer: this share of their side, and no less than FINER_M."""
+
+
+@dataclass(frozen=True, slots=True)
+class FieldSize:
+    """``fine_m``: as small as narrow ground needs; ``most``: there are no more fields than this, if they may be small.
+
+    A mission's own ``resolution_m`` counts instead; without one, it is the largest side that fields get.
+    """
+
+    fine_m: float
+    most: int
+
+    def side_m(self, area_m2: float, largest_m: float) -> float:
+        """The side of a field on ground of this area."""
+        return min(largest_m, max(self.fine_m, math.sqrt(area_m2 / self.most)))
+
+
+def field_size(rover: RoverSpec, settings: MappingSettings, *, narrow_sight: bool = False) -> FieldSize | None:
+    """The size by the rover; None: the mission's default is as good.
+
+    For planned motions (``keeps`` "outline") no obstacle fits between two places of a field that are free. A rover that
+    turns in arcs, or sees with single thin beams, needs more room than small fields would give it.
+    """
+    if settings.keeps == "outline":
+        return FieldSize(_in_steps(map_radius_m(rover, settings) / math.sqrt(2.0)), MOST_FINE_PLANNED)
+    if narrow_sight or rover.turning_radius_m > 0.0:
+        return None
+    return FieldSize(_in_steps(RADII * rover.radius_m), MOST_FINE)
+
+
+def map_radius_m(rover: RoverSpec, settings: MappingSettings) -> float:
+    """What the rover's middle keeps from obstacles on the map, by ``mapping.keeps``."""
+    return rover.radius_m if settings.keeps == "circle" else rover.footprint.discs()[1] + settings.beside_m
+
+
+def finer_evidence(settings: MappingSettings, resolution_m: float) -> MappingSettings:
+    """Evidence for fields that follow from the rover: it decides which gaps are wide enough."""
+    finer_m = FINER_M if settings.keeps == "outline" else max(FINER_M, FINER_SHARE * resolution_m)
+    return settings.model_copy(update={"evidence_m": min(settings.evidence_m, finer_m)})
+
+
+def sure_gap_m(rover: RoverSpec, settings: MappingSettings, resolution_m: float) -> float:
+    """A gap of this width is open on the map wherever it lies and however it is turned, to a tenth of a metre."""
+    kept_m = map_radius_m(rover, settings) + settings.evidence_m
+    return math.ceil(10.0 * (2.0 * kept_m + math.sqrt(2.0) * resolution_m) - 0.5) / 10.0
+
+
+def _in_steps(size_m: float) -> float:
+    return max(math.floor(size_m / STEP_M + 1e-9), 1) * STEP_M

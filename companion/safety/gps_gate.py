@@ -1,0 +1,70 @@
+"""The GPS gate: the rover stands while the GPS fix is worse than ``safety.gps_fix`` asks for, or is not told.
+
+Nouns: GPS gate.
+"""
+
+from __future__ import annotations
+
+import math
+
+from companion.safety.reasons import Doubt, Reason
+from companion.safety.watchdogs import Monitor
+from companion.settings.live_settings import LiveSettings
+from companion.vehicle.events import Event, GpsSeen
+from companion.vehicle.gps_fix import NEEDED, GpsFix
+from companion.vehicle.state import VehicleState
+
+
+class GpsGate(Monitor):
+    """Shut until the fix has been good for ``gps_settle_s`` without a break; shut again ``gps_lost_s`` after the last
+    good one.
+
+    A message that is late, missing, or repeats the time of the fix before it is no good one. Times are the companion's.
+    """
+
+    def __init__(self, settings: LiveSettings) -> None:
+        self._settings = settings
+        self._open = False
+        self._fix = GpsFix.NO_GPS
+        self._heard_s = -math.inf
+        self._good_s = -math.inf
+        """When the last good fix came."""
+        self._since_s = math.inf
+        """When the first of an unbroken row of good ones came."""
+        self._fix_us = 0
+
+    def take(self, event: Event, vehicle: VehicleState) -> None:
+        """One more event."""
+        if not isinstance(event, GpsSeen) or (event.fix_us == self._fix_us != 0):
+            return
+        self._fix, self._heard_s, self._fix_us = event.fix, event.time_s, event.fix_us
+        needed = self._needed
+        if needed is None or event.fix >= needed:
+            self._good_s = event.time_s
+            self._since_s = min(self._since_s, event.time_s)
+        else:
+            self._since_s = math.inf
+
+    def tick(self, now_s: float) -> None:
+        """Open or shut."""
+        safety = self._settings.current.safety
+        lost = now_s - self._good_s > safety.gps_lost_s
+        if lost:
+            self._since_s = math.inf
+        self._open = not lost and (self._open or now_s - self._since_s >= safety.gps_settle_s)
+
+    def doubt(self, now_s: float) -> Reason[Doubt] | None:
+        """Why the rover must stand, as of the last ``tick``."""
+        needed, safety = self._needed, self._settings.current.safety
+        if needed is None or self._open:
+            return None
+        if now_s - self._heard_s > safety.gps_lost_s:
+            return Reason(Doubt.GPS_SILENT, (safety.gps_lost_s,))
+        if self._fix < needed:
+            return Reason(Doubt.GPS_POOR, (self._fix.text, needed.text))
+        return Reason(Doubt.GPS_SETTLES, (self._fix.text, safety.gps_settle_s))
+
+    @property
+    def _needed(self) -> GpsFix | None:
+        """None: any will do, even none."""
+        return NEEDED.get(self._settings.current.safety.gps_fix)
