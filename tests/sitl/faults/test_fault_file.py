@@ -33,6 +33,9 @@ LEAST = {
     "gps_fix": 'fix = "3d"',
     "wheel_slip": "share = 0.5",
     "command": 'effect = "lost"',
+    "lidar_loss": "probability = 0.01",
+    "lidar_corrupt": "probability = 0.01",
+    "lidar_noise": "metres = 0.05",
 }
 
 
