@@ -21,8 +21,8 @@ def deskewed(scan: RangeScan, forward_m_s: float, yaw_rate_rad_s: float) -> Rang
     ``forward_m_s``: along the heading; ``yaw_rate_rad_s``: clockwise. A reading that hit something is where that lies
     from the rover's place at ``time_s``; of one that hit nothing only the direction changes.
     """
-    if scan.age_s is None or (forward_m_s == 0.0 and yaw_rate_rad_s == 0.0):
-        return replace(scan, age_s=None)
+    if scan.age_s is None:
+        return scan
     back_rad = -yaw_rate_rad_s * scan.age_s
     hit = np.isfinite(scan.range_m)
     range_m = np.where(hit, scan.range_m, 0.0)

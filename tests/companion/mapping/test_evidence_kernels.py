@@ -43,7 +43,15 @@ def cast(range_cells: float, protected: np.ndarray = NOTHING, kept_cells: float 
     log_odds, stamps = np.zeros((SIZE, SIZE), np.float32), np.zeros((SIZE, SIZE), np.int32)
     scan = ScanInCells(24.5, 24.5, 0.0, np.zeros(1), np.array([range_cells]), 16.0, 0.05)
     for stamp in range(1, times + 1):
-        cast_scan(log_odds, stamps, np.int32(stamp), scan, MODEL._replace(kept_cells=kept_cells), protected, 1.0)
+        cast_scan(
+            log_odds,
+            stamps,
+            np.int32(stamp),
+            scan,
+            MODEL._replace(kept_cells=kept_cells),
+            protected,
+            (scan.x, scan.y, 1.0),
+        )
     return log_odds
 
 

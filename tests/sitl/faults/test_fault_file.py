@@ -32,6 +32,9 @@ LEAST = {
     "gps_noise": "metres = 0.5",
     "wheel_slip": "share = 0.5",
     "command": 'effect = "lost"',
+    "lidar_loss": "probability = 0.01",
+    "lidar_corrupt": "probability = 0.01",
+    "lidar_noise": "metres = 0.05",
 }
 
 
