@@ -13,13 +13,15 @@ from companion.vehicle.gps_fix import GpsFix
 
 WATCHED_S = 10.0
 """A step is looked for, and must be over, so long after the fix has changed."""
-BEFORE_S = 1.5
-"""The position may have begun to step so long before the message with the new fix came."""
+BEFORE_S = 2.0
+"""The position may have begun to step before the message with the new fix came; what counts is where it was then."""
 KNOWN_S = 3.0
 """A fix that is older than this is not compared with the next one."""
 SEEN_M = 0.15
-"""Less than this is the noise of position and velocity."""
-CALM_S, CALM_M = 1.0, 0.05
+"""A step begins beyond this: less is the noise of position and velocity. What has begun is followed to its end."""
+MEAN_S = 0.4
+"""Places are means over so long: single reports are noisy."""
+CALM_S, CALM_M = 1.0, 0.04
 """The step is over when the position has followed the velocity this well for so long."""
 MARK_S = 0.1
 GAP_S = 1.0
@@ -49,10 +51,12 @@ class FixJump:
         self.before = self.after = GpsFix.NO_GPS
         self._told: GpsSeen | None = None
         self._last: LocalPositionSeen | None = None
-        self._off_m = (0.0, 0.0)
-        """Position minus integrated velocity."""
+        self._sum_m = (0.0, 0.0)
+        """Position minus integrated velocity, as of the last report."""
         self._marks: list[tuple[float, float, float]] = []
-        """Time and ``_off_m`` then, of the last BEFORE_S."""
+        """Time and ``_sum_m`` then, of the last BEFORE_S."""
+        self._off_m = (0.0, 0.0)
+        """The mean of the newest of them."""
         self._from_m: tuple[float, float] | None = None
         """``_off_m`` before the change; None while no step is looked for."""
         self._until_s = -math.inf
@@ -86,9 +90,10 @@ class FixJump:
             return
         if self._from_m is None:
             self.before = told.fix
-            self._from_m = self._marks[0][1:] if self._marks else self._off_m
+            self._from_m = self._mean_until(self._marks[0][0] + MEAN_S) if self._marks else self._off_m
         self.after = event.fix
-        self._until_s = event.time_s + WATCHED_S
+        if self.phase is not JumpPhase.STEPPING:  # or a fix that changes again and again would let it step for ever
+            self._until_s = event.time_s + WATCHED_S
 
     def take_report(self, now: LocalPositionSeen) -> None:
         """One more position."""
@@ -99,15 +104,17 @@ class FixJump:
         elapsed_s = now.boot_s - last.boot_s
         north_m = now.north_m - last.north_m - (last.north_m_s + now.north_m_s) / 2.0 * elapsed_s
         east_m = now.east_m - last.east_m - (last.east_m_s + now.east_m_s) / 2.0 * elapsed_s
-        self._off_m = self._off_m[0] + north_m, self._off_m[1] + east_m
-        if not self._marks or now.time_s - self._marks[-1][0] >= MARK_S:
+        self._sum_m = self._sum_m[0] + north_m, self._sum_m[1] + east_m
+        if not self._marks or now.time_s - self._marks[-1][0] >= MARK_S - 1e-6:
             kept = [mark for mark in self._marks if now.time_s - mark[0] <= BEFORE_S]
-            self._marks = [*kept, (now.time_s, *self._off_m)]
+            self._marks = [*kept, (now.time_s, *self._sum_m)]
+        self._off_m = self._mean_until(math.inf, now.time_s - MEAN_S)
         self._look(now.time_s)
 
     def begin_anew(self) -> None:
         """Whatever has been the matter so far does not count any more."""
-        self._off_m, self._marks, self._from_m, self.phase = (0.0, 0.0), [], None, JumpPhase.NONE
+        self._sum_m = self._off_m = (0.0, 0.0)
+        self._marks, self._from_m, self.phase = [], None, JumpPhase.NONE
 
     def _look(self, now_s: float) -> None:
         """The phase. After a step that is over the next one is looked for; after one that is lost it begins anew."""
@@ -115,8 +122,10 @@ class FixJump:
             self._from_m, self.before = self._off_m, self.after
         elif self.phase is JumpPhase.LOST:
             self.begin_anew()
+            return
+        steps = self._from_m is not None and (self.phase is JumpPhase.STEPPING or self.off_m > SEEN_M)
         self.phase = JumpPhase.NONE
-        if self.off_m > SEEN_M:
+        if steps:
             self.phase = JumpPhase.SETTLED if self._is_calm(now_s) else JumpPhase.STEPPING
             if self.phase is JumpPhase.STEPPING and now_s > self._until_s:
                 self.phase = JumpPhase.LOST
@@ -124,7 +133,13 @@ class FixJump:
             self._from_m = None
 
     def _is_calm(self, now_s: float) -> bool:
-        lately = [mark for mark in self._marks if now_s - mark[0] <= CALM_S]
-        north_m, east_m = self._off_m
-        away_m = max(math.hypot(mark[1] - north_m, mark[2] - east_m) for mark in lately)
-        return now_s - lately[0][0] >= CALM_S - 2.0 * MARK_S and away_m <= CALM_M
+        """Whether the means of the last moments lie together."""
+        if now_s - self._marks[0][0] < CALM_S - 2.0 * MARK_S:
+            return False
+        before = self._mean_until(now_s - CALM_S + MEAN_S, now_s - CALM_S)
+        return math.dist(before, self._off_m) <= CALM_M
+
+    def _mean_until(self, until_s: float, from_s: float = -math.inf) -> tuple[float, float]:
+        """The mean of the marks of this time; of the newest if there is none."""
+        chosen = [mark for mark in self._marks if from_s <= mark[0] <= until_s] or self._marks[-1:]
+        return sum(mark[1] for mark in chosen) / len(chosen), sum(mark[2] for mark in chosen) / len(chosen)

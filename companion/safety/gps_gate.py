@@ -14,10 +14,13 @@ from companion.vehicle.events import Event, GpsSeen
 from companion.vehicle.gps_fix import NEEDED, GpsFix
 from companion.vehicle.state import VehicleState
 
+MADE_UP = 0.5
+"""A good fix makes up for so much of its own time of bad ones: more than a third of them shut the gate in the end."""
+
 
 class GpsGate(Monitor):
-    """Shut until the fix has been good for ``gps_settle_s`` without a break; shut again ``gps_lost_s`` after the last
-    good one.
+    """Shut until the fix has been good for ``gps_settle_s`` without a break; shut again after ``gps_lost_s`` without a
+    good one, or with as much of bad ones, of which good ones make up for half their time.
 
     A message that is late, missing, or repeats the time of the fix before it is no good one. Times are the companion's.
     """
@@ -32,14 +35,19 @@ class GpsGate(Monitor):
         self._since_s = math.inf
         """When the first of an unbroken row of good ones came."""
         self._fix_us = 0
+        self._bad_s = 0.0
+        """The time of bad fixes, less what good ones have made up for."""
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event."""
         if not isinstance(event, GpsSeen) or (event.fix_us == self._fix_us != 0):
             return
+        passed_s = min(event.time_s - self._heard_s, self._settings.current.safety.gps_lost_s)
         self._fix, self._heard_s, self._fix_us = event.fix, event.time_s, event.fix_us
         needed = self._needed
-        if needed is None or event.fix >= needed:
+        good = needed is None or event.fix >= needed
+        self._bad_s = max(self._bad_s + (-passed_s * MADE_UP if good else passed_s), 0.0)
+        if good:
             self._good_s = event.time_s
             self._since_s = min(self._since_s, event.time_s)
         else:
@@ -48,10 +56,13 @@ class GpsGate(Monitor):
     def tick(self, now_s: float) -> None:
         """Open or shut."""
         safety = self._settings.current.safety
-        lost = now_s - self._good_s > safety.gps_lost_s
-        if lost:
+        silent = now_s - self._good_s > safety.gps_lost_s
+        if silent:
             self._since_s = math.inf
-        self._open = not lost and (self._open or now_s - self._since_s >= safety.gps_settle_s)
+        settled = now_s - self._since_s >= safety.gps_settle_s
+        if settled:
+            self._bad_s = 0.0
+        self._open = settled or (self._open and not silent and self._bad_s <= safety.gps_lost_s)
 
     def doubt(self, now_s: float) -> Reason[Doubt] | None:
         """Why the rover must stand, as of the last ``tick``."""

@@ -92,6 +92,8 @@ class LocalizationMonitor(Monitor):
         match event:
             case LocalPositionSeen() if vehicle.jump_m > self._settings.current.safety.jump_m:
                 self._begin(Doubt.POSITION_JUMPED, event.time_s, f"Position jumped {vehicle.jump_m:.1f} m")
+            case LocalPositionSeen() if self._doubt is Doubt.FIX_CHANGED and not self._fix.watching:
+                self._begin(Doubt.POSITION_WANDERED, event.time_s, "Positions were missing after a change of GPS fix")
             case LocalPositionSeen() if self._fix.watching and self._doubt in (None, Doubt.FIX_CHANGED):
                 self._follow_fix(event.time_s, executor)
             case LocalPositionSeen() if vehicle.wander.noticed:
@@ -115,9 +117,11 @@ class LocalizationMonitor(Monitor):
         fix, limit_m = self._fix, self._settings.current.safety.jump_m
         if fix.off_m > limit_m or fix.phase is JumpPhase.LOST:
             self._begin(Doubt.POSITION_WANDERED, now_s, f"Position left by {fix.off_m:.1f} m after a change of GPS fix")
+            self._count_wandering(now_s)
         elif fix.phase is JumpPhase.STEPPING:
             self._doubt, self._doubt_s = Doubt.FIX_CHANGED, now_s
-        elif self._doubt is Doubt.FIX_CHANGED:
+        elif fix.phase is JumpPhase.SETTLED:
+            self._count_wandering(now_s)  # a fix that comes and goes is no better than a position that wanders
             text = f"GPS {fix.before.text} to {fix.after.text}: the map is moved by {fix.off_m:.2f} m"
             self._notifier.tell(text, Severity.WARNING)
             executor.move_map(fix.north_m, fix.east_m, now_s)

@@ -80,7 +80,15 @@ def test_each_gate_asks_for_its_fix_or_a_better_one(needed: str, enough: GpsFix,
 @pytest.mark.parametrize("bad", [FLOAT, GpsFix.NO_FIX, None])
 def test_single_bad_messages_stop_nothing(bad: GpsFix | None) -> None:
     assert set(Gated().opened().hear(*[bad, FIXED, FIXED] * 20)) == {None}
-    assert set(Gated().opened().hear(*[bad, bad, bad, FIXED] * 20)) == {None}
+    assert set(Gated().opened().hear(bad, bad, bad, *[FIXED] * 20)) == {None}
+
+
+@pytest.mark.parametrize("row", [[FLOAT, FIXED], [FLOAT, FLOAT, FLOAT, FLOAT, FIXED]])
+def test_a_fix_that_is_bad_more_often_than_not_shuts_it_though_good_ones_come_between(row: list[GpsFix]) -> None:
+    gated = Gated().opened()
+    assert Doubt.GPS_POOR in gated.hear(*row * 20)
+    assert gated.hear(*row * 20)[-1] is not None, "it stays shut"
+    assert gated.hear(*[FIXED] * 20)[-1] is None
 
 
 @pytest.mark.parametrize(("bad", "says"), [(FLOAT, Doubt.GPS_POOR), (None, Doubt.GPS_SILENT)])

@@ -19,10 +19,12 @@ from companion.supervision.localization_monitor import (
 )
 from companion.vehicle.dead_reckoning import Drift
 from companion.vehicle.events import (
+    GpsSeen,
     HomeSeen,
     LocalPositionSeen,
     OriginSeen,
 )
+from companion.vehicle.gps_fix import GpsFix
 from companion.vehicle.state import VehicleState
 from tests.companion.safety.test_mode_latch import PLACE, vehicle
 from tests.support.desk import Desk
@@ -100,6 +102,28 @@ def test_a_position_that_wanders_again_and_again_is_not_driven_by(tmp_path: Path
     assert located.doubt is Doubt.POSITION_WANDERS
     located.clock.time_s += CALM_S
     assert located.doubt is None
+
+
+def test_reports_that_are_missing_while_the_position_steps_with_the_fix_end_in_a_new_map(tmp_path: Path) -> None:
+    """It must not stand there for ever: what became of the position meanwhile is not known."""
+    located = Located(tmp_path)
+
+    def go(seconds: float, fix: GpsFix, north_m: float) -> None:
+        for _ in range(round(seconds / 0.1)):
+            located.clock.time_s += 0.1
+            located.monitor.take(GpsSeen(located.now_s, fix, 10), located.run.vehicle)
+            position = LocalPositionSeen(located.now_s, located.now_s, north_m, 0.0, 0.0, 0.0)
+            located.monitor.take(position, replace(vehicle(located.now_s), position=position))
+
+    go(4.0, GpsFix.RTK_FLOAT, 0.0)
+    go(0.5, GpsFix.RTK_FIXED, 0.5)
+    assert located.doubt is Doubt.FIX_CHANGED
+    located.clock.time_s += 1.5
+    go(0.5, GpsFix.RTK_FIXED, 0.5)
+    assert located.doubt is Doubt.POSITION_WANDERED
+    located.clock.time_s += SETTLED_S + 0.01
+    located.hear_origin()
+    assert located.doubt is None and located.executor.maps_begun == 1
 
 
 def test_before_the_mission_there_is_no_map_to_doubt_and_home_is_told_once(tmp_path: Path) -> None:
