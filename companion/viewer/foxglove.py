@@ -23,7 +23,7 @@ from companion.viewer.foxglove_schemas import UNUSED
 Json = dict[str, Any]
 MAP, ROVER = "map", "rover"
 UINT8 = 1
-LINE_STRIP = 0
+LINE_STRIP, DELETE_ALL = 0, 1
 PATH_COLOUR = {"r": 0.15, "g": 0.4, "b": 0.9, "a": 1.0}
 TARGET_COLOUR = {"r": 0.95, "g": 0.55, "b": 0.1, "a": 1.0}
 PATH_PIXELS = 3.0
@@ -86,7 +86,8 @@ def laser_scan(unix_us: int, scan: RangeScan) -> Json:
         "start_angle": round(first_rad, 5),
         "end_angle": round(last_rad, 5),
         "ranges": np.round(ranges, 3).tolist(),
-        "intensities": [],
+        # Points are coloured by it, and all dark without.
+        "intensities": np.round(ranges, 3).tolist(),
     }
 
 
@@ -142,7 +143,9 @@ def targets(unix_us: int, places: Iterable[tuple[str, NedPoint]]) -> Json:
             "text": name,
         }
         entities.append(_entity(unix_us, f"target {number + 1}", spheres=[ball], texts=[words]))
-    return _scene(unix_us, entities)
+    # All those of an earlier, longer list go first.
+    everything: Json = {"timestamp": stamp(unix_us), "type": DELETE_ALL, "id": ""}
+    return {**_scene(unix_us, entities), "deletions": [everything]}
 
 
 def log(unix_us: int, level: str, text: str, name: str) -> Json:

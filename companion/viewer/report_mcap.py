@@ -24,12 +24,12 @@ from companion.viewer import foxglove
 from companion.viewer.foxglove_schemas import SCHEMAS
 from companion.viewer.frame import mode_name, news_of
 from companion.viewer.map_colours import CELL_COLOURS
-from companion.viewer.map_tiles import UNKNOWN, cell_classes
+from companion.viewer.map_tiles import cell_classes
 
 MAP_S, PATH_S = 2.0, 0.5
 """So often each is written, if it has changed."""
-SEEN, UNSEEN = 255, 0
-"""Opacity."""
+OPAQUE = 255
+"""Unknown ground, too: what shines through from behind has any colour, that of obstacles as well."""
 TOPICS = {
     "/tf": "FrameTransform",
     "/pose": "PoseInFrame",
@@ -40,7 +40,27 @@ TOPICS = {
     "/targets": "SceneUpdate",
     "/log": "Log",
 }
-FREE_FORM = b'{"type":"object"}'
+OWN: dict[str, dict[str, str]] = {
+    "/state": {
+        "doing": "string",
+        "mode": "string",
+        "armed": "boolean",
+        "speed_m_s": "number",
+        "turn_rate_rad_s": "number",
+        "battery_v": "number",
+    },
+    "/decision": {
+        "number": "integer",
+        "target": "string",
+        "action": "string",
+        "part": "string",
+        "reason": "string",
+        "path_fields": "integer",
+        "searches": "array",
+    },
+}
+"""Topics with a schema of our own: fields and their types. A value that is not known is null all the same: readers of
+such files want one type a field."""
 Json = dict[str, Any]
 
 
@@ -70,8 +90,8 @@ class McapReport(ReplayObserver):
             for name, schema in SCHEMAS.items()
         }
         own = {
-            topic: self._writer.register_schema(f"rover_companion.{topic[1:].title()}", "jsonschema", FREE_FORM)
-            for topic in ("/state", "/decision")
+            topic: self._writer.register_schema(f"rover_companion.{topic[1:].title()}", "jsonschema", _own(topic))
+            for topic in OWN
         }
         topics = {**{topic: schemas[name] for topic, name in TOPICS.items()}, **own}
         self._channels = {topic: self._writer.register_channel(topic, "json", which) for topic, which in topics.items()}
@@ -165,7 +185,7 @@ class McapReport(ReplayObserver):
         self._map = cells.tobytes()
         rows, columns = (np.flatnonzero(cells.any(axis=axis)) for axis in (1, 0))
         kept = cells[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
-        opacity = np.where(kept == UNKNOWN, UNSEEN, SEEN).astype(np.uint8)
+        opacity = np.full(kept.shape, OPAQUE, np.uint8)
         colours = np.dstack((CELL_COLOURS[kept], opacity))
         corner, cell_m = evidence.base.south_west, evidence.evidence_m
         south_west = NedPoint(corner.north_m + rows[0] * cell_m, corner.east_m + columns[0] * cell_m)
@@ -179,3 +199,11 @@ class McapReport(ReplayObserver):
         at_ns = 1000 * self._at_us(time_s)
         data = json.dumps(value, allow_nan=False, separators=(",", ":")).encode()
         self._writer.add_message(self._channels[topic], at_ns, data, at_ns)
+
+
+def _own(topic: str) -> bytes:
+    """The schema of a topic of our own."""
+    kinds = {"array": {"type": "array", "items": {"type": "string"}}}
+    fields = {name: kinds.get(kind, {"type": kind}) for name, kind in OWN[topic].items()}
+    schema = {"title": f"rover_companion.{topic[1:].title()}", "type": "object", "properties": fields}
+    return json.dumps(schema, separators=(",", ":")).encode()

@@ -136,6 +136,11 @@ def test_messages_are_read_back_as_their_schemas_say(record: Path, made: Path) -
             schemas[schema.name] = json.loads(schema.data)
             if schema.name in REQUIRED:
                 assert value.keys() == set(REQUIRED[schema.name].split())
+            if not schema.name.startswith("foxglove"):  # what is not known yet is null there
+                value = {key: one for key, one in value.items() if one is not None}
+                fields = schemas[schema.name]["properties"]
+                assert all(fits(one, fields[key]) for key, one in value.items()), value
+                continue
             assert fits(value, schemas[schema.name]), value
     assert schemas.keys() > REQUIRED.keys()
     poses = rows_of(made / "csv" / "pose.csv")
@@ -146,6 +151,7 @@ def test_messages_are_read_back_as_their_schemas_say(record: Path, made: Path) -
     assert len(found["/decision"]) == len(load_record(record).decisions)
     assert any(one["message"] == "Reached gate" and one["name"] == "companion" for _, one in found["/log"])
     assert max(max(one["ranges"]) for _, one in found["/scan"]) > 3.0
+    assert all(len(one["intensities"]) == len(one["ranges"]) for _, one in found["/scan"])
     ground = found["/map"][-1][1]
     rows = len(base64.b64decode(ground["data"])) / ground["row_stride"]
     assert rows == int(rows) > 20 and ground["column_count"] > 20
