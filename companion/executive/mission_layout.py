@@ -109,12 +109,6 @@ def _start(point: NedPoint, grid: Grid) -> ResolvedTarget:
     return ResolvedTarget("start", point, grid.cell_at(point), 0.0, OnBlocked.HOLD, None)
 
 
-def _map_radius_m(mission: Mission, settings: MappingSettings) -> float:
-    """What the rover's middle keeps from obstacles, by ``mapping.keeps``."""
-    rover = mission.rover
-    return rover.radius_m if settings.keeps == "circle" else rover.footprint.discs()[1] + settings.beside_m
-
-
 def _laid(
     mission: Mission, settings: MappingSettings, frame: LocalFrame, home: GeoPoint, fence: AutopilotFence, narrow: bool
 ) -> tuple[ResolvedMission, EvidenceMap]:
