@@ -55,6 +55,8 @@ class CommandSender:
         self._announced_s = self._sent_s = -math.inf
         self._saved = False
         self._rejected = False
+        self._taken_up = False
+        """Whether an earlier run may have sent the present command."""
         self._extra: dict[int, tuple[int, float]] = {}
         """By command: how many answers may still come to repetitions of one that is done, and until when."""
 
@@ -65,7 +67,7 @@ class CommandSender:
             return progress
         if head.command.repeatable:
             text = f"{head.command.name} at {place} may have been sent before: sent again"
-            self._announced_s = -math.inf
+            self._announced_s, self._taken_up = -math.inf, True
         else:
             text = f"{head.command.name} at {place} may have been sent before: not sent again, its result is not known"
             progress = settled(progress, CommandResult.UNANSWERED, None)
@@ -81,13 +83,25 @@ class CommandSender:
         self._saved = True
 
     def due(
-        self, progress: CommandProgress, now_s: float, left_m: float, latency_s: float, place: str
+        self,
+        progress: CommandProgress,
+        now_s: float,
+        left_m: float,
+        latency_s: float,
+        place: str,
+        *,
+        away: bool = False,
     ) -> tuple[CommandProgress, RunCommand | None]:
-        """What to send now, and how far the commands are. ``left_m``: to the next target; ``place``: of the head."""
+        """What to send now, and how far the commands are. ``left_m``: to the next target; ``place``: of the head.
+
+        ``away``: the rover is not at that place any more: nothing is sent for it, for the first time or again.
+        """
         progress = begun(progress, now_s)
         head = progress.head
         if head is None or not (head.announced or is_due(head, now_s, left_m)):
             return progress, None
+        if away:
+            return self._left_behind(progress, now_s, place), None
         if not head.announced:
             self._reset()
             self._announced_s = now_s
@@ -101,6 +115,17 @@ class CommandSender:
         if self._tries < (TRIES if head.command.repeatable or self._rejected else 1):
             return progress, self._send(head, now_s, latency_s)
         return self._end(progress, CommandResult.UNANSWERED, None, place), None
+
+    def _left_behind(self, progress: CommandProgress, now_s: float, place: str) -> CommandProgress:
+        """What becomes of the head away from its place; an answer that may still come is awaited."""
+        if self._tries == 0:
+            result = CommandResult.UNANSWERED if self._taken_up else CommandResult.LEFT_OUT
+            return self._end(progress, result, None, place)
+        if now_s < self._again_s:
+            return progress
+        if self._rejected:
+            return self._end(progress, CommandResult.REFUSED, REJECTED_FOR_NOW, place)
+        return self._end(progress, CommandResult.UNANSWERED, None, place)
 
     def answered(self, progress: CommandProgress, ack: AckSeen, place: str) -> CommandProgress:
         """An answer of the autopilot. ``place``: of the head, in words."""
@@ -137,6 +162,10 @@ class CommandSender:
         head = progress.open[0]
         if result is CommandResult.ACCEPTED:
             self._notifier.tell(f"{head.command.name} at {place}: accepted", Severity.INFO)
+        elif result is CommandResult.LEFT_OUT:
+            self._notifier.tell(
+                f"Not sent, the rover is not at {place} any more: {head.command.name}", Severity.WARNING
+            )
         else:
             again = f" after {self._tries} tries" if self._tries > 1 else ""
             text = f"{head.command.name} at {place}: {result} ({result_text(answer)}){again}"
@@ -148,6 +177,7 @@ class CommandSender:
 
     def _reset(self) -> None:
         self._tries, self._saved, self._rejected = 0, False, False
+        self._taken_up = False
         self._again_s = math.inf
 
 

@@ -24,6 +24,7 @@ class Bench:
     told: Notices = field(default_factory=Notices)
     now_s: float = 0.0
     saves: bool = True
+    away: bool = False
     sent: list[tuple[float, RunCommand]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -33,7 +34,7 @@ class Bench:
         before = len(self.sent)
         for _ in range(round(seconds / 0.05)):
             self.now_s += 0.05
-            self.progress, command = self.sender.due(self.progress, self.now_s, 0.0, 0.1, "gate")
+            self.progress, command = self.sender.due(self.progress, self.now_s, 0.0, 0.1, "gate", away=self.away)
             if command is not None:
                 self.sent.append((self.now_s, command))
             if self.saves and self.sender.awaits_save(self.progress):
@@ -123,3 +124,27 @@ def test_what_was_not_announced_is_taken_up_without_a_word() -> None:
     one = bench(TOGGLE)
     one.progress = one.sender.resume(one.progress, "gate")
     assert one.told.texts == [] and len(one.run(0.3)) == 1
+
+
+def test_away_from_its_place_a_command_is_neither_sent_nor_repeated() -> None:
+    one = bench(SERVO, TOGGLE)
+    one.run(0.5)
+    one.away = True
+    assert one.run(1.0) == [] and len(one.sent) == 1, "its answer does not come, and it is not repeated"
+    assert one.run(0.3) == [] and one.progress.open == ()
+    assert (one.count(CommandResult.UNANSWERED), one.count(CommandResult.LEFT_OUT)) == (1, 1)
+    assert one.told.texts[-1] == "Not sent, the rover is not at gate any more: DO_SET_RELAY 0 2"
+
+
+def test_a_rejection_stands_when_the_rover_has_left() -> None:
+    one = bench(SERVO)
+    one.run(0.2)
+    one.answer(183, 1)
+    one.away = True
+    assert one.run(2.0) == [] and one.count(CommandResult.REFUSED) == 1
+
+
+def test_what_an_earlier_run_may_have_sent_elsewhere_is_not_sent_here() -> None:
+    one = Bench(announced(arrived(NO_COMMANDS, 0, (SERVO,), 0.0)), away=True)
+    one.progress = one.sender.resume(one.progress, "gate")
+    assert one.run(1.0) == [] and one.count(CommandResult.UNANSWERED) == 1
