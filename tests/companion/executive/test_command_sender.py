@@ -148,3 +148,45 @@ def test_what_an_earlier_run_may_have_sent_elsewhere_is_not_sent_here() -> None:
     one = Bench(announced(arrived(NO_COMMANDS, 0, (SERVO,), 0.0)), away=True)
     one.progress = one.sender.resume(one.progress, "gate")
     assert one.run(1.0) == [] and one.count(CommandResult.UNANSWERED) == 1
+
+
+def test_a_lost_answer_does_not_swallow_the_next_commands_answer() -> None:
+    """What must not arrive twice: of two in a row, one answer came."""
+    one = bench(TOGGLE, TOGGLE, TOGGLE)
+    one.run(3.5)
+    assert len(one.sent) == 2 and one.count(CommandResult.UNANSWERED) == 1
+    one.answer(181, 0)
+    one.run(3.5)
+    assert (one.count(CommandResult.ACCEPTED), one.count(CommandResult.UNANSWERED), len(one.sent)) == (1, 1, 3)
+    assert one.told.texts[-1] == "DO_SET_RELAY 0 2 at gate: accepted, or the one before it was"
+    one.answer(181, 0)
+    assert one.told.texts[-1] == "DO_SET_RELAY 0 2 at gate: accepted" and one.progress.open == ()
+
+
+def test_a_late_answer_and_ones_own_are_told_apart_by_their_number() -> None:
+    one = bench(TOGGLE, TOGGLE)
+    one.run(3.5)
+    one.answer(181, 0)
+    one.answer(181, 4)
+    assert one.told.texts[-1] == "DO_SET_RELAY 0 2 at gate: refused (failed)" and one.progress.open == ()
+
+
+def test_after_three_lost_answers_the_same_command_is_repeated_and_its_answers_count() -> None:
+    one = bench(SERVO, SERVO)
+    one.run(3.9)
+    assert one.count(CommandResult.UNANSWERED) == 1
+    for _ in range(3):
+        one.answer(183, 0)
+        one.run(1.25)
+    assert one.count(CommandResult.ACCEPTED) == 1 and len(one.sent) == 6
+
+
+def test_an_answered_rejection_leaves_no_answer_outstanding() -> None:
+    one = bench(TOGGLE, TOGGLE)
+    one.run(0.2)
+    one.answer(181, 1)
+    one.run(1.2)
+    one.answer(181, 0)
+    one.run(0.2)
+    one.answer(181, 0)
+    assert one.count(CommandResult.ACCEPTED) == 2 and all(text.endswith("accepted") for text in one.told.texts)

@@ -211,7 +211,7 @@ def test_every_command_that_is_taken_has_a_name_and_only_those_may_be_given() ->
         (2000, (0, 0, 1), True),
         (2000, (0, 2, 5), False),
         (2000, (0, 2, 0), False),
-    ],  # fmt: skip
+    ],
 )
 def test_what_switches_over_must_not_arrive_twice(command: int, params: tuple[float, ...], repeatable: bool) -> None:
     assert DoCommand(command, (*params, *(None,) * (7 - len(params)))).repeatable is repeatable
