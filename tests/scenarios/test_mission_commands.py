@@ -100,12 +100,15 @@ def test_a_person_who_takes_over_is_not_disturbed_by_commands(tmp_path: Path) ->
     assert [event.command for event in rig.simulator.commands] == [SPRAYER, SERVO, CAMERA, GRIPPER, SPRAYER]
 
 
-def test_nothing_is_switched_on_where_a_pilot_has_brought_the_rover(tmp_path: Path) -> None:
-    late = WORKING.replace("after_s = 1.0", "after_s = 4.0")
-    rig = Rig(yard(tmp_path, late))
+@pytest.mark.parametrize("resumed", [False, True])
+def test_nothing_is_switched_on_where_a_pilot_has_brought_the_rover(tmp_path: Path, resumed: bool) -> None:
+    mission = yard(tmp_path, WORKING.replace("after_s = 1.0", "after_s = 4.0"))
+    rig = Rig(mission, state=tmp_path / "state")
     rig.until(lambda: any(event.command == SERVO for event in rig.simulator.commands), 120.0)
     rig.pilot_mode(RTL)
     rig.run_for(12.0)
+    if resumed:
+        rig.restart_companion(mission, resume=True)
     rig.pilot_mode(GUIDED)
     rig.finish()
     assert CAMERA not in [event.command for event in rig.simulator.commands]
