@@ -348,6 +348,7 @@ def _saved_commands(commands: CommandProgress, now_s: float) -> SavedCommands:
                 left_s=None if one.due_s is None else _left_s(one.due_s, now_s),
                 on_way=one.on_way,
                 announced=one.announced,
+                at=None if one.at is None else SavedPlace(name="", north_m=one.at.north_m, east_m=one.at.east_m),
             )
             for one in commands.open
         ),

@@ -5,7 +5,7 @@ Nouns: interrupted run.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -228,15 +228,25 @@ def _progress(
         until_s=now_s + saved.left_s,
         give_up_s=None if saved.give_up_left_s is None else now_s + saved.give_up_left_s,
         requested=requested,
-        commands=_commands(state.commands, mission_commands, now_s),
+        commands=_commands(
+            state.commands, mission_commands, now_s, lambda place: _in_frame(place, saved_origin, layout.origin)
+        ),
         patrol=patrol,
         lap=state.lap.number,
         missed=state.lap.missed,
     )
 
 
-def _commands(saved: SavedCommands, commands: Mapping[int, tuple[DoCommand, ...]], now_s: float) -> CommandProgress:
-    """How far the commands of the mission are; what is not in the mission was never asked for."""
+def _commands(
+    saved: SavedCommands,
+    commands: Mapping[int, tuple[DoCommand, ...]],
+    now_s: float,
+    placed: Callable[[SavedPlace], NedPoint],
+) -> CommandProgress:
+    """How far the commands of the mission are; what is not in the mission was never asked for.
+
+    ``placed``: where a saved place lies now.
+    """
     opened = tuple(
         OpenCommand(
             one.place,
@@ -245,6 +255,7 @@ def _commands(saved: SavedCommands, commands: Mapping[int, tuple[DoCommand, ...]
             None if one.left_s is None else now_s + one.left_s,
             one.on_way,
             one.announced,
+            None if one.at is None else placed(one.at),
         )
         for one in saved.open
         if one.number < len(commands.get(one.place, ()))

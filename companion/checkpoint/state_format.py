@@ -114,6 +114,7 @@ class SavedOpenCommand(SavedValues):
     left_s: Seconds | None
     on_way: bool
     announced: bool
+    at: SavedPlace | None = None
 
 
 class SavedCommandTally(SavedValues):

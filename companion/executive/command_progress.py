@@ -5,10 +5,11 @@ Nouns: command progress, command result.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from companion.core.frames import NedPoint
 from companion.mission.do_commands import DoCommand
 
 START = -1
@@ -31,7 +32,8 @@ class OpenCommand:
     """A command that is to be sent. ``place`` and ``number`` tell which one it is.
 
     ``due_s``: not before then; None while others come before a condition of time. ``on_way``: the rover goes on
-    meanwhile. ``announced``: it may have been sent, for all that a later run can know.
+    meanwhile. ``announced``: it may have been sent, for all that a later run can know. ``at``: where the rover arrived,
+    in the local frame; None for what is sent on the way.
     """
 
     place: int
@@ -40,6 +42,11 @@ class OpenCommand:
     due_s: float | None
     on_way: bool = False
     announced: bool = False
+    at: NedPoint | None = None
+
+    def is_left_by(self, rover: NedPoint, near_m: float) -> bool:
+        """Whether the rover is farther than ``near_m`` from where it arrived for this command."""
+        return self.at is not None and rover.distance_m(self.at) > near_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +88,13 @@ class CommandProgress:
 NO_COMMANDS = CommandProgress()
 
 
-def arrived(progress: CommandProgress, place: int, commands: tuple[DoCommand, ...], now_s: float) -> CommandProgress:
-    """The commands of a place that was reached. What still waited for its time on the way here is left out."""
+def arrived(
+    progress: CommandProgress, place: int, commands: tuple[DoCommand, ...], now_s: float, at: NedPoint | None = None
+) -> CommandProgress:
+    """The commands of a place that was reached. What still waited for its time on the way here is left out.
+
+    ``at``: where the rover is, in the local frame; None: its commands may be sent from anywhere.
+    """
     if not commands and not progress.open:
         return progress
     progress = given_up(progress)
@@ -90,7 +102,7 @@ def arrived(progress: CommandProgress, place: int, commands: tuple[DoCommand, ..
     for number, command in enumerate(commands):
         on_way = on_way or command.is_conditional
         due_s = None if on_way else now_s + command.after_s
-        opened.append(OpenCommand(place, number, command, due_s, on_way))
+        opened.append(OpenCommand(place, number, command, due_s, on_way, at=None if on_way else at))
     return replace(progress, open=tuple(opened))
 
 
@@ -108,6 +120,12 @@ def given_up(progress: CommandProgress) -> CommandProgress:
         if not one.announced:
             progress = counted(progress, one.place, one.number, CommandResult.LEFT_OUT, None)
     return replace(progress, open=kept)
+
+
+def carried(progress: CommandProgress, to: Callable[[NedPoint], NedPoint]) -> CommandProgress:
+    """The same, with the places where the rover arrived in another frame. ``to``: where a place lies now."""
+    opened = tuple(one if one.at is None else replace(one, at=to(one.at)) for one in progress.open)
+    return replace(progress, open=opened)
 
 
 def begun(progress: CommandProgress, now_s: float) -> CommandProgress:

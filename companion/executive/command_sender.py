@@ -45,6 +45,10 @@ def result_text(answer: int | None) -> str:
     return "no answer" if answer is None else RESULTS.get(answer, f"result {answer}")
 
 
+def _result_of(answer: int) -> CommandResult:
+    return CommandResult.ACCEPTED if answer == ACCEPTED else CommandResult.REFUSED
+
+
 class CommandSender:
     """``saved`` is told when the announcement of the present command is safe on the disk, or needs not be."""
 
@@ -55,8 +59,13 @@ class CommandSender:
         self._announced_s = self._sent_s = -math.inf
         self._saved = False
         self._rejected = False
+        self._taken_up = False
+        """Whether an earlier run may have sent the present command."""
         self._extra: dict[int, tuple[int, float]] = {}
-        """By command: how many answers may still come to repetitions of one that is done, and until when."""
+        """By command: how many answers may still come to one that is done, and until when."""
+        self._answers = 0
+        self._doubtful: int | None = None
+        """An answer that belongs to the present command, or to one like it before."""
 
     def resume(self, progress: CommandProgress, place: str) -> CommandProgress:
         """Take up the commands of an earlier run. One that may have been sent is sent again if that does no harm."""
@@ -65,7 +74,7 @@ class CommandSender:
             return progress
         if head.command.repeatable:
             text = f"{head.command.name} at {place} may have been sent before: sent again"
-            self._announced_s = -math.inf
+            self._announced_s, self._taken_up = -math.inf, True
         else:
             text = f"{head.command.name} at {place} may have been sent before: not sent again, its result is not known"
             progress = settled(progress, CommandResult.UNANSWERED, None)
@@ -81,13 +90,25 @@ class CommandSender:
         self._saved = True
 
     def due(
-        self, progress: CommandProgress, now_s: float, left_m: float, latency_s: float, place: str
+        self,
+        progress: CommandProgress,
+        now_s: float,
+        left_m: float,
+        latency_s: float,
+        place: str,
+        *,
+        away: bool = False,
     ) -> tuple[CommandProgress, RunCommand | None]:
-        """What to send now, and how far the commands are. ``left_m``: to the next target; ``place``: of the head."""
+        """What to send now, and how far the commands are. ``left_m``: to the next target; ``place``: of the head.
+
+        ``away``: the rover is not at that place any more: nothing is sent for it, for the first time or again.
+        """
         progress = begun(progress, now_s)
         head = progress.head
         if head is None or not (head.announced or is_due(head, now_s, left_m)):
             return progress, None
+        if away:
+            return self._left_behind(progress, now_s, place), None
         if not head.announced:
             self._reset()
             self._announced_s = now_s
@@ -100,24 +121,47 @@ class CommandSender:
             return progress, None
         if self._tries < (TRIES if head.command.repeatable or self._rejected else 1):
             return progress, self._send(head, now_s, latency_s)
-        return self._end(progress, CommandResult.UNANSWERED, None, place), None
+        return self._unanswered(progress, place), None
+
+    def _left_behind(self, progress: CommandProgress, now_s: float, place: str) -> CommandProgress:
+        """What becomes of the head away from its place; an answer that may still come is awaited."""
+        if self._tries == 0:
+            result = CommandResult.UNANSWERED if self._taken_up else CommandResult.LEFT_OUT
+            return self._end(progress, result, None, place)
+        if now_s < self._again_s:
+            return progress
+        if self._rejected:
+            return self._end(progress, CommandResult.REFUSED, REJECTED_FOR_NOW, place)
+        return self._unanswered(progress, place)
+
+    def _unanswered(self, progress: CommandProgress, place: str) -> CommandProgress:
+        """No answer is surely the head's. A doubtful one decides: answers come in order, so no older one comes now."""
+        if self._doubtful is None:
+            return self._end(progress, CommandResult.UNANSWERED, None, place)
+        self._answers = self._tries
+        return self._end(progress, _result_of(self._doubtful), self._doubtful, place)
 
     def answered(self, progress: CommandProgress, ack: AckSeen, place: str) -> CommandProgress:
         """An answer of the autopilot. ``place``: of the head, in words."""
         head = progress.head
-        if self._is_extra(ack) or head is None or self._tries == 0 or ack.command != head.command.command:
+        is_extra = self._is_extra(ack)
+        if head is None or self._tries == 0 or ack.command != head.command.command:
+            return progress
+        if is_extra:
+            self._doubtful = ack.result if ack.result != IN_PROGRESS else self._doubtful
             return progress
         if ack.result == IN_PROGRESS:
             self._again_s = ack.time_s + BUSY_S
             return progress
+        self._answers += 1
+        self._doubtful = None
         if ack.result == REJECTED_FOR_NOW and self._tries < TRIES:
             self._again_s, self._rejected = ack.time_s + TIMEOUT_S, True
             return progress
-        result = CommandResult.ACCEPTED if ack.result == ACCEPTED else CommandResult.REFUSED
-        return self._end(progress, result, ack.result, place)
+        return self._end(progress, _result_of(ack.result), ack.result, place)
 
     def _is_extra(self, ack: AckSeen) -> bool:
-        """Whether it answers a repetition of a command that is done."""
+        """Whether it may answer a command that is done."""
         count, until_s = self._extra.pop(ack.command, (0, -math.inf))
         if count > 1 and ack.time_s <= until_s:
             self._extra[ack.command] = (count - 1, until_s)
@@ -135,19 +179,27 @@ class CommandSender:
 
     def _end(self, progress: CommandProgress, result: CommandResult, answer: int | None, place: str) -> CommandProgress:
         head = progress.open[0]
+        doubt = ", or the one before it was" if self._doubtful is not None and answer is not None else ""
         if result is CommandResult.ACCEPTED:
-            self._notifier.tell(f"{head.command.name} at {place}: accepted", Severity.INFO)
+            self._notifier.tell(f"{head.command.name} at {place}: accepted{doubt}", Severity.INFO)
+        elif result is CommandResult.LEFT_OUT:
+            self._notifier.tell(
+                f"Not sent, the rover is not at {place} any more: {head.command.name}", Severity.WARNING
+            )
         else:
             again = f" after {self._tries} tries" if self._tries > 1 else ""
-            text = f"{head.command.name} at {place}: {result} ({result_text(answer)}){again}"
+            text = f"{head.command.name} at {place}: {result} ({result_text(answer)}){again}{doubt}"
             self._notifier.tell(text if answer is not None else text.replace(" (no answer)", ""), Severity.WARNING)
-        late = self._tries - (answer is not None)
-        self._extra[head.command.command] = (late, self._sent_s + LATE_S)
+        before, until_s = self._extra.get(head.command.command, (0, -math.inf))
+        late = self._tries - self._answers + (before if until_s >= self._sent_s else 0)
+        if self._tries > 0:
+            self._extra[head.command.command] = (late, self._sent_s + LATE_S)
         self._reset()
         return settled(progress, result, answer)
 
     def _reset(self) -> None:
         self._tries, self._saved, self._rejected = 0, False, False
+        self._taken_up, self._answers, self._doubtful = False, 0, None
         self._again_s = math.inf
 
 

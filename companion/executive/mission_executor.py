@@ -24,6 +24,7 @@ from companion.core.rover_limits import RoverLimits
 from companion.core.scan import RangeScan
 from companion.core.severity import Severity, TextSink
 from companion.executive.command_progress import START, CommandResult, names
+from companion.executive.command_progress import carried as carried_commands
 from companion.executive.command_sender import CommandSender, place_name
 from companion.executive.controller_choice import settings_in_force
 from companion.executive.goal_driver import GoalDriver, controller_for
@@ -84,6 +85,8 @@ LAPS_KEPT = 1000
 """The summaries of so many newest laps are kept."""
 LAP_M = 1.0
 """A shorter lap has led nowhere: the next one begins after a while."""
+MOVED_M = 1.0
+"""So much farther than where it counts as arrived, a rover has been moved away from a place."""
 FAILED = (CommandResult.REFUSED, CommandResult.UNANSWERED)
 
 
@@ -260,6 +263,10 @@ class MissionExecutor:
         self._refuges = [replace(one, place=moved) if one.place == start else one for one in self._refuges]
         if self.progress.home == start:
             self.progress = relaid(self.progress, self.progress.targets, moved, self.progress.requested)
+        commands = carried_commands(
+            self.progress.commands, lambda point: NedPoint(point.north_m + north_m, point.east_m + east_m)
+        )
+        self.progress = replace(self.progress, commands=commands)
         self.trail = self.trail.carried(north_m, east_m, evidence.base)
         self._tracker = ObjectTracker(evidence)
         self.driver.leave()
@@ -332,10 +339,18 @@ class MissionExecutor:
 
     def commands_due(self, vehicle: VehicleState, now_s: float) -> RunCommand | None:
         """The command to send in this tick, if there is one. Asked only while the rover is driven."""
-        pose, goal = vehicle.pose_at(now_s), self.progress.goal
-        left_m = math.inf if pose is None or self.progress.ended else pose.point.distance_m(goal.point)
+        pose, head = vehicle.pose_at(now_s), self.progress.commands.head
+        if pose is None:
+            return None
+        left_m = math.inf if self.progress.ended else pose.point.distance_m(self.progress.goal.point)
+        near_m = self._given.guidance.arrival_m + MOVED_M
         commands, command = self.command_sender.due(
-            self.progress.commands, now_s, left_m, vehicle.latency_s, self._commands_place
+            self.progress.commands,
+            now_s,
+            left_m,
+            vehicle.latency_s,
+            self._commands_place,
+            away=head is not None and head.is_left_by(pose.point, near_m),
         )
         self.progress = replace(self.progress, commands=commands)
         return command
@@ -360,10 +375,10 @@ class MissionExecutor:
         """Whether the rover stays for a command; not on its way back, where nothing may hold it up."""
         return self.progress.commands.keeps_here and self.progress.phase is not MissionPhase.HOME
 
-    def _reach_here(self, now_s: float) -> None:
+    def _reach_here(self, at: NedPoint, now_s: float) -> None:
         """A target without a place of its own is reached where the rover is."""
         self._notifier.tell(f"Reached {self.progress.goal.name}, where the rover is", Severity.INFO)
-        self._advance(on_reached(self.progress, now_s), now_s)
+        self._advance(on_reached(self.progress, now_s, at), now_s)
         self.driver.leave()
 
     def _note_way(self, pose: Pose, now_s: float) -> None:
@@ -426,7 +441,7 @@ class MissionExecutor:
         if self.progress.ended:
             return MissionTask.END
         if self.progress.goal.here and self.progress.phase is MissionPhase.TRAVEL and not self._busy_here:
-            self._reach_here(now_s)
+            self._reach_here(view.pose.point, now_s)
         if self.progress.phase in (MissionPhase.STAY, MissionPhase.WAIT) or self._busy_here:
             waits = self.progress.phase is MissionPhase.WAIT
             self.phase = RunPhase.WAY_BLOCKED if waits else RunPhase.STAYING
@@ -443,7 +458,7 @@ class MissionExecutor:
         self.phase = RunPhase.DRIVING
         decision = self.driver.decide(view, self.moving)
         if decision is not None:
-            self._take_decision(decision, now_s)
+            self._take_decision(decision, view.pose.point, now_s)
         return MissionTask.DRIVE
 
     def guide(self, task: MissionTask, view: LocalView) -> ControlCommand:
@@ -537,13 +552,13 @@ class MissionExecutor:
             text = f"Fields of {side_m:.2g} m may close gaps below {gap_m:.1f} m; smaller ones open more"
             self._notifier.tell(text, Severity.INFO)
 
-    def _take_decision(self, decision: Decision, now_s: float) -> None:
+    def _take_decision(self, decision: Decision, at: NedPoint, now_s: float) -> None:
         goal = self.progress.goal
         self.decisions += 1
         self._log.write_decision(now_s, goal.name, decision)
         if decision.action is Action.REACHED:
             self._notifier.tell(f"Reached {goal.name}", Severity.INFO)
-            self._advance(on_reached(self.progress, now_s), now_s)
+            self._advance(on_reached(self.progress, now_s, at), now_s)
         elif decision.action is Action.UNREACHABLE:
             self._notifier.tell(f"Unreachable: {goal.name} ({decision.reason})", Severity.WARNING)
             self._tell_of_gaps()

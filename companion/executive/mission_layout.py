@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import OBSTACLE, Grid, inflated
+from companion.executive.command_progress import carried as carried_commands
 from companion.executive.mission_progress import MissionProgress, relaid
 from companion.mapping.evidence_map import EvidenceMap, new_map, rebase
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
@@ -75,7 +76,8 @@ def lay_again(
     again = MissionLayout(
         origin, layout.home, resolved.targets, start, evidence, layout.fence, resolved.bounds, resolved.refused
     )
-    return again, relaid(progress, resolved.targets, back, requested)
+    commands = carried_commands(progress.commands, lambda point: frame.to_ned(before.to_geo(point)))
+    return again, relaid(replace(progress, commands=commands), resolved.targets, back, requested)
 
 
 def fenced_again(layout: MissionLayout, mission: Mission, fence: AutopilotFence) -> MissionLayout:
@@ -107,12 +109,6 @@ def apart_m(here: GeoPoint, there: GeoPoint) -> float:
 
 def _start(point: NedPoint, grid: Grid) -> ResolvedTarget:
     return ResolvedTarget("start", point, grid.cell_at(point), 0.0, OnBlocked.HOLD, None)
-
-
-def _map_radius_m(mission: Mission, settings: MappingSettings) -> float:
-    """What the rover's middle keeps from obstacles, by ``mapping.keeps``."""
-    rover = mission.rover
-    return rover.radius_m if settings.keeps == "circle" else rover.footprint.discs()[1] + settings.beside_m
 
 
 def _laid(

@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
+from companion.core.frames import NedPoint
 from companion.executive.command_progress import NO_COMMANDS, START, CommandProgress, arrived, given_up, missed
 from companion.mission.do_commands import DoCommand
 from companion.mission.mission import OnBlocked, Patrol
@@ -96,7 +97,7 @@ def plan_progress(
     now_s: float = 0.0,
 ) -> MissionProgress:
     """The progress at the start of a mission. ``commands``: to be sent there."""
-    opened = arrived(NO_COMMANDS, START, commands, now_s)
+    opened = arrived(NO_COMMANDS, START, commands, now_s, home.point)
     return MissionProgress(targets, home, (TargetStatus.PENDING,) * len(targets), commands=opened, patrol=patrol)
 
 
@@ -155,8 +156,11 @@ def relaid(
     return replace(progress, targets=targets, home=home, requested=requested)
 
 
-def on_reached(progress: MissionProgress, now_s: float) -> MissionProgress:
-    """The goal has been reached: stay as long as the target asks, or be done."""
+def on_reached(progress: MissionProgress, now_s: float, at: NedPoint | None = None) -> MissionProgress:
+    """The goal has been reached: stay as long as the target asks, or be done.
+
+    ``at``: where the rover is, in the local frame; None: at the goal itself.
+    """
     if progress.requested is not None:
         return replace(progress, requested=None)
     if progress.phase is MissionPhase.HOME:
@@ -167,7 +171,7 @@ def on_reached(progress: MissionProgress, now_s: float) -> MissionProgress:
         phase=MissionPhase.STAY,
         until_s=now_s + target.hold_s,
         give_up_s=None,
-        commands=arrived(progress.commands, progress.index, target.commands, now_s),
+        commands=arrived(progress.commands, progress.index, target.commands, now_s, at or target.point),
     )
 
 

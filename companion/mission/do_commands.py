@@ -32,7 +32,7 @@ TAKEN: Mapping[int, int] = MappingProxyType(
         197: 0,
         mav.DO_SET_ROI: 4,
         202: 7,
-        203: 7,
+        mav.DO_DIGICAM_CONTROL: 7,
         204: 7,
         205: 7,
         206: 3,
@@ -44,7 +44,7 @@ TAKEN: Mapping[int, int] = MappingProxyType(
         532: 2,
         534: 3,
         mav.DO_GIMBAL_PITCHYAW: 7,
-        2000: 4,
+        mav.IMAGE_START_CAPTURE: 4,
         2001: 1,
         2500: 3,
         2501: 1,
@@ -55,7 +55,7 @@ TAKEN: Mapping[int, int] = MappingProxyType(
 WITH_PLACE = frozenset({mav.DO_SET_HOME, mav.DO_SET_ROI_LOCATION, mav.DO_SET_ROI})
 """Of those: commands whose p5 to p7 are latitude, longitude and altitude."""
 
-EACH_TIME_ANEW = frozenset({mav.DO_REPEAT_RELAY, mav.DO_REPEAT_SERVO})
+EACH_TIME_ANEW = frozenset({mav.DO_REPEAT_RELAY, mav.DO_REPEAT_SERVO, mav.DO_DIGICAM_CONTROL})
 """Of those: commands that begin something anew each time they arrive, so that a second one is not the same as one."""
 RELAY_STATES = (0.0, 1.0)
 """ArduRover switches a relay over with any other state (AP_ServoRelayEvents)."""
@@ -112,9 +112,14 @@ class DoCommand:
 
     @property
     def repeatable(self) -> bool:
-        """Whether a second one changes nothing that the first has not done: it sets a state, or takes a picture."""
+        """Whether a second one changes nothing that the first has not done: it sets a state.
+
+        A second series of pictures (IMAGE_START_CAPTURE, p3 pictures, 0: without end) is taken beside the first one.
+        """
         if self.command == mav.DO_SET_RELAY:
             return (self.params[1] or 0.0) in RELAY_STATES
+        if self.command == mav.IMAGE_START_CAPTURE:
+            return self.params[2] == 1.0
         return self.command not in EACH_TIME_ANEW
 
 

@@ -35,6 +35,8 @@ from companion.mission.mission import (
 )
 
 MAX_TARGETS = 10_000
+WRONG_SHOWN = 10
+"""So many wrong items are told one by one."""
 FOR_EVER_S = 1e9
 GROUND_M = 1.0
 """Width of the ground along the lines that the autopilot drives by itself."""
@@ -54,6 +56,8 @@ class _Walk:
     notes: list[str] = field(default_factory=list)
     unknown: dict[tuple[str, str], list[Item]] = field(default_factory=dict)
     """Items that this rover cannot do, by what they are and why not."""
+    wrong: list[str] = field(default_factory=list)
+    """What no mission may hold: an item, its command and the reason."""
     speed_m_s: float | None = None
     home: Place | None = None
     ended_by: Item | None = None
@@ -89,6 +93,8 @@ def mission_from_items(
     route = [item for item in items if not is_fence(item)]
     walk, patrol = _walk_items(route)
     lines = [_unknown_text(what, why, found) for (what, why), found in walk.unknown.items()]
+    if walk.wrong:
+        raise ItemError("; ".join([*_first(walk.wrong), *(() if skip_unknown else lines)]))
     if lines and not skip_unknown:
         raise ItemError(f"{'; '.join(lines)}; --skip-unknown drives the rest")
     return Mission(
@@ -106,6 +112,11 @@ def mission_from_items(
     )
 
 
+def _first(wrong: list[str]) -> list[str]:
+    more = len(wrong) - WRONG_SHOWN
+    return wrong if more <= 0 else [*wrong[:WRONG_SHOWN], f"{more} more of this kind"]
+
+
 def _unknown_text(what: str, why: str, items: list[Item]) -> str:
     numbers = [str(item.index) for item in items if item.index >= 0]
     where = f"item{'s' * (len(numbers) > 1)} {', '.join(numbers)}: " if numbers else ""
@@ -116,7 +127,20 @@ def _unknown_text(what: str, why: str, items: list[Item]) -> str:
 
 
 def _walk_items(items: Sequence[Item]) -> tuple[_Walk, Patrol | None]:
+    """Walk through all items. What stops the walk is named with the wrong items before it."""
     walk, order = _Walk(in_auto=any(_hands_over(item) for item in items)), ItemWalk(items)
+    try:
+        _walk_through(items, walk, order)
+        return walk, None if order.loop is None or walk.wrong else _patrol(walk, *order.loop)
+    except ItemError as error:
+        # A loop may lead nowhere only because a wrong item in it made no target.
+        if not walk.wrong:
+            walk.wrong.append(str(error))
+    return walk, None
+
+
+def _walk_through(items: Sequence[Item], walk: _Walk, order: ItemWalk) -> None:
+    """Raises ItemError when the walk cannot go on."""
     steps = 0
     while not order.over:
         item = items[order.here]
@@ -128,11 +152,14 @@ def _walk_items(items: Sequence[Item]) -> tuple[_Walk, Patrol | None]:
                 raise ItemError(f"{item.label}: repeats for ever; in AUTO a mission needs an end")
             order.jump(item, len(walk.targets), walk.speed_m_s)
             continue
-        _take(item, walk)
+        try:
+            _take(item, walk)
+        except ItemError as error:
+            if str(error) not in walk.wrong:
+                walk.wrong.append(str(error))
         order.here += 1
     for number, (to, times) in order.jumped.items():
         walk.note(f"item {number}: {mav.command_name(mav.DO_JUMP)}: to item {to}, {times} times, written out")
-    return walk, None if order.loop is None else _patrol(walk, *order.loop)
 
 
 def _take(item: Item, walk: _Walk) -> None:

@@ -16,7 +16,7 @@ from sitl.lockstep import Drive
 from sitl.scenario import scenario_from_mission
 from sitl.simulator import Simulator
 from tests.support.records import recorded
-from tests.support.rig import GATE, GUIDED, HOLD, Rig, yard
+from tests.support.rig import GATE, GUIDED, HOLD, RTL, Rig, yard
 from tests.support.served import finished, mission_path, process, served
 from tests.support.shared_data import SHARED, needs_shared
 
@@ -98,6 +98,22 @@ def test_a_person_who_takes_over_is_not_disturbed_by_commands(tmp_path: Path) ->
     rig.pilot_mode(GUIDED)
     rig.finish()
     assert [event.command for event in rig.simulator.commands] == [SPRAYER, SERVO, CAMERA, GRIPPER, SPRAYER]
+
+
+@pytest.mark.parametrize("resumed", [False, True])
+def test_nothing_is_switched_on_where_a_pilot_has_brought_the_rover(tmp_path: Path, resumed: bool) -> None:
+    mission = yard(tmp_path, WORKING.replace("after_s = 1.0", "after_s = 4.0"))
+    rig = Rig(mission, state=tmp_path / "state")
+    rig.until(lambda: any(event.command == SERVO for event in rig.simulator.commands), 120.0)
+    rig.pilot_mode(RTL)
+    rig.run_for(12.0)
+    if resumed:
+        rig.restart_companion(mission, resume=True)
+    rig.pilot_mode(GUIDED)
+    rig.finish()
+    assert CAMERA not in [event.command for event in rig.simulator.commands]
+    assert "Not sent, the rover is not at corner any more: DO_DIGICAM_CONTROL 0 0" in rig.companion.outcome.said
+    assert "DO_DIGICAM_CONTROL 0 0 at corner: left out" in rig.companion.command_lines()
 
 
 def with_a_relay(simulator: Simulator) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from companion.core.frames import NedPoint
 from companion.executive.command_progress import (
     NO_COMMANDS,
     CommandResult,
     announced,
     arrived,
     begun,
+    carried,
     given_up,
     is_due,
     missed,
@@ -48,6 +50,15 @@ def test_the_next_place_leaves_out_what_was_not_due_but_waits_for_what_may_have_
     assert [(one.place, one.number, one.on_way) for one in progress.open] == [(0, 0, True), (1, 0, False)]
     assert progress.total(CommandResult.LEFT_OUT) == 1
     assert given_up(progress).open == progress.open[:1]
+
+
+def test_what_belongs_to_a_place_knows_where_the_rover_arrived() -> None:
+    progress = arrived(NO_COMMANDS, 0, (servo(1), servo(2, delay_s=1.0), servo(3)), 0.0, NedPoint(3.0, 4.0))
+    progress = carried(progress, lambda point: NedPoint(point.north_m + 10.0, point.east_m))
+    assert [one.at for one in progress.open] == [NedPoint(13.0, 4.0), None, None]
+    here, on_way = progress.open[:2]
+    assert here.is_left_by(NedPoint(13.0, 5.6), 1.5) and not here.is_left_by(NedPoint(13.0, 5.4), 1.5)
+    assert not on_way.is_left_by(NedPoint(0.0, 0.0), 1.5)
 
 
 def test_a_place_that_was_missed_leaves_all_out() -> None:

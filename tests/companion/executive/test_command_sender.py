@@ -24,6 +24,7 @@ class Bench:
     told: Notices = field(default_factory=Notices)
     now_s: float = 0.0
     saves: bool = True
+    away: bool = False
     sent: list[tuple[float, RunCommand]] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -33,7 +34,7 @@ class Bench:
         before = len(self.sent)
         for _ in range(round(seconds / 0.05)):
             self.now_s += 0.05
-            self.progress, command = self.sender.due(self.progress, self.now_s, 0.0, 0.1, "gate")
+            self.progress, command = self.sender.due(self.progress, self.now_s, 0.0, 0.1, "gate", away=self.away)
             if command is not None:
                 self.sent.append((self.now_s, command))
             if self.saves and self.sender.awaits_save(self.progress):
@@ -123,3 +124,69 @@ def test_what_was_not_announced_is_taken_up_without_a_word() -> None:
     one = bench(TOGGLE)
     one.progress = one.sender.resume(one.progress, "gate")
     assert one.told.texts == [] and len(one.run(0.3)) == 1
+
+
+def test_away_from_its_place_a_command_is_neither_sent_nor_repeated() -> None:
+    one = bench(SERVO, TOGGLE)
+    one.run(0.5)
+    one.away = True
+    assert one.run(1.0) == [] and len(one.sent) == 1, "its answer does not come, and it is not repeated"
+    assert one.run(0.3) == [] and one.progress.open == ()
+    assert (one.count(CommandResult.UNANSWERED), one.count(CommandResult.LEFT_OUT)) == (1, 1)
+    assert one.told.texts[-1] == "Not sent, the rover is not at gate any more: DO_SET_RELAY 0 2"
+
+
+def test_a_rejection_stands_when_the_rover_has_left() -> None:
+    one = bench(SERVO)
+    one.run(0.2)
+    one.answer(183, 1)
+    one.away = True
+    assert one.run(2.0) == [] and one.count(CommandResult.REFUSED) == 1
+
+
+def test_what_an_earlier_run_may_have_sent_elsewhere_is_not_sent_here() -> None:
+    one = Bench(announced(arrived(NO_COMMANDS, 0, (SERVO,), 0.0)), away=True)
+    one.progress = one.sender.resume(one.progress, "gate")
+    assert one.run(1.0) == [] and one.count(CommandResult.UNANSWERED) == 1
+
+
+def test_a_lost_answer_does_not_swallow_the_next_commands_answer() -> None:
+    """What must not arrive twice: of two in a row, one answer came."""
+    one = bench(TOGGLE, TOGGLE, TOGGLE)
+    one.run(3.5)
+    assert len(one.sent) == 2 and one.count(CommandResult.UNANSWERED) == 1
+    one.answer(181, 0)
+    one.run(3.5)
+    assert (one.count(CommandResult.ACCEPTED), one.count(CommandResult.UNANSWERED), len(one.sent)) == (1, 1, 3)
+    assert one.told.texts[-1] == "DO_SET_RELAY 0 2 at gate: accepted, or the one before it was"
+    one.answer(181, 0)
+    assert one.told.texts[-1] == "DO_SET_RELAY 0 2 at gate: accepted" and one.progress.open == ()
+
+
+def test_a_late_answer_and_ones_own_are_told_apart_by_their_number() -> None:
+    one = bench(TOGGLE, TOGGLE)
+    one.run(3.5)
+    one.answer(181, 0)
+    one.answer(181, 4)
+    assert one.told.texts[-1] == "DO_SET_RELAY 0 2 at gate: refused (failed)" and one.progress.open == ()
+
+
+def test_after_three_lost_answers_the_same_command_is_repeated_and_its_answers_count() -> None:
+    one = bench(SERVO, SERVO)
+    one.run(3.9)
+    assert one.count(CommandResult.UNANSWERED) == 1
+    for _ in range(3):
+        one.answer(183, 0)
+        one.run(1.25)
+    assert one.count(CommandResult.ACCEPTED) == 1 and len(one.sent) == 6
+
+
+def test_an_answered_rejection_leaves_no_answer_outstanding() -> None:
+    one = bench(TOGGLE, TOGGLE)
+    one.run(0.2)
+    one.answer(181, 1)
+    one.run(1.2)
+    one.answer(181, 0)
+    one.run(0.2)
+    one.answer(181, 0)
+    assert one.count(CommandResult.ACCEPTED) == 2 and all(text.endswith("accepted") for text in one.told.texts)

@@ -69,6 +69,17 @@ def test_all_that_no_rover_can_do_is_named_at_once_and_can_be_left_out(tmp_path:
     assert mission.notes[0] == "left out: items 1, 4: NAV_TAKEOFF (22): no rover can do it"
 
 
+def test_wrong_values_are_named_with_what_no_rover_can_do(tmp_path: Path) -> None:
+    rows = (do(1, 22, lat=1, lon=1), waypoint(2, hold=-5), waypoint(3), do(4, 178, 1, -3), do(5, 82, lat=1, lon=1))
+    path = wpl(tmp_path, HOME, *rows)
+    wrong = "item 2: NAV_WAYPOINT (16): a hold of -5.0 s; item 4: DO_CHANGE_SPEED (178): a speed of -3 m/s"
+    unknown = "item 1: NAV_TAKEOFF (22): no rover can do it; item 5: NAV_SPLINE_WAYPOINT (82): no rover can do it"
+    assert refusal(path) == f"{wrong}; {unknown}"
+    with pytest.raises(MissionError) as error:
+        load_mission(path, skip_unknown=True)
+    assert str(error.value).endswith(wrong)
+
+
 def test_an_endless_jump_is_a_patrol_of_one_lap(tmp_path: Path) -> None:
     mission = load_mission(wpl(tmp_path, HOME, waypoint(1), waypoint(2), do(3, 177, 1, -1)))
     assert names(mission) == ["waypoint 1", "waypoint 2"] and mission.patrol == Patrol(0)
@@ -190,7 +201,17 @@ def test_every_command_that_is_taken_has_a_name_and_only_those_may_be_given() ->
 
 @pytest.mark.parametrize(
     ("command", "params", "repeatable"),
-    [(183, (9, 1900), True), (181, (0, 1), True), (181, (0, 2), False), (182, (0, 3, 1), False), (184, (9,), False)],
+    [
+        (183, (9, 1900), True),
+        (181, (0, 1), True),
+        (181, (0, 2), False),
+        (182, (0, 3, 1), False),
+        (184, (9,), False),
+        (203, (0, 0, 0, 0, 1), False),
+        (2000, (0, 0, 1), True),
+        (2000, (0, 2, 5), False),
+        (2000, (0, 2, 0), False),
+    ],
 )
 def test_what_switches_over_must_not_arrive_twice(command: int, params: tuple[float, ...], repeatable: bool) -> None:
     assert DoCommand(command, (*params, *(None,) * (7 - len(params)))).repeatable is repeatable
