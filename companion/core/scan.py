@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 AHEAD_RAD = np.radians(20.0)
 NARROW_RAD = np.radians(30.0)
 """A scan that covers less is a beam, not a view."""
+KNOWN_SHARE = 0.01
 WIRED = 0
 """The sender of scans that came over no link: of a lidar on a serial port of the companion's own."""
 
@@ -58,6 +59,12 @@ class RangeScan:
     def is_narrow(self) -> bool:
         """Whether this is one thin beam, which leaves most of the rover's own width unseen."""
         return bool(len(self.bearing_rad) * self.beam_width_rad < NARROW_RAD)
+
+    @property
+    def tells(self) -> bool:
+        """Whether more than a stray reading is not unknown."""
+        known = np.count_nonzero(~np.isnan(self.range_m))
+        return bool(known >= max(KNOWN_SHARE * len(self.range_m), 1.0))
 
     @property
     def looks_ahead(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from companion.lidar.turns import Turn
 AHEAD_DEG = 45.0
 """A turn ends when the lidar has swept so far past straight ahead."""
 LEAST_WIDTH_DEG, MOST_WIDTH_DEG = 0.1, 5.0
+ECHO_SHARE = 0.01
+"""A lidar that gets fewer echoes is taken to be blind: its laser is dead, or it is covered or dazzled."""
 
 
 def cut_deg(mounting: Mounting) -> float:
@@ -25,7 +28,7 @@ def cut_deg(mounting: Mounting) -> float:
 def scan_of(turn: Turn, mounting: Mounting, source: str) -> RangeScan:
     """The turn as the rover sees it, in the order in which its readings were taken."""
     points = turn.points
-    bearing_deg = mounting.yaw_deg + (-points.angle_deg if mounting.flipped else points.angle_deg)
+    bearing_deg = _bearings_deg(turn, mounting)
     range_m = _ranges(turn, mounting, _masked(bearing_deg, mounting))
     bearing_rad = np.radians((bearing_deg + 180.0) % 360.0 - 180.0)
     width_rad = math.radians(_width_deg(points.angle_deg))
@@ -45,6 +48,25 @@ def scan_of(turn: Turn, mounting: Mounting, source: str) -> RangeScan:
         mounting.empty_m,
         origin_m,
     )
+
+
+def believed(mounting: Mounting, turn: Turn) -> Mounting:
+    """The mounting to read this turn with: of a blind lidar no reading says that nothing is there.
+
+    Echoes count that are not masked, too near or too weak. A person who told ``empty`` is believed.
+    """
+    if mounting.empty_told:
+        return mounting
+    counts = ~_masked(_bearings_deg(turn, mounting), mounting)
+    range_m, quality = turn.points.range_m, turn.points.quality
+    echo = counts & (range_m > 0.0) & (range_m >= mounting.min_m) & (quality >= mounting.least_quality)
+    blind = echo.sum() < max(ECHO_SHARE * counts.sum(), 1.0)
+    return replace(mounting, empty_m=0.0) if blind else mounting
+
+
+def _bearings_deg(turn: Turn, mounting: Mounting) -> Floats:
+    angle_deg = turn.points.angle_deg
+    return mounting.yaw_deg + (-angle_deg if mounting.flipped else angle_deg)
 
 
 def _masked(bearing_deg: Floats, mounting: Mounting) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
 from companion.core.scan import RangeScan
-from companion.lidar.mounted import cut_deg, scan_of
+from companion.lidar.mounted import believed, cut_deg, scan_of
 from companion.lidar.spec import LidarSpec
 from companion.lidar.turns import TurnJoiner
 from companion.vehicle.events import RangeSeen
@@ -130,7 +130,8 @@ class LidarReader:
             self._echoes += int((points.range_m > 0.0).sum())
         turns = self._joiner.feed(points, chunk.time_s)
         self._scans += len(turns)
-        return [scan_of(turn, self.spec.mounting, self.name) for turn in turns]
+        mounting = self.spec.mounting
+        return [scan_of(turn, believed(mounting, turn), self.name) for turn in turns]
 
 
 class Lidars:

@@ -29,8 +29,8 @@ class Mounting:
     ``yaw_deg``: where its zero looks, clockwise from straight ahead; ``forward_m``, ``right_m``: its place from the
     rover's middle; ``flipped``: upside down. ``masked_deg``: sectors (from, to), clockwise from straight ahead as seen
     from the lidar, in [0, 360). Nearer readings than ``min_m`` say nothing; farther ones than ``max_m``, and no echo at
-    all, mean that nothing is there up to ``empty_m``; 0: they say nothing. Echoes weaker than ``least_quality`` say
-    nothing.
+    all, mean that nothing is there up to ``empty_m``; 0: they say nothing. ``empty_told``: a person said so, and it holds
+    also where there is no echo in a whole turn. Echoes weaker than ``least_quality`` say nothing.
     """
 
     min_m: float
@@ -42,6 +42,7 @@ class Mounting:
     masked_deg: tuple[tuple[float, float], ...] = ()
     least_quality: int = 0
     empty_m: float = EMPTY_M
+    empty_told: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,7 +93,7 @@ def _with_option(mounting: Mounting, option: str, model: LidarModel, text: str) 
         case "flip" if value in ("", "yes", "no"):
             return replace(mounting, flipped=value != "no")
         case "empty":
-            return replace(mounting, empty_m=_number(text, option, 0.0, model.max_m))
+            return replace(mounting, empty_m=_number(text, option, 0.0, model.max_m), empty_told=True)
         case "yaw":
             return replace(mounting, yaw_deg=_number(text, option, -360.0, 360.0))
         case "x":

@@ -1,12 +1,15 @@
-"""Lidar monitor: the lidars that are wired to the companion, each of which must be heard.
+"""Lidar monitor: the lidars that are wired to the companion, each of which must be heard, and must see.
 
 A sensor on the autopilot's network may come and go. A lidar that a person gave on the command line is one that the
-rover needs, also if another one still looks ahead.
+rover needs, also if another one still looks ahead. One whose
+readings are all unknown, as those of a lidar without any echo, is as good as silent.
 
 Nouns: lidar monitor.
 """
 
 from __future__ import annotations
+
+import math
 
 from companion.core.scan import WIRED
 from companion.safety.reasons import Doubt, Reason
@@ -22,18 +25,23 @@ class LidarMonitor(Monitor):
     def __init__(self, names: tuple[str, ...], settings: LiveSettings) -> None:
         self._settings = settings
         self._heard_s: dict[str, float | None] = dict.fromkeys(names)
+        self._saw_s: dict[str, float] = dict.fromkeys(names, -math.inf)
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event."""
         if isinstance(event, RangeSeen) and event.scan.sender == WIRED:
             self._heard_s[event.scan.source] = event.time_s
+            if event.scan.tells:
+                self._saw_s[event.scan.source] = event.time_s
 
     def doubt(self, now_s: float) -> Reason[Doubt] | None:
-        """The first lidar that is silent."""
+        """The first lidar that is silent, or sees nothing."""
         limit_s = self._settings.current.safety.stale_s
         for name, heard_s in self._heard_s.items():
             if heard_s is None:
                 return Reason(Doubt.DATA_MISSING, (name,))
             if now_s - heard_s > limit_s:
                 return Reason(Doubt.DATA_OLD, (name, limit_s))
+            if now_s - self._saw_s[name] > limit_s:
+                return Reason(Doubt.LIDAR_BLIND, (name, limit_s))
         return None

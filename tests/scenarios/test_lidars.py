@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import socket
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from sitl.faults.plan import Fault, FaultPlan, LidarFault, SensorFault
 from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import scenario_from_mission, with_faults, with_lidars, with_sensors
 from sitl.sensors.range_sensors import Defect
+from sitl.sensors.serial_lidar import SerialLidar
 from tests.sitl.network.test_server import free_port
 from tests.support.lidars import NAMES
 from tests.support.records import START_US
@@ -81,6 +83,22 @@ def test_a_rover_whose_lidar_fails_stops_touches_nothing_and_says_so(tmp_path: P
     assert run.report.outcome is DriveOutcome.TIME_LIMIT and run.report.collisions == 0
     assert run.simulator.truth.speed_m_s == pytest.approx(0.0, abs=0.01)
     assert any(says in line for line in run.report.said), run.report.said
+
+
+def test_a_rover_whose_lidar_gets_no_echo_any_more_stops_and_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The laser is dead, or the window covered; the motor turns and the bytes come."""
+    measure = SerialLidar._measure
+
+    def dark(self: SerialLidar, *given: Any) -> Any:
+        return measure(self, *given) * (given[-1] < 48.0)
+
+    monkeypatch.setattr(SerialLidar, "_measure", dark)
+    run = drive(tmp_path, "LD19", limit_s=70.0)
+    assert run.report.outcome is DriveOutcome.TIME_LIMIT and run.report.collisions == 0
+    assert run.simulator.truth.speed_m_s == pytest.approx(0.0, abs=0.01)
+    assert any("lidar 1 (LD19) has seen nothing" in line for line in run.report.said), run.report.said
 
 
 def test_it_goes_on_when_the_cable_is_in_again(tmp_path: Path) -> None:

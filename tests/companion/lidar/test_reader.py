@@ -129,3 +129,20 @@ def test_several_lidars_have_names_of_their_own_and_are_all_heard() -> None:
 def test_turns_that_pile_up_are_taken_no_oftener_than_other_scans() -> None:
     scans = [RangeSeen(scan.time_s, scan) for scan in desk("LD19").run(1.0)]
     assert len(scans) > SAME == len(newest_ranges(scans))
+
+
+@pytest.mark.parametrize(("options", "free"), [("", False), ("mask=30..330", False), ("empty=5", True)])
+def test_a_lidar_without_any_echo_says_nothing_unless_somebody_said_what_no_echo_means(
+    options: str, free: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = desk("LD19", options)
+    rig.run(0.5)
+    assert rig.run(0.5)[-1].tells
+    with monkeypatch.context() as patched:
+        patched.setattr(rig.device, "_measure", lambda angle_deg, *rest: np.zeros(len(angle_deg)))
+        rig.run(0.3)
+        dark = rig.run(0.5)
+        assert len(dark) >= 4
+        assert all(bool(np.isinf(scan.range_m).any()) is free and scan.tells is free for scan in dark)
+    rig.run(0.3)
+    assert rig.run(0.3)[-1].tells

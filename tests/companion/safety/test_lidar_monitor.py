@@ -48,3 +48,19 @@ def test_a_sensor_on_the_link_does_not_count_for_it() -> None:
     watch = monitor(FRONT)
     watch.take(seen(FRONT, 1.0, sender=196), VehicleState())
     assert watch.doubt(1.0) == Reason(Doubt.DATA_MISSING, (FRONT,))
+
+
+def test_one_whose_turns_tell_nothing_is_as_good_as_silent() -> None:
+    """Also from the beginning; a stray reading in a hundred is none."""
+    watch, unknown = monitor(FRONT), np.full(450, np.nan)
+    unknown[:4] = 3.0
+    blind = RangeScan(0.0, np.zeros(450), unknown, 0.1, 8.0, 0.1, FRONT, WIRED)
+    watch.take(RangeSeen(0.5, blind), VehicleState())
+    assert watch.doubt(0.5) == Reason(Doubt.LIDAR_BLIND, (FRONT, 1.0))
+    watch.take(seen(FRONT, 1.0), VehicleState())
+    for time_s in (1.5, 2.0, 2.1):
+        assert watch.doubt(time_s - 0.1) is None
+        watch.take(RangeSeen(time_s, blind), VehicleState())
+    assert watch.doubt(2.1) == Reason(Doubt.LIDAR_BLIND, (FRONT, 1.0))
+    watch.take(seen(FRONT, 2.2), VehicleState())
+    assert watch.doubt(2.2) is None
