@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from companion.core.scan import RangeScan
+from companion.core.scan import WIRED, RangeScan
 from companion.vehicle.events import (
     Event,
     RangeSeen,
@@ -45,6 +45,12 @@ OWN_BODY_M = 0.6
 """A mast in front of the sensor gives the same reading for ever; readings this near say nothing of the world."""
 DISTINCT = 5
 """This many different ranges do not repeat by chance, not even rounded to centimetres between parallel walls."""
+ALIKE_RAD, ALIKE_M = math.radians(0.1), 0.002
+"""Readings of two turns of a wired lidar nearer than this in bearing belong together, and in range are the same."""
+OTHER_SHARE, MOST_DAMAGED = 0.25, 6
+"""More of those that belong together must really differ: a damaged byte does not make a stuck lidar move."""
+FAR_M = 1e6
+"""Stands for no echo, so that ranges can be subtracted."""
 THIN_RAD = math.radians(10.0)
 """A beam no wider than this looks along one line: what it hits straight ahead comes nearer as the rover does."""
 AHEAD_RAD = math.radians(15.0)
@@ -133,7 +139,31 @@ class ScanWatch:
 
 
 def _same(one: RangeScan, other: RangeScan) -> bool:
+    """Whether a sensor repeats itself: bit for bit over the link; turn by turn, of what both tell, from a serial line.
+
+    Lines lose bytes, so that a lidar that is stuck sends the same turns with other gaps.
+    """
+    if one.sender == WIRED == other.sender and len(one.range_m) and len(other.range_m):
+        return _same_turn(one, other)
     return len(one.range_m) == len(other.range_m) and bool(np.array_equal(one.range_m, other.range_m, equal_nan=True))
+
+
+def _same_turn(one: RangeScan, other: RangeScan) -> bool:
+    order = np.argsort(one.bearing_rad)
+    bearing_rad = one.bearing_rad[order]
+    right = np.searchsorted(bearing_rad, other.bearing_rad).clip(1, max(len(bearing_rad) - 1, 1))
+    right = np.minimum(right, len(bearing_rad) - 1)
+    left = np.maximum(right - 1, 0)
+    nearer = np.where(
+        other.bearing_rad - bearing_rad[left] < bearing_rad[right] - other.bearing_rad, order[left], order[right]
+    )
+    before_m, now_m = one.range_m[nearer], other.range_m
+    both = np.abs(one.bearing_rad[nearer] - other.bearing_rad) <= ALIKE_RAD
+    both &= ~(np.isnan(before_m) | np.isnan(now_m))
+    both &= np.isfinite(before_m) | np.isfinite(now_m)
+    before_m, now_m = np.minimum(before_m[both], FAR_M), np.minimum(now_m[both], FAR_M)
+    differ = np.count_nonzero(np.abs(before_m - now_m) > ALIKE_M)
+    return bool(differ <= min(MOST_DAMAGED, OTHER_SHARE * len(now_m)))
 
 
 def _telling(scan: RangeScan) -> tuple[float, float]:

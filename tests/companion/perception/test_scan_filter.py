@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from companion.core.scan import RangeScan
+from companion.core.scan import WIRED, RangeScan
 from companion.perception.scan_filter import MOST_SCANS, SAME, STUCK_M, STUCK_S, ScanWatch, newest_ranges
 from companion.vehicle.events import (
     AttitudeSeen,
@@ -112,6 +112,35 @@ def test_the_same_readings_are_noticed_when_they_would_have_to_change(readings, 
     found_s = noticed_s(readings, motion, bearing_rad)
     assert found_s <= limit_s and math.isfinite(found_s) == math.isfinite(limit_s)
     assert found_s >= STUCK_S
+
+
+def turn(time_s: float, lost: int, range_m: np.ndarray, bearing_rad: np.ndarray) -> RangeScan:  # type: ignore[type-arg]
+    """A turn of a wired lidar, without 24 readings from the one with this number on, and one of them unknown."""
+    kept = np.delete(np.arange(len(range_m)), np.arange(lost, lost + 24))
+    known_m = range_m[kept]
+    known_m[lost % len(kept)] = math.nan
+    return RangeScan(time_s, bearing_rad[kept], known_m, 0.02, 12.0, math.radians(0.8), "lidar 1", WIRED)
+
+
+def test_a_wired_lidar_that_repeats_itself_on_a_line_that_loses_bytes_is_noticed_and_stays_so() -> None:
+    """Until its readings really differ: one damaged reading is not enough."""
+    bearing_rad = np.radians(np.arange(0.0, 360.0, 0.8))
+    range_m, watch = 3.0 + np.sin(bearing_rad), ScanWatch()
+    for i in range(30):
+        sent_m = range_m.copy()
+        sent_m[7 * i % 450] += 1.0 * (i % 3 == 0)
+        watch.take(turn(0.1 * i, 31 * i % 420, sent_m, bearing_rad + 1e-4 * (i % 2)), vehicle(0.1 * i, 1.0, 0.0))
+        assert (watch.repeating is not None) == (i >= 5)
+    watch.take(turn(3.0, 0, range_m + 0.05 * np.cos(bearing_rad), bearing_rad), vehicle(3.0, 1.0, 0.0))
+    assert watch.repeating is None
+
+
+def test_a_wired_lidar_that_sees_the_room_come_nearer_does_not_repeat_itself() -> None:
+    bearing_rad, watch = np.radians(np.arange(0.0, 360.0, 0.8)), ScanWatch()
+    for i in range(30):
+        seen_m = np.minimum(2.0 / np.abs(np.sin(bearing_rad + 1e-9)), (9.0 - 0.03 * i) / np.abs(np.cos(bearing_rad)))
+        assert watch.take(turn(0.1 * i, 31 * i % 420, seen_m, bearing_rad), vehicle(0.1 * i, 0.3, 0.0))
+    assert watch.repeating is None
 
 
 def test_the_nearest_of_all_sensors_may_look_at_a_wall_all_day():
