@@ -21,13 +21,15 @@ from numpy.typing import NDArray
 
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import Cell, Grid
-from companion.core.scan import RangeScan
+from companion.core.scan import WIRED, RangeScan
 from companion.mapping.cell_frame import CellFrame
 from companion.mapping.evidence_kernels import InverseSensorModel, ScanInCells, cast_scan, soften, weigh, weigh_roomy
 from companion.mapping.sensor_agreement import SensorAgreement
 from companion.settings import MappingSettings
 
 MAX_EVIDENCE_CELLS = 16_000_000
+BLIND_M = 0.3
+"""Beyond the least range of a wired lidar: what was seen nearer than that may now be too near to give an echo."""
 MAX_SOFT_WEIGHT = 0.9
 """Soft cost never makes a field look like an obstacle."""
 
@@ -88,12 +90,15 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
     """Add one scan to the map; ``stamp`` must differ from scan to scan.
 
     A beam frees the cells it passed and hardens the one it ended in. In one scan a hit outweighs any number of
-    passes, and each cell changes once. A cell in which another sensor has just seen something is not freed. The
+    passes, and each cell changes once. An empty ray of a wired lidar frees nothing if it begins in front of an obstacle,
+    which may have come too near to be seen. A cell in which another sensor has just seen something is not freed. The
     ground under the rover is free.
     """
     settings, frame = evidence.settings, evidence.frame
     x, y = frame.xy(pose.point)
     begin, bearing_rad, range_m = _rays(pose, scan)
+    if scan.sender == WIRED:
+        range_m = _without_too_near(evidence, begin, pose.heading_rad + bearing_rad, range_m, scan.min_range_m + BLIND_M)
     kept_m = settings.narrow_kept_m if scan.is_narrow else 0.0
     cast_scan(
         evidence.log_odds,
@@ -247,6 +252,30 @@ def _rays(pose: Pose, scan: RangeScan) -> tuple[NedPoint, NDArray[np.float64], N
     aside_m = seen_m * np.sin(scan.bearing_rad) - right_m
     bearing_rad = np.where(hit, np.arctan2(aside_m, ahead_m), scan.bearing_rad)
     return place, bearing_rad, np.where(hit, np.hypot(ahead_m, aside_m), scan.range_m)
+
+
+def _without_too_near(
+    evidence: EvidenceMap, begin: NedPoint, heading_rad: NDArray[np.float64], range_m: NDArray[np.float64], near_m: float
+) -> NDArray[np.float64]:
+    """The ranges; nan instead of inf where the map has an obstacle within ``near_m`` of where the rays begin."""
+    x, y = evidence.frame.xy(begin)
+    near = evidence.frame.cells(near_m)
+    x0, y0 = max(0, math.floor(x - near)), max(0, math.floor(y - near))
+    window = evidence.log_odds[y0 : max(math.floor(y + near) + 1, 0), x0 : max(math.floor(x + near) + 1, 0)]
+    rows, columns = np.nonzero(window >= evidence.settings.occupied_at)
+    empty = np.flatnonzero(np.isinf(range_m))
+    if not len(rows) or not len(empty):
+        return range_m
+    east, north = columns + 0.5 + x0 - x, rows + 0.5 + y0 - y
+    away = np.hypot(east, north)
+    # As seen from there a cell is no wider than its diagonal.
+    half_rad = np.arctan2(math.sqrt(0.5), np.maximum(away - math.sqrt(0.5), 0.0))
+    bearing_rad = np.arctan2(east, north)
+    aside_rad = (heading_rad[empty, None] - bearing_rad + np.pi) % (2.0 * np.pi) - np.pi
+    hidden = np.any((np.abs(aside_rad) <= half_rad) & (away <= near + math.sqrt(0.5)), axis=1)
+    result = range_m.copy()
+    result[empty[hidden]] = np.nan
+    return result
 
 
 def _soft_reach(evidence: EvidenceMap) -> int:

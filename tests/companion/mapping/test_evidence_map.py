@@ -10,7 +10,7 @@ import pytest
 
 from companion.core.frames import NedPoint, Pose
 from companion.core.grid import BASE_WEIGHT, Cell, Grid, empty_grid
-from companion.core.scan import RangeScan
+from companion.core.scan import WIRED, RangeScan
 from companion.mapping.evidence_map import (
     EvidenceMap,
     forget,
@@ -375,3 +375,21 @@ def test_clearance_is_the_distance_to_the_nearest_obstacle():
 def test_very_large_maps_get_a_coarser_raster():
     assert new_map(empty_grid(3000, 1500), RADIUS_M, SETTINGS).evidence_m > SETTINGS.evidence_m
     assert new_map(empty_grid(100, 50), RADIUS_M, SETTINGS).evidence_m == SETTINGS.evidence_m
+
+
+def test_a_post_that_comes_too_near_for_an_echo_is_not_freed_by_empty_rays() -> None:
+    """A wired lidar gives no echo of what is nearer than its least range; beside and away from it the rays free."""
+    evidence = new_map(empty_grid(20, 20, 0.5), RADIUS_M, SETTINGS)
+    pose, nothing = Pose(5.0, 5.0, 0.0, 0.0), np.full(len(FULL_CIRCLE), np.inf)
+    wired = replace(scan(nothing), sender=WIRED, source="lidar 1", origin_m=(0.3, 0.0))
+    x, y = (int(one) for one in evidence.frame.xy(NedPoint(5.42, 5.0)))
+    hit = nothing.copy()
+    hit[0] = 0.42
+    for stamp in range(1, 4):
+        integrate(evidence, pose, replace(wired, range_m=hit), stamp)
+    before = evidence.log_odds[y - 1 : y + 2, x - 1 : x + 1].max()
+    assert before >= SETTINGS.occupied_at
+    for stamp in range(4, 40):
+        integrate(evidence, pose, replace(wired, range_m=nothing), stamp)
+    assert evidence.log_odds[y - 1 : y + 2, x - 1 : x + 1].max() == before
+    assert evidence.log_odds[y, x - 20] < 0.0 and evidence.log_odds[y, x + 20] < 0.0
