@@ -45,6 +45,9 @@ class RangeScan:
     origin_m: tuple[float, float] = (0.0, 0.0)
     """Where the rays begin: metres forward and right of the rover's middle. Readings still count from the middle."""
 
+    late_s: float = 0.0
+    """How late it came by the sensor's own clock, compared with the best moment of the run; 0 if it tells none."""
+
     @property
     def sight_m(self) -> float:
         """How far ground that is free is known to be so."""

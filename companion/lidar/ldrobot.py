@@ -47,6 +47,7 @@ class LdrobotDecoder:
 
     def __init__(self) -> None:
         self.bad_bytes = 0
+        self.clock_ms: int | None = None
         self._rest = b""
 
     def feed(self, data: bytes) -> Points:
@@ -69,7 +70,10 @@ class LdrobotDecoder:
                 self.bad_bytes += 1
                 at += 1
         self._rest = buffer[at:]
-        return _points(b"".join(found)) if found else NO_POINTS
+        if not found:
+            return NO_POINTS
+        self.clock_ms = int.from_bytes(found[-1][44:46], "little")
+        return _points(b"".join(found))
 
 
 def _is_valid(packet: bytes) -> bool:

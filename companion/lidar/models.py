@@ -32,8 +32,8 @@ class LidarModel:
     max_m: float
     turns_hz: float
     most_quality: int
-    start: bytes = b""
-    stop: bytes = b""
+    start: tuple[bytes, ...] = ()
+    stop: tuple[bytes, ...] = ()
     dtr: bool = True
 
 
@@ -42,9 +42,9 @@ YD_STOP, YD_SCAN = b"\xa5\x65", b"\xa5\x60"
 MODELS = (
     LidarModel("LD06", 230400, LdrobotDecoder, 0.02, 12.0, 10.0, 255),
     LidarModel("LD19", 230400, LdrobotDecoder, 0.02, 12.0, 10.0, 255),
-    LidarModel("RPLIDAR-A1", 115200, RplidarDecoder, 0.15, 12.0, 5.5, 63, RP_STOP + RP_SCAN, RP_STOP, dtr=False),
-    LidarModel("RPLIDAR-C1", 460800, RplidarDecoder, 0.05, 12.0, 10.0, 63, RP_STOP + RP_SCAN, RP_STOP, dtr=False),
-    LidarModel("YDLIDAR-X4", 128000, YdlidarDecoder, 0.12, 10.0, 7.0, 0, YD_STOP + YD_SCAN, YD_STOP),
+    LidarModel("RPLIDAR-A1", 115200, RplidarDecoder, 0.15, 12.0, 5.5, 63, (RP_STOP, RP_SCAN), (RP_STOP,), dtr=False),
+    LidarModel("RPLIDAR-C1", 460800, RplidarDecoder, 0.05, 12.0, 10.0, 63, (RP_STOP, RP_SCAN), (RP_STOP,), dtr=False),
+    LidarModel("YDLIDAR-X4", 128000, YdlidarDecoder, 0.12, 10.0, 7.0, 0, (YD_STOP, YD_SCAN), (YD_STOP,)),
 )
 NAMES = ", ".join(model.name for model in MODELS)
 

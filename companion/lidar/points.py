@@ -53,6 +53,8 @@ class Decoder(Protocol):
 
     bad_bytes: int
     """Bytes that belonged to no valid packet."""
+    clock_ms: int | None
+    """What the sensor's own clock told last; None: it has none."""
 
     def feed(self, data: bytes) -> Points:
         """The points completed by these bytes."""

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple, Protocol
 
 from companion.core.scan import RangeScan
+from companion.lidar.device_clock import DeviceClock
 from companion.lidar.mounted import believed, cut_deg, scan_of
 from companion.lidar.spec import LidarSpec
 from companion.lidar.turns import TurnJoiner
@@ -20,6 +21,8 @@ from companion.vehicle.events import RangeSeen
 
 WAKE_S = 2.0
 """A lidar that gives no points is told to start this often."""
+BURST_S = 0.03
+"""Bytes that come sooner after others may have waited with them: only the last of them are known to be new."""
 
 
 class Chunk(NamedTuple):
@@ -37,7 +40,7 @@ class LidarPort(Protocol):
         ...
 
     def write(self, data: bytes) -> None:
-        """Send a command; dropped while the port is not there."""
+        """Send a command, some time after the one before; dropped while the port is not there."""
         ...
 
     def close(self) -> None:
@@ -85,6 +88,7 @@ class LidarReader:
 
     def _begin(self) -> None:
         self._decoder = self.spec.model.decoder()
+        self._clock = DeviceClock()
         self._joiner = TurnJoiner(cut_deg(self.spec.mounting), 1.0 / self.spec.model.turns_hz)
 
     @property
@@ -96,14 +100,15 @@ class LidarReader:
         )  # fmt: skip
 
     def poll(self, now_s: float, log: LidarLog) -> list[RangeScan]:
-        """The scans since the last call, the newest last."""
-        scans: list[RangeScan] = []
-        for chunk in self._port.read():
+        """The newest scan since the last call, if there is one."""
+        chunks = self._port.read()
+        for chunk in chunks:
             log.lidar_heard(self.number, chunk.time_s, chunk.data)
-            scans += self._decoded(chunk, now_s)
+        scans = [scan for chunk in in_bursts(chunks) for scan in self._decoded(chunk, now_s)][-1:]
         if self.spec.model.start and now_s - (-math.inf if self._woken_s is None else self._woken_s) >= WAKE_S:
             self._woken_s = now_s
-            self._port.write(self.spec.model.start)
+            for command in self.spec.model.start:
+                self._port.write(command)
         return scans
 
     def drop(self) -> None:
@@ -128,10 +133,24 @@ class LidarReader:
             self._woken_s = now_s
             self._points += len(points)
             self._echoes += int((points.range_m > 0.0).sum())
+        late_s = self._clock.late_s(self._decoder.clock_ms, chunk.time_s)
         turns = self._joiner.feed(points, chunk.time_s)
         self._scans += len(turns)
         mounting = self.spec.mounting
-        return [scan_of(turn, believed(mounting, turn), self.name) for turn in turns]
+        scans = [scan_of(turn, believed(mounting, turn), self.name) for turn in turns]
+        return [replace(scan, late_s=late_s) for scan in scans]
+
+
+def in_bursts(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """The same bytes, those joined that came at once. The time of a burst is that of its last bytes."""
+    bursts: list[Chunk] = []
+    for chunk in chunks:
+        last = bursts[-1] if bursts else None
+        if last is not None and last.data and chunk.data and chunk.time_s - last.time_s <= BURST_S:
+            bursts[-1] = Chunk(chunk.time_s, last.data + chunk.data)
+        else:
+            bursts.append(chunk)
+    return bursts
 
 
 class Lidars:

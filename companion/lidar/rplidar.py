@@ -33,6 +33,7 @@ class RplidarDecoder:
 
     def __init__(self) -> None:
         self.bad_bytes = 0
+        self.clock_ms: int | None = None
         self._rest = b""
         self._in_row = False
         """Whether the rest begins with points that were found to be in a row."""

@@ -20,6 +20,11 @@ from companion.mavlink.serial_port import open_reason
 QUEUE_BYTES = 65_536
 """More than a second of the fastest lidar. What is older is dropped: nobody has come to read it."""
 READ_BYTES = 4096
+MOST_COMMANDS = 4
+MOST_READS = 16
+"""At once, until nothing waits any more: what waited is not new, only the last of it is."""
+STEP_S = 0.005
+"""Between two commands: a lidar needs some time after it was told to stop."""
 WAIT_S = 0.02
 """A read waits no longer than this, so that bytes are stamped soon after they came."""
 PAUSE_S = 0.005
@@ -38,6 +43,7 @@ class SerialLidarPort:
         self._queued = 0
         self._lock = threading.Lock()
         self._closing = threading.Event()
+        self._commands: deque[bytes] = deque(maxlen=MOST_COMMANDS)
         try:
             self._port: serial.Serial | None = self._opened()
         except (OSError, ValueError) as error:
@@ -55,16 +61,11 @@ class SerialLidarPort:
         return chunks
 
     def write(self, data: bytes) -> None:
-        """Send a command; dropped while the port is not there."""
-        port = self._port
-        if port is not None:
-            with contextlib.suppress(OSError, TypeError):  # the thread notices what is wrong
-                port.write(data)
+        """Have the thread send a command: a line may take its time. Dropped while the port is not there."""
+        self._commands.append(data)
 
     def close(self) -> None:
         """Stop the lidar and close the port."""
-        if not self._closing.is_set():
-            self.write(self._spec.model.stop)
         self._closing.set()
         self._thread.join(1.0)
 
@@ -73,27 +74,38 @@ class SerialLidarPort:
         port = serial.Serial(None, model.baud, timeout=WAIT_S, write_timeout=0.1, exclusive=True)
         port.port, port.dtr = self._spec.port, model.dtr
         port.open()
-        port.write(model.start)
+        self._send(port, model.start)
         return port
+
+    def _send(self, port: serial.Serial, commands: Sequence[bytes]) -> None:
+        for number, command in enumerate(commands):
+            if number:
+                self._closing.wait(STEP_S)
+            port.write(command)
 
     def _run(self) -> None:
         """The thread: reads until it is to end, and opens the port again when it was lost."""
         while not self._closing.is_set():
-            if self._port is None:
+            port = self._port
+            if port is None:
+                self._commands.clear()
                 self._closing.wait(RETRY_S)
                 with contextlib.suppress(OSError, ValueError):
                     self._port = self._opened()
                     self._put(CUT)
                 continue
             try:
-                data = self._port.read(1)
-                data += self._port.read(min(self._port.in_waiting, READ_BYTES))
+                self._send(port, [self._commands.popleft() for _ in range(len(self._commands))])
+                data = _waiting(port)
             except (OSError, TypeError):  # pyserial fails with a TypeError if the port is lost between two calls
                 self._lose()
                 continue
             if data:
                 self._put(data)
                 self._closing.wait(PAUSE_S)
+        if self._port is not None:
+            with contextlib.suppress(OSError, TypeError):
+                self._send(self._port, self._spec.model.stop)
         self._lose()
 
     def _put(self, data: bytes) -> None:
@@ -111,6 +123,17 @@ class SerialLidarPort:
         if port is not None:
             with contextlib.suppress(OSError):
                 port.close()
+
+
+def _waiting(port: serial.Serial) -> bytes:
+    """All that has come, or the first byte to come; nothing after WAIT_S."""
+    data = bytes(port.read(1))
+    for _ in range(MOST_READS):
+        waiting = port.in_waiting
+        if not waiting:
+            break
+        data += port.read(min(waiting, READ_BYTES))
+    return data
 
 
 def open_ports(specs: Sequence[LidarSpec], clock: Clock) -> list[LidarPort]:

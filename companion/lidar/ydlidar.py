@@ -25,6 +25,7 @@ class YdlidarDecoder:
 
     def __init__(self) -> None:
         self.bad_bytes = 0
+        self.clock_ms: int | None = None
         self._rest = b""
 
     def feed(self, data: bytes) -> Points:

@@ -18,6 +18,9 @@ from companion.settings.live_settings import LiveSettings
 from companion.vehicle.events import Event, RangeSeen
 from companion.vehicle.state import VehicleState
 
+LATE_S = 0.3
+"""By its own clock: the scan no longer fits the place where it is put on the map."""
+
 
 class LidarMonitor(Monitor):
     """``names``: as the scans of the lidars bear them."""
@@ -25,17 +28,20 @@ class LidarMonitor(Monitor):
     def __init__(self, names: tuple[str, ...], settings: LiveSettings) -> None:
         self._settings = settings
         self._heard_s: dict[str, float | None] = dict.fromkeys(names)
+        self._on_time_s: dict[str, float] = dict.fromkeys(names, -math.inf)
         self._saw_s: dict[str, float] = dict.fromkeys(names, -math.inf)
 
     def take(self, event: Event, vehicle: VehicleState) -> None:
         """One more event."""
         if isinstance(event, RangeSeen) and event.scan.sender == WIRED:
             self._heard_s[event.scan.source] = event.time_s
+            if event.scan.late_s <= LATE_S:
+                self._on_time_s[event.scan.source] = event.time_s
             if event.scan.tells:
                 self._saw_s[event.scan.source] = event.time_s
 
     def doubt(self, now_s: float) -> Reason[Doubt] | None:
-        """The first lidar that is silent, or sees nothing."""
+        """The first lidar that is silent, sees nothing, or is late: three turns or so, since a tick may be."""
         limit_s = self._settings.current.safety.stale_s
         for name, heard_s in self._heard_s.items():
             if heard_s is None:
@@ -44,4 +50,6 @@ class LidarMonitor(Monitor):
                 return Reason(Doubt.DATA_OLD, (name, limit_s))
             if now_s - self._saw_s[name] > limit_s:
                 return Reason(Doubt.LIDAR_BLIND, (name, limit_s))
+            if heard_s - self._on_time_s[name] > LATE_S:
+                return Reason(Doubt.LIDAR_LATE, (name, LATE_S))
         return None

@@ -39,6 +39,7 @@ class Doubt(Enum):
     PLANNING_LONG = "planning has taken over {:g} s"
     SCAN_REPEATED = "{} repeats itself"
     LIDAR_BLIND = "{} has seen nothing for over {:g} s"
+    LIDAR_LATE = "{} later than {:g} s"
     OTHER_COMPANION = "another companion drives this rover"
     FENCE_BREACHED = "the autopilot's fence is breached"
     BEYOND_BORDER = "the rover is beyond the border of {}"

@@ -313,7 +313,7 @@ def lidar_example(model: LidarModel) -> bytes:
     """What it sends in a third of a second."""
     from tests.support.lidars import room, started, stream
 
-    return stream(started(room(name=model.name), model.start), 0.35)
+    return stream(started(room(name=model.name), b"".join(model.start)), 0.35)
 
 
 def driving_examples() -> tuple[bytes, ...]:

@@ -30,7 +30,7 @@ def decoder(name: str) -> Decoder:
 
 
 def sent(name: str, seconds: float = 0.4, noise_m: float = 0.0) -> bytes:
-    return stream(started(room(noise_m, name), model(name).start), seconds)
+    return stream(started(room(noise_m, name), b"".join(model(name).start)), seconds)
 
 
 STREAMS = {name: sent(name) for name in NAMES}

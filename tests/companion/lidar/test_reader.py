@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 
 import numpy as np
 import pytest
 
 from companion.core.scan import RangeScan
-from companion.lidar.reader import Chunk, LidarReader, Lidars, lidars_on
+from companion.lidar.reader import Chunk, LidarReader, Lidars, in_bursts, lidars_on
 from companion.lidar.spec import parsed
 from companion.perception.scan_filter import SAME, newest_ranges
 from companion.vehicle.events import RangeSeen
@@ -146,3 +147,70 @@ def test_a_lidar_without_any_echo_says_nothing_unless_somebody_said_what_no_echo
         assert all(bool(np.isinf(scan.range_m).any()) is free and scan.tells is free for scan in dark)
     rig.run(0.3)
     assert rig.run(0.3)[-1].tells
+
+
+def backlog(gap_s: float, piece: int = 4097) -> tuple[Desk, list[RangeScan]]:
+    """A rover that drives north at 1 m/s, whose reader was not scheduled for a while; what it reads in one tick then."""
+    rig = desk("LD19")
+    rig.run(1.0, speed_m_s=1.0)
+    data = b""
+    for _ in range(round(gap_s / 0.01)):
+        rig.now_s += 0.01
+        rig.device.advance(rig.now_s, rig.pose(1.0, 0.0))
+        data += rig.device.take()
+    pieces = [data[at : at + piece] for at in range(0, len(data), piece)]
+    chunks = [Chunk(rig.now_s + 0.005 * (number + 1 - len(pieces)), one) for number, one in enumerate(pieces)]
+    port = _Given(chunks)
+    rig.reader._port = port
+    return rig, rig.reader.poll(rig.now_s, rig)
+
+
+class _Given:
+    """A port with these chunks."""
+
+    def __init__(self, chunks: list[Chunk]) -> None:
+        self.chunks = chunks
+        self.written: list[bytes] = []
+
+    def read(self) -> list[Chunk]:
+        chunks, self.chunks = self.chunks, []
+        return chunks
+
+    def write(self, data: bytes) -> None:
+        self.written.append(data)
+
+    def close(self) -> None:
+        """Nothing to close."""
+
+
+@pytest.mark.parametrize("gap_s", [0.2, 0.3, 0.5, 0.8])
+def test_of_bytes_that_have_waited_only_the_newest_turn_counts_with_the_time_at_which_it_was_taken(gap_s: float) -> None:
+    rig, (scan,) = backlog(gap_s)
+    assert scan.age_s is not None and rig.now_s - scan.time_s < 0.11 and scan.age_s.max() < 0.11
+    ahead = np.abs(scan.bearing_rad) < math.radians(2.0)
+    wall_m = 4.0 - (scan.time_s - scan.age_s[ahead]) * 1.0
+    assert np.abs(scan.range_m[ahead] - wall_m).max() < 0.03
+
+
+def test_what_comes_after_a_pause_is_no_burst_and_a_cut_stays_where_it_was() -> None:
+    chunks = [Chunk(1.0, b"a"), Chunk(1.01, b"b"), Chunk(1.2, b"c"), Chunk(1.2, b""), Chunk(1.21, b"d")]
+    assert in_bursts(chunks) == [Chunk(1.01, b"ab"), Chunk(1.2, b"c"), Chunk(1.2, b""), Chunk(1.21, b"d")]
+
+
+def test_the_clock_of_an_ld19_shows_that_its_bytes_have_become_late() -> None:
+    rig, held = desk("LD19"), deque[list[Chunk]]()
+    take = rig.read
+
+    def late() -> list[Chunk]:
+        held.append(take())
+        return [Chunk(rig.now_s, one.data) for one in held.popleft()] if len(held) > 10 else []
+
+    assert rig.run(1.0)[-1].late_s < 0.05
+    rig.read = late  # type: ignore[method-assign]
+    assert rig.run(2.0)[-1].late_s == pytest.approx(0.5, abs=0.05)
+
+
+def test_an_rplidar_is_told_to_stop_and_to_scan_one_after_the_other() -> None:
+    port = _Given([])
+    LidarReader(parsed("A1:x"), port, 1).poll(0.0, desk("LD19"))
+    assert port.written == [b"\xa5\x25", b"\xa5\x20"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from companion.core.scan import WIRED, RangeScan
@@ -64,3 +66,11 @@ def test_one_whose_turns_tell_nothing_is_as_good_as_silent() -> None:
     assert watch.doubt(2.1) == Reason(Doubt.LIDAR_BLIND, (FRONT, 1.0))
     watch.take(seen(FRONT, 2.2), VehicleState())
     assert watch.doubt(2.2) is None
+
+
+def test_one_whose_turns_come_late_again_and_again_is_doubted() -> None:
+    watch = monitor(FRONT)
+    for time_s, late_s, doubted in ((1.0, 0.0, False), (1.2, 0.5, False), (1.4, 0.5, True), (1.5, 0.1, False)):
+        one = seen(FRONT, time_s)
+        watch.take(RangeSeen(time_s, replace(one.scan, late_s=late_s)), VehicleState())
+        assert watch.doubt(time_s) == (Reason(Doubt.LIDAR_LATE, (FRONT, 0.3)) if doubted else None)
