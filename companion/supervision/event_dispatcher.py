@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Protocol
 
+from companion.core.scan import WIRED
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan, MissionRun
 from companion.lidar.reader import Lidars
@@ -89,13 +90,17 @@ class EventDispatcher:
     def _located(self, event: RangeSeen, now_s: float) -> LocatedScan | None:
         """The scan where it was taken; None when that is doubtful.
 
-        One whose readings have ages is brought to the rover's place of now; any other was taken as it came.
+        One whose readings have ages is brought to the rover's place of now, any other was taken as it came. The
+        position comes over the link, and is half a round trip old when it does. What comes over the same link is as
+        late, and a lidar of the companion's own is not.
         """
         if not self._scans.fits or self._localization.position_doubted:
             return None
         vehicle, scan, at_s = self._run.vehicle, event.scan, event.time_s
         if scan.age_s is not None:
             scan, at_s = replace(scan, age_s=scan.age_s + (now_s - event.time_s)), now_s
+        if scan.sender == WIRED:
+            at_s += 0.5 * vehicle.latency_s
         pose, attitude = vehicle.pose_at(at_s), vehicle.attitude
         if pose is None or attitude is None:
             return None

@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 
+from companion.core.scan import WIRED
 from companion.core.severity import Severity
 from companion.executive.mission_run import LocatedScan
 from companion.operator.notifications import News
@@ -21,6 +22,7 @@ from companion.vehicle.events import (
     Event,
     HeartbeatSeen,
     ParameterAsked,
+    RangeSeen,
     TextSeen,
 )
 from tests.companion.safety.test_mode_latch import HOLD
@@ -85,3 +87,20 @@ def test_a_scan_goes_on_the_map_only_where_it_was_taken(tmp_path: Path, missing:
     found = heard.listen(seen.scan)
     assert len(found) == (0 if missing else 1)
     assert missing or ((found[0].pose.north_m, found[0].pose.east_m) == (2.0, 3.0) and found[0].scan is seen.scan.scan)
+
+
+@pytest.mark.parametrize("sender", [1, WIRED])
+def test_a_scan_of_a_wired_lidar_lies_before_the_position_that_came_late_over_the_link(
+    tmp_path: Path, sender: int
+) -> None:
+    heard = Heard(tmp_path)
+    seen = heard.desk.stand(2.0, 3.0)
+    now_s = heard.desk.now_s
+    assert seen.scan is not None and seen.position is not None
+    heard.desk.run.vehicle = replace(
+        seen,
+        position=replace(seen.position, time_s=now_s, north_m_s=1.0),
+        latency=replace(seen.latency, round_trips_s=(0.4, 0.4, 0.4)),
+    )
+    (found,) = heard.listen(RangeSeen(now_s, replace(seen.scan.scan, time_s=now_s, sender=sender)))
+    assert found.pose.north_m == pytest.approx(2.2 if sender == WIRED else 2.0)
