@@ -28,7 +28,8 @@ VOLUME /data
 ENTRYPOINT ["rover-companion"]
 CMD ["run", "/data/mission.toml", "--connect", "tcp:127.0.0.1:5777", "--resume", "--web", "8421"]
 
-# Of a BlueOS extension. The volume has a name, so that it belongs to the user above.
+# Of a BlueOS extension. The volume has a name, so that it belongs to the user above. A lidar wired to the computer needs
+# "Devices" in HostConfig, with its serial port (docs/install.md); one that is missing keeps the container from starting.
 ARG VERSION=0.1.0
 ARG SOURCE_URL=https://example.org/rover-companion
 LABEL version="${VERSION}"

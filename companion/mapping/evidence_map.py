@@ -124,7 +124,8 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
         (x, y, frame.cells(evidence.rover_radius_m)),
     )
     evidence.agreement.note(scan, _hit_cells(evidence, pose, scan))
-    reach = math.ceil(evidence.base.fields(scan.max_range_m + math.hypot(*scan.origin_m))) + 1 + _soft_reach(evidence)
+    touched_m = max(_touched_m(range_m, scan.sight_m, settings.hit_depth_m), evidence.rover_radius_m)
+    reach = math.ceil(evidence.base.fields(touched_m + math.hypot(*scan.origin_m))) + 1 + _soft_reach(evidence)
     cell = evidence.base.cell_at(pose.point)
     _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
 
@@ -276,6 +277,14 @@ def _without_too_near(
     result = range_m.copy()
     result[empty[hidden]] = np.nan
     return result
+
+
+def _touched_m(range_m: NDArray[np.float64], sight_m: float, hit_depth_m: float) -> float:
+    """How far from where the rays begin a scan may have changed the map: no farther than it has seen."""
+    known_m = range_m[~np.isnan(range_m)]
+    hit_m = known_m[np.isfinite(known_m)]
+    farthest_m = float(hit_m.max()) + hit_depth_m if len(hit_m) else 0.0
+    return max(farthest_m, sight_m) if len(hit_m) < len(known_m) else farthest_m
 
 
 def _soft_reach(evidence: EvidenceMap) -> int:

@@ -19,6 +19,7 @@ from companion.mapping.evidence_map import (
     known_fields,
     new_map,
     penalise,
+    restore,
 )
 from companion.mapping.map_queries import clearance_m, look_along
 from companion.mapping.sensor_agreement import BELIEVED_S
@@ -393,3 +394,24 @@ def test_a_post_that_comes_too_near_for_an_echo_is_not_freed_by_empty_rays() -> 
         integrate(evidence, pose, replace(wired, range_m=nothing), stamp)
     assert evidence.log_odds[y - 1 : y + 2, x - 1 : x + 1].max() == before
     assert evidence.log_odds[y, x - 20] < 0.0 and evidence.log_odds[y, x + 20] < 0.0
+
+
+@pytest.mark.parametrize(("field_m", "keeps"), [(0.5, "circle"), (0.15, "outline")])
+def test_after_every_scan_the_weights_are_those_of_a_map_that_is_computed_anew(field_m: float, keeps: str) -> None:
+    """Posts come and go, also beyond the edge, so that obstacles appear and disappear."""
+    side, rng = round(12.0 / field_m), np.random.default_rng(3)
+    settings = SETTINGS.model_copy(update={"keeps": keeps, "evidence_m": min(0.1, field_m / 3.0)})
+    evidence = new_map(empty_grid(side, side, field_m), RADIUS_M, settings)
+    obstacles = []
+    for stamp in range(1, 25):
+        pose = Pose(*rng.uniform(-1.0, 12.0, 2), rng.uniform(-3.0, 3.0), 0.0)
+        posts = [(*rng.uniform(0.0, 12.0, 2), 0.3) for _ in range(stamp % 5)]
+        seen_m = ranges(pose, posts, FULL_CIRCLE)
+        seen_m[np.isinf(seen_m)] = (math.inf, math.nan, 3.0)[stamp % 3]
+        one = replace(scan(seen_m), sender=stamp % 2, empty_m=5.0, origin_m=(0.4, 0.0))
+        integrate(evidence, pose, one, stamp)
+        again = new_map(evidence.base, RADIUS_M, settings)
+        restore(again, evidence.log_odds, evidence.penalty)
+        assert np.array_equal(evidence.grid.weights, again.grid.weights)
+        obstacles.append(int((evidence.grid.weights >= 1.0).sum()))
+    assert len(set(obstacles)) > 10
