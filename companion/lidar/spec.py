@@ -29,8 +29,8 @@ class Mounting:
     ``yaw_deg``: where its zero looks, clockwise from straight ahead; ``forward_m``, ``right_m``: its place from the
     rover's middle; ``flipped``: upside down. ``masked_deg``: sectors (from, to), clockwise from straight ahead as seen
     from the lidar, in [0, 360). Nearer readings than ``min_m`` say nothing; farther ones than ``max_m``, and no echo at
-    all, mean that nothing is there up to ``empty_m``; 0: they say nothing. ``empty_told``: a person said so, and it holds
-    also where there is no echo in a whole turn. Echoes weaker than ``least_quality`` say nothing.
+    all, mean that nothing is there up to ``empty_m``; 0: they say nothing. ``empty_told``: a person said so, and it
+    holds also where there is no echo in a whole turn. Echoes weaker than ``least_quality`` say nothing.
     """
 
     min_m: float

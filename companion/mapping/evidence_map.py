@@ -90,7 +90,7 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
     """Add one scan to the map; ``stamp`` must differ from scan to scan.
 
     A beam frees the cells it passed and hardens the one it ended in. In one scan a hit outweighs any number of
-    passes, and each cell changes once. An empty ray of a wired lidar frees nothing if it begins in front of an obstacle,
+    passes, and each cell changes once. An empty ray of a wired lidar frees nothing if it begins before an obstacle,
     which may have come too near to be seen. A cell in which another sensor has just seen something is not freed. The
     ground under the rover is free.
     """
@@ -98,7 +98,9 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
     x, y = frame.xy(pose.point)
     begin, bearing_rad, range_m = _rays(pose, scan)
     if scan.sender == WIRED:
-        range_m = _without_too_near(evidence, begin, pose.heading_rad + bearing_rad, range_m, scan.min_range_m + BLIND_M)
+        range_m = _without_too_near(
+            evidence, begin, pose.heading_rad + bearing_rad, range_m, scan.min_range_m + BLIND_M
+        )
     kept_m = settings.narrow_kept_m if scan.is_narrow else 0.0
     cast_scan(
         evidence.log_odds,
@@ -256,7 +258,11 @@ def _rays(pose: Pose, scan: RangeScan) -> tuple[NedPoint, NDArray[np.float64], N
 
 
 def _without_too_near(
-    evidence: EvidenceMap, begin: NedPoint, heading_rad: NDArray[np.float64], range_m: NDArray[np.float64], near_m: float
+    evidence: EvidenceMap,
+    begin: NedPoint,
+    heading_rad: NDArray[np.float64],
+    range_m: NDArray[np.float64],
+    near_m: float,
 ) -> NDArray[np.float64]:
     """The ranges; nan instead of inf where the map has an obstacle within ``near_m`` of where the rays begin."""
     x, y = evidence.frame.xy(begin)

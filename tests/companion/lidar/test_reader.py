@@ -150,7 +150,7 @@ def test_a_lidar_without_any_echo_says_nothing_unless_somebody_said_what_no_echo
 
 
 def backlog(gap_s: float, piece: int = 4097) -> tuple[Desk, list[RangeScan]]:
-    """A rover that drives north at 1 m/s, whose reader was not scheduled for a while; what it reads in one tick then."""
+    """A rover that drives north at 1 m/s, whose reader was not scheduled for a while; and what it reads then."""
     rig = desk("LD19")
     rig.run(1.0, speed_m_s=1.0)
     data = b""
@@ -184,7 +184,9 @@ class _Given:
 
 
 @pytest.mark.parametrize("gap_s", [0.2, 0.3, 0.5, 0.8])
-def test_of_bytes_that_have_waited_only_the_newest_turn_counts_with_the_time_at_which_it_was_taken(gap_s: float) -> None:
+def test_of_bytes_that_have_waited_only_the_newest_turn_counts_with_the_time_at_which_it_was_taken(
+    gap_s: float,
+) -> None:
     rig, (scan,) = backlog(gap_s)
     assert scan.age_s is not None and rig.now_s - scan.time_s < 0.11 and scan.age_s.max() < 0.11
     ahead = np.abs(scan.bearing_rad) < math.radians(2.0)
