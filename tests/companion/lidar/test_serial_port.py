@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import threading
 from pathlib import Path
 
 import pytest
+import serial
 
 from companion.core.clock import WallClock
 from companion.core.scan import RangeScan
@@ -72,3 +74,20 @@ def test_if_one_of_two_ports_fails_the_other_is_closed_again(tmp_path: Path) -> 
         with pytest.raises(LidarError):
             open_ports(specs, WallClock())
         lidars_on(specs[:1], open_ports(specs[:1], WallClock())).close()  # it would be in use
+
+
+def test_a_command_never_waits_for_the_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with spinning(tmp_path / "tty"):
+        port, ready, written = SerialLidarPort(parsed(f"LD19:{tmp_path / 'tty'}"), WallClock()), threading.Event(), []
+
+        def slow(line: serial.Serial, data: bytes) -> None:
+            ready.wait(5.0)
+            written.append(data)
+
+        monkeypatch.setattr(serial.Serial, "write", slow)
+        port.write(b"stop")
+        port.write(b"scan")
+        assert written == []
+        ready.set()
+        wait_until(lambda: written == [b"stop", b"scan"])
+        port.close()
