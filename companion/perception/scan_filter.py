@@ -47,6 +47,8 @@ DISTINCT = 5
 """This many different ranges do not repeat by chance, not even rounded to centimetres between parallel walls."""
 ALIKE_RAD, ALIKE_M = math.radians(0.1), 0.002
 """Readings of two turns of a wired lidar nearer than this in bearing belong together, and in range are the same."""
+MATCHED_SHARE = 0.4
+"""Of the readings of a turn that is sent again, without what was lost of both, so many belong together at least."""
 OTHER_SHARE, MOST_DAMAGED = 0.25, 6
 """More of those that belong together must really differ: a damaged byte does not make a stuck lidar move."""
 FAR_M = 1e6
@@ -162,6 +164,8 @@ def _same_turn(one: RangeScan, other: RangeScan) -> bool:
     both &= ~(np.isnan(before_m) | np.isnan(now_m))
     both &= np.isfinite(before_m) | np.isfinite(now_m)
     before_m, now_m = np.minimum(before_m[both], FAR_M), np.minimum(now_m[both], FAR_M)
+    if len(now_m) < MATCHED_SHARE * np.isfinite(other.range_m).sum():
+        return False  # other directions: what is sent again has the same ones
     differ = np.count_nonzero(np.abs(before_m - now_m) > ALIKE_M)
     return bool(differ <= min(MOST_DAMAGED, OTHER_SHARE * len(now_m)))
 

@@ -143,6 +143,15 @@ def test_a_wired_lidar_that_sees_the_room_come_nearer_does_not_repeat_itself() -
     assert watch.repeating is None
 
 
+def test_a_wired_lidar_whose_turns_look_in_other_directions_each_does_not_repeat_itself() -> None:
+    """As those of an A1, which takes 363.6 readings a turn."""
+    bearing_rad, watch = np.radians(np.arange(0.0, 360.0, 0.99)), ScanWatch()
+    for i in range(30):
+        at_rad = bearing_rad + math.radians(0.37) * (i % 2)
+        watch.take(turn(0.1 * i, 0, 3.0 + np.sin(at_rad) + 0.1 * i, at_rad), vehicle(0.1 * i, 1.0, 0.0))
+        assert watch.repeating is None
+
+
 def test_the_nearest_of_all_sensors_may_look_at_a_wall_all_day():
     assert noticed_s([3.0], "driving", [0.0], "rangefinder") == math.inf
 
