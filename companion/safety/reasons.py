@@ -38,7 +38,7 @@ class Doubt(Enum):
     LOOP_LATE = "the companion is too slow"
     PLANNING_LONG = "planning has taken over {:g} s"
     SCAN_REPEATED = "{} repeats itself"
-    LIDAR_BLIND = "{} has seen nothing for over {:g} s"
+    LIDAR_BLIND = "{} has seen nothing for over {:g} s (on open ground: empty=5)"
     LIDAR_LATE = "{} later than {:g} s"
     OTHER_COMPANION = "another companion drives this rover"
     FENCE_BREACHED = "the autopilot's fence is breached"

@@ -46,7 +46,7 @@ TEXTS: list[tuple[Enum, tuple[object, ...], str]] = [
     (Doubt.LOOP_LATE, (), "the companion is too slow"),
     (Doubt.PLANNING_LONG, (30.0,), "planning has taken over 30 s"),
     (Doubt.SCAN_REPEATED, ("lidar",), "lidar repeats itself"),
-    (Doubt.LIDAR_BLIND, ("lidar", 1.0), "lidar has seen nothing for over 1 s"),
+    (Doubt.LIDAR_BLIND, ("lidar", 1.0), "lidar has seen nothing for over 1 s (on open ground: empty=5)"),
     (Doubt.LIDAR_LATE, ("lidar", 0.3), "lidar later than 0.3 s"),
     (Doubt.OTHER_COMPANION, (), "another companion drives this rover"),
     (Doubt.FENCE_BREACHED, (), "the autopilot's fence is breached"),
