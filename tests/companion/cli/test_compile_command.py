@@ -29,9 +29,8 @@ def quick(name: str) -> Any:
     return job
 
 
-def test_nothing_to_do_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_to_do_is_said() -> None:
     """The tests begin with compiled kernels."""
-    monkeypatch.setenv("NUMBA_CACHE_DIR", os.environ.get("NUMBA_CACHE_DIR", "the cache"))
     answer = run()
     assert (
         answer.exit_code == 0
@@ -44,8 +43,8 @@ def test_bad_settings_are_one_line(tmp_path: Path) -> None:
     assert answer.exit_code == 2 and answer.output.count("\n") == 1
 
 
-def test_a_line_for_each_part_where_nobody_looks(monkeypatch: pytest.MonkeyPatch) -> None:
-    cold(monkeypatch)
+def test_a_line_for_each_part_where_nobody_looks(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    cold(monkeypatch, tmp_path)
     done = ["a", "b", "c", "d"]
     monkeypatch.setattr(compiling, "done_one_by_one", lambda jobs, after, processes: map(quick, done))
     answer = run("--jobs", 1)
@@ -74,8 +73,8 @@ def test_one_line_with_a_bar_for_a_person(monkeypatch: pytest.MonkeyPatch) -> No
     assert "compiled: b" in drawn and "2/2" in drawn
 
 
-def test_want_of_memory_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    cold(monkeypatch)
+def test_want_of_memory_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    cold(monkeypatch, tmp_path)
     monkeypatch.setattr(compiling, "genetic_planner", killed)
     monkeypatch.setattr(compiling, "graph_searches", killed)
     answer = run("--jobs", 1)
@@ -83,7 +82,7 @@ def test_want_of_memory_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_settings_add_what_they_choose(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    cold(monkeypatch)
+    cold(monkeypatch, tmp_path)
     asked: list[Any] = []
     monkeypatch.setattr(compiling, "done_one_by_one", lambda jobs, after, processes: asked.extend(jobs) or [])
     file = tmp_path / "faster.toml"
@@ -100,9 +99,9 @@ def test_jobs_wait_for_those_whose_kernels_they_use() -> None:
     assert compiling._before(Chosen(Settings()), [drive, first], AFTER) == [drive, first]
 
 
-def cold(monkeypatch: pytest.MonkeyPatch) -> None:
+def cold(monkeypatch: pytest.MonkeyPatch, place: Path) -> None:
     monkeypatch.setattr(compiling, "is_compiled", lambda settings: False)
-    monkeypatch.setenv("NUMBA_CACHE_DIR", "the cache")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(place))
 
 
 def killed() -> None:
