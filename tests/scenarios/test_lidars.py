@@ -25,7 +25,6 @@ from sitl.scenario import scenario_from_mission, with_faults, with_lidars, with_
 from sitl.sensors.range_sensors import Defect
 from sitl.sensors.serial_lidar import SerialLidar
 from tests.sitl.network.test_server import free_port
-from tests.support.lidars import NAMES
 from tests.support.records import START_US
 from tests.support.rig import yard
 from tests.support.served import finished, mission_path, process, wait_until
@@ -49,13 +48,24 @@ def drive(
     return run
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        "LD19",
+        "RPLIDAR-A1",
+        "YDLIDAR-X4",
+        pytest.param("LD06", marks=pytest.mark.thorough),
+        pytest.param("RPLIDAR-C1", marks=pytest.mark.thorough),
+    ],
+)
 def test_every_model_leads_a_rover_round_the_wall(tmp_path: Path, name: str) -> None:
     report = drive(tmp_path, name).report
     assert (report.outcome, report.collisions) == (DriveOutcome.REACHED, 0)
 
 
-@pytest.mark.parametrize("mounting", ["yaw=120,x=0.3,y=-0.2", "flip,yaw=-60,x=-0.3"])
+@pytest.mark.parametrize(
+    "mounting", [pytest.param("yaw=120,x=0.3,y=-0.2", marks=pytest.mark.thorough), "flip,yaw=-60,x=-0.3"]
+)
 def test_however_it_is_mounted_the_wall_is_mapped_where_it_stands(tmp_path: Path, mounting: str) -> None:
     run = drive(tmp_path, f"LD19:{mounting}")
     assert (run.report.outcome, run.report.collisions) == (DriveOutcome.REACHED, 0)

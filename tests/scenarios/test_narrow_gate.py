@@ -17,7 +17,7 @@ from sitl.world.truth import SimStart
 
 @pytest.mark.parametrize(
     ("angle_deg", "aside_m", "seed"),
-    [(0.0, 1.0, 0), pytest.param(30.0, -1.2, 1, marks=pytest.mark.thorough), (30.0, 0.5, 2)],
+    [(0.0, 1.0, 0), *(pytest.param(*one, marks=pytest.mark.thorough) for one in ((30.0, -1.2, 1), (30.0, 0.5, 2)))],
 )
 def test_a_rover_with_default_settings_gets_through(angle_deg: float, aside_m: float, seed: int) -> None:
     goal = Target("goal", HomePoint(0.0, SIDE_M - 6.0))
