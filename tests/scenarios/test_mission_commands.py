@@ -146,6 +146,7 @@ def drive(mission: Mission) -> Drive:
     return one
 
 
+@pytest.mark.thorough
 @needs_shared
 def test_a_real_patrol_goes_round_and_counts(tmp_path: Path) -> None:
     mission = with_laps(load_mission(SHARED / "data" / "missions" / "ros_gz_rover" / "playpen.txt"), 2)

@@ -25,6 +25,7 @@ def can_build() -> bool:
     return int(version("setuptools").split(".")[0]) >= LEAST
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 @pytest.mark.skipif(not can_build(), reason=f"setuptools is older than {LEAST}")
 def test_a_wheel_installs_and_drives(tmp_path: Path) -> None:
