@@ -181,7 +181,7 @@ def grid_shift(state: SavedState, layout: MissionLayout) -> Cell:
     Home is in the middle of a field in both grids; but a grid around places in degrees may be a field larger in another
     frame.
     """
-    corner, resolution_m = from_home(layout).south_west, layout.evidence.base.resolution_m
+    corner, resolution_m = from_home(layout), layout.evidence.base.resolution_m
     east, north = state.ground.east_m - corner.east_m, state.ground.north_m - corner.north_m
     return Cell(round(east / resolution_m), round(north / resolution_m))
 

@@ -29,7 +29,7 @@ from companion.executive.command_sender import CommandSender, place_name
 from companion.executive.controller_choice import settings_in_force
 from companion.executive.goal_driver import GoalDriver, controller_for
 from companion.executive.laps import LapStart, LapSummary, Odometer, lap_summary
-from companion.executive.mission_layout import MissionLayout, apart_m, carried, fenced_again, from_home, lay_again
+from companion.executive.mission_layout import MissionLayout, apart_m, carried, fenced_again, lay_again, seen_ground
 from companion.executive.mission_progress import (
     MissionPhase,
     MissionProgress,
@@ -48,7 +48,7 @@ from companion.executive.mission_progress import (
     with_requested,
 )
 from companion.executive.return_path import Refuge, Trail, refuges
-from companion.mapping.evidence_map import EvidenceMap, forget, integrate, known_fields, look_again, move
+from companion.mapping.evidence_map import EvidenceMap, forget, integrate, look_again, move
 from companion.mapping.map_files import save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.do_commands import DoCommand
@@ -284,7 +284,8 @@ class MissionExecutor:
 
     def save_map(self, path_without_suffix: Path) -> None:
         """Write what has been mapped as a ROS map (.yaml and .pgm), its place in metres from home. Raises MapError."""
-        save_ros_map(from_home(self.layout), path_without_suffix, known=known_fields(self.evidence))
+        ground, known = seen_ground(self.layout)
+        save_ros_map(ground, path_without_suffix, known=known)
 
     # Other goals than the next target ----------------------------------------------------------------------------
 

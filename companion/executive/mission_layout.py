@@ -8,11 +8,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
 from companion.core.grid import OBSTACLE, Grid, inflated
 from companion.executive.command_progress import carried as carried_commands
 from companion.executive.mission_progress import MissionProgress, relaid
-from companion.mapping.evidence_map import EvidenceMap, new_map, rebase
+from companion.mapping.evidence_map import EvidenceMap, known_fields, new_map, occupied_fields, rebase
 from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bounds
 from companion.mission.check import MAX_GRID_FIELDS
@@ -31,6 +34,8 @@ class MissionLayout:
     targets: tuple[ResolvedTarget, ...]
     start: ResolvedTarget
     """Where the rover was when the mission began: it returns there when it has to."""
+    ground: Grid
+    """What was known of it beforehand; obstacles have their own size there."""
     evidence: EvidenceMap
     fence: AutopilotFence
     bounds: Bounds
@@ -51,7 +56,9 @@ def lay(
     """Lay the mission out; the rover returns to ``pose`` when it has to. Raises MissionError."""
     resolved, evidence = _laid(mission, settings, LocalFrame(origin), home, fence, narrow_sight)
     start = _start(pose.point, resolved.ground)
-    return MissionLayout(origin, home, resolved.targets, start, evidence, fence, resolved.bounds, resolved.refused)
+    return MissionLayout(
+        origin, home, resolved.targets, start, resolved.ground, evidence, fence, resolved.bounds, resolved.refused
+    )
 
 
 def lay_again(
@@ -73,9 +80,10 @@ def lay_again(
     if requested is not None:
         point = frame.to_ned(before.to_geo(requested.point))
         requested = replace(requested, point=point, cell=resolved.ground.cell_at(point))
-    again = MissionLayout(
-        origin, layout.home, resolved.targets, start, evidence, layout.fence, resolved.bounds, resolved.refused
-    )
+    again = replace(
+        layout, origin=origin, targets=resolved.targets, start=start, ground=resolved.ground, evidence=evidence,
+        bounds=resolved.bounds, refused=resolved.refused,
+    )  # fmt: skip
     commands = carried_commands(progress.commands, lambda point: frame.to_ned(before.to_geo(point)))
     return again, relaid(replace(progress, commands=commands), resolved.targets, back, requested)
 
@@ -95,11 +103,27 @@ def carried(place: ResolvedTarget, north_m: float, east_m: float, grid: Grid) ->
     return replace(place, point=point, cell=grid.cell_at(point))
 
 
-def from_home(layout: MissionLayout) -> Grid:
-    """The map as it is, with its place in metres from home: what ``prior_map`` expects of a saved map."""
-    grid = layout.evidence.grid
-    home, corner = LocalFrame(layout.origin).to_ned(layout.home), grid.south_west
-    return Grid(grid.weights, grid.resolution_m, NedPoint(corner.north_m - home.north_m, corner.east_m - home.east_m))
+def from_home(layout: MissionLayout) -> NedPoint:
+    """The south-west corner of the map in metres from home."""
+    home, corner = LocalFrame(layout.origin).to_ned(layout.home), layout.evidence.base.south_west
+    return NedPoint(corner.north_m - home.north_m, corner.east_m - home.east_m)
+
+
+def seen_ground(layout: MissionLayout) -> tuple[Grid, NDArray[np.bool_]]:
+    """What ``prior_map`` expects of a saved map, and which of its fields are known; cut to those.
+
+    Obstacles have their own size: whoever reads the map adds the rover's radius. Fences are the mission's.
+    """
+    evidence, corner = layout.evidence, from_home(layout)
+    obstacles = occupied_fields(evidence) | (layout.ground.weights >= OBSTACLE)
+    known = known_fields(evidence) | obstacles
+    rows, columns = (np.flatnonzero(known.any(axis=axis)) for axis in (1, 0))
+    kept = np.s_[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1] if len(rows) else np.s_[:, :]
+    low_y, low_x = (rows[0], columns[0]) if len(rows) else (0, 0)
+    side_m = evidence.base.resolution_m
+    south_west = NedPoint(corner.north_m + side_m * float(low_y), corner.east_m + side_m * float(low_x))
+    weights = np.where(obstacles, OBSTACLE, 0.0).astype(evidence.base.weights.dtype)
+    return Grid(weights[kept], side_m, south_west), known[kept]
 
 
 def apart_m(here: GeoPoint, there: GeoPoint) -> float:

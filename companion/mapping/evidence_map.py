@@ -228,9 +228,17 @@ def _forget_cells(evidence: EvidenceMap, cells: NDArray[np.bool_]) -> None:
 
 def known_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
     """Shape (height, width): True where at least one evidence cell of the field has been seen."""
+    return _fields_with(evidence, evidence.log_odds != 0.0)
+
+
+def occupied_fields(evidence: EvidenceMap) -> NDArray[np.bool_]:
+    """Shape (height, width): True where something was seen in the field itself, however wide the rover is."""
+    return _fields_with(evidence, evidence.log_odds >= evidence.settings.occupied_at)
+
+
+def _fields_with(evidence: EvidenceMap, cells: NDArray[np.bool_]) -> NDArray[np.bool_]:
     s = evidence.subdivisions
-    blocks = (evidence.log_odds != 0.0).reshape(evidence.base.height, s, evidence.base.width, s)
-    return np.asarray(blocks.any(axis=(1, 3)))
+    return np.asarray(cells.reshape(evidence.base.height, s, evidence.base.width, s).any(axis=(1, 3)))
 
 
 def _hit_cells(evidence: EvidenceMap, pose: Pose, scan: RangeScan) -> NDArray[np.int64]:

@@ -3,6 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from companion.mapping.map_files import load_map
 from companion.mission.load import load_mission
 from companion.recording.recorder import NullRecorder
@@ -22,10 +24,13 @@ def test_what_was_mapped_is_known_the_next_time(tmp_path: Path) -> None:
     seen = load_map(tmp_path / "seen.yaml")
     assert mission.grid.home is not None
     # Home is the middle of its field, and the map's place counts from there.
-    assert abs(seen.south_west.east_m + mission.grid.home.x + 0.5) < 1e-6
-    assert abs(seen.south_west.north_m + mission.grid.home.y + 0.5) < 1e-6
-    obstacles = seen.weights >= 1.0
-    assert (obstacles == (first.companion.evidence.grid.weights >= 1.0)).all()
+    west_m = seen.south_west.east_m + mission.grid.home.x + 0.5
+    south_m = seen.south_west.north_m + mission.grid.home.y + 0.5
+    assert abs(west_m - round(west_m)) < 1e-6 and abs(south_m - round(south_m)) < 1e-6
+    obstacles = np.zeros_like(first.companion.evidence.grid.weights, bool)
+    height, width = seen.weights.shape
+    obstacles[round(south_m) : round(south_m) + height, round(west_m) : round(west_m) + width] = seen.weights >= 1.0
+    assert obstacles.any() and (first.companion.evidence.grid.weights[obstacles] >= 1.0).all()
 
     known = replace(mission, prior_map=tmp_path / "seen.yaml")
     second = Drive(known, scenario_from_mission(known), Settings(), 1, NullRecorder())

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint, LocalFrame, NedPoint, Pose
-from companion.executive.mission_layout import apart_m, fenced_again, from_home, lay, lay_again
+from companion.executive.mission_layout import apart_m, fenced_again, from_home, lay, lay_again, seen_ground
 from companion.executive.mission_progress import MissionPhase, on_reached, on_time, plan_progress
+from companion.mapping.map_files import load_map, save_ros_map
 from companion.mission.autopilot_fence import AutopilotFence
 from companion.mission.mission import HomePoint, Mission, RoverSpec, Target
 from companion.settings import MappingSettings
@@ -33,9 +35,28 @@ def test_fields_and_metres_count_from_home(mission: Mission) -> None:
     assert second.point.distance_m(NedPoint(5.0, 1.0)) < 1e-3
     assert layout.start.point == POSE.point
     assert layout.evidence.base.cell_at(POSE.point) == layout.start.cell
-    saved = from_home(layout)
-    assert saved.south_west.north_m == pytest.approx(-7.5, abs=1e-3)
-    assert saved.south_west.east_m == pytest.approx(-2.5, abs=1e-3)
+    assert from_home(layout).north_m == pytest.approx(-7.5, abs=1e-3)
+    assert from_home(layout).east_m == pytest.approx(-2.5, abs=1e-3)
+
+
+def test_a_map_that_is_saved_and_read_again_and_again_stays_as_it_is(tmp_path: Path) -> None:
+    """Fields of 0.15 m, less than the rover's radius: obstacles keep their size, the ground is what was seen."""
+    goal = Target("goal", HomePoint(0.0, 9.0))
+    mission, drawn = Mission("m", (goal,), rover=RoverSpec(0.35)), []
+    for number in range(3):
+        layout = lay(mission, MappingSettings(), ORIGIN, HOME, POSE)
+        if number == 0:
+            log_odds = layout.evidence.log_odds
+            log_odds[200:260, 200:260] = -2.0
+            log_odds[230, 210:250] = 3.0
+        save_ros_map(seen_ground(layout)[0], tmp_path / f"m{number}", seen_ground(layout)[1])
+        saved = tmp_path / f"m{number}.yaml"
+        mission = replace(mission, prior_map=saved)
+        drawn.append(load_map(saved).weights >= 1.0)
+    assert drawn[0].sum() == drawn[1].sum() == drawn[2].sum() > 10
+    assert drawn[0].size < 0.01 * layout.evidence.base.weights.size
+    base = lay(mission, MappingSettings(), ORIGIN, HOME, POSE).evidence.base
+    assert base.resolution_m < 0.16 and (base.weights >= 1.0).sum() > 3 * drawn[0].sum(), "there the radius is added"
 
 
 def test_laid_again_everything_is_where_it_was_on_earth_and_progress_is_kept(mission: Mission) -> None:
