@@ -114,7 +114,8 @@ class PointController:
         ):
             return stop_for(Purpose.BRAKE)
         wanted_m = settings.least_reach_m if self._looking_rad is None else _reach_after_look_m(view)
-        if reach.distance_m < min(wanted_m, distance_m - 0.1) and not (at_end and reach.distance_m > 0.0):
+        short = reach.distance_m < min(wanted_m, distance_m - 0.1) and not at_end
+        if short or reach.distance_m == 0.0:
             if self._looking_rad is not None and not _is_turned_to(self._looking_rad, pose, settings):
                 return turn_to(self._looking_rad, view)
             look = _look_or_blocked(path, view)

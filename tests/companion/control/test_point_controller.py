@@ -344,3 +344,11 @@ def test_whatever_stands_round_it_the_way_to_the_target_is_clear_and_seen(seed):
             assert gaps.min() > radius_m + ROVER.radius_m - 0.05
     else:
         assert answer.purpose is Purpose.LOOK
+
+
+def test_where_its_path_ends_and_it_can_be_sent_nowhere_it_does_not_drive():
+    """The end of a path that fields make may lie within centimetres of the rover, and something right before it."""
+    ground, here = looked(), Pose(HERE.north_m, HERE.east_m, 1.2, 0.0)
+    ground.map.log_odds[:] = 0.0
+    path = ReferencePath(np.array([[HERE.north_m, HERE.east_m], [HERE.north_m + 0.05, HERE.east_m]]))
+    assert told(ground, here, path=path).purpose is not Purpose.DRIVE
