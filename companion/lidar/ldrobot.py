@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from companion.lidar.points import NO_POINTS, Points
+from companion.lidar.points import NO_POINTS, Points, next_header
 
 HEADER = b"\x54\x2c"
 PACKET_BYTES, POINTS = 47, 12
@@ -55,11 +55,9 @@ class LdrobotDecoder:
         buffer, at = self._rest + data, 0
         found: list[bytes] = []
         while True:
-            begin = buffer.find(HEADER, at)
-            if begin < 0:
-                begin = len(buffer) - (buffer[-1:] == HEADER[:1])
-            self.bad_bytes += max(begin - at, 0)
-            at = max(begin, at)
+            begin = next_header(buffer, HEADER, at)
+            self.bad_bytes += begin - at
+            at = begin
             if at + PACKET_BYTES > len(buffer):
                 break
             packet = buffer[at : at + PACKET_BYTES]

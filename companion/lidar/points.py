@@ -48,6 +48,12 @@ def joined(parts: list[Points]) -> Points:
     )
 
 
+def next_header(buffer: bytes, header: bytes, at: int) -> int:
+    """Where the next packet begins, or where the rest begins that may hold the first byte of a header of two."""
+    begin = buffer.find(header, at)
+    return begin if begin >= 0 else max(len(buffer) - (buffer[-1:] == header[:1]), at)
+
+
 class Decoder(Protocol):
     """Decodes the bytes of one lidar."""
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from companion.lidar.points import Floats, Points, joined
+from companion.lidar.points import Floats, Points, joined, next_header
 
 HEADER = b"\xaa\x55"
 HEAD_BYTES, MOST_POINTS = 10, 40
@@ -33,11 +33,9 @@ class YdlidarDecoder:
         buffer, at = self._rest + data, 0
         found: list[Points] = []
         while True:
-            begin = buffer.find(HEADER, at)
-            if begin < 0:
-                begin = len(buffer) - (buffer[-1:] == HEADER[:1])
-            self.bad_bytes += max(begin - at, 0)
-            at = max(begin, at)
+            begin = next_header(buffer, HEADER, at)
+            self.bad_bytes += begin - at
+            at = begin
             if at + HEAD_BYTES > len(buffer):
                 break
             size = _size(buffer, at)
