@@ -82,8 +82,12 @@ DRIVING_S = 3.0
     ("fault", "says"),
     [
         (LidarFault(DRIVING_S, since="driving", unplugged=True), "lidar 1 (LD19)"),
-        (LidarFault(DRIVING_S, since="driving", stalled=True), "lidar 1 (LD19)"),
-        (SensorFault(DRIVING_S, since="driving", defect=Defect.SILENT), "lidar 1 (LD19)"),
+        pytest.param(
+            LidarFault(DRIVING_S, since="driving", stalled=True), "lidar 1 (LD19)", marks=pytest.mark.thorough
+        ),
+        pytest.param(
+            SensorFault(DRIVING_S, since="driving", defect=Defect.SILENT), "lidar 1 (LD19)", marks=pytest.mark.thorough
+        ),
         (SensorFault(DRIVING_S, since="driving", defect=Defect.STUCK), "lidar 1 (LD19)"),
     ],
     ids=["unplugged", "stalled", "silent", "stuck"],

@@ -121,7 +121,7 @@ def with_a_relay(simulator: Simulator) -> None:
     simulator.vehicle.parameters.set("RELAY1_PIN", 5.0)
 
 
-@pytest.mark.parametrize("ticks", [0, 1, 2, 3, 4])
+@pytest.mark.parametrize("ticks", [0, 1, *(pytest.param(ticks, marks=pytest.mark.thorough) for ticks in (2, 3, 4))])
 def test_killed_round_a_command_it_is_done_once(tmp_path: Path, ticks: int) -> None:
     """The death comes so many ticks after the rover has reached the place."""
     relay = '[[target.command]]\nname = "DO_SET_RELAY"\nparams = [0, 2]\n'

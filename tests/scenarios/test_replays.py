@@ -80,7 +80,7 @@ def test_nothing_differs_in_another_process_which_opens_no_socket(record: Path) 
         ("crossing.toml", "radio", 60.0),
         ("ackermann.toml", "interrupted", 75.0),
         pytest.param("field.plan", "gps", 65.0, marks=pytest.mark.thorough),
-        ("clutter.toml", "vehicle", 60.0),
+        pytest.param("clutter.toml", "vehicle", 60.0, marks=pytest.mark.thorough),
     ],
 )
 def test_nothing_differs_under_faults(tmp_path: Path, name: str, faults: str, limit_s: float) -> None:
