@@ -19,7 +19,7 @@ from companion.control.local_view import LocalView
 from companion.control.reference_path import STEP_M, ReferencePath
 from companion.core.frames import NedPoint, wrap_pi_rad
 from companion.mapping.map_queries import ArcQueries, Unseen, Until, ground_at, look_along, unseen_beside
-from companion.mapping.reach_kernels import Stopping, first_to_stop_at, may_stop_at
+from companion.mapping.reach_kernels import Stopping, first_to_stop_at, stops_in_a_row
 
 BACK_LEAST_M_S = 0.2
 """The rover does not back out at all where there is only room to do so slower than this."""
@@ -93,7 +93,17 @@ class _Search:
 
         The farther the target, the faster the autopilot drives, so no decimetre is given away.
         """
-        here, frame = self._view.pose.point, self._view.evidence.frame
+        steps = self._nearer(reach, further)
+        if not steps:
+            return reach
+        places = np.array([(step.target.north_m, step.target.east_m) for step in steps])
+        may = stops_in_a_row(self._ground, self._start, self._view.evidence.frame.xys(places), stopping)
+        return steps[may - 1] if may else reach
+
+    def _nearer(self, reach: Reach, further: list[NedPoint]) -> list[Reach]:
+        """The places in steps of ``ROLLED_M`` towards these points, as long as each is farther than the last one."""
+        here = self._view.pose.point
+        steps: list[Reach] = []
         for point in further:
             bearing, left_m = reach.target.bearing_rad(point), reach.target.distance_m(point)
             pieces = max(1, math.ceil(left_m / ROLLED_M - 1e-6))
@@ -101,11 +111,10 @@ class _Search:
                 target = reach.target.moved(bearing, left_m / pieces)
                 nearer = Reach(target, here.distance_m(target), reach.room_m)
                 if not reach.distance_m < nearer.distance_m <= self._limit_m:
-                    return reach
-                if not may_stop_at(self._ground, self._start, frame.xy(target), stopping):
-                    return reach
+                    return steps
+                steps.append(nearer)
                 reach = nearer
-        return reach
+        return steps
 
     def _stopping(self, room_m: float) -> Stopping:
         evidence, radius_m = self._view.evidence, self._view.rover.radius_m

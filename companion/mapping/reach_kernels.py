@@ -83,6 +83,15 @@ def first_to_stop_at(ground, start, targets, limit, stopping):
 
 
 @njit(cache=True, nogil=True)
+def stops_in_a_row(ground, start, targets, stopping):
+    """How many targets, shape (n, 2), from the first one on may be stopped at."""
+    for index in range(len(targets)):
+        if not may_stop_at(ground, start, (targets[index, 0], targets[index, 1]), stopping):
+            return index
+    return len(targets)
+
+
+@njit(cache=True, nogil=True)
 def _look(ground, start, end, half_width, stopping):
     return look(
         ground.log_odds, ground.base, ground.penalty, start, end, half_width, stopping.map_radius, ground.occupied_at

@@ -54,7 +54,8 @@ def judged(state: BatteryState, now_s: float, settings: PowerSettings) -> Batter
         for level in (BatteryLevel.RETURN, BatteryLevel.HOLD)
     }
     since_s = {level: state.since_s.get(level, now_s) for level, reason in reasons.items() if reason is not None}
-    state = replace(state, since_s=since_s)
+    if since_s != state.since_s:
+        state = replace(state, since_s=since_s)
     for level, began_s in since_s.items():
         if level > state.level and now_s - began_s >= settings.after_s:
             state = replace(state, level=level, reason=reasons[level])

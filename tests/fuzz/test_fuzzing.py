@@ -13,7 +13,7 @@ import pytest
 from tests.fuzz.targets import targets
 
 ROOT = Path(__file__).resolve().parents[2]
-RUNS = 5
+RUNS = 2
 
 pytestmark = pytest.mark.skipif(
     importlib.util.find_spec("atheris") is None, reason="no build of atheris for this machine"

@@ -253,7 +253,9 @@ def test_range_data_at_a_thousand_a_second_is_not_mapped_so_often_and_parameters
     assert set(rig.companion.vehicle.parameters) <= PARAMETERS_KEPT
 
 
-@pytest.mark.parametrize(("flood", "hz"), [(lidar, 20), (lidar, 40), (lidar, 1000), (beams, 1000)])
+@pytest.mark.parametrize(
+    ("flood", "hz"), [(lidar, 20), pytest.param(lidar, 40, marks=pytest.mark.thorough), (lidar, 1000), (beams, 1000)]
+)
 def test_a_sensor_that_sees_nothing_far_too_often_does_not_hide_the_wall_from_the_one_that_sees_it(
     tmp_path: Path, flood: Callable[[int], bytes], hz: int
 ) -> None:

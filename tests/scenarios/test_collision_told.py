@@ -40,7 +40,7 @@ def test_in_lines_table_figures_record_and_picture(tmp_path: Path, monkeypatch: 
         "drive",
         "glass.toml",
         "--time-limit-s",
-        "70",
+        "60",
         "--json",
         "figures.json",
         "--record",

@@ -99,8 +99,10 @@ OVERCOME: dict[str, tuple[Fault, ...]] = {
 }
 
 
-OFTEN_SHOWN = ("out of order and twice", "outages", "lost and damaged", "late", "pilot")
-"""Like what the plan of a poor radio below does, and tests of a pilot; make test-all drives them too."""
+OFTEN_SHOWN = ("out of order and twice", "outages", "lost and damaged", "late", "pilot", "gps for a moment")
+"""Like what the shipped plans below do, and tests of a pilot; make test-all drives them too."""
+TOLD_ELSEWHERE = ("pilot stays", "blind")
+"""By tests of safety; make test-all drives them here, too."""
 
 
 @pytest.mark.parametrize(
@@ -122,7 +124,9 @@ STOPPED: dict[str, tuple[tuple[Fault, ...], int, str]] = {
 }
 
 
-@pytest.mark.parametrize("name", STOPPED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.thorough if name in TOLD_ELSEWHERE else ()) for name in STOPPED]
+)
 def test_a_rover_that_stops_says_why(name: str) -> None:
     faults, armed, words = STOPPED[name]
     run = Run(FaultPlan(faults), limit_s=85.0)
@@ -145,6 +149,7 @@ def test_a_low_battery_that_must_stop_the_rover_does() -> None:
     assert run.report.collisions == 0
 
 
+@pytest.mark.thorough
 def test_same_seed_same_run() -> None:
     plan = load_faults(MISSIONS / "faults" / "gps.toml")
     plan = replace(plan, faults=plan.faults + load_faults(MISSIONS / "faults" / "radio.toml").faults)

@@ -14,19 +14,27 @@ ROOT = Path(__file__).resolve().parents[2]
 RUNS = 6
 
 
-@pytest.fixture(scope="module")
-def made(tmp_path_factory):
-    """The unknown maps, once: exit code, output, figures and the folder of documents."""
-    folder = tmp_path_factory.mktemp("maps")
-    arguments = ["experiment", "kwasniewski-maps", "--runs", str(RUNS), "--seed", "1000"]
-    result = CliRunner().invoke(app, [*arguments, "--json", str(folder / "out.json"), "--docs", str(folder / "docs")])
+def experiment(*arguments: str) -> str:
+    """What ``kwasniewski-maps`` prints."""
+    result = CliRunner().invoke(app, ["experiment", "kwasniewski-maps", "--seed", "1000", *arguments])
     assert result.exit_code == 0, result.output
-    return result.output, json.loads((folder / "out.json").read_text()), folder / "docs"
+    return result.output
 
 
-def test_every_run_reaches_the_target_on_every_map_in_both_profiles(made):
+def test_the_unknown_maps(tmp_path):
+    """One test, so that one worker makes them, once."""
+    file, docs = tmp_path / "out.json", tmp_path / "docs"
+    output = experiment("--runs", str(RUNS), "--json", str(file), "--docs", str(docs))
+    figures = json.loads(file.read_text())
+    check_every_run_reaches_the_target_on_every_map_in_both_profiles(figures)
+    check_the_terminal_shows_a_table_for_each_profile_in_80_columns(output)
+    check_the_documents_have_tables_and_pictures(docs)
+    experiment("--runs", "2", "--jobs", "2", "--json", str(tmp_path / "two.json"))
+    check_results_do_not_depend_on_the_number_of_jobs(figures, json.loads((tmp_path / "two.json").read_text()))
+
+
+def check_every_run_reaches_the_target_on_every_map_in_both_profiles(figures):
     """The figure to hold is 100 of 100. Were it 90 of 100, these 48 runs would show it with a chance of 0.994."""
-    _, figures, _ = made
     assert figures["runs"] == RUNS and figures["step_limit"] == 2000
     assert figures["versions"]["numba"] and figures["settings"]["planner"]["mixing"] == 0.8
     cases = {(result["profile"], result["map"]): result for result in figures["results"]}
@@ -40,15 +48,13 @@ def test_every_run_reaches_the_target_on_every_map_in_both_profiles(made):
     assert min(cases["default", "rooms"]["steps"]) > 150, "through the doors, not through the walls"
 
 
-def test_the_terminal_shows_a_table_for_each_profile_in_80_columns(made):
-    output, _, _ = made
+def check_the_terminal_shows_a_table_for_each_profile_in_80_columns(output):
     for profile in ("default", "paper"):
         assert f"profile {profile}" in output
     assert output.count(f"{RUNS}/{RUNS}") == 8 and "…" not in output
 
 
-def test_the_documents_have_tables_and_pictures(made):
-    _, _, docs = made
+def check_the_documents_have_tables_and_pictures(docs):
     page = (docs / "results.md").read_text()
     assert page.count(f"{RUNS}/{RUNS}") == 8 and "not available" in page
     for what in ("paths", "times", "steps"):
@@ -56,12 +62,8 @@ def test_the_documents_have_tables_and_pictures(made):
         assert (docs / "images" / f"kwasniewski-maps-{what}.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_results_do_not_depend_on_the_number_of_jobs(made, tmp_path):
-    _, alone, _ = made
-    file = tmp_path / "two.json"
-    arguments = ["experiment", "kwasniewski-maps", "--runs", "2", "--seed", "1000", "--jobs", "2", "--json", str(file)]
-    assert CliRunner().invoke(app, arguments).exit_code == 0
-    for one, two in zip(alone["results"], json.loads(file.read_text())["results"], strict=True):
+def check_results_do_not_depend_on_the_number_of_jobs(alone, both):
+    for one, two in zip(alone["results"], both["results"], strict=True):
         for key in ("steps", "return_steps", "searches"):
             assert one[key][:2] == two[key]
 

@@ -81,7 +81,9 @@ DRIVING_S = 3.0
 @pytest.mark.parametrize(
     ("fault", "says"),
     [
-        (LidarFault(DRIVING_S, since="driving", unplugged=True), "lidar 1 (LD19)"),
+        pytest.param(
+            LidarFault(DRIVING_S, since="driving", unplugged=True), "lidar 1 (LD19)", marks=pytest.mark.thorough
+        ),
         pytest.param(
             LidarFault(DRIVING_S, since="driving", stalled=True), "lidar 1 (LD19)", marks=pytest.mark.thorough
         ),

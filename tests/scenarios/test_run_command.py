@@ -123,7 +123,9 @@ def test_a_peer_that_is_not_there_is_waited_for_until_ctrl_c(tmp_path: Path) -> 
     assert "Traceback" not in err
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT, signal.SIGHUP])
+@pytest.mark.parametrize(
+    "number", [signal.SIGTERM, signal.SIGINT, pytest.param(signal.SIGHUP, marks=pytest.mark.thorough)]
+)
 @pytest.mark.slow
 def test_a_signal_while_driving_stops_the_rover(tmp_path: Path, number: signal.Signals) -> None:
     mission = yard(tmp_path)

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Any
 
 CASES = [
-    ("drive", "crossing.toml", "vertex++", "points", "75"),
-    ("drive", "ackermann.toml", "hybrid", "motion-ga", "85"),  # led by points
-    ("drive", "one-obstacle.toml", "hybrid", "motion-ga", "70"),
+    ("drive", "crossing.toml", "vertex++", "points", "64"),
+    ("drive", "ackermann.toml", "hybrid", "motion-ga", "66"),  # led by points
+    ("drive", "one-obstacle.toml", "hybrid", "motion-ga", "62"),
     ("serve", "open.toml", "beams"),
     ("serve", "ackermann.toml", "lidar-360"),
 ]

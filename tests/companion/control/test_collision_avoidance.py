@@ -197,7 +197,7 @@ def test_a_plan_of_meeting_by_chance_is_never_driven_into() -> None:
     """Played through: whatever crosses the straight way at an even speed, a rover that obeys is never touched."""
     chance = np.random.default_rng(7)
     ground = open_ground()
-    for _ in range(60):
+    for _ in range(20):
         meets_s, pace_m_s = chance.uniform(2.0, 7.0), chance.uniform(0.5, 1.5) * chance.choice((-1.0, 1.0))
         moving = Moving("m", 100.0, NedPoint(20.0 + 1.8 * meets_s, 20.0 - pace_m_s * meets_s), 0.0, pace_m_s, 0.5)
         north_m, speed_m_s, gaps = 20.0, 1.5, []
