@@ -166,6 +166,11 @@ class Simulator:
         return float(self._rover[0]["driven_m"])
 
     @property
+    def drawn_ah(self) -> float:
+        """Ampere-hours drawn from the battery."""
+        return float(self._rover[0]["drawn_ah"])
+
+    @property
     def clearance_m(self) -> float:
         """Metres between the rover's outline and the nearest obstacle, moving or not; 0 to 5."""
         truth = self.truth

@@ -38,6 +38,11 @@ def stopwatch_s() -> float:
     return time.perf_counter()
 
 
+def processor_s() -> float:
+    """Seconds of the processor that this process has used (never for decisions)."""
+    return time.process_time()
+
+
 def unix_time_us() -> int:
     """Microseconds since 1970, for records that people read (never for decisions)."""
     return time.time_ns() // 1000

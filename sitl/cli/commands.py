@@ -7,6 +7,7 @@ from typing import Annotated
 import typer
 
 from companion.cli.inputs import version_option
+from sitl.cli.campaign import campaign
 from sitl.cli.drive import drive
 from sitl.cli.experiment import experiment
 from sitl.cli.missions import missions
@@ -31,3 +32,4 @@ app.command()(serve)
 app.command()(physics)
 app.command()(missions)
 app.command()(experiment)
+app.command()(campaign)

@@ -1,0 +1,1 @@
+"""Campaigns: many drives from one file, kept one by one, summed up with intervals."""

@@ -1,0 +1,121 @@
+"""Campaign files: what is driven, as lists of which every combination is one run for each seed.
+
+Nouns: campaign, axis.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from companion.planning.registry import UnknownPlannerError, make_planner
+from companion.settings import PlannerSettings, SettingsError
+from companion.settings.settings import ControllerKind
+from companion.settings.settings_file import parse_settings
+from companion.storage.toml_file import read_table
+from sitl.experiments.narrow_grounds import GroundKind
+from sitl.faults.fault_file import FaultFileError, load_faults
+
+NOTHING = "none"
+"""No faults."""
+OWN = "own"
+"""The sensors that the mission names; generated ground is driven with ``USUAL_SENSORS``."""
+SHIPPED = "shipped"
+"""The name of the settings without a change."""
+Share = Annotated[float, Field(ge=0.0, le=0.9)]
+Seconds = Annotated[float, Field(ge=0.0, le=2.0)]
+MOST_RUNS = 1_000_000
+
+
+class CampaignError(Exception):
+    """A campaign that cannot be driven; the text is one line with file, place and remedy."""
+
+
+class CampaignTable(BaseModel):
+    """The file. All lists are axes; the first value of each is what the others are compared with."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
+
+    name: str = Field(default="", max_length=100)
+    worlds: list[str] = Field(min_length=1)
+    seed: int = Field(default=0, ge=0)
+    runs: int = Field(default=30, ge=1)
+    planners: list[str] = Field(default=["hybrid"], min_length=1)
+    controllers: list[ControllerKind] = Field(default=["points"], min_length=1)
+    sensors: list[str] = Field(default=[OWN], min_length=1)
+    faults: list[str] = Field(default=[NOTHING], min_length=1)
+    guard: list[bool] = Field(default=[False], min_length=1)
+    off_model: list[Share] = Field(default=[0.0], min_length=1)
+    late_s: list[Seconds] = Field(default=[0.0], min_length=1)
+    time_limit_s: float = Field(default=1800.0, gt=0.0, le=36000.0)
+    settings: dict[str, dict[str, Any]] = Field(default={SHIPPED: {}}, min_length=1)
+
+
+def load_campaign(path: Path) -> CampaignTable:
+    """Read a campaign. Files that it names count from its own folder, and must be there.
+
+    Raises CampaignError: one line with file, place, reason and remedy.
+    """
+    table = read_table(path, CampaignTable, CampaignError, "docs/campaigns.md describes the file")
+    folder = path.resolve().parent
+    _check_names(path, table)
+    count = run_count(table)
+    if count > MOST_RUNS:
+        raise CampaignError(f"{path}: {count} runs are more than {MOST_RUNS}; make the lists shorter")
+    for world in table.worlds:
+        _check_world(path, folder, world)
+    for plan in table.faults:
+        _check_faults(path, folder, plan)
+    return table.model_copy(update={"name": table.name or path.stem})
+
+
+def run_count(table: CampaignTable) -> int:
+    """How many runs there are."""
+    lists = (
+        table.worlds, table.planners, table.controllers, table.sensors, table.faults, table.guard, table.off_model,
+        table.late_s, table.settings,
+    )  # fmt: skip
+    count = table.runs
+    for values in lists:
+        count *= len(values)
+    return count
+
+
+def _check_names(path: Path, table: CampaignTable) -> None:
+    for number, name in enumerate(table.planners, 1):
+        try:
+            make_planner(name, PlannerSettings())
+        except UnknownPlannerError as error:
+            raise CampaignError(f"{path}: planners {number}: {error}") from error
+    for name, values in table.settings.items():
+        try:
+            parse_settings({**values}, f"{path}: settings.{name}")
+        except SettingsError as error:
+            raise CampaignError(str(error)) from error
+        for section, key, axis in (("guidance", "controller", "controllers"), ("navigator", "planner", "planners")):
+            if key in values.get(section, {}):
+                raise CampaignError(
+                    f"{path}: settings.{name}: {section}.{key}: stands in the list {axis}; name it there"
+                )
+    for axis in ("worlds", "planners", "controllers", "sensors", "faults", "guard", "off_model", "late_s"):
+        values_of = getattr(table, axis)
+        if len(set(values_of)) < len(values_of):
+            raise CampaignError(f"{path}: {axis}: a value stands there twice; each combination is driven once")
+
+
+def _check_world(path: Path, folder: Path, world: str) -> None:
+    """It must be a kind of ground or a mission. Raises CampaignError."""
+    if world not in set(GroundKind) and not (folder / world).is_file():
+        kinds = ", ".join(GroundKind)
+        raise CampaignError(f"{path}: worlds: {world!r:.80} is no kind of ground ({kinds}) and no mission file")
+
+
+def _check_faults(path: Path, folder: Path, plan: str) -> None:
+    """It must be a plan that can be used. Raises CampaignError."""
+    if plan != NOTHING:
+        try:
+            load_faults(folder / plan)
+        except FaultFileError as error:
+            raise CampaignError(f"{path}: faults: {error}") from error

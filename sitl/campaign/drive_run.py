@@ -1,0 +1,139 @@
+"""Drives one run of a campaign, in lock-step.
+
+Nouns: campaign run.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from companion.core.clock import processor_s
+from companion.executive.mission_progress import TargetStatus
+from companion.mission.load import load_mission
+from companion.mission.mission import GridSpec, HomePoint, Mission, OnBlocked, RoverSpec, SitlSpec, Target
+from companion.recording.recorder import NullRecorder, Recorder
+from companion.settings import Settings
+from companion.settings.settings_file import parse_settings
+from sitl.campaign.campaign_file import NOTHING, OWN
+from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.experiments.dead_companion import STOOD_M_S
+from sitl.experiments.experiment import GUARD
+from sitl.experiments.narrow_grounds import GroundKind, NarrowGround, drawn
+from sitl.experiments.off_model import off_model
+from sitl.faults.fault_file import load_faults
+from sitl.lockstep import Drive, TrackPoint
+from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
+from sitl.world.truth import SimStart
+
+USUAL_SENSORS = "lidar-360"
+"""On generated ground."""
+STREAM = 71
+"""Separates what the rover is like from all other random draws with the same seed."""
+ERROR = "error"
+LEAST_S = 2.0
+"""Of the time in one metre square that is kept."""
+
+
+def drive(spec: RunSpec, folder: Path) -> RunResult:
+    """One run. ``folder``: that of the campaign's file. An error of the programs is a result, too."""
+    began_s = processor_s()
+    try:
+        run = prepared(spec, folder)
+        run.run()
+    except Exception as error:
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        return RunResult("", ERROR, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0, 0, processor_s() - began_s, text[:300])
+    return _result(run, processor_s() - began_s)
+
+
+def prepared(spec: RunSpec, folder: Path, recorder: Recorder | NullRecorder | None = None) -> Drive:
+    """The run, ready to be driven."""
+    mission, scenario = _mission_and_scenario(spec, folder)
+    settings = settings_of(spec)
+    return Drive(
+        mission, scenario, settings, spec.seed, recorder or NullRecorder(), spec.time_limit_s, late_s=spec.late_s
+    )
+
+
+def settings_of(spec: RunSpec) -> Settings:
+    """The variant's settings, with the run's planner and controller."""
+    changes = json.loads(spec.changes)
+    changes.setdefault("navigator", {})["planner"] = spec.planner
+    changes.setdefault("guidance", {})["controller"] = spec.controller
+    return parse_settings(changes, f"settings.{spec.settings}")
+
+
+def mission_of(spec: RunSpec, folder: Path) -> Mission:
+    """The mission that is driven, with the run's sensors."""
+    if spec.world in set(GroundKind):
+        mission = _mission_on(drawn(GroundKind(spec.world), spec.seed))
+    else:
+        mission = load_mission(folder / spec.world)
+    if spec.sensors == OWN:
+        return mission
+    return with_sensors(mission, str(folder / spec.sensors) if spec.sensors.endswith(".toml") else spec.sensors)
+
+
+def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenario]:
+    mission = mission_of(spec, folder)
+    scenario = scenario_from_mission(mission)
+    if spec.world in set(GroundKind):
+        ground = drawn(GroundKind(spec.world), spec.seed)
+        start = SimStart(*ground.start_m, np.pi / 2.0, scenario.start.home)
+        scenario = replace(scenario, world=ground.world, start=start)
+    if spec.faults != NOTHING:
+        scenario = with_faults(scenario, load_faults(folder / spec.faults))
+    if spec.guard:
+        scenario = replace(scenario, parameters={**scenario.parameters, **GUARD})
+    if spec.off_model > 0.0 and mission.rover.turning_radius_m <= 0.0:
+        drivetrain, limits = off_model(np.random.default_rng((spec.seed, STREAM)), spec.off_model)
+        scenario = replace(scenario, drivetrain=drivetrain, parameters={**scenario.parameters, **limits})
+    return mission, scenario
+
+
+def _mission_on(ground: NarrowGround) -> Mission:
+    """From one side of generated ground to the other; nothing but the target is given."""
+    place = HomePoint(ground.goal_m[0] - ground.start_m[0], ground.goal_m[1] - ground.start_m[1])
+    target = Target("goal", place, 0.0, OnBlocked.SKIP)
+    sitl = SitlSpec(heading_deg=90.0, sensors=USUAL_SENSORS)
+    return Mission(f"{ground.kind}", (target,), GridSpec(margin_m=30.0, by_footprint=True), RoverSpec(), sitl=sitl)
+
+
+def _result(run: Drive, cpu_s: float) -> RunResult:
+    report, executor, hits = run.report, run.companion.executor, run.simulator.collisions
+    run_into = sum(hit.mover is not None and abs(hit.speed_m_s) < STOOD_M_S for hit in hits)
+    statuses = Counter(status for _, status in report.targets)
+    return RunResult(
+        led_by="" if executor is None else executor.controller,
+        outcome=report.outcome.value,
+        reached=statuses[TargetStatus.REACHED],
+        targets=len(report.targets),
+        touched=len(hits) - run_into,
+        run_into=run_into,
+        refused=report.refused,
+        unreachable=statuses[TargetStatus.UNREACHABLE],
+        seconds=round(report.driving_time_s, 2),
+        metres=round(report.distance_m, 2),
+        drawn_ah=round(run.simulator.drawn_ah, 4),
+        steps=report.steps,
+        searches=report.searches,
+        cpu_s=round(cpu_s, 2),
+        said=report.said[-1][:300] if report.said else "",
+        dwelt=_dwelt(report.track),
+    )
+
+
+def _dwelt(track: list[TrackPoint]) -> tuple[tuple[int, int, int], ...]:
+    """See ``RunResult``. From the first movement on: before it the autopilot starts."""
+    places = [(one.north_m, one.east_m) for one in track]
+    begun = next((number for number, place in enumerate(places) if place != places[0]), 0)
+    spent: dict[tuple[int, int], float] = {}
+    for one, following in zip(track[begun:], track[begun + 1 :], strict=False):
+        square = int(one.north_m // 1.0), int(one.east_m // 1.0)
+        spent[square] = spent.get(square, 0.0) + following.time_s - one.time_s
+    return tuple((north, east, round(time_s)) for (north, east), time_s in spent.items() if time_s >= LEAST_S)

@@ -1,0 +1,103 @@
+"""Pictures of a campaign's report: distributions of driving times, and where the time went.
+
+Nouns: heat map.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from companion.mission.load import load_mission
+from sitl.campaign.campaign_file import CampaignTable
+from sitl.campaign.run_spec import RunResult
+from sitl.campaign.summary import Runs, shown, varied
+from sitl.experiments import drawing
+from sitl.experiments.narrow_grounds import GroundKind
+from sitl.scenario import scenario_from_mission
+
+COLOURS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.RED, drawing.GREY, "#7b5ea7", "#56b4e9", "#444444")
+
+
+def times(campaign: CampaignTable, runs: Runs) -> Figure:
+    """For each world the share of complete runs that took at most so long, a line for each combination."""
+    axes = [axis for axis in varied(campaign) if axis != "world"]
+    worlds = [world for world in campaign.worlds if any(spec.world == world and one.complete for spec, one in runs)]
+    columns = min(3, len(worlds))
+    lines = -(-len(worlds) // columns)
+    figure = Figure(figsize=(4.2 * columns + 0.6, 3.0 * lines + 0.6), layout="constrained")
+    panels = figure.subplots(lines, columns, squeeze=False).ravel()
+    for panel, world in zip(panels, worlds, strict=False):
+        groups: dict[str, list[float]] = {}
+        for spec, result in runs:
+            if spec.world == world and result.complete:
+                name = ", ".join(_named(axis, getattr(spec, axis)) for axis in axes) or "all"
+                groups.setdefault(name, []).append(result.seconds)
+        for number, (name, seconds) in enumerate(groups.items()):
+            at_s = np.sort(seconds)
+            shares = np.arange(1, len(at_s) + 1) / len(at_s)
+            panel.step(at_s, shares, where="post", label=name, color=COLOURS[number % len(COLOURS)])
+        drawing.title(panel, Path(world).stem)
+        panel.set_ylim(0.0, 1.02)
+        panel.spines[["top", "right"]].set_visible(False)
+        panel.set_xlabel("driving time, s", fontsize=8)
+        panel.tick_params(labelsize=8)
+    for panel in panels[len(worlds) :]:
+        panel.set_visible(False)
+    panels[0].set_ylabel("share of complete runs", fontsize=8)
+    handles, labels = panels[0].get_legend_handles_labels()
+    if len(labels) > 1:
+        figure.legend(handles, labels, loc="outside lower center", ncols=min(3, len(labels)), frameon=False, fontsize=8)
+    return figure
+
+
+def _named(axis: str, value: object) -> str:
+    return f"{axis} {shown(value)}" if isinstance(value, bool | float) else shown(value)
+
+
+def heat_maps(runs: Runs, folder: Path) -> list[tuple[str, Figure]]:
+    """Of each world that is the same for every seed: the mission's name and its picture."""
+    results: dict[str, list[RunResult]] = {}
+    for spec, result in runs:
+        if spec.world not in set(GroundKind):
+            results.setdefault(spec.world, []).append(result)
+    return [(world, _heat_map(folder / world, own)) for world, own in results.items()]
+
+
+def _heat_map(mission_file: Path, results: list[RunResult]) -> Figure:
+    spent: dict[tuple[int, int], float] = {}
+    for result in results:
+        for north, east, seconds in result.dwelt:
+            spent[north, east] = spent.get((north, east), 0.0) + seconds / len(results)
+    scenario = scenario_from_mission(load_mission(mission_file))
+    north_m, east_m = _extent(list(spent), scenario.start.north_m, scenario.start.east_m)
+    shares = np.full((north_m[1] - north_m[0], east_m[1] - east_m[0]), np.nan)
+    for (north, east), mean_s in spent.items():
+        shares[north - north_m[0], east - east_m[0]] = mean_s
+    figure = Figure(figsize=(8.0, 1.2 + 7.0 * min(1.2, shares.shape[0] / shares.shape[1])), layout="constrained")
+    panel = figure.subplots()
+    solid: NDArray[np.bool_] = scenario.world.obstacles
+    side_m = scenario.world.resolution_m
+    if solid.size > 1:
+        walls = np.where(solid, 1.0, np.nan)
+        edges = (0.0, solid.shape[1] * side_m, 0.0, solid.shape[0] * side_m)
+        panel.imshow(walls, origin="lower", extent=edges, cmap="gray", vmin=0.0, vmax=4.0, interpolation="nearest")
+    shown_at = (east_m[0], east_m[1], north_m[0], north_m[1])
+    image = panel.imshow(shares, origin="lower", extent=shown_at, cmap="YlOrRd", vmin=0.0, interpolation="nearest")
+    panel.set_xlim(east_m[0], east_m[1])
+    panel.set_ylim(north_m[0], north_m[1])
+    panel.plot(scenario.start.east_m, scenario.start.north_m, "^", color=drawing.BLUE, markersize=8)
+    panel.set_xlabel("metres east", fontsize=8)
+    panel.set_ylabel("metres north", fontsize=8)
+    drawing.title(panel, f"{mission_file.stem}: {len(results)} runs")
+    figure.colorbar(image, ax=panel, label="seconds in a square metre", shrink=0.8)
+    return figure
+
+
+def _extent(places: list[tuple[int, int]], north_m: float, east_m: float) -> tuple[tuple[int, int], tuple[int, int]]:
+    """From where to where, north and east, with two metres round it."""
+    norths, easts = [int(north_m), *(place[0] for place in places)], [int(east_m), *(place[1] for place in places)]
+    return (min(norths) - 2, max(norths) + 3), (min(easts) - 2, max(easts) + 3)

@@ -1,0 +1,130 @@
+"""The report of a campaign: one HTML file with tables, distributions, paired differences and where time was lost.
+
+Nouns: campaign report.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+import shlex
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+from sitl.campaign.campaign_file import CampaignTable, run_count
+from sitl.campaign.pictures import heat_maps, times
+from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.campaign.summary import HEAD, PAIR_HEAD, Runs, differences, rows, shown, varied
+
+MOST_LISTED = 200
+SLOWEST = 10
+STYLE = """
+:root { color-scheme: light dark; --line: #8886; --soft: #8882; }
+body { font: 15px/1.5 system-ui, sans-serif; max-width: 75rem; margin: 2rem auto; padding: 0 1rem; }
+h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
+.scroll { overflow-x: auto; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
+th { background: var(--soft); } th.text, td.text { text-align: left; }
+td.wide { white-space: normal; min-width: 18rem; text-align: left; }
+figure { margin: 1rem 0; background: #fff; padding: .5rem; display: inline-block; max-width: 100%; }
+img { max-width: 100%; height: auto; }
+code { font-size: .85em; background: var(--soft); padding: .1rem .3rem; user-select: all; }
+"""
+
+
+def write_report(file: Path, campaign: CampaignTable, runs: Runs, source: Path) -> None:
+    """Write it. ``source``: the campaign's file, for the commands that drive a run again. Raises OSError."""
+    file.write_text(page(campaign, runs, source), encoding="utf-8")
+
+
+def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
+    """The whole page; it loads nothing."""
+    axes = varied(campaign)
+    pairs = [(one.axis, one.world, one.value, one.other, *one.cells) for one in differences(campaign, runs)]
+    parts = [
+        f"<h1>{html.escape(campaign.name)}</h1>",
+        f"<p>{len(runs)} of {run_count(campaign)} runs, seeds {campaign.seed} to {campaign.seed + campaign.runs - 1}. "
+        "Companion and simulator in lock-step. <i>complete</i>: every target reached and nothing touched, with its "
+        "exact 95 % interval; <i>touched</i>: contacts while the rover moved; <i>run into</i>: it stood, and something "
+        "that moves came along; <i>refused</i>: setpoints that the last look replaced by a stop; <i>mean s</i>, "
+        "<i>metres</i>, <i>mAh</i>: driving time with its 95 % interval, distance and charge of complete runs.</p>",
+        _table((*axes, *HEAD), rows(campaign, runs), len(axes)),
+    ]
+    if pairs:
+        parts += [
+            "<h2>Pairs</h2><p>Two runs that differ in one axis only: same world, same seed. Each value against the "
+            "axis's first one; times where both are complete, 95 % intervals by resampling pairs.</p>",
+            _table(("axis", "world", "value", "against", *PAIR_HEAD), pairs, 4),
+        ]
+    if any(result.complete for _, result in runs):
+        parts += ["<h2>Driving times</h2>", _figure(times(campaign, runs), "driving times of complete runs")]
+    maps = heat_maps(runs, source.resolve().parent)
+    if maps:
+        parts.append("<h2>Where the time goes</h2><p>Seconds in each square of one metre, mean of all runs.</p>")
+        parts += [_figure(figure, f"where the time goes: {world}") for world, figure in maps]
+    parts += _lists(campaign, runs, source)
+    return _document(campaign.name, parts)
+
+
+def _lists(campaign: CampaignTable, runs: Runs, source: Path) -> list[str]:
+    bad = [one for one in runs if not one[1].complete or one[1].refused]
+    slow = sorted((one for one in runs if one[1].complete), key=lambda one: -one[1].seconds)[:SLOWEST]
+    text = f"<h2>Worth a look: {len(bad)} runs</h2>"
+    listed = [text, _runs(campaign, bad[:MOST_LISTED], source)] if bad else ["<p>Every run was complete.</p>"]
+    return [*listed, "<h2>The slowest</h2>", _runs(campaign, slow, source)] if slow else listed
+
+
+def _runs(campaign: CampaignTable, runs: Sequence[tuple[RunSpec, RunResult]], source: Path) -> str:
+    axes = varied(campaign)
+    lines = [
+        (
+            *(shown(getattr(spec, axis)) for axis in axes), f"{spec.seed}", result.outcome,
+            f"{result.reached} of {result.targets}", f"{result.touched}", f"{result.refused}", f"{result.seconds:.1f}",
+            result.said, _command(spec, source),
+        )
+        for spec, result in runs
+    ]  # fmt: skip
+    head = (*axes, "seed", "outcome", "targets", "touched", "refused", "s", "last word", "drive it again")
+    return _table(head, lines, len(axes), wide=(len(head) - 2,), code=(len(head) - 1,))
+
+
+def _command(spec: RunSpec, source: Path) -> str:
+    return f"rover-sitl campaign {shlex.quote(str(source))} --replay {spec.id} --record {spec.id}"
+
+
+def _table(
+    head: Sequence[str],
+    lines: Iterable[Sequence[str]],
+    texts: int,
+    wide: Sequence[int] = (),
+    code: Sequence[int] = (),
+) -> str:
+    """``texts``: so many columns from the left are words."""
+
+    def cell(number: int, text: str) -> str:
+        inside = html.escape(text)
+        kind = "wide" if number in wide else "text" if number < texts or number in code else ""
+        return f'<td class="{kind}">{f"<code>{inside}</code>" if number in code else inside}</td>'
+
+    top = "".join(f'<th class="{"text" if n < texts else ""}">{html.escape(name)}</th>' for n, name in enumerate(head))
+    body = "".join(f"<tr>{''.join(cell(n, text) for n, text in enumerate(line))}</tr>" for line in lines)
+    return f'<div class="scroll"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _figure(figure: Figure, what: str) -> str:
+    out = io.BytesIO()
+    figure.savefig(out, format="png", dpi=110, metadata={"Software": None})
+    data = base64.b64encode(out.getvalue()).decode()
+    return f'<figure><img alt="{html.escape(what)}" src="data:image/png;base64,{data}"></figure>'
+
+
+def _document(title: str, parts: Iterable[str]) -> str:
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{html.escape(title)}</title>'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">'
+        f"<style>{STYLE}</style></head><body>{''.join(parts)}</body></html>\n"
+    )

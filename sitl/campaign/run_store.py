@@ -1,0 +1,110 @@
+"""The file of a campaign's results: one line a run, appended as it is done, checked when it is read.
+
+A line is JSON: the run, its result, what code made it, and a check sum of the rest. A line that was torn by an end
+before the time, or made by other code or of other files, does not count; a run counts once.
+
+Nouns: run store.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from companion.mission.load import load_mission
+from companion.storage.files import read_at_most
+from sitl.campaign.campaign_file import NOTHING, CampaignError, CampaignTable
+from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.experiments.experiment import code_digest
+from sitl.experiments.narrow_grounds import GroundKind
+
+MOST_BYTES = 2_000_000_000
+
+
+class RunStore:
+    """Results by run."""
+
+    def __init__(self, file: Path, digest: str) -> None:
+        """``digest``: of the code and the campaign's files. Raises CampaignError when the file cannot be read."""
+        self.file = file
+        self.results: dict[str, RunResult] = {}
+        self.torn = 0
+        """Lines that could not be read."""
+        self.older = 0
+        """Lines of other code or other files."""
+        self._digest = digest
+        for line in _lines(file):
+            self._take(line)
+
+    def add(self, spec: RunSpec, result: RunResult) -> None:
+        """Append a result; it is on the disk before this returns. Raises OSError."""
+        if spec.id in self.results:
+            return
+        body = {"run": asdict(spec), "result": asdict(result), "digest": self._digest, "id": spec.id}
+        line = json.dumps({**body, "check": _check_of(body)}, separators=(",", ":"))
+        with self.file.open("a", encoding="utf-8") as out:
+            out.write(line + "\n")
+            out.flush()
+            os.fsync(out.fileno())
+        self.results[spec.id] = result
+
+    def of(self, specs: Iterable[RunSpec]) -> list[tuple[RunSpec, RunResult]]:
+        """These runs as far as they are done."""
+        return [(spec, self.results[spec.id]) for spec in specs if spec.id in self.results]
+
+    def _take(self, line: str) -> None:
+        try:
+            body: dict[str, Any] = json.loads(line)
+            check = body.pop("check")
+            if check != _check_of(body):
+                raise ValueError("check sum")
+            spec, result = RunSpec(**body["run"]), _result(body["result"])
+        except (ValueError, KeyError, TypeError, AttributeError):
+            self.torn += 1
+            return
+        if body["digest"] != self._digest:
+            self.older += 1
+            return
+        self.results.setdefault(spec.id, result)
+
+
+def digest_of(campaign: CampaignTable, folder: Path) -> str:
+    """A name for the code as it stands and for all files that the campaign names."""
+    digest = hashlib.sha256(code_digest().encode())
+    for file in sorted(set(_files(campaign, folder))):
+        digest.update(file.name.encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+def _files(campaign: CampaignTable, folder: Path) -> Iterator[Path]:
+    for world in campaign.worlds:
+        if world not in set(GroundKind):
+            yield from load_mission(folder / world).files
+    yield from (folder / plan for plan in campaign.faults if plan != NOTHING)
+    yield from (folder / one for one in campaign.sensors if one.endswith(".toml"))
+
+
+def _lines(file: Path) -> list[str]:
+    try:
+        data = read_at_most(file, MOST_BYTES) if file.exists() else b""
+    except OSError as error:
+        raise CampaignError(f"{file}: cannot be read: {error.strerror}; choose another folder with --out") from error
+    if data and not data.endswith(b"\n"):
+        # A line that was torn: the next one must not be appended to it.
+        with file.open("ab") as out:
+            out.write(b"\n")
+    return data.decode("utf-8", errors="replace").splitlines()
+
+
+def _result(values: dict[str, Any]) -> RunResult:
+    return RunResult(**{**values, "dwelt": tuple((int(n), int(e), int(s)) for n, e, s in values["dwelt"])})
+
+
+def _check_of(body: dict[str, Any]) -> str:
+    return f"{zlib.crc32(json.dumps(body, sort_keys=True).encode()):08x}"

@@ -1,0 +1,133 @@
+"""What a campaign's runs come to: a row for each combination, and paired differences with intervals.
+
+A pair is two runs that differ in one axis only: same world, same seed. Times are compared where both reached every
+target; intervals are those of 95 %, by resampling pairs.
+
+Nouns: paired difference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sitl.campaign.campaign_file import CampaignTable
+from sitl.campaign.run_spec import AXES, RunResult, RunSpec
+from sitl.experiments.results_page import share_with_interval
+
+Runs = Sequence[tuple[RunSpec, RunResult]]
+DRAWS = 2000
+HEAD = (
+    "runs", "complete", "touched", "run into", "refused", "missed", "errors", "mean s", "95 %", "metres", "mAh",
+)  # fmt: skip
+PAIR_HEAD = ("pairs", "mean s", "compared with s", "difference s", "ratio", "both complete", "only this", "only other")
+
+
+@dataclass(frozen=True, slots=True)
+class PairedDifference:
+    """One value of an axis against the axis's first one, over all pairs of a world."""
+
+    axis: str
+    world: str
+    value: str
+    other: str
+    cells: tuple[str, ...]
+    """As ``PAIR_HEAD``."""
+
+
+def varied(campaign: CampaignTable) -> list[str]:
+    """The axes with more than one value; the world always."""
+    return [axis for axis in AXES if axis == "world" or len(values_of(campaign, axis)) > 1]
+
+
+def values_of(campaign: CampaignTable, axis: str) -> list[object]:
+    """The values of an axis; the first one is what the others are compared with."""
+    values: dict[str, Sequence[object]] = {
+        "world": campaign.worlds,
+        "planner": campaign.planners,
+        "controller": campaign.controllers,
+        "sensors": campaign.sensors,
+        "faults": campaign.faults,
+        "guard": campaign.guard,
+        "off_model": campaign.off_model,
+        "late_s": campaign.late_s,
+        "settings": list(campaign.settings),
+    }
+    return list(values[axis])
+
+
+def rows(campaign: CampaignTable, runs: Runs) -> list[list[str]]:
+    """A row for each combination of the axes that vary, in the order of the file, and one for all."""
+    axes, groups = varied(campaign), dict[tuple[str, ...], list[RunResult]]()
+    for spec, result in runs:
+        groups.setdefault(tuple(shown(getattr(spec, axis)) for axis in axes), []).append(result)
+    table = [[*key, *_row(results)] for key, results in groups.items()]
+    if len(groups) > 1:
+        table.append(["all", *[""] * (len(axes) - 1), *_row([result for _, result in runs])])
+    return table
+
+
+def shown(value: object) -> str:
+    """A value of an axis as text."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def differences(campaign: CampaignTable, runs: Runs) -> Iterator[PairedDifference]:
+    """For each axis that varies and each world: every value against the axis's first one."""
+    for axis in (axis for axis in varied(campaign) if axis != "world"):
+        for world in campaign.worlds:
+            own = [(spec, result) for spec, result in runs if spec.world == world]
+            by_value = dict[str, dict[tuple[object, ...], RunResult]]()
+            for spec, result in own:
+                by_value.setdefault(shown(getattr(spec, axis)), {})[spec.without(axis)] = result
+            first = shown(values_of(campaign, axis)[0])
+            for value, results in by_value.items():
+                if value != first and first in by_value:
+                    yield PairedDifference(axis, world, value, first, _paired(results, by_value[first]))
+
+
+def _row(results: Sequence[RunResult]) -> list[str]:
+    complete = [one for one in results if one.complete]
+    times_s = np.array([one.seconds for one in complete])
+    counts = [sum(getattr(one, name) for one in results) for name in ("touched", "run_into", "refused")]
+    missed = sum(one.targets - one.reached for one in results)
+    errors = sum(one.outcome == "error" for one in results)
+    driven = [[one.metres for one in complete], [1e3 * one.drawn_ah for one in complete]]
+    means = [f"{np.mean(values):.1f}" if complete else "-" for values in driven]
+    low_high = "-" if len(complete) < 2 else "{:.1f} to {:.1f}".format(*interval(times_s))
+    mean_s = f"{times_s.mean():.1f}" if complete else "-"
+    return [
+        f"{len(results)}", share_with_interval(len(complete), len(results)), *map(str, (*counts, missed, errors)),
+        mean_s, low_high, *means,
+    ]  # fmt: skip
+
+
+def interval(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> tuple[float, float]:
+    """The 95 % interval of a mean, by resampling."""
+    picks = np.random.default_rng(0).integers(len(values), size=(DRAWS, len(values)))
+    low, high = np.percentile(values[picks].mean(axis=1), (2.5, 97.5))
+    return float(low), float(high)
+
+
+def _paired(these: dict[tuple[object, ...], RunResult], others: dict[tuple[object, ...], RunResult]) -> tuple[str, ...]:
+    pairs = [(these[key], others[key]) for key in these if key in others]
+    both = np.array([(a.seconds, b.seconds) for a, b in pairs if a.complete and b.complete]).reshape(-1, 2)
+    counts = (
+        f"{len(both)}", f"{sum(a.complete > b.complete for a, b in pairs)}",
+        f"{sum(b.complete > a.complete for a, b in pairs)}",
+    )  # fmt: skip
+    if len(both) < 2:
+        return (f"{len(pairs)}", "-", "-", "-", "-", *counts)
+    low_s, high_s = interval(both[:, 0] - both[:, 1])
+    picks = np.random.default_rng(0).integers(len(both), size=(DRAWS, len(both)))
+    means = both[picks].mean(axis=1)
+    low, high = np.percentile(means[:, 0] / means[:, 1], (2.5, 97.5))
+    mean, other = both.mean(axis=0)
+    return (
+        f"{len(pairs)}", f"{mean:.1f}", f"{other:.1f}", f"{mean - other:+.1f} ({low_s:+.1f} to {high_s:+.1f})",
+        f"{mean / other:.3f} ({low:.3f} to {high:.3f})", *counts,
+    )  # fmt: skip

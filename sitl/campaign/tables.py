@@ -1,0 +1,49 @@
+"""A campaign's runs as tables for other programs: CSV and Parquet, a row a run.
+
+Nouns: none.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import asdict
+from pathlib import Path
+
+from sitl.campaign.campaign_file import CampaignError
+from sitl.campaign.summary import Runs
+
+LEFT_OUT = ("dwelt",)
+
+
+def write_csv(file: Path, runs: Runs) -> None:
+    """A line a run. Raises OSError."""
+    records = records_of(runs)
+    with file.open("w", encoding="utf-8", newline="") as out:
+        writer = csv.DictWriter(out, records[0].keys() if records else ["id"])
+        writer.writeheader()
+        writer.writerows(records)
+
+
+def write_parquet(file: Path, runs: Runs) -> None:
+    """The same for pandas, polars, DuckDB. Raises OSError, and CampaignError if pyarrow is not installed."""
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError as error:
+        raise CampaignError(
+            "--parquet: pyarrow is not installed; install rover-companion[parquet], or leave the option out"
+        ) from error
+    parquet.write_table(pyarrow.Table.from_pylist(records_of(runs)), file)
+
+
+def records_of(runs: Runs) -> list[dict[str, object]]:
+    """A flat record a run: what it was, and what came out."""
+    return [
+        {
+            "id": spec.id,
+            **asdict(spec),
+            **{name: value for name, value in asdict(result).items() if name not in LEFT_OUT},
+            "complete": result.complete,
+        }
+        for spec, result in runs
+    ]

@@ -1,0 +1,159 @@
+"""``rover-sitl campaign``: drives every run of a campaign file, keeps each, and sums up."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+from companion.cli.entry import StoppedError
+from companion.cli.inputs import EXIT_BAD_INPUT, OutputError, writable, written
+from companion.executive.warm_up import COMPILING, kernels_warm, warm_up
+from companion.mapping.map_files import MapError
+from companion.mission.mission import MissionError
+from companion.recording.record_format import RecordError
+from companion.recording.recorder import Recorder
+from sitl.campaign.campaign_file import CampaignError, CampaignTable, load_campaign
+from sitl.campaign.drive_run import mission_of, prepared, settings_of
+from sitl.campaign.run_spec import RunSpec, specs_of
+from sitl.campaign.run_store import RunStore, digest_of
+from sitl.campaign.workers import Done, driven_here, driven_on
+from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
+from sitl.scenario import ScenarioError
+
+EXIT_FAILED = 3
+FILE = "runs.jsonl"
+LINES = 10
+"""Of progress, where there is no terminal for a bar."""
+
+
+def campaign(
+    file: Annotated[Path, typer.Argument(metavar="CAMPAIGN", help="TOML file: docs/campaigns.md describes it.")],
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Folder of the results; default: out/NAME. What is done there is not done again."),
+    ] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes of this machine (needs joblib).")] = 1,
+    cluster: Annotated[
+        str | None,
+        typer.Option(metavar="tcp://HOST:PORT", help="A dask scheduler whose workers drive (needs the extra cluster)."),
+    ] = None,
+    replay: Annotated[
+        str | None, typer.Option(metavar="ID", help="Drive this single run again, with a record; ID as in the report.")
+    ] = None,
+    record: Annotated[Path | None, typer.Option(help="With --replay: the folder of the record.")] = None,
+    parquet: Annotated[
+        bool, typer.Option("--parquet", help=f"Write {PARQUET}, too (needs the extra parquet).")
+    ] = False,
+) -> None:
+    """Drive every run of CAMPAIGN: worlds x planners x controllers x sensors x faults x settings x seeds.
+
+    Exit code 2: bad input; 3: a run ended with an error of the programs; 130: stopped, what is done is kept.
+    """
+    console = Console()
+    try:
+        table, folder = load_campaign(file), file.resolve().parent
+        if replay is not None or record is not None:
+            _drive_again(file, table, folder, replay, record)
+            return
+        place = out or Path("out") / table.name
+        writable(place / FILE)
+        store = RunStore(place / FILE, digest_of(table, folder))
+        specs = list(specs_of(table))
+        _say_what_there_is(store, specs)
+        left = [spec for spec in specs if spec.id not in store.results]
+        if left:
+            _drive(console, left, store, folder, jobs, cluster)
+        put_out(console, table, store.of(specs), file, place, parquet=parquet)
+    except (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError) as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+    errors = sum(result.outcome == "error" for _, result in store.of(specs))
+    if errors:
+        typer.echo(
+            f"{table.name}: {errors} runs ended with an error of the programs; {place / REPORT} lists them", err=True
+        )
+        raise typer.Exit(EXIT_FAILED)
+
+
+def _say_what_there_is(store: RunStore, specs: list[RunSpec]) -> None:
+    done = len(store.of(specs))
+    parts = [f"{done} of {len(specs)} runs are there"] if done else []
+    parts += [f"{store.torn} torn lines are left out"] if store.torn else []
+    parts += [f"{store.older} lines of other code or files are left out"] if store.older else []
+    if parts:
+        typer.echo(f"{store.file}: {', '.join(parts)}", err=True)
+
+
+def _drive(
+    console: Console, left: list[RunSpec], store: RunStore, folder: Path, jobs: int, cluster: str | None
+) -> None:
+    """All that is left. Ctrl-C ends it; what is done is kept."""
+    if cluster is None:
+        _warm_up(left, folder)
+    before = len(store.results)
+    done: Done = driven_here(left, folder, jobs) if cluster is None else driven_on(left, folder, cluster)
+    try:
+        with _progress(console, len(left)) as advance:
+            for spec, result in done:
+                with written(store.file):
+                    store.add(spec, result)
+                advance()
+    except KeyboardInterrupt:
+        kept = len(store.results) - before
+        raise StoppedError(
+            f"{kept} of {len(left)} runs; they are kept in {store.file}, and the same command goes on"
+        ) from None
+
+
+def _warm_up(left: list[RunSpec], folder: Path) -> None:
+    """Once, before several processes would each compile for themselves."""
+    kinds = {(spec.planner, spec.controller, spec.settings, spec.world): spec for spec in left}
+    for spec in kinds.values():
+        settings, radius_m = settings_of(spec), mission_of(spec, folder).rover.turning_radius_m
+        if not kernels_warm(settings, radius_m):
+            typer.echo(COMPILING, err=True)
+            warm_up(settings, radius_m)
+
+
+@contextmanager
+def _progress(console: Console, total: int) -> Iterator[Callable[[], None]]:
+    columns = (
+        TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
+        TextColumn("left:"), TimeRemainingColumn(),
+    )  # fmt: skip
+    done = told = 0
+    with Progress(*columns, console=console, disable=not console.is_terminal) as progress:
+        task = progress.add_task("runs", total=total)
+
+        def advance() -> None:
+            nonlocal done, told
+            done += 1
+            progress.update(task, completed=done)
+            if not console.is_terminal and LINES * done // total > told:
+                told = LINES * done // total
+                typer.echo(f"{done} of {total} runs", err=True)
+
+        yield advance
+
+
+def _drive_again(file: Path, table: CampaignTable, folder: Path, run_id: str | None, record: Path | None) -> None:
+    """One run with a record. Raises CampaignError for an ID that the campaign does not have."""
+    if run_id is None or record is None:
+        raise CampaignError(f"{file}: --replay ID and --record FOLDER go together")
+    spec = next((spec for spec in specs_of(table) if spec.id == run_id), None)
+    if spec is None:
+        raise CampaignError(f"{file}: --replay {run_id:.40}: no run of this campaign; the report names them")
+    writable(record / "meta.json")
+    mission, settings = mission_of(spec, folder), settings_of(spec)
+    recorder = Recorder(record, mission, settings, spec.seed, arm=True, start_us=0)
+    report = prepared(spec, folder, recorder).run()
+    recorder.close()
+    contacts = f", {report.collisions} contacts" if report.collisions else ""
+    typer.echo(f"{spec.world}, seed {spec.seed}: {report.outcome} after {report.driving_time_s:.1f} s{contacts}")
+    typer.echo(f"record: {record}; rover-companion report {record} shows it")
