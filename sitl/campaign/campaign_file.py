@@ -1,10 +1,11 @@
-"""Campaign files: what is driven, as lists of which every combination is one run for each seed.
+"""Campaign files: what is driven, as lists (axes) of which every combination is one run for each seed.
 
-Nouns: campaign, axis.
+Nouns: campaign.
 """
 
 from __future__ import annotations
 
+from copy import deepcopy
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -91,7 +92,7 @@ def _check_names(path: Path, table: CampaignTable) -> None:
             raise CampaignError(f"{path}: planners {number}: {error}") from error
     for name, values in table.settings.items():
         try:
-            parse_settings({**values}, f"{path}: settings.{name}")
+            parse_settings(deepcopy(values), f"{path}: settings.{name}")
         except SettingsError as error:
             raise CampaignError(str(error)) from error
         for section, key, axis in (("guidance", "controller", "controllers"), ("navigator", "planner", "planners")):

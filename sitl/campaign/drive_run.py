@@ -1,7 +1,4 @@
-"""Drives one run of a campaign, in lock-step.
-
-Nouns: campaign run.
-"""
+"""Drives one run of a campaign, in lock-step."""
 
 from __future__ import annotations
 

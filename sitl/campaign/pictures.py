@@ -37,8 +37,8 @@ def times(campaign: CampaignTable, runs: Runs) -> Figure:
                 name = ", ".join(_named(axis, getattr(spec, axis)) for axis in axes) or "all"
                 groups.setdefault(name, []).append(result.seconds)
         for number, (name, seconds) in enumerate(groups.items()):
-            at_s = np.sort(seconds)
-            shares = np.arange(1, len(at_s) + 1) / len(at_s)
+            at_s = np.sort(seconds)[[0, *range(len(seconds))]]
+            shares = np.arange(len(at_s)) / len(seconds)
             panel.step(at_s, shares, where="post", label=name, color=COLOURS[number % len(COLOURS)])
         drawing.title(panel, Path(world).stem)
         panel.set_ylim(0.0, 1.02)

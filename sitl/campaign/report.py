@@ -1,7 +1,4 @@
-"""The report of a campaign: one HTML file with tables, distributions, paired differences and where time was lost.
-
-Nouns: campaign report.
-"""
+"""The report of a campaign: one HTML file with tables, distributions, paired differences and where time was lost."""
 
 from __future__ import annotations
 
@@ -28,7 +25,7 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
 .scroll { overflow-x: auto; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid var(--line); white-space: nowrap; }
-th { background: var(--soft); } th.text, td.text { text-align: left; }
+th { background: var(--soft); vertical-align: bottom; } th.text, td.text { text-align: left; }
 td.wide { white-space: normal; min-width: 18rem; text-align: left; }
 figure { margin: 1rem 0; background: #fff; padding: .5rem; display: inline-block; max-width: 100%; }
 img { max-width: 100%; height: auto; }
@@ -73,27 +70,29 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
 def _lists(campaign: CampaignTable, runs: Runs, source: Path) -> list[str]:
     bad = [one for one in runs if not one[1].complete or one[1].refused]
     slow = sorted((one for one in runs if one[1].complete), key=lambda one: -one[1].seconds)[:SLOWEST]
-    text = f"<h2>Worth a look: {len(bad)} runs</h2>"
-    listed = [text, _runs(campaign, bad[:MOST_LISTED], source)] if bad else ["<p>Every run was complete.</p>"]
-    return [*listed, "<h2>The slowest</h2>", _runs(campaign, slow, source)] if slow else listed
+    again = f"rover-sitl campaign {shlex.quote(str(source))} --replay ID --record FOLDER"
+    parts = [
+        "<h2>Worth a look</h2>",
+        f"<p>To drive one run again, with a record: <code>{html.escape(again)}</code></p>",
+    ]
+    more = f"; the first {MOST_LISTED} of them" if len(bad) > MOST_LISTED else ""
+    parts += [f"<p>{len(bad)} runs were not complete, or had a setpoint refused{more}.</p>"] if bad else []
+    parts += [_runs(campaign, bad[:MOST_LISTED])] if bad else ["<p>Every run was complete.</p>"]
+    return [*parts, "<h2>The slowest</h2>", _runs(campaign, slow)] if slow else parts
 
 
-def _runs(campaign: CampaignTable, runs: Sequence[tuple[RunSpec, RunResult]], source: Path) -> str:
+def _runs(campaign: CampaignTable, runs: Sequence[tuple[RunSpec, RunResult]]) -> str:
     axes = varied(campaign)
     lines = [
         (
             *(shown(getattr(spec, axis)) for axis in axes), f"{spec.seed}", result.outcome,
             f"{result.reached} of {result.targets}", f"{result.touched}", f"{result.refused}", f"{result.seconds:.1f}",
-            result.said, _command(spec, source),
+            result.said, spec.id,
         )
         for spec, result in runs
     ]  # fmt: skip
-    head = (*axes, "seed", "outcome", "targets", "touched", "refused", "s", "last word", "drive it again")
+    head = (*axes, "seed", "outcome", "targets", "touched", "refused", "s", "last word", "ID")
     return _table(head, lines, len(axes), wide=(len(head) - 2,), code=(len(head) - 1,))
-
-
-def _command(spec: RunSpec, source: Path) -> str:
-    return f"rover-sitl campaign {shlex.quote(str(source))} --replay {spec.id} --record {spec.id}"
 
 
 def _table(

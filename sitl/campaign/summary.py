@@ -22,7 +22,7 @@ DRAWS = 2000
 HEAD = (
     "runs", "complete", "touched", "run into", "refused", "missed", "errors", "mean s", "95 %", "metres", "mAh",
 )  # fmt: skip
-PAIR_HEAD = ("pairs", "mean s", "compared with s", "difference s", "ratio", "both complete", "only this", "only other")
+PAIR_HEAD = ("pairs", "mean s", "against s", "difference s", "ratio", "both complete", "only this", "only other")
 
 
 @dataclass(frozen=True, slots=True)

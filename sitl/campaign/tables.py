@@ -1,7 +1,4 @@
-"""A campaign's runs as tables for other programs: CSV and Parquet, a row a run.
-
-Nouns: none.
-"""
+"""A campaign's runs as tables for other programs: CSV and Parquet, a row a run."""
 
 from __future__ import annotations
 

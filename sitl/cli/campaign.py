@@ -68,7 +68,7 @@ def campaign(
         _say_what_there_is(store, specs)
         left = [spec for spec in specs if spec.id not in store.results]
         if left:
-            _drive(console, left, store, folder, jobs, cluster)
+            _drive(console, table, left, store, folder, jobs, cluster)
         put_out(console, table, store.of(specs), file, place, parquet=parquet)
     except (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError) as error:
         typer.echo(str(error), err=True)
@@ -91,13 +91,19 @@ def _say_what_there_is(store: RunStore, specs: list[RunSpec]) -> None:
 
 
 def _drive(
-    console: Console, left: list[RunSpec], store: RunStore, folder: Path, jobs: int, cluster: str | None
+    console: Console,
+    table: CampaignTable,
+    left: list[RunSpec],
+    store: RunStore,
+    folder: Path,
+    jobs: int,
+    cluster: str | None,
 ) -> None:
     """All that is left. Ctrl-C ends it; what is done is kept."""
     if cluster is None:
         _warm_up(left, folder)
     before = len(store.results)
-    done: Done = driven_here(left, folder, jobs) if cluster is None else driven_on(left, folder, cluster)
+    done: Done = driven_here(left, folder, jobs) if cluster is None else driven_on(left, table, folder, cluster)
     try:
         with _progress(console, len(left)) as advance:
             for spec, result in done:

@@ -22,6 +22,7 @@ from companion.cli.run import EXIT_BAD_INPUT, EXIT_MISSED, EXIT_STOPPED
 from companion.cli.service import ALIVE_S
 from companion.mission.sensor_tables import BeamTable, LidarTable, ProximityTable, SensorsTable, SunTable
 from companion.settings import parse_settings
+from sitl.campaign.campaign_file import load_campaign, run_count
 from sitl.faults.fault_file import load_faults
 from sitl.sensors.suites import suite_of
 from sitl.world.world_file import DoorTable, ObstacleTable, RoughTable, SlipperyTable, WorldTable, load_world
@@ -88,6 +89,12 @@ def test_toml_examples_are_understood(where: str, text: str, tmp_path: Path) -> 
     if text.startswith("# faults"):
         (tmp_path / "plan.toml").write_text(text, encoding="utf-8")
         assert load_faults(tmp_path / "plan.toml").faults
+        return
+    if text.startswith("# campaign"):
+        shutil.copy(ROOT / "missions" / "dead-end.toml", tmp_path)
+        (tmp_path / "campaigns").mkdir()
+        (tmp_path / "campaigns" / "c.toml").write_text(text, encoding="utf-8")
+        assert run_count(load_campaign(tmp_path / "campaigns" / "c.toml")) > 1
         return
     if text.startswith("# world"):
         (tmp_path / "world.toml").write_text(text, encoding="utf-8")

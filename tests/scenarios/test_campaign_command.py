@@ -1,0 +1,121 @@
+"""``rover-sitl campaign`` as a user starts it: on this machine, stopped and gone on with, and on a cluster."""
+
+from __future__ import annotations
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from sitl.cli.commands import app
+from tests.sitl.network.test_server import free_port
+from tests.support.rig import yard
+from tests.support.served import finished, mission_path, process, wait_until
+
+CAMPAIGN = """
+worlds = ["yard.toml"]
+runs = 4
+off_model = [0.0, 0.3]
+time_limit_s = 49.0  # the autopilot's start-up takes 43 s
+"""
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Path:
+    assert mission_path(yard(tmp_path)).name == "yard.toml"
+    file = tmp_path / "short.toml"
+    file.write_text(CAMPAIGN)
+    return file
+
+
+def lines_of(folder: Path) -> list[dict[str, Any]]:
+    file = folder / "runs.jsonl"
+    return [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+
+
+def results(folder: Path) -> dict[str, Any]:
+    """By ID, without what depends on the machine."""
+    return {line["id"]: {**line["result"], "cpu_s": 0.0} for line in lines_of(folder)}
+
+
+@contextmanager
+def dask(what: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *arguments]
+    run = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    try:
+        yield run
+    finally:
+        run.kill()
+        run.wait()
+
+
+@pytest.mark.slow
+def test_on_a_cluster_whose_worker_is_killed_the_figures_are_those_of_this_machine(campaign: Path) -> None:
+    here, there = campaign.parent / "here", campaign.parent / "there"
+    address = f"tcp://127.0.0.1:{free_port(socket.SOCK_STREAM)}"
+    worker = (address, "--nthreads", "1", "--no-nanny", "--no-dashboard")
+    with (
+        dask("scheduler", "--host", "127.0.0.1", "--port", address.rpartition(":")[2], "--no-dashboard", "--no-show"),
+        dask("worker", *worker) as killed,
+        dask("worker", *worker),
+        process("sitl", "campaign", campaign, "--cluster", address, "--out", there) as run,
+    ):
+        with process("sitl", "campaign", campaign, "--out", here) as alone:
+            wait_until(lambda: len(lines_of(here)) >= 3)
+            alone.send_signal(signal.SIGINT)
+            code, _, err = finished(alone)
+        assert code == 130 and "they are kept" in err and "Traceback" not in err
+        wait_until(lambda: len(lines_of(there)) >= 2)
+        killed.kill()
+        code, out, err = finished(run)
+    assert code == 0, err
+    assert len(lines_of(there)) == 8 and len(results(there)) == 8, "nothing lost, nothing twice"
+    assert results(here).items() <= results(there).items() and len(results(here)) >= 3
+    assert "off_model" in out and (there / "report.html").stat().st_size > 10_000
+
+
+def test_what_is_done_is_not_done_again_and_a_run_can_be_driven_again(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(campaign.parent)
+    campaign.write_text(CAMPAIGN.replace("runs = 4", "runs = 1"))
+    first = CliRunner().invoke(app, ["campaign", "short.toml", "--jobs", "2", "--parquet"])
+    assert first.exit_code == 0, first.output
+    (one, two) = lines_of(Path("out/short"))
+    assert one["result"]["metres"] > 1.0 and one["result"] != two["result"]
+    again = CliRunner().invoke(app, ["campaign", "short.toml"])
+    assert "2 of 2 runs are there" in again.output and len(lines_of(Path("out/short"))) == 2
+    single = CliRunner().invoke(app, ["campaign", "short.toml", "--replay", two["id"], "--record", "rec"])
+    assert f"{two['result']['outcome']} after {two['result']['seconds']:.1f} s" in single.output
+    assert Path("rec/link.tlog").stat().st_size > 10_000
+    columns = Path("out/short/runs.csv").read_text().splitlines()[0].split(",")
+    from pyarrow import parquet
+
+    assert parquet.read_table("out/short/runs.parquet").column_names == columns
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["missing.toml"], "missing.toml: cannot be read"),
+        (["short.toml", "--replay", "abc"], "--replay ID and --record FOLDER go together"),
+        (["short.toml", "--replay", "abc", "--record", "r"], "no run of this campaign"),
+        (["short.toml", "--out", "/proc/none"], "cannot be written"),
+        (["short.toml", "--cluster", "tcp://127.0.0.1:1"], "nobody answers there"),
+    ],
+)
+def test_what_cannot_be_done_is_one_line(
+    campaign: Path, monkeypatch: pytest.MonkeyPatch, arguments: list[str], says: str
+) -> None:
+    monkeypatch.chdir(campaign.parent)
+    result = CliRunner().invoke(app, ["campaign", *arguments])
+    assert result.exit_code == 2 and says in result.output, result.output
+    assert len(result.output.strip().splitlines()) == 1

@@ -1,0 +1,67 @@
+"""Campaign files: what is read, and what is refused in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sitl.campaign.campaign_file import CampaignError, load_campaign, run_count
+from sitl.campaign.run_spec import specs_of
+
+MISSIONS = Path(__file__).resolve().parents[3] / "missions"
+
+
+def written(folder: Path, text: str) -> Path:
+    file = folder / "c.toml"
+    file.write_text(text)
+    return file
+
+
+def test_each_combination_is_one_run_for_each_seed_and_seeds_come_one_after_the_other(tmp_path: Path) -> None:
+    table = load_campaign(
+        written(
+            tmp_path,
+            'worlds = ["clutter", "yard"]\nseed = 5\nruns = 3\ncontrollers = ["points", "motion-ga"]\n'
+            "guard = [false, true]\n[settings.shipped]\n[settings.wide]\nguidance = { clearance_m = 0.4 }\n",
+        )
+    )
+    specs = list(specs_of(table))
+    assert table.name == "c" and len(specs) == run_count(table) == 3 * 16
+    assert len({spec.id for spec in specs}) == len(specs)
+    assert [spec.seed for spec in specs] == sorted(spec.seed for spec in specs)
+    wide = next(spec for spec in specs if spec.settings == "wide")
+    assert wide.changes == '{"guidance": {"clearance_m": 0.4}}'
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "worlds: field required"),
+        ("worlds = []", "worlds: list should have at least 1 item"),
+        ('worlds = ["moon"]', "worlds: 'moon' is no kind of ground (clutter, rooms, yard"),
+        ('worlds = ["yard"]\nrun = 3', "unknown key, did you mean 'runs'?"),
+        ('worlds = ["yard"]\nruns = 0', "runs: input should be greater than or equal to 1"),
+        ('worlds = ["yard"]\nplanners = ["dijkstr"]', "planners 1: unknown planner 'dijkstr'"),
+        ('worlds = ["yard"]\ncontrollers = ["feet"]', "controllers"),
+        ('worlds = ["yard", "yard"]', "worlds: a value stands there twice"),
+        ('worlds = ["yard"]\nfaults = ["no.toml"]', "no.toml: cannot be read"),
+        ('worlds = ["yard"]\noff_model = [1.5]', "off_model"),
+        ('worlds = ["yard"]\nruns = 2000000', "2000000 runs are more than 1000000"),
+        ('worlds = ["yard"]\n[settings.a]\nguidance = { clear_m = 1.0 }', "settings.a: guidance.clear_m: unknown key"),
+        (
+            'worlds = ["yard"]\n[settings.a]\nguidance = { controller = "dwa" }',
+            "stands in the list controllers; name it there",
+        ),
+    ],
+)
+def test_what_cannot_be_driven_is_one_line_with_file_place_and_remedy(tmp_path: Path, text: str, says: str) -> None:
+    file = written(tmp_path, text)
+    with pytest.raises(CampaignError) as caught:
+        load_campaign(file)
+    assert says in str(caught.value) and str(caught.value).startswith(f"{tmp_path}") and "\n" not in str(caught.value)
+
+
+def test_files_count_from_the_campaigns_own_folder(tmp_path: Path) -> None:
+    (tmp_path / "yard.toml").write_text("[[target]]\nnorth_m = 1.0\neast_m = 2.0\n")
+    assert load_campaign(written(tmp_path, 'worlds = ["yard.toml"]')).worlds == ["yard.toml"]
