@@ -36,7 +36,8 @@ class ScanInCells(NamedTuple):
 class InverseSensorModel(NamedTuple):
     """How readings change the log-odds. Lengths in evidence cells.
 
-    A beam ends ``depth_cells`` behind its range. The last ``kept_cells`` before a hit are not freed.
+    A beam ends ``depth_cells`` behind its range. The last ``kept_cells`` before a hit are not freed. From
+    ``occupied_at`` on a cell is an obstacle.
     """
 
     hit: float
@@ -45,6 +46,7 @@ class InverseSensorModel(NamedTuple):
     free_limit: float
     depth_cells: float
     kept_cells: float
+    occupied_at: float
 
 
 @njit(cache=True, nogil=True)
@@ -70,9 +72,17 @@ def _chord(scan, i, share):
     return own * its * math.sin(apart_rad) / (own * math.sin(aside_rad) + its * math.sin(apart_rad - aside_rad))
 
 
+@njit(cache=True, nogil=True, inline="always")
+def _enclose(box, x, y):
+    """Make a box of cells (first x, first y, last x, last y) enclose one more."""
+    box[0], box[1], box[2], box[3] = min(box[0], x), min(box[1], y), max(box[2], x), max(box[3], y)
+
+
 @njit(cache=True, nogil=True)
-def _free_cells(log_odds, stamps, stamp, ray, model):
+def _free_cells(log_odds, stamps, stamp, ray, model, turned):
     """Free the cells along a ``ray``, that this scan has not touched: its beginning, its direction and its length.
+
+    The box ``turned`` encloses those which were obstacles before.
 
     Inside the map whole numbers need no floor and places no check: most of the time of a scan is spent here.
     """
@@ -89,16 +99,21 @@ def _free_cells(log_odds, stamps, stamp, ray, model):
         d += 0.7
         if (inside or (0 <= x < width and 0 <= y < height)) and stamps[y, x] != stamp:
             stamps[y, x] = stamp
-            log_odds[y, x] = max(log_odds[y, x] - model.miss, -model.free_limit)
+            before = log_odds[y, x]
+            log_odds[y, x] = max(before - model.miss, -model.free_limit)
+            if before >= model.occupied_at > log_odds[y, x]:
+                _enclose(turned, x, y)
 
 
 @njit(cache=True, nogil=True)
 def cast_scan(log_odds, stamps, stamp, scan, model, protected, stands):
     """Add one scan to the evidence, and free the cells where the rover ``stands``: its place, x and y, and its radius.
 
-    The cells ``protected`` are not freed: shape (n, 2), x and y, all of them on the map.
+    The cells ``protected`` are not freed: shape (n, 2), x and y, all of them on the map. Returns the box (first x, first
+    y, last x, last y) of cells that have become obstacles or are none any more; the last before the first for none.
     """
     height, width = log_odds.shape
+    turned = np.array((width, height, -1, -1))
     x0, y0, heading_rad, width_rad = scan.x, scan.y, scan.heading_rad, scan.beam_width_rad
     bearing_rad, range_cells = scan.bearing_rad, scan.range_cells
     # Hits first: a cell stamped by a hit cannot be freed by another beam of the same scan.
@@ -111,7 +126,10 @@ def cast_scan(log_odds, stamps, stamp, scan, model, protected, stands):
         y = int(math.floor(y0 + (r + model.depth_cells) * math.cos(angle)))
         if 0 <= x < width and 0 <= y < height and stamps[y, x] != stamp:
             stamps[y, x] = stamp
-            log_odds[y, x] = min(log_odds[y, x] + model.hit, model.limit)
+            before = log_odds[y, x]
+            log_odds[y, x] = min(before + model.hit, model.limit)
+            if before < model.occupied_at <= log_odds[y, x]:
+                _enclose(turned, x, y)
     for i in range(protected.shape[0]):
         stamps[protected[i, 1], protected[i, 0]] = stamp
     for i in range(bearing_rad.size):
@@ -126,13 +144,16 @@ def cast_scan(log_odds, stamps, stamp, scan, model, protected, stands):
             dx = math.sin(angle)
             dy = math.cos(angle)
             free = min(reach, _chord(scan, i, share) - 0.5)
-            _free_cells(log_odds, stamps, stamp, (x0, y0, dx, dy, free), model)
+            _free_cells(log_odds, stamps, stamp, (x0, y0, dx, dy, free), model, turned)
     x0, y0, radius_cells = stands
     r = int(math.ceil(radius_cells))
     for y in range(max(0, int(y0) - r), min(height, int(y0) + r + 1)):
         for x in range(max(0, int(x0) - r), min(width, int(x0) + r + 1)):
             if math.hypot(x + 0.5 - x0, y + 0.5 - y0) <= radius_cells:
+                if log_odds[y, x] >= model.occupied_at:
+                    _enclose(turned, x, y)
                 log_odds[y, x] = -model.free_limit
+    return turned
 
 
 @njit(cache=True, nogil=True)

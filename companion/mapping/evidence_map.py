@@ -102,7 +102,7 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
             evidence, begin, pose.heading_rad + bearing_rad, range_m, scan.min_range_m + BLIND_M
         )
     kept_m = settings.narrow_kept_m if scan.is_narrow else 0.0
-    cast_scan(
+    turned = cast_scan(
         evidence.log_odds,
         evidence.stamps,
         np.int32(stamp),
@@ -121,15 +121,17 @@ def integrate(evidence: EvidenceMap, pose: Pose, scan: RangeScan, stamp: int) ->
             settings.free_limit,
             frame.cells(settings.hit_depth_m),
             frame.cells(kept_m),
+            settings.occupied_at,
         ),
         evidence.agreement.others(scan),
         (x, y, frame.cells(evidence.rover_radius_m)),
     )
     evidence.agreement.note(scan, _hit_cells(evidence, pose, scan))
-    touched_m = max(_touched_m(range_m, scan.sight_m, settings.hit_depth_m), evidence.rover_radius_m)
-    reach = math.ceil(evidence.base.fields(touched_m + math.hypot(*scan.origin_m))) + 1 + _soft_reach(evidence)
-    cell = evidence.base.cell_at(pose.point)
-    _refresh(evidence, cell.x - reach, cell.y - reach, cell.x + reach + 1, cell.y + reach + 1)
+    left, low, right, high = (int(cell) // evidence.subdivisions for cell in turned)
+    if left <= right:
+        # Weights follow from which cells are obstacles: most scans change that of few.
+        reach = _soft_reach(evidence) + 2
+        _refresh(evidence, left - reach, low - reach, right + reach + 1, high + reach + 1)
 
 
 def penalise(evidence: EvidenceMap, cell: Cell, amount: float) -> None:
@@ -291,14 +293,6 @@ def _without_too_near(
     result = range_m.copy()
     result[empty[hidden]] = np.nan
     return result
-
-
-def _touched_m(range_m: NDArray[np.float64], sight_m: float, hit_depth_m: float) -> float:
-    """How far from where the rays begin a scan may have changed the map: no farther than it has seen."""
-    known_m = range_m[~np.isnan(range_m)]
-    hit_m = known_m[np.isfinite(known_m)]
-    farthest_m = float(hit_m.max()) + hit_depth_m if len(hit_m) else 0.0
-    return max(farthest_m, sight_m) if len(hit_m) < len(known_m) else farthest_m
 
 
 def _soft_reach(evidence: EvidenceMap) -> int:
