@@ -109,8 +109,9 @@ def _free_cells(log_odds, stamps, stamp, ray, model, turned):
 def cast_scan(log_odds, stamps, stamp, scan, model, protected, stands):
     """Add one scan to the evidence, and free the cells where the rover ``stands``: its place, x and y, and its radius.
 
-    The cells ``protected`` are not freed: shape (n, 2), x and y, all of them on the map. Returns the box (first x, first
-    y, last x, last y) of cells that have become obstacles or are none any more; the last before the first for none.
+    The cells ``protected`` are not freed: shape (n, 2), x and y, all of them on the map. Returns the box (first x,
+    first y, last x, last y) of cells that have become obstacles or are none any more; the last before the first for
+    none.
     """
     height, width = log_odds.shape
     turned = np.array((width, height, -1, -1))

@@ -23,7 +23,9 @@ from companion.mapping.evidence_kernels import (
 )
 
 SIZE, S = 48, 8
-MODEL = InverseSensorModel(hit=0.8, miss=0.3, limit=3.0, free_limit=2.0, depth_cells=0.4, kept_cells=0.0, occupied_at=0.5)
+MODEL = InverseSensorModel(
+    hit=0.8, miss=0.3, limit=3.0, free_limit=2.0, depth_cells=0.4, kept_cells=0.0, occupied_at=0.5
+)
 NOTHING = np.empty((0, 2), np.int64)
 CELLS = st.sets(st.tuples(st.integers(0, SIZE - 1), st.integers(0, SIZE - 1)), max_size=20)
 PLACES = st.floats(1.0, SIZE - 1.0)
