@@ -29,6 +29,7 @@ from companion.lidar.examination import LidarHeard, lidar_findings
 from companion.lidar.reader import Lidars, lidars_on
 from companion.lidar.serial_port import open_ports
 from companion.lidar.spec import LidarError, LidarSpec
+from companion.lidar.trouble import trouble
 from companion.mapping.map_files import MapError
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
@@ -72,7 +73,7 @@ def doctor(
         mission = None
         if mission_file is not None:
             mission = load_mission(mission_file, simulated=False, skip_unknown=True)
-        commands, clock, specs = commands_of(mission), WallClock(), lidars_given(lidar)
+        commands, clock, specs = commands_of(mission), WallClock(), lidars_given(lidar, connect)
         link, wired = _opened(connect, specs, clock)
     except (SettingsError, LinkError, MissionError, OutputError, SigningKeyError, LidarError) as error:
         typer.echo(str(error), err=True)
@@ -190,7 +191,7 @@ class _Wired:
     def heard(self, seconds: float) -> list[LidarHeard]:
         """What was heard of each."""
         return [
-            LidarHeard(one.name, one.spec.port, seconds, one.counters, self._newest.get(one.name))
+            LidarHeard(one.name, one.spec.port, seconds, one.counters, self._newest.get(one.name), trouble(one))
             for one in self.lidars.readers
         ]
 

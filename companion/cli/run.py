@@ -127,7 +127,7 @@ def run(
             budget = ShutdownBudget()
             files = StateFiles(state, budget)
             ends.callback(files.close)
-            settings, specs = files.settings(usable_settings(settings_file), say), lidars_given(lidar)
+            settings, specs = files.settings(usable_settings(settings_file), say), lidars_given(lidar, connect)
             signer = files.signer(signing_key)
             painter = painter_for(view=view, say=say)
             page = web_viewer(web, web_token, warn, actions=web_actions, signer=signer)

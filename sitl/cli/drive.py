@@ -98,7 +98,7 @@ def drive(
         where = OnWorld(world, start, target, resolution_m, top_left, prior)
         given = Given(resolution_m if world is None else None, radius_m, speed_m_s)
         chosen = mission_to_drive(mission_file, where, given, skip_unknown=skip_unknown, laps=laps)
-        lidars = tuple(parsed(text, SIMULATED) for text in lidar or ())
+        lidars = tuple(map(_simulated_lidar, lidar or ()))
         mission = equipped(chosen, "none" if lidars and sensors is None else sensors, params)
         scenario = _simulated(mission, faults, lidars)
         files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
@@ -144,6 +144,13 @@ def drive(
     except OutputError as error:
         raise _refused(error) from error
     raise typer.Exit(report.exit_code)
+
+
+def _simulated_lidar(text: str) -> LidarSpec:
+    """A lidar of ``--lidar``. Raises LidarError."""
+    if "/" in text.partition(":")[2]:
+        raise LidarError(f"lidar '{text}': names a port; a simulated lidar has none: write MODEL[:KEY=VALUE,...]")
+    return parsed(text, SIMULATED)
 
 
 def _painter(view: bool) -> Painter | None:
