@@ -47,6 +47,7 @@ STEP_S = 0.05
 LISTEN_S = 4.0
 """So long at least to lidars."""
 EXIT_FINE, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 3, 4
+MISSION_FINDINGS = ("mission", "far-target", "payload")
 COLOURS = {Level.STOP: "red", Level.WARN: "yellow", Level.NOTE: "cyan"}
 
 
@@ -106,7 +107,9 @@ def doctor(
         summary = {**_summary(seen), "lidars": [one.described for one in heard]}
         typer.echo(json.dumps({"heard": summary, "followed": _followed(estimate), "findings": found}, indent=2))
     else:
-        _show(seen, findings, estimate, settings.safety.gps_fix, [one.described for one in heard])
+        lines = [one.described for one in heard]
+        lines += [] if mission is None else [mission_line(mission, seen, findings)]
+        _show(seen, findings, estimate, settings.safety.gps_fix, lines)
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
@@ -148,6 +151,18 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
         says = f"The mission's fields are {side_m:.2g} m wide: the rover drives through gaps of {gap_m:.1f} m or more."
         found.append(Finding("fields", Level.NOTE, says, "for narrower ones: resolution_m, docs/missions.md"))
     return found
+
+
+def mission_line(mission: Mission, seen: Survey, findings: Sequence[Finding]) -> str:
+    """What was looked at of a mission, and whether anything is wrong with it."""
+    count = len(mission.targets)
+    name = f"mission {mission.name}: {count} target{'s' * (count != 1)}"
+    if seen.vehicle.home is None:
+        return f"{name}; not laid out, because the autopilot tells no home yet"
+    if any(one.name in MISSION_FINDINGS for one in findings):
+        return f"{name}; see below"
+    commands = ", and the autopilot has what its commands need" if commands_of(mission) else ""
+    return f"{name}; it can be laid out round the rover's home{commands}"
 
 
 def _summary(seen: Survey) -> dict[str, object]:
@@ -197,10 +212,10 @@ class _Wired:
 
 
 def _show(
-    seen: Survey, findings: list[Finding], estimate: ModelEstimate | None, gps_fix: str, lidars: list[str]
+    seen: Survey, findings: list[Finding], estimate: ModelEstimate | None, gps_fix: str, lines: list[str]
 ) -> None:
     console = Console()
-    for line in lidars:
+    for line in lines:
         console.print(line, soft_wrap=True, markup=False, highlight=False)
     if seen.rover_heard:
         version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"
