@@ -21,6 +21,7 @@ from companion.mission.field_size import FieldSize, field_size, finer_evidence, 
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
 from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place
+from companion.mission.outline_hint import outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
 from companion.settings import MappingSettings
 from companion.storage.toml_file import read_toml
@@ -200,6 +201,8 @@ def _vehicle(mission: Mission) -> list[str]:
         f"in arcs of {rover.turning_radius_m:g} m radius or wider" if rover.turning_radius_m > 0.0 else "on the spot"
     )
     lines = [f"rover: radius {rover.radius_m:g} m, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
+    if hint := outline_hint(rover):
+        lines.append(f"note: {hint}")
     if mission.planned_home is not None:
         lines.append(f"planned home: {place_text(mission.planned_home)}; the rover's own home is what counts")
     if mission.sitl is not None:

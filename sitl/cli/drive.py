@@ -23,6 +23,7 @@ from companion.lidar.spec import LidarError, LidarSpec, parsed
 from companion.mapping.map_files import MapError
 from companion.mission.given import Given
 from companion.mission.mission import Mission, MissionError
+from companion.mission.outline_hint import outline_hint
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings, SettingsError
@@ -34,7 +35,7 @@ from sitl.cli.drive_outputs import outputs, print_summary, write_collisions
 from sitl.cli.drive_progress import Also, Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.faults.fault_file import FaultFileError
-from sitl.lockstep import Drive
+from sitl.lockstep import Drive, Report
 from sitl.network.collision_log import CollisionLog
 from sitl.scenario import Scenario, ScenarioError, equipped, simulated, with_lidars
 
@@ -137,7 +138,7 @@ def drive(
     finally:
         _closed(page)
     recorder.close()
-    print_summary(report, console)
+    _print_results(report, console, mission, settings)
     _print_last(painter, wanted.lines + isinstance(recorder, Recorder))
     try:
         wanted.write(run, recorder, console)
@@ -151,6 +152,13 @@ def _simulated_lidar(text: str) -> LidarSpec:
     if "/" in text.partition(":")[2]:
         raise LidarError(f"lidar '{text}': names a port; a simulated lidar has none: write MODEL[:KEY=VALUE,...]")
     return parsed(text, SIMULATED)
+
+
+def _print_results(report: Report, console: Console, mission: Mission, settings: Settings) -> None:
+    print_summary(report, console)
+    hint = outline_hint(mission.rover, settings.guidance.controller)
+    if hint and any(status is TargetStatus.UNREACHABLE for _, status in report.targets):
+        _warn(hint)
 
 
 def _painter(view: bool) -> Painter | None:
