@@ -70,6 +70,8 @@ def parsed(text: str, port: str = "") -> LidarSpec:
         port, options = _split(rest)
     if not port:
         raise LidarError(f"lidar '{text}': names no port; write {FORM}")
+    if "=" in port:
+        raise LidarError(f"lidar '{text}': one colon stands before all options, and commas between them: {FORM}")
     mounting = Mounting(model.min_m, model.max_m)
     for option in filter(None, options.split(",")):
         mounting = _with_option(mounting, option, model, text)

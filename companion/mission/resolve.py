@@ -225,7 +225,8 @@ def _refuse_large(width: int, height: int, resolution_m: float, mission: Mission
         if enough_m > COARSEST_M:
             across = " x ".join(distance_text(fields * resolution_m) for fields in (width, height))
             why = doubtful[0] if doubtful else "are all places, fences and margin_m meant so?"
-            raise GridTooLargeError(f"grid: {across} is more ground than a rover can keep a map of; {why}")
+            says = f"{across} is more ground than a rover can keep a map of; {why}"
+            raise GridTooLargeError(f"grid: {says} If it is, drive it in parts")
         raise GridTooLargeError(
             f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; {near}, {remedy}"
         )

@@ -59,6 +59,10 @@ def test_a_command_without_what_it_needs_is_named_with_the_remedy(tmp_path: Path
     ("command", "says"),
     [
         ('name = "DO_SET_SERVO"', "command 1: DO_SET_SERVO: needs 2 parameters (output from 1, pulse in µs)"),
+        ('name = "DO_SET_SERVO"\nparams = [9.5, 1900]', "there is no output 9.5; give the number of a SERVOn_FUNCTION"),
+        ('name = "DO_SET_RELAY"\nparams = [-1, 1]', "there is no relay -1; relays are counted from 0 to 15"),
+        ('name = "SET_SERVO"', "'SET_SERVO' is no MAVLink command known here; did you mean DO_SET_SERVO?"),
+        ('name = "NAV_WAYPOINT"', "it moves the rover, and targets do that"),
         ('name = "DO_SPRAYER"', "command 1: DO_SPRAYER: needs 1 parameter (0 off or 1 on)"),
         ('name = "DO_SET_ROI"', "DO_SET_ROI: needs lat_deg and lon_deg; DO_SET_ROI_NONE looks ahead again"),
     ],
