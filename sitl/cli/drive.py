@@ -84,7 +84,8 @@ def drive(
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
-    4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person ends after a minute.
+    4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person ends after a minute,
+    one that cannot begin after five.
     """
     painter: Painter | None = None
     console, wanted = Console(), outputs(image, map_stem, json_file, report_file, record)
