@@ -24,6 +24,7 @@ from companion.mapping.map_files import MapError
 from companion.navigation.search_budget import budget_of
 from companion.planning.registry import PLANNERS, UnknownPlannerError, warm_up
 from companion.settings import Settings, SettingsError
+from companion.storage.shipped import SOURCE, shipped
 
 
 class BenchError(ValueError):
@@ -96,7 +97,7 @@ def _cases(files: list[Path], sizes: str, maps: Path | None, problems: int) -> l
         raise BenchError(f"--sizes {sizes}: whole numbers with commas are needed, as in 1,4,16") from None
     if any(not 1 <= scale <= 100 for scale in scales):
         raise BenchError(f"--sizes {sizes}: from 1 to 100")
-    folder = maps or Path(__file__).parents[2] / "missions" / "maps"
+    folder = maps or (shipped() or SOURCE) / "maps"
     cases = paper_cases(folder, scales) if scales else []
     cases += [map_case(file, problems) for file in files]
     if not cases:

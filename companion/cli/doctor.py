@@ -29,6 +29,7 @@ from companion.lidar.examination import LidarHeard, lidar_findings
 from companion.lidar.reader import Lidars, lidars_on
 from companion.lidar.serial_port import open_ports
 from companion.lidar.spec import LidarError, LidarSpec
+from companion.lidar.trouble import trouble
 from companion.mapping.map_files import MapError
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.surveyor import Surveyor
@@ -46,6 +47,7 @@ STEP_S = 0.05
 LISTEN_S = 4.0
 """So long at least to lidars."""
 EXIT_FINE, EXIT_WOULD_STOP, EXIT_NOBODY = 0, 3, 4
+MISSION_FINDINGS = ("mission", "far-target", "payload")
 COLOURS = {Level.STOP: "red", Level.WARN: "yellow", Level.NOTE: "cyan"}
 
 
@@ -72,7 +74,7 @@ def doctor(
         mission = None
         if mission_file is not None:
             mission = load_mission(mission_file, simulated=False, skip_unknown=True)
-        commands, clock, specs = commands_of(mission), WallClock(), lidars_given(lidar)
+        commands, clock, specs = commands_of(mission), WallClock(), lidars_given(lidar, connect)
         link, wired = _opened(connect, specs, clock)
     except (SettingsError, LinkError, MissionError, OutputError, SigningKeyError, LidarError) as error:
         typer.echo(str(error), err=True)
@@ -105,7 +107,9 @@ def doctor(
         summary = {**_summary(seen), "lidars": [one.described for one in heard]}
         typer.echo(json.dumps({"heard": summary, "followed": _followed(estimate), "findings": found}, indent=2))
     else:
-        _show(seen, findings, estimate, settings.safety.gps_fix, [one.described for one in heard])
+        lines = [one.described for one in heard]
+        lines += [] if mission is None else [mission_line(mission, seen, findings)]
+        _show(seen, findings, estimate, settings.safety.gps_fix, lines)
     if not seen.rover_heard and seen.unbelieved is None:
         raise typer.Exit(EXIT_NOBODY)
     raise typer.Exit(EXIT_WOULD_STOP if any(one.level is Level.STOP for one in findings) else EXIT_FINE)
@@ -149,6 +153,18 @@ def of_mission(mission: Mission, seen: Survey, settings: Settings) -> list[Findi
     return found
 
 
+def mission_line(mission: Mission, seen: Survey, findings: Sequence[Finding]) -> str:
+    """What was looked at of a mission, and whether anything is wrong with it."""
+    count = len(mission.targets)
+    name = f"mission {mission.name}: {count} target{'s' * (count != 1)}"
+    if seen.vehicle.home is None:
+        return f"{name}; not laid out, because the autopilot tells no home yet"
+    if any(one.name in MISSION_FINDINGS for one in findings):
+        return f"{name}; see below"
+    commands = ", and the autopilot has what its commands need" if commands_of(mission) else ""
+    return f"{name}; it can be laid out round the rover's home{commands}"
+
+
 def _summary(seen: Survey) -> dict[str, object]:
     """The survey as JSON values."""
     return {
@@ -190,16 +206,16 @@ class _Wired:
     def heard(self, seconds: float) -> list[LidarHeard]:
         """What was heard of each."""
         return [
-            LidarHeard(one.name, one.spec.port, seconds, one.counters, self._newest.get(one.name))
+            LidarHeard(one.name, one.spec.port, seconds, one.counters, self._newest.get(one.name), trouble(one))
             for one in self.lidars.readers
         ]
 
 
 def _show(
-    seen: Survey, findings: list[Finding], estimate: ModelEstimate | None, gps_fix: str, lidars: list[str]
+    seen: Survey, findings: list[Finding], estimate: ModelEstimate | None, gps_fix: str, lines: list[str]
 ) -> None:
     console = Console()
-    for line in lidars:
+    for line in lines:
         console.print(line, soft_wrap=True, markup=False, highlight=False)
     if seen.rover_heard:
         version = "" if seen.version is None else f", ArduRover {'.'.join(map(str, seen.version))}"

@@ -11,11 +11,13 @@ from typing import Annotated
 import typer
 
 from companion.cli.inputs import EXIT_BAD_INPUT, OutputError
+from companion.cli.lidars import lidars_given
 from companion.cli.state import StateFiles
 from companion.core.clock import Clock, WallClock
 from companion.lidar.reader import Lidars, lidars_on
 from companion.lidar.serial_port import open_ports
-from companion.lidar.spec import FORM, LidarError, parsed
+from companion.lidar.spec import FORM, LidarError
+from companion.lidar.trouble import trouble
 from companion.mavlink.obstacle_publisher import COMPONENT, ObstaclePublisher
 from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError, open_link
@@ -42,7 +44,7 @@ def lidar(
     clock = WallClock()
     with contextlib.ExitStack() as ends:
         try:
-            spec = parsed(spec_text)
+            (spec,) = lidars_given([spec_text], connect)
             files = StateFiles(None)
             ends.callback(files.close)
             publisher = ObstaclePublisher(component, system, files.signer(signing_key))
@@ -79,6 +81,7 @@ def _publish(lidars: Lidars, publisher: ObstaclePublisher, link: ByteLink, clock
                 typer.echo(f"{len(seen.scan.bearing_rad)} readings a turn")
         if talks is not False and now_s - heard_s > SILENT_S:
             talks = False
-            typer.echo(f"no whole turn for {SILENT_S:g} s: look at power, cable, port and model")
+            why = trouble(lidars.readers[0]) or "look at its power and cable"
+            typer.echo(f"no whole turn for {SILENT_S:g} s: {why}")
         clock.sleep_until_s(now_s + STEP_S)
         now_s = clock.now_s()

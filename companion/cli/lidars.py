@@ -8,6 +8,8 @@ from typing import Annotated
 import typer
 
 from companion.lidar.spec import FORM, LidarError, LidarSpec, parsed
+from companion.mavlink.port_users import same_device
+from companion.mavlink.transport import device_of
 
 LidarOption = Annotated[
     list[str] | None,
@@ -15,10 +17,22 @@ LidarOption = Annotated[
 ]
 
 
-def lidars_given(texts: Sequence[str] | None) -> list[LidarSpec]:
-    """The lidars that are described. Raises LidarError, also if two are on one port."""
-    specs = [parsed(text) for text in texts or ()]
+def lidars_given(texts: Sequence[str] | None, connect: str = "") -> list[LidarSpec]:
+    """The lidars that are described. ``connect``: the link to the autopilot.
+
+    Raises LidarError, also if two are on one port, or one on the autopilot's, under whatever names.
+    """
+    specs, autopilots = [parsed(text) for text in texts or ()], device_of(connect)
     for number, spec in enumerate(specs):
-        if any(spec.port == other.port for other in specs[:number]):
-            raise LidarError(f"lidar '{spec.text}': {spec.port} is another lidar's port")
+        for other in specs[:number]:
+            if same_device(spec.port, other.port):
+                is_it = f"{_the_same(spec.port, other.port)} another lidar's port ('{other.text}')"
+                raise LidarError(f"lidar '{spec.text}': {is_it}; each has its own")
+        if autopilots is not None and same_device(spec.port, autopilots):
+            is_it = f"{_the_same(spec.port, autopilots)} the autopilot's port (--connect {connect})"
+            raise LidarError(f"lidar '{spec.text}': {is_it}; give the lidar's own, see `ls -l /dev/serial/by-id`")
     return specs
+
+
+def _the_same(port: str, other: str) -> str:
+    return f"{port} is" if port == other else f"{port} and {other} are one device:"

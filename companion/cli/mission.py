@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from pathlib import Path
 from typing import Annotated
 
@@ -21,7 +20,8 @@ from companion.mission.do_commands import DoCommand
 from companion.mission.field_size import FieldSize, field_size, finer_evidence, sure_gap_m
 from companion.mission.given import Given, with_given
 from companion.mission.load import load_mission
-from companion.mission.mission import Area, Here, Mission, MissionError, MoverSpec, Place
+from companion.mission.mission import Area, GridTooLargeError, Here, Mission, MissionError, MoverSpec, Place
+from companion.mission.outline_hint import outline_hint
 from companion.mission.resolve import ResolvedMission, resolve
 from companion.settings import MappingSettings
 from companion.storage.toml_file import read_toml
@@ -47,6 +47,7 @@ def check(
         mission = load_mission(mission_file, skip_unknown=skip_unknown)
         mission = with_given(mission, Given(resolution_m, radius_m, speed_m_s))
         maps = _maps(mission)
+        _check_start(mission)
         resolved = _try_resolve(mission)
     except (MissionError, MapError) as error:
         typer.echo(str(error), err=True)
@@ -55,20 +56,32 @@ def check(
     warn_of_places(mission, lambda line: typer.echo(warning(line)))
 
 
+def _check_start(mission: Mission) -> None:
+    """Raises MissionError unless it is known where the rover stands in the simulator's world."""
+    sitl = mission.sitl
+    if sitl is not None and sitl.world is not None and sitl.start is None and mission.grid.home is None:
+        says = f"missing; give the field of {sitl.world} in which the rover starts"
+        raise MissionError(f"{mission.source or mission.name}: sitl.start: {says}")
+
+
 def _try_resolve(mission: Mission) -> ResolvedMission | None:
     """The mission as at the start of a run, if the file alone says where home is.
 
     This finds targets inside a fence, and a grid that is too large. A rover's home may differ from the planned home, so
-    a mission in degrees is resolved only where the file has one, and then nothing is refused. Raises MissionError.
+    a mission in degrees is resolved only where the file has one, and then only a grid that is too large is refused.
+    Raises MissionError.
     """
     degrees, size = any(isinstance(place, GeoPoint) for place in _all_places(mission)), _size_of(mission)
     if not degrees:
         return resolve(mission, LocalFrame(GeoPoint(0.0, 0.0)), NedPoint(0.0, 0.0), size=size)
     if mission.planned_home is None:
         return None
-    with contextlib.suppress(MissionError, MapError):
+    try:
         return resolve(mission, LocalFrame(mission.planned_home), NedPoint(0.0, 0.0), size=size)
-    return None
+    except GridTooLargeError:
+        raise
+    except (MissionError, MapError):
+        return None
 
 
 def _size_of(mission: Mission) -> FieldSize | None:
@@ -188,6 +201,8 @@ def _vehicle(mission: Mission) -> list[str]:
         f"in arcs of {rover.turning_radius_m:g} m radius or wider" if rover.turning_radius_m > 0.0 else "on the spot"
     )
     lines = [f"rover: radius {rover.radius_m:g} m, cruises at {rover.cruise_speed_m_s:g} m/s, turns {turns}"]
+    if hint := outline_hint(rover):
+        lines.append(f"note: {hint}")
     if mission.planned_home is not None:
         lines.append(f"planned home: {place_text(mission.planned_home)}; the rover's own home is what counts")
     if mission.sitl is not None:

@@ -42,6 +42,7 @@ from companion.mavlink.signing import SigningKeyError
 from companion.mavlink.transport import ByteLink, LinkError
 from companion.mission.given import Given
 from companion.mission.mission import Mission, MissionError, with_laps
+from companion.mission.outline_hint import outline_hint
 from companion.navigation.step_runner import ThreadRunner
 from companion.recording.record_format import STATE, RecordError
 from companion.recording.recorder import NullRecorder, Recorder
@@ -127,7 +128,7 @@ def run(
             budget = ShutdownBudget()
             files = StateFiles(state, budget)
             ends.callback(files.close)
-            settings, specs = files.settings(usable_settings(settings_file), say), lidars_given(lidar)
+            settings, specs = files.settings(usable_settings(settings_file), say), lidars_given(lidar, connect)
             signer = files.signer(signing_key)
             painter = painter_for(view=view, say=say)
             page = web_viewer(web, web_token, warn, actions=web_actions, signer=signer)
@@ -301,6 +302,9 @@ def _ended(companion: Companion, rig: _Rig) -> int:
     with contextlib.suppress(OSError):  # no reader: the exit code remains
         for line in (*companion.command_lines(), *map(str, companion.laps)):
             typer.echo(line)
+        if any(status is TargetStatus.UNREACHABLE for _, status in companion.statuses()):
+            hint = outline_hint(rig.mission.rover, rig.settings.guidance.controller)
+            typer.echo(hint, nl=bool(hint))
         if companion.estimate is not None:
             typer.echo(f"the rover follows velocities {described(companion.estimate)}")
         for line in (rig.files.close(), rig.keeping.problem, str(rig.autopilot.codec.counters.refused)):

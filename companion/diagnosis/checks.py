@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 from companion.diagnosis.finding import Finding, Level, to_set
 from companion.vehicle.events import RoverMode
 from companion.vehicle.gps_fix import NEEDED, GpsFix
-from companion.vehicle.motion_limits import LIMITS, THROTTLE_SCALE, full_throttle_m_s
+from companion.vehicle.motion_limits import CRUISE_M_S, LIMITS, THROTTLE_SCALE, full_throttle_m_s
 from companion.vehicle.recommended_parameters import RECOMMENDED_PARAMETERS
 from companion.vehicle.state import EKF_CONST_POSITION, EKF_POSITION, EkfQuantity
 from companion.vehicle.survey import Survey
@@ -367,7 +367,8 @@ def throttle(seen: Survey) -> Iterator[Finding]:
     if len(known) < len(THROTTLE_SCALE) or wanted_m_s <= 0.0:
         return
     full_m_s = full_throttle_m_s(known)
-    if min(known.values()) > 0.0 and wanted_m_s <= full_m_s <= UNLIKELY * wanted_m_s:
+    most_m_s = UNLIKELY * max(wanted_m_s, CRUISE_M_S)  # a rover may be told to drive slowly, as on its first drive
+    if min(known.values()) > 0.0 and wanted_m_s <= full_m_s <= most_m_s:
         return
     says = (
         f"By CRUISE_SPEED {known['CRUISE_SPEED']:g} the rover drives {full_m_s:.1f} m/s with full throttle. If it does "

@@ -10,6 +10,7 @@ import numpy as np
 from companion.core.scan import RangeScan
 from companion.diagnosis.finding import Finding, Level
 from companion.lidar.reader import LidarCounters
+from companion.lidar.trouble import LidarTrouble
 
 BAD_SHARE = 0.02
 ECHO_SHARE = 0.05
@@ -19,13 +20,17 @@ OWN_BODY_M = 0.3
 
 @dataclass(frozen=True, eq=False, slots=True)
 class LidarHeard:
-    """What was heard of one lidar within ``seconds``; ``scan``: the newest, None if there was none."""
+    """What was heard of one lidar within ``seconds``; ``scan``: the newest, None if there was none.
+
+    ``trouble``: why there was none, or none that tells anything.
+    """
 
     name: str
     port: str
     seconds: float
     counters: LidarCounters
     scan: RangeScan | None
+    trouble: LidarTrouble | None = None
 
     @property
     def described(self) -> str:
@@ -48,26 +53,17 @@ def lidar_findings(heard: Sequence[LidarHeard], *, others_look_ahead: bool) -> I
     """What is wrong with them. ``others_look_ahead``: whether range data over the link covers straight ahead."""
     for one in heard:
         yield from _findings(one)
-    ahead = others_look_ahead or any(one.scan is not None and one.scan.looks_ahead for one in heard)
-    if heard and not ahead:
+    scans = [one.scan for one in heard if one.scan is not None]
+    ahead = others_look_ahead or any(scan.looks_ahead for scan in scans)
+    if heard and not ahead and not any(one.trouble for one in heard):  # where such a one looks is not known
         says = "No lidar tells what is straight ahead (within 20 degrees)."
         yield Finding("not-ahead", Level.STOP, says, "look at yaw, flip and mask of --lidar")
 
 
 def _findings(heard: LidarHeard) -> Iterator[Finding]:
     name, counted = f"{heard.name} on {heard.port}", heard.counters
-    if not counted.bytes:
-        says, remedy = f"{name} sends nothing.", "look at power, cable and port"
-        yield Finding("lidar-silent", Level.STOP, says, remedy)
-    elif not counted.points:
-        says = f"{name} sends {counted.bytes / heard.seconds:.0f} bytes a second, but no points of this model."
-        yield Finding("lidar-unreadable", Level.STOP, says, "give --lidar the right model")
-    elif not counted.scans:
-        says, remedy = (
-            f"{name} sends points, but no whole turns.",
-            "look whether its motor turns; it needs 5 V and 0.5 A",
-        )
-        yield Finding("lidar-stalled", Level.STOP, says, remedy)
+    if heard.trouble is not None:
+        yield Finding(heard.trouble.name, Level.STOP, f"{heard.trouble.says}.", heard.trouble.remedy)
     else:
         yield from _doubts(heard, name, counted)
 
@@ -77,10 +73,10 @@ def _doubts(heard: LidarHeard, name: str, counted: LidarCounters) -> Iterator[Fi
         says = f"{name}: {counted.bad_bytes / counted.bytes:.0%} of its bytes cannot be used."
         yield Finding("lidar-damaged", Level.WARN, says, "look at the cable, and that nothing else reads this port")
     if counted.echoes < ECHO_SHARE * counted.points:
-        says = (
-            f"{name}: {counted.echoes / counted.points:.0%} of its readings have an echo; it may be covered or dazzled."
-        )
-        yield Finding("lidar-no-echo", Level.WARN, says, "look at its window, and away from the sun")
+        share = f"{counted.echoes / counted.points:.0%}"
+        says = f"{name}: {share} of its readings have an echo: open ground, or it is covered or dazzled."
+        remedy = "look at its window, and away from the sun; on open ground give it empty=5 (docs/lidars.md)"
+        yield Finding("lidar-no-echo", Level.WARN, says, remedy)
     if counted.scans < SLOW_HZ * heard.seconds:
         says = (
             f"{name} turns {counted.scans / heard.seconds:.1f} times a second; after a second without, the rover stops."

@@ -51,5 +51,5 @@ NAMES = ", ".join(model.name for model in MODELS)
 
 def model_named(name: str) -> LidarModel | None:
     """The model with this name, however it is spelt; None if there is none."""
-    wanted = name.upper().replace("_", "-")
+    wanted = name.upper().replace("_", "-").replace(" ", "-")
     return next((one for one in MODELS if one.name in (wanted, f"RPLIDAR-{wanted}", f"YDLIDAR-{wanted}")), None)

@@ -21,6 +21,8 @@ from companion.vehicle.events import RangeSeen
 
 WAKE_S = 2.0
 """A lidar that gives no points is told to start this often."""
+SAMPLE_BYTES = 2048
+"""So much is kept before there is a scan, to tell what it is if none comes."""
 BURST_S = 0.03
 """Bytes that come sooner after others may have waited with them: only the last of them are known to be new."""
 
@@ -84,6 +86,10 @@ class LidarReader:
         self._port = port
         self._bytes = self._bad_bytes = self._points = self._echoes = self._scans = self._incomplete = 0
         self._woken_s: float | None = None
+        self.sample = b""
+        """The newest bytes, until there is a first scan."""
+        self.saw = False
+        """Whether a scan had more than a stray reading that is not unknown."""
         self._begin()
 
     def _begin(self) -> None:
@@ -129,6 +135,7 @@ class LidarReader:
             return []
         self._bytes += len(chunk.data)
         points = self._decoder.feed(chunk.data)
+        self.sample = b"" if self._scans else (self.sample + chunk.data)[-SAMPLE_BYTES:]
         if len(points):
             self._woken_s = now_s
             self._points += len(points)
@@ -138,6 +145,7 @@ class LidarReader:
         self._scans += len(turns)
         mounting = self.spec.mounting
         scans = [scan_of(turn, believed(mounting, turn), self.name) for turn in turns]
+        self.saw = self.saw or any(scan.tells for scan in scans)
         return [replace(scan, late_s=late_s) for scan in scans]
 
 

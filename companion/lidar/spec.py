@@ -63,20 +63,22 @@ def parsed(text: str, port: str = "") -> LidarSpec:
     model = model_named(name)
     if model is None:
         raise LidarError(f"lidar '{text}': {name!r:.40} is no model; models are {NAMES}")
+    whole = text
     if port:
-        text = f"{name}:{port}{':' * bool(rest)}{rest}"
-        options = rest
+        whole, options = f"{name}:{port}{':' * bool(rest)}{rest}", rest
     else:
         port, options = _split(rest)
     if not port:
         raise LidarError(f"lidar '{text}': names no port; write {FORM}")
+    if "=" in port:
+        raise LidarError(f"lidar '{text}': one colon stands before all options, and commas between them: {FORM}")
     mounting = Mounting(model.min_m, model.max_m)
     for option in filter(None, options.split(",")):
         mounting = _with_option(mounting, option, model, text)
     if mounting.min_m >= mounting.max_m:
         limits = f"min={mounting.min_m:g} is not below max={mounting.max_m:g}"
         raise LidarError(f"lidar '{text}': {limits}; the {model.name} sees from {model.min_m:g} to {model.max_m:g} m")
-    return LidarSpec(model, port, mounting, text)
+    return LidarSpec(model, port, mounting, whole)
 
 
 def _split(rest: str) -> tuple[str, str]:

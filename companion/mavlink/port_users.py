@@ -70,6 +70,16 @@ def of_port(kind: str, port: int, proc: Path = PROC) -> tuple[PortUser, ...]:
     return tuple(user for user, files in _processes(proc) if any(map(is_it, files))) if sockets else ()
 
 
+def same_device(one: str, other: str) -> bool:
+    """Whether two names are of one device: below /dev/serial/by-id every port has a second name."""
+    if os.path.realpath(one) == os.path.realpath(other):
+        return True
+    with contextlib.suppress(OSError, ValueError):
+        files = os.stat(one), os.stat(other)
+        return all(stat.S_ISCHR(file.st_mode) for file in files) and files[0].st_rdev == files[1].st_rdev
+    return False
+
+
 def in_words(users: tuple[PortUser, ...]) -> str:
     """The programs as part of a sentence; "another program" if none is known."""
     return " and ".join(map(str, users)) or "another program"

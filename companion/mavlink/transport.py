@@ -61,14 +61,27 @@ def open_link(url: str, clock: Clock | None = None) -> ByteLink:
             return UdpLink(host, port, bind=kind != "udpout")
 
 
-def _serial(place: str, url: str, clock: Clock) -> SerialLink:
-    """A serial line; the baud rate stands behind a comma (MAVProxy) or a colon (ArduPilot)."""
+def device_of(url: str) -> str | None:
+    """The serial device that a URL names; None for a link over the network, or no link at all."""
+    if url.startswith("/dev/"):
+        return _device_and_baud(url, url)[0]
+    return _device_and_baud(url.removeprefix("serial:"), url)[0] if url.startswith("serial:") else None
+
+
+def _device_and_baud(place: str, url: str) -> tuple[str, str | None]:
+    """The baud rate stands behind a comma (MAVProxy) or a colon (ArduPilot); None: it is not given."""
     device, sign, baud = place.rpartition("," if "," in place else ":")
     if place == url and sign == ":" and not baud.isdigit():  # /dev/serial/by-path names have colons of their own
-        device, sign = place, ""
-    if place and not sign:
-        return SerialLink(place, DEFAULT_BAUD, clock)
-    if not device:
+        sign = ""
+    return (device, baud) if sign else (place, None)
+
+
+def _serial(place: str, url: str, clock: Clock) -> SerialLink:
+    """A serial line."""
+    device, baud = _device_and_baud(place, url)
+    if device and baud is None:
+        return SerialLink(device, DEFAULT_BAUD, clock)
+    if not device or baud is None:
         raise LinkError(f"'{url}' names no device; use {FORMS}")
     rate = _number(baud, url, "baud rate", " (a device with a colon in its name needs one behind it)")
     if not LEAST_BAUD <= rate <= MOST_BAUD:

@@ -52,11 +52,42 @@ TAKEN: Mapping[int, int] = MappingProxyType(
 )
 """Commands that ArduRover takes in any mode, and how many parameters they have at most, without a place."""
 
+NEEDED: Mapping[int, tuple[str, ...]] = MappingProxyType(
+    {
+        mav.DO_SET_RELAY: ("relay from 0", "0 off or 1 on"),
+        mav.DO_REPEAT_RELAY: ("relay from 0", "how often", "seconds for one"),
+        mav.DO_SET_SERVO: ("output from 1", "pulse in µs"),
+        mav.DO_REPEAT_SERVO: ("output from 1", "pulse in µs", "how often", "seconds for one"),
+        206: ("metres, 0 to end",),
+        207: ("0 off or 1 on",),
+        211: ("gripper", "0 open or 1 close"),
+        216: ("0 off or 1 on",),
+        218: ("function", "switch 0 to 2"),
+        531: ("kind", "value"),
+        532: ("kind", "value"),
+        mav.DO_GIMBAL_PITCHYAW: ("pitch", "yaw"),
+    }
+)
+"""Of those: parameters without which a command says nothing."""
+
 WITH_PLACE = frozenset({mav.DO_SET_HOME, mav.DO_SET_ROI_LOCATION, mav.DO_SET_ROI})
 """Of those: commands whose p5 to p7 are latitude, longitude and altitude."""
 
 EACH_TIME_ANEW = frozenset({mav.DO_REPEAT_RELAY, mav.DO_REPEAT_SERVO, mav.DO_DIGICAM_CONTROL})
 """Of those: commands that begin something anew each time they arrive, so that a second one is not the same as one."""
+MOVES = frozenset(
+    {
+        mav.NAV_WAYPOINT,
+        mav.NAV_LOITER_UNLIM,
+        mav.NAV_LOITER_TURNS,
+        mav.NAV_LOITER_TIME,
+        mav.NAV_RETURN_TO_LAUNCH,
+        mav.NAV_DELAY,
+        mav.DO_CHANGE_SPEED,
+    }
+)
+"""Commands that a ground station's mission may have, and a target says in other words."""
+OUTPUTS, RELAYS = 32, 16
 RELAY_STATES = (0.0, 1.0)
 """ArduRover switches a relay over with any other state (AP_ServoRelayEvents)."""
 
@@ -123,6 +154,20 @@ class DoCommand:
         return self.command not in EACH_TIME_ANEW
 
 
+def lacking(command: DoCommand) -> str:
+    """What this command lacks to be done, with the remedy; empty if nothing."""
+    needed, first = NEEDED.get(command.command, ()), command.params[0]
+    if any(value is None for value in command.params[: len(needed)]):
+        return f"needs {len(needed)} parameter{'s' * (len(needed) > 1)} ({', '.join(needed)})"
+    if command.command in (mav.DO_SET_RELAY, mav.DO_REPEAT_RELAY) and first not in range(RELAYS):
+        return f"there is no relay {first:g}; relays are counted from 0 to {RELAYS - 1}"
+    if command.command in (mav.DO_SET_SERVO, mav.DO_REPEAT_SERVO) and first not in range(1, OUTPUTS + 1):
+        return f"there is no output {first:g}; give the number of a SERVOn_FUNCTION, from 1 to {OUTPUTS}"
+    if command.command == mav.DO_SET_ROI_LOCATION and command.place is None:
+        return "has no place to look at; give its latitude and longitude, or DO_SET_ROI_NONE to look ahead again"
+    return ""
+
+
 def why_not(command: int) -> str:
     """Why this cannot be driven; for a command that neither moves the rover nor is in ``TAKEN``."""
     if command in ONLY_IN_AUTO:
@@ -135,10 +180,12 @@ def command_of_name(name: str) -> int:
     plain = name.upper().removeprefix("MAV_CMD_")
     number = next((number for number, known in mav.NAMES.items() if known == plain), None)
     if number is None:
-        raise ValueError(f"name: {name!r:.60} is no MAVLink command known here; docs/missions.md lists them")
+        meant = f"did you mean DO_{plain}?" if f"DO_{plain}" in mav.NAMES.values() else "docs/missions.md lists them"
+        raise ValueError(f"name: {name!r:.60} is no MAVLink command known here; {meant}")
     if number in TAKEN:
         return number
-    raise ValueError(f"name: {plain} cannot be given at a place: {why_not(number)}; docs/missions.md lists those")
+    why = "it moves the rover, and targets do that" if number in MOVES else why_not(number)
+    raise ValueError(f"name: {plain} cannot be given at a place: {why}; docs/missions.md lists those")
 
 
 def padded(params: tuple[float | None, ...]) -> Params:

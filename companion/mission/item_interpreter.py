@@ -16,7 +16,7 @@ from types import MappingProxyType
 from companion.core.frames import GeoPoint
 from companion.core.grid import BASE_WEIGHT
 from companion.mission import mav_commands as mav
-from companion.mission.do_commands import TAKEN, WITH_PLACE, WITHOUT_EFFECT, DoCommand, why_not
+from companion.mission.do_commands import TAKEN, WITH_PLACE, WITHOUT_EFFECT, DoCommand, lacking, why_not
 from companion.mission.fence_items import fences_of, is_fence
 from companion.mission.item_walk import ItemWalk
 from companion.mission.items import MAX_ITEMS, Item, ItemError, geo_point
@@ -370,6 +370,8 @@ def _command(item: Item, walk: _Walk) -> None:
         delay_s=condition.delay_s if condition else None,
         within_m=condition.within_m if condition else None,
     )
+    if lacks := lacking(command):
+        raise ItemError(f"{item.label}: {lacks}")
     if not walk.targets:
         walk.commands.append(command)
     else:

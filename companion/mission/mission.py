@@ -20,6 +20,10 @@ class MissionError(Exception):
     """A mission file that cannot be driven; the text is one line with file, place and reason."""
 
 
+class GridTooLargeError(MissionError):
+    """A mission that reaches so far that its ground cannot be kept."""
+
+
 class OnBlocked(StrEnum):
     """What to do when a target cannot be reached."""
 

@@ -16,12 +16,14 @@ from companion.mission.autopilot_fence import NO_FENCE, AutopilotFence
 from companion.mission.bounds import Bound, Bounds, autopilot_bounds, mission_bounds
 from companion.mission.check import MAX_GRID_FIELDS
 from companion.mission.do_commands import DoCommand
-from companion.mission.doubtful_places import doubtful_places
+from companion.mission.doubtful_places import distance_text, doubtful_places
 from companion.mission.field_size import FieldSize
-from companion.mission.mission import Here, Mission, MissionError, OnBlocked
+from companion.mission.mission import GridTooLargeError, Here, Mission, MissionError, OnBlocked
 from companion.mission.prior_map import stamp_prior
 
 MIN_MARGIN_M = 25.0
+COARSEST_M = 5.0
+"""With larger fields no rover finds its way round anything: to ask for them is no remedy."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +99,8 @@ def resolve(
     try:
         return _resolved(mission, frame, home, fence, size)
     except (MissionError, MapError) as error:
-        raise MissionError(f"{mission.source or mission.name}: {error}") from error
+        kind = type(error) if isinstance(error, MissionError) else MissionError
+        raise kind(f"{mission.source or mission.name}: {error}") from error
 
 
 def _resolved(
@@ -214,12 +217,17 @@ def _enclosing_grid(
 def _refuse_large(width: int, height: int, resolution_m: float, mission: Mission, doubtful: list[str]) -> None:
     """Raises MissionError for too many fields. ``doubtful``: what is to be said of places that may be wrong."""
     if width * height > MAX_GRID_FIELDS:
-        enough_m = resolution_m * math.sqrt(width * height / MAX_GRID_FIELDS)
+        enough_m = math.ceil(10.0 * resolution_m * math.sqrt(width * height / MAX_GRID_FIELDS)) / 10.0
         of_ours = not mission.stored and (mission.source is None or mission.source.suffix.lower() == ".toml")
-        coarser = f"{'resolution_m =' if of_ours else '--resolution-m'} {math.ceil(enough_m * 10.0) / 10.0:g} or larger"
+        coarser = f"{'resolution_m =' if of_ours else '--resolution-m'} {enough_m:g} or larger"
         remedy = f"use {coarser}, or a smaller margin_m" if of_ours else f"use {coarser}"
         near = f"{doubtful[0]} If it is" if doubtful else "are all places near home? If they are"
-        raise MissionError(
+        if enough_m > COARSEST_M:
+            across = " x ".join(distance_text(fields * resolution_m) for fields in (width, height))
+            why = doubtful[0] if doubtful else "are all places, fences and margin_m meant so?"
+            says = f"{across} is more ground than a rover can keep a map of; {why}"
+            raise GridTooLargeError(f"grid: {says} If it is, drive it in parts")
+        raise GridTooLargeError(
             f"grid: {width} x {height} fields of {resolution_m:g} m are more than {MAX_GRID_FIELDS}; {near}, {remedy}"
         )
 

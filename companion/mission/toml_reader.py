@@ -16,8 +16,9 @@ from pydantic import BeforeValidator, Field, model_validator
 from companion.core.footprint import Footprint
 from companion.core.frames import GeoPoint
 from companion.core.grid import Cell
+from companion.mission import mav_commands as mav
 from companion.mission.check import LARGEST, check_mission
-from companion.mission.do_commands import PARAMETERS, TAKEN, WITH_PLACE, DoCommand, command_of_name, padded
+from companion.mission.do_commands import PARAMETERS, TAKEN, WITH_PLACE, DoCommand, command_of_name, lacking, padded
 from companion.mission.ground_station_reader import load_ground_station_file
 from companion.mission.mission import (
     Area,
@@ -126,7 +127,12 @@ class CommandTable(Table):
         if self.lat_deg is not None and self.lon_deg is not None:
             place = GeoPoint(self.lat_deg, self.lon_deg)
             params = (*padded(params)[:6], self.altitude_m or 0.0)
-        return DoCommand(number, padded(params), place, ABOVE_HOME, None, self.after_s, self.delay_s, self.within_m)
+        made = DoCommand(number, padded(params), place, ABOVE_HOME, None, self.after_s, self.delay_s, self.within_m)
+        if number == mav.DO_SET_ROI and place is None:
+            raise ValueError(f"{self.name}: needs lat_deg and lon_deg; DO_SET_ROI_NONE looks ahead again")
+        if lacks := lacking(made):
+            raise ValueError(f"{self.name}: {lacks}")
+        return made
 
 
 class TargetTable(PlaceTable):

@@ -30,6 +30,7 @@ from companion.recording.record_format import (
     MISSION,
     PACKETS,
     STAMP,
+    STATE,
     TICKS,
     WITH_LIDARS,
     InputFile,
@@ -112,7 +113,8 @@ def load_record(directory: Path) -> Record:
     notes = [f"{directory}: recorded with {line}; differences may come from that" for line in _other_versions(meta)]
     for entry in meta.inputs:
         _check_input(directory, entry)
-        if entry.name != MISSION and _has_changed(Path(entry.source), entry.sha256):
+        # A resumed run goes on writing the state that it began with: that this has changed says nothing.
+        if entry.name != MISSION and entry.kind != STATE and _has_changed(Path(entry.source), entry.sha256):
             notes.append(f"{entry.source}: changed since the run; its copy in the record is used")
     mission, settings = _mission_and_settings(directory, meta)
     cut = [line for name in _logs(meta) if (line := _check_length(directory / name, meta))]

@@ -52,7 +52,8 @@ def _described(error: ValidationError, model: type[BaseModel]) -> str:
     if fault["type"] == "value_error":
         return f"{place}: {fault['msg'].removeprefix('Value error, ')}"
     if fault["type"] in ("list_type", "tuple_type") and isinstance(fault.get("input"), dict):
-        return f"{place}: one table where several may stand; write [[{place}]] with double brackets"
+        name = ".".join(key for key in fault["loc"] if isinstance(key, str))
+        return f"{place}: one table where several may stand; write [[{name}]] with double brackets"
     if fault["type"] in WANTED:
         return f"{place}: input should be {WANTED[fault['type']]} (got {fault.get('input')!r:.60})"
     if fault["type"] != "extra_forbidden":
@@ -60,7 +61,13 @@ def _described(error: ValidationError, model: type[BaseModel]) -> str:
     known = _known_keys(model, fault["loc"][:-1])
     near = alike(str(fault["loc"][-1]), known)
     hint = f", did you mean '{near}'?" if near else f"; known here: {', '.join(known)}"
-    return f"{place}: unknown key{hint}"
+    sections = [] if len(fault["loc"]) > 1 else _sections_with(model, str(fault["loc"][0]))
+    return f"{place}: unknown key{f'; it stands below [{sections[0]}]' if len(sections) == 1 else hint}"
+
+
+def _sections_with(model: type[BaseModel], key: str) -> list[str]:
+    """The tables of the file that have this key."""
+    return [name for name in model.model_fields if key in _known_keys(model, (name,)) and key != name]
 
 
 def _known_keys(model: type[BaseModel], place: tuple[int | str, ...]) -> list[str]:

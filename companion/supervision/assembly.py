@@ -74,7 +74,7 @@ def assemble(
     log.begin(clock.now_s(), Mark.BEGIN)
 
     pace = Pace(clock, live)
-    monitors = make_monitors(run, autopilot, live, notifier, pace, noted, options.lidars.names)
+    monitors = make_monitors(run, autopilot, live, notifier, pace, noted, options.lidars)
     permission = DrivePermission(run, monitors.by_precedence, live, notifier)
     operator_server = OperatorServer(run, autopilot, live, notifier, options.keep_settings)
     requests = (RequestedGoals(run, live, notifier), MissionRequests(run, notifier))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from companion.core.severity import TextSink
 from companion.executive.autopilot_mission import MissionChangeMonitor
 from companion.executive.mission_run import MissionRun
+from companion.lidar.reader import Lidars
 from companion.mavlink.autopilot_link import AutopilotLink
 from companion.safety.battery_monitor import BatteryMonitor
 from companion.safety.gps_gate import GpsGate
@@ -18,6 +19,7 @@ from companion.safety.lidar_monitor import LidarMonitor
 from companion.safety.watchdogs import DataMonitor, Loop, LoopMonitor, Monitor, ScanMonitor, SticksMonitor, Worker
 from companion.settings.live_settings import LiveSettings
 from companion.supervision.fence_monitor import FenceMonitor
+from companion.supervision.lidar_trouble_monitor import LidarTroubleMonitor
 from companion.supervision.limits_monitor import LimitsMonitor
 from companion.supervision.localization_monitor import LocalizationMonitor
 from companion.supervision.mission_limits import BorderMonitor
@@ -44,16 +46,16 @@ def make_monitors(
     notifier: TextSink,
     loop: Loop,
     worker: Worker,
-    lidars: tuple[str, ...] = (),
+    lidars: Lidars | None = None,
 ) -> Monitors:
-    """The monitors of a run that has not begun. ``lidars``: names of those wired to the companion."""
-    settings = live.current
+    """The monitors of a run that has not begun. ``lidars``: those wired to the companion."""
+    settings, wired = live.current, lidars or Lidars()
     localization, scans = LocalizationMonitor(run, autopilot, live, notifier), ScanMonitor()
     rivals, batteries = RivalMonitor(autopilot), BatteryMonitor(settings.power)
     fences, gate = FenceMonitor(autopilot, settings.fence, notifier), GpsGate(live)
     by_precedence = (
         SticksMonitor(),
-        LidarMonitor(lidars, live),
+        LidarMonitor(wired.names, live),
         DataMonitor(live),
         localization,
         LoopMonitor(loop, worker, settings.safety.planner_s),
@@ -64,6 +66,7 @@ def make_monitors(
         gate,
         batteries,
         GuardMonitor(notifier),
+        LidarTroubleMonitor(wired, notifier),
         LimitsMonitor(autopilot, live, notifier),
         MissionChangeMonitor(run.mission.stored, autopilot.downloads, notifier),
     )

@@ -23,6 +23,7 @@ from companion.lidar.spec import LidarError, LidarSpec, parsed
 from companion.mapping.map_files import MapError
 from companion.mission.given import Given
 from companion.mission.mission import Mission, MissionError
+from companion.mission.outline_hint import outline_hint
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings, SettingsError
@@ -34,7 +35,7 @@ from sitl.cli.drive_outputs import outputs, print_summary, write_collisions
 from sitl.cli.drive_progress import Also, Pace, Unattended, run_with_progress
 from sitl.cli.drive_view import run_with_view
 from sitl.faults.fault_file import FaultFileError
-from sitl.lockstep import Drive
+from sitl.lockstep import Drive, Report
 from sitl.network.collision_log import CollisionLog
 from sitl.scenario import Scenario, ScenarioError, equipped, simulated, with_lidars
 
@@ -83,7 +84,8 @@ def drive(
     """Drive MISSION (or --world with --start and --target), companion and simulator together, faster than real time.
 
     Exit code 0: all targets reached and no collision; 3: a target unreachable, given up or not reached in time;
-    4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person ends after a minute.
+    4: collision; 2: bad input; 130: stopped by Ctrl-C or SIGTERM. A run that waits for a person ends after a minute,
+    one that cannot begin after five.
     """
     painter: Painter | None = None
     console, wanted = Console(), outputs(image, map_stem, json_file, report_file, record)
@@ -98,7 +100,7 @@ def drive(
         where = OnWorld(world, start, target, resolution_m, top_left, prior)
         given = Given(resolution_m if world is None else None, radius_m, speed_m_s)
         chosen = mission_to_drive(mission_file, where, given, skip_unknown=skip_unknown, laps=laps)
-        lidars = tuple(parsed(text, SIMULATED) for text in lidar or ())
+        lidars = tuple(map(_simulated_lidar, lidar or ()))
         mission = equipped(chosen, "none" if lidars and sensors is None else sensors, params)
         scenario = _simulated(mission, faults, lidars)
         files = {"settings": settings_file, "faults": faults, "sensors": _file(sensors)}
@@ -137,13 +139,27 @@ def drive(
     finally:
         _closed(page)
     recorder.close()
-    print_summary(report, console)
+    _print_results(report, console, mission, settings)
     _print_last(painter, wanted.lines + isinstance(recorder, Recorder))
     try:
         wanted.write(run, recorder, console)
     except OutputError as error:
         raise _refused(error) from error
     raise typer.Exit(report.exit_code)
+
+
+def _simulated_lidar(text: str) -> LidarSpec:
+    """A lidar of ``--lidar``. Raises LidarError."""
+    if "/" in text.partition(":")[2]:
+        raise LidarError(f"lidar '{text}': names a port; a simulated lidar has none: write MODEL[:KEY=VALUE,...]")
+    return parsed(text, SIMULATED)
+
+
+def _print_results(report: Report, console: Console, mission: Mission, settings: Settings) -> None:
+    print_summary(report, console)
+    hint = outline_hint(mission.rover, settings.guidance.controller)
+    if hint and any(status is TargetStatus.UNREACHABLE for _, status in report.targets):
+        _warn(hint)
 
 
 def _painter(view: bool) -> Painter | None:

@@ -15,6 +15,8 @@ from sitl.lockstep import TRACK_PERIOD_S, Drive, Report
 LINE_EVERY_S = 60.0
 NOBODY_S = 60.0
 """Nobody is there to do what a companion waits for: after so long the run is ended."""
+BEGINS_S = 300.0
+"""A simulated rover that cannot begin until then never will: its EKF takes 45 s."""
 
 
 class Pace:
@@ -42,7 +44,10 @@ class Also:
 
 
 class Unattended:
-    """Ends a run that waits for a person: in lock-step there is none but those of a plan of faults, or at a page."""
+    """Ends a run that waits for a person: in lock-step there is none but those of a plan of faults, or at a page.
+
+    Also one that does not begin, because data that it needs never comes.
+    """
 
     def __init__(self, run: Drive, say: Callable[[str], None]) -> None:
         self._run = run
@@ -52,13 +57,19 @@ class Unattended:
 
     def look(self, status: Status) -> None:
         """To be called often."""
+        if self._run.companion.executor is None and status.time_s >= BEGINS_S and self._run.station is None:
+            self._end(status, f"{status.doing} since the start; it cannot be expected any more")
         if not status.activity.needs_person or self._run.station is not None:
             self._since_s = None
             return
         self._since_s = status.time_s if self._since_s is None else self._since_s
-        if status.time_s - self._since_s >= NOBODY_S and not self._ended:
+        if status.time_s - self._since_s >= NOBODY_S:
+            self._end(status, "nobody is here to do what the companion waits for")
+
+    def _end(self, status: Status, why: str) -> None:
+        if not self._ended:
             self._ended = True
-            self._say(f"{status.time_s:6.1f} s  ended: nobody is here to do what the companion waits for")
+            self._say(f"{status.time_s:6.1f} s  ended: {why}")
             self._run.companion.stop()
 
 

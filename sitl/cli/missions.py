@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import contextlib
-import importlib.metadata
 import shutil
 import tomllib
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from companion.cli.inputs import EXIT_BAD_INPUT
+from companion.storage.shipped import ONE, shipped
 
-SOURCE = Path(__file__).resolve().parents[2] / "missions"
-PACKAGE, ONE = "rover-companion", "rooms.toml"
+LISTED = ("*.toml", "first-drive/*.toml", "*.plan", "*.waypoints")
 
 
 def missions(
@@ -30,23 +27,10 @@ def missions(
         _copy(folder, copy)
         return
     typer.echo(f"in {folder}:")
-    for file in sorted((*folder.glob("*.toml"), *folder.glob("first-drive/*.toml"))):
-        if "target" in tomllib.loads(file.read_text(encoding="utf-8")):
+    for file in sorted(file for pattern in LISTED for file in folder.glob(pattern)):
+        if file.suffix != ".toml" or "target" in tomllib.loads(file.read_text(encoding="utf-8")):
             typer.echo(f"  {file.relative_to(folder)}")
     typer.echo(f"rover-sitl drive {folder / ONE} drives one")
-
-
-def shipped() -> Path | None:
-    """The folder of the shipped missions: beside the sources, or where a wheel has put it; None if there is none."""
-    return next((file.parent for file in _places() if file.is_file()), None)
-
-
-def _places() -> Iterator[Path]:
-    yield SOURCE / ONE
-    with contextlib.suppress(importlib.metadata.PackageNotFoundError):
-        for file in importlib.metadata.files(PACKAGE) or ():
-            if file.name == ONE:
-                yield Path(str(file.locate())).resolve()
 
 
 def _copy(folder: Path, place: Path) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType
 from typing import Annotated
@@ -75,7 +76,7 @@ def serve(
         try:
             console = terminal(sys.stdout) if view else None
             place = asked_place(web, web_token)
-            lidars = [terminal_of(text) for text in lidar_pty or ()]
+            lidars = terminals_of(lidar_pty or ())
             sensors = "none" if lidars and sensors is None else sensors
             name, scenario = _scenario(mission_file, sensors, params, faults)
             scenario = with_lidars(scenario, lidars)
@@ -119,6 +120,20 @@ def serve(
     if not quiet:
         touched = len(simulator.collisions)
         say(f"stopped after {simulator.time_s:.0f} s of the rover's time and {touched} collision{'s' * (touched != 1)}")
+
+
+def terminals_of(texts: Sequence[str]) -> list[LidarSpec]:
+    """The lidars of ``--lidar-pty``. Raises LidarError, also if two have one path."""
+    lidars = [terminal_of(text) for text in texts]
+    for number, spec in enumerate(lidars):
+        same = [text for text, one in zip(texts, lidars[:number], strict=False) if _one_path(one.port, spec.port)]
+        if same:
+            raise LidarError(f"--lidar-pty '{texts[number]}': '{same[0]}' has the same path; give each its own")
+    return lidars
+
+
+def _one_path(one: str, other: str) -> bool:
+    return NO_PATH not in (one, other) and os.path.abspath(one) == os.path.abspath(other)
 
 
 def terminal_of(text: str) -> LidarSpec:

@@ -22,6 +22,7 @@ from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings
 from companion.settings.settings import ControllerKind
 from companion.storage.files import why_no_file
+from companion.storage.shipped import SOURCE, shipped
 from sitl.experiments import drawing
 from sitl.experiments.results_page import write_section
 
@@ -203,7 +204,7 @@ def planners_of(options: Options, usual: Iterable[str]) -> tuple[str, ...]:
 
 def load_maps(folder: Path | None, names: tuple[str, ...]) -> dict[str, Grid]:
     """The named maps (NAME.png). Raises ExperimentError, or MapError for a file that is no map."""
-    given = Path(__file__).parents[2] / "missions" / "maps" if folder is None else folder
+    given = (shipped() or SOURCE) / "maps" if folder is None else folder
     if not given.is_dir():
         raise ExperimentError(f"{given}: no such folder of maps; name one with --maps (missions/maps of the source)")
     maps = {}
@@ -224,7 +225,7 @@ def shipped_missions(maps: Path | None, names: tuple[str, ...]) -> list[Path]:
 
     Raises ExperimentError.
     """
-    source = Path(__file__).parents[2] / "missions" / "maps"
+    source = (shipped() or SOURCE) / "maps"
     folder = source if maps is None else maps
     if maps is not None and not maps.is_dir():
         raise ExperimentError(f"{maps}: no such folder of maps; name one with --maps (missions/maps of the source)")

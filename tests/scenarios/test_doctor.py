@@ -16,7 +16,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from typer.testing import CliRunner
 
 from companion.cli.commands import app
-from companion.cli.doctor import of_mission
+from companion.cli.doctor import mission_line, of_mission
 from companion.control.following import Following
 from companion.control.model_estimate import ModelEstimate
 from companion.core.frames import LocalFrame, NedPoint
@@ -366,6 +366,10 @@ def test_a_mission_is_looked_at_from_where_the_rovers_home_is(tmp_path: Path) ->
         ("[[target]]\nnorth_m = 30\neast_m = 0\n[grid]\nresolution_m = 1\n", []),
     ):
         (tmp_path / "m.toml").write_text(text)
-        findings = of_mission(load_mission(tmp_path / "m.toml"), case.result, Settings())
+        mission = load_mission(tmp_path / "m.toml")
+        findings = of_mission(mission, case.result, Settings())
+        line = mission_line(mission, case.result, findings)
+        is_so = "it can be laid out round the rover's home" if all(level is N for _, level in found) else "see below"
+        assert line == f"mission m: 1 target; {is_so}"
         assert [(one.name, one.level) for one in findings] == found
         assert all("\n" not in one.says and one.remedy for one in findings)

@@ -178,7 +178,12 @@ def test_a_record_says_which_lidars_there_were(record: Path, tmp_path: Path) -> 
     ("command", "says"),
     [
         (["drive", "MISSION", "--lidar", "LD20"], "lidar 'LD20': 'LD20' is no model; models are LD06"),
-        (["drive", "MISSION", "--lidar", "LD19:up=1"], "'up=1' is no option"),
+        (["drive", "MISSION", "--lidar", "LD19:up=1"], "lidar 'LD19:up=1': 'up=1' is no option"),
+        (["drive", "MISSION", "--lidar", "LD19:/dev/ttyUSB0"], "'LD19:/dev/ttyUSB0': names a port; a simulated lidar"),
+        (
+            ["serve", "MISSION", "--lidar-pty", "LD19:./tty", "--lidar-pty", "C1:tty:yaw=3"],
+            "--lidar-pty 'C1:tty:yaw=3': 'LD19:./tty' has the same path; give each its own",
+        ),
         (
             ["drive", "MISSION", "--faults", "FAULTS"],
             "fault 1: there are 0 lidars on serial lines; give them",
@@ -231,3 +236,19 @@ def test_run_refuses_a_lidar_that_is_not_there_before_anything_is_sent(tmp_path:
     twice = ["--lidar", f"LD19:{place}", "--lidar", f"C1:{place}"]
     found = CliRunner().invoke(app, [*command, *twice, "--state", str(tmp_path / "state")])
     assert found.exit_code == 2 and f"{place} is another lidar's port" in found.output
+
+
+@pytest.mark.parametrize("command", ["run", "doctor"])
+def test_one_device_under_two_names_is_told_as_that(tmp_path: Path, command: str) -> None:
+    """Names below /dev/serial/by-id are symbolic links."""
+    device, by_id = tmp_path / "ttyUSB0", tmp_path / "usb-CP2102"
+    device.touch()
+    by_id.symlink_to(device)
+    given = [command, str(mission_path(yard(tmp_path))), "--connect", f"serial:{device}:115200"]
+    found = CliRunner().invoke(app, [*given, "--lidar", f"LD19:{by_id}", "--state", str(tmp_path / "state")])
+    says = f"lidar 'LD19:{by_id}': {by_id} and {device} are one device: the autopilot's port (--connect serial:{device}"
+    assert found.exit_code == 2 and says in found.output and len(found.output.splitlines()) == 1
+    given[-1] = "udpin:127.0.0.1:1"
+    lidars = ["--lidar", f"LD19:{device}", "--lidar", f"LD19:{by_id}"]
+    found = CliRunner().invoke(app, [*given, *lidars, "--state", str(tmp_path / "state")])
+    assert found.exit_code == 2 and f"{by_id} and {device} are one device: another lidar's port" in found.output

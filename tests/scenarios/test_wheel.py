@@ -65,5 +65,7 @@ def test_a_wheel_installs_and_drives(tmp_path: Path) -> None:
     assert said("rover-companion", "--version") == f"rover-companion {told}\n"
     listed = said("rover-sitl", "missions")
     assert listed.startswith(f"in {place / 'share' / 'rover-companion' / 'missions'}:")
+    maps = "from sitl.experiments.experiment import load_maps; print(*load_maps(None, ('rooms', 'clutter')))"
+    assert said("python", "-c", maps) == "rooms clutter\n"
     mission = place / "share" / "rover-companion" / "missions" / "first-drive" / "five-metres.toml"
     assert "outcome: reached" in said("rover-sitl", "drive", str(mission))

@@ -61,7 +61,8 @@ def test_a_bad_world_is_found_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("north_m", "reason"), [(30.0, "target 1 'target 1': lies in"), (30000.0, "are more than 4000000")]
+    ("north_m", "reason"),
+    [(30.0, "target 1 'target 1': lies in"), (30000.0, "km is more ground than a rover can keep a map of")],
 )
 def test_a_mission_that_could_never_begin_is_refused(tmp_path: Path, north_m: float, reason: str) -> None:
     path = tmp_path / "m.toml"
@@ -116,10 +117,18 @@ def checked(path: Path, *options: str) -> str:
     return result.output
 
 
+def refused(path: Path) -> str:
+    result = CliRunner().invoke(app, ["mission", "check", str(path)])
+    assert result.exit_code == 2 and result.output.count("\n") == 1, result.output
+    return result.output
+
+
 def test_it_warns_of_places_that_seem_wrong(tmp_path: Path) -> None:
     path = tmp_path / "far.waypoints"
+    path.write_text(FAR.replace("23.1700\t53.1330", "53.1331\t23.1691").replace("53.2330", "53.1450"))
+    assert checked(path).endswith("warning: target 3 'waypoint 3' is 1.4 km from home; is that meant?\n")
     path.write_text(FAR)
-    assert checked(path).endswith(WARNED)
+    assert WARNED.splitlines()[0].removeprefix("warning: ") in refused(path)
     assert "warning" not in checked(MISSIONS / "field.plan")
 
 
@@ -155,3 +164,16 @@ def test_a_grid_that_is_too_large_names_the_place_that_makes_it_so(tmp_path: Pat
     result = CliRunner().invoke(app, ["mission", "check", str(path)])
     assert result.exit_code == 2 and result.output.count("\n") == 1
     assert "target 2 'target 2' is 4.0 km from home; is that meant? If it is, use resolution_m = " in result.output
+
+
+def test_what_drive_would_refuse_is_refused_here_too(tmp_path: Path) -> None:
+    """A place that makes the ground too large, in a file with a planned home; a world in which nobody stands."""
+    rows = [f"{n} 0 3 16 0 0 0 0 {lat} 23.2 0 1" for n, lat in enumerate((53.1, 53.1001, 13.2))]
+    path = tmp_path / "far.waypoints"
+    path.write_text("\n".join(["QGC WPL 110", *(row.replace(" ", "\t") for row in rows)]))
+    output = refused(path)
+    assert "target 2 'waypoint 2' is 4437 km from home; is that meant?" in output and "--resolution-m" not in output
+    path = tmp_path / "m.toml"
+    path.write_text('[[target]]\nnorth_m = 3\neast_m = 0\n[sitl]\nworld = "w.toml"\n')
+    (tmp_path / "w.toml").write_text("size_m = [20.0, 16.0]\n")
+    assert "sitl.start: missing; give the field of " in refused(path)

@@ -172,6 +172,10 @@ def test_one_fault_is_one_finding(name: str, level: Level, seen: Survey) -> None
         assert finding.value == seen.parameters[finding.parameter] != finding.wanted
 
 
+def test_a_rover_that_is_told_to_drive_slowly_may_well_be_faster() -> None:
+    assert diagnose(with_set(WP_SPEED=0.5, CRUISE_SPEED=3.0, CRUISE_THROTTLE=75.0)) == []
+
+
 def test_few_bytes_or_few_of_them_bad_are_no_finding() -> None:
     assert diagnose(replace(WELL, bad_bytes=49, read_bytes=1000)) == []
     assert diagnose(replace(WELL, bad_bytes=100, read_bytes=400)) == []

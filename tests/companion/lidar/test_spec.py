@@ -49,6 +49,8 @@ def test_ports_with_colons_of_their_own(text: str, port: str) -> None:
         ("LD19:/dev/x:mask=20", "mask=20: write mask=FROM..TO"),
         ("LD19:/dev/x:mask=10..10", "begins where it ends"),
         ("X4:/dev/x:intensity=3", "the YDLIDAR-X4 does not tell how strong echoes are"),
+        ("LD19:/dev/x,yaw=90", "one colon stands before all options, and commas between them"),
+        ("LD19:/dev/x:yaw=90:flip", "one colon stands before all options"),
         ("LD19:/dev/x:flip=maybe", "'flip=maybe' is no option"),
     ],
 )

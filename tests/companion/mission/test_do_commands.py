@@ -45,6 +45,36 @@ def test_a_region_of_interest_has_a_place_and_a_camera_none(tmp_path: Path) -> N
     assert (roi.place, roi.frame) == (GeoPoint(53.4, 23.4), 3) and off.place is None and camera.place is None
 
 
+def test_a_command_without_what_it_needs_is_named_with_the_remedy(tmp_path: Path) -> None:
+    rows = (waypoint(1), do(2, 183, 0, 1900), do(3, 195), do(4, 183, 9, float("nan")), waypoint(5))
+    assert refusal(wpl(tmp_path, HOME, *rows)) == (
+        "item 2: DO_SET_SERVO (183): there is no output 0; give the number of a SERVOn_FUNCTION, from 1 to 32; "
+        "item 3: DO_SET_ROI_LOCATION (195): has no place to look at; give its latitude and longitude, or "
+        "DO_SET_ROI_NONE to look ahead again; "
+        "item 4: DO_SET_SERVO (183): needs 2 parameters (output from 1, pulse in µs)"
+    )
+
+
+@pytest.mark.parametrize(
+    ("command", "says"),
+    [
+        ('name = "DO_SET_SERVO"', "command 1: DO_SET_SERVO: needs 2 parameters (output from 1, pulse in µs)"),
+        ('name = "DO_SET_SERVO"\nparams = [9.5, 1900]', "there is no output 9.5; give the number of a SERVOn_FUNCTION"),
+        ('name = "DO_SET_RELAY"\nparams = [-1, 1]', "there is no relay -1; relays are counted from 0 to 15"),
+        ('name = "SET_SERVO"', "'SET_SERVO' is no MAVLink command known here; did you mean DO_SET_SERVO?"),
+        ('name = "NAV_WAYPOINT"', "it moves the rover, and targets do that"),
+        ('name = "DO_SPRAYER"', "command 1: DO_SPRAYER: needs 1 parameter (0 off or 1 on)"),
+        ('name = "DO_SET_ROI"', "DO_SET_ROI: needs lat_deg and lon_deg; DO_SET_ROI_NONE looks ahead again"),
+    ],
+)
+def test_a_command_in_toml_without_what_it_needs(tmp_path: Path, command: str, says: str) -> None:
+    path = tmp_path / "m.toml"
+    path.write_text(f"[[target]]\nnorth_m = 9\neast_m = 0\n[[target.command]]\n{command}\n")
+    with pytest.raises(MissionError) as error:
+        load_mission(path)
+    assert says in str(error.value) and len(str(error.value).splitlines()) == 1
+
+
 def test_home_that_is_set_on_the_way_is_where_the_rover_returns_to(tmp_path: Path) -> None:
     rows = (waypoint(1), do(2, 179, 1), do(3, 20), do(4, 179, 0, lat=53.3, lon=23.3), do(5, 20))
     mission = load_mission(wpl(tmp_path, HOME, *rows))

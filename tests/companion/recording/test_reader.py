@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import shutil
 from pathlib import Path
@@ -50,6 +51,17 @@ def test_all_that_was_recorded_is_read(record: Path) -> None:
     assert len(ticks) == TICKS and len(loaded.decisions) == 9
     assert ticks[0].heard == ticks[0].said == []
     assert all(len(entry.heard) == 2 and len(entry.said) == 1 for entry in ticks[1:])
+
+
+def test_the_state_that_a_resumed_run_writes_on_has_not_changed(copy: Path, tmp_path: Path) -> None:
+    state, source = b"as it was", tmp_path / "mission.state"
+    (copy / "inputs" / "mission.state").write_bytes(state)
+    source.write_bytes(b"as the run left it")
+    digest = hashlib.sha256(state).hexdigest()
+    entry = {"kind": "state", "name": "inputs/mission.state", "source": str(source), "sha256": digest}
+    meta = json.loads((copy / "meta.json").read_text())
+    with_meta("inputs", [*meta["inputs"], entry])(copy)
+    assert load_record(copy).notes == []
 
 
 def test_a_file_that_changed_since_is_named_and_its_copy_used(copy: Path, tmp_path: Path) -> None:

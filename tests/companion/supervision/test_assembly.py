@@ -19,5 +19,5 @@ def test_monitors_hear_of_an_event_before_the_drive_permission(tmp_path: Path) -
     parts = assemble(link, HandClock(), yard(tmp_path), SETTINGS, InlineRunner(), Log(), Options(seed=0, arm=False))
     assert isinstance(parts.supervisor, Supervisor)
     names = [type(handler).__name__ for handler in parts.dispatcher._handlers]
-    assert names[:2] == ["OperatorServer", "SticksMonitor"] and len(names) == 19
+    assert names[:2] == ["OperatorServer", "SticksMonitor"] and len(names) == 20
     assert names[-4:] == ["RequestedGoals", "MissionRequests", "MissionRun", "DrivePermission"]

@@ -28,6 +28,7 @@ def test_the_monitors_stand_in_their_order_of_precedence(tmp_path: Path) -> None
         "GpsGate",
         "BatteryMonitor",
         "GuardMonitor",
+        "LidarTroubleMonitor",
         "LimitsMonitor",
         "MissionChangeMonitor",
     ]

@@ -1,9 +1,18 @@
-"""The speed of simulated time."""
+"""The speed of simulated time, and runs that nobody can help."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
 
 import pytest
 
-from sitl.cli.drive_progress import Pace
+from companion.operator.notifications import Status
+from companion.safety.reasons import Activity, Doubt, Reason, RunPhase, WaitReason
+from sitl.cli.drive_progress import BEGINS_S, Pace, Unattended
 from tests.support.notices import HandClock
+
+AWAITED = Reason(WaitReason.GOOD_DATA, (Reason(Doubt.DATA_MISSING, ("range data ahead",)),))
 
 
 def test_a_pace_counts_from_its_first_moment_and_catches_up() -> None:
@@ -17,3 +26,37 @@ def test_a_pace_counts_from_its_first_moment_and_catches_up() -> None:
     clock.time_s = 110.0
     pace.wait(30.0)
     assert clock.time_s == 110.0
+
+
+@dataclass
+class Run:
+    """Stands in for a drive and its companion."""
+
+    executor: object | None = None
+    station: None = None
+    stops: list[float] = field(default_factory=list)
+
+    @property
+    def companion(self) -> Run:
+        return self
+
+    def stop(self) -> None:
+        self.stops.append(1.0)
+
+
+def looked_at(executor: object | None) -> tuple[list[str], int]:
+    run: Any = Run(executor)
+    said: list[str] = []
+    unattended = Unattended(run, said.append)
+    for time_s in (1.0, BEGINS_S - 1.0, BEGINS_S, BEGINS_S + 1.0):
+        unattended.look(Status(time_s, Activity(RunPhase.WAITING, None, AWAITED), None, None, "", 0, 1, 0))
+    return said, len(run.stops)
+
+
+def test_a_run_that_waits_for_data_that_never_comes_ends_with_its_reason() -> None:
+    (line,), stops = looked_at(None)
+    assert "ended: waiting for good data (no range data ahead) since the start" in line and stops == 1
+
+
+def test_one_that_has_begun_may_wait_for_data() -> None:
+    assert looked_at(object()) == ([], 0)

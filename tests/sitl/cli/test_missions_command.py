@@ -18,7 +18,9 @@ ROOT = Path(__file__).resolve().parents[3]
 def test_each_listed_one_can_be_loaded() -> None:
     answer = CliRunner().invoke(app, ["missions"])
     names = [line.strip() for line in answer.output.splitlines()[1:-1]]
-    assert answer.exit_code == 0 and {"rooms.toml", "first-drive/gate.toml"} <= set(names)
+    assert answer.exit_code == 0 and {"rooms.toml", "first-drive/gate.toml", "field.plan", "field.waypoints"} <= set(
+        names
+    )
     assert "first-drive/gate-world.toml" not in names
     assert all(load_mission(ROOT / "missions" / name).targets for name in names)
 
