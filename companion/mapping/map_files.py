@@ -31,6 +31,8 @@ LARGEST = 1e9
 """No number in a map file has a reason to be larger."""
 
 NOT_TURNED_RAD = 1e-6
+QUARTER_RAD, ROUNDED_RAD = 0.5 * math.pi, 1e-3
+"""A yaw as near to a quarter turn as this was rounded: with 1.5708 every field would overlap two others."""
 MAX_TEXT_BYTES = 2 * MAX_FIELDS
 MAX_YAML_BYTES = 100_000
 IMAGE_SUFFIXES = (".png", ".pgm", ".bmp")
@@ -180,6 +182,8 @@ def _load_ros(path: Path) -> Grid:
     if fault := why_no_file(picture):
         raise MapError(f"{path}: image: {picture}: {fault}")
     weights, corner = _weights_of(*_read_grey(picture), shades), NedPoint(north_m, east_m)
+    quarters_rad = round(yaw_rad / QUARTER_RAD) * QUARTER_RAD
+    yaw_rad = quarters_rad if abs(yaw_rad - quarters_rad) <= ROUNDED_RAD else yaw_rad
     if abs(wrap_pi_rad(yaw_rad)) <= NOT_TURNED_RAD:
         return Grid(weights, resolution_m, corner)
     width, height = turned_size(weights.shape[1], weights.shape[0], yaw_rad)

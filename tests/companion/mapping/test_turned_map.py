@@ -75,8 +75,10 @@ def yaml_of(tmp_path: Path, yaw: str) -> Path:
     return tmp_path / "room.yaml"
 
 
-def test_a_turned_ros_map_is_read_about_its_origin(tmp_path: Path) -> None:
-    grid = load_map(yaml_of(tmp_path, "1.5707963267948966"))
+@pytest.mark.parametrize("yaw", ["1.5707963267948966", "1.5708", "-4.712"])
+def test_a_turned_ros_map_is_read_about_its_origin(tmp_path: Path, yaw: str) -> None:
+    """Also where the quarter turn was rounded."""
+    grid = load_map(yaml_of(tmp_path, yaw))
     # The picture's top left corner lies north of the origin; a quarter turn takes it to the west.
     assert (grid.width, grid.height) == (2, 3) and grid.is_obstacle(grid.cell_at(NedPoint(2.25, 0.25)))
     assert int((grid.weights >= OBSTACLE).sum()) == 1
