@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -60,20 +61,20 @@ def values_of(campaign: CampaignTable, axis: str) -> list[object]:
 
 def rows(campaign: CampaignTable, runs: Runs) -> list[list[str]]:
     """A row for each combination of the axes that vary, in the order of the file, and one for all."""
-    axes, groups = varied(campaign), dict[tuple[str, ...], list[RunResult]]()
+    axes, groups = varied(campaign), dict[tuple[object, ...], list[RunResult]]()
     for spec, result in runs:
-        groups.setdefault(tuple(shown(getattr(spec, axis)) for axis in axes), []).append(result)
-    table = [[*key, *_row(results)] for key, results in groups.items()]
+        groups.setdefault(tuple(getattr(spec, axis) for axis in axes), []).append(result)
+    table = [[*map(shown, key), *_row(results)] for key, results in groups.items()]
     if len(groups) > 1:
         table.append(["all", *[""] * (len(axes) - 1), *_row([result for _, result in runs])])
     return table
 
 
 def shown(value: object) -> str:
-    """A value of an axis as text."""
+    """A value of an axis as text; of a file its name alone."""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else str(value)
+    return f"{value:g}" if isinstance(value, float) else Path(str(value)).stem
 
 
 def differences(campaign: CampaignTable, runs: Runs) -> Iterator[PairedDifference]:
@@ -81,13 +82,14 @@ def differences(campaign: CampaignTable, runs: Runs) -> Iterator[PairedDifferenc
     for axis in (axis for axis in varied(campaign) if axis != "world"):
         for world in campaign.worlds:
             own = [(spec, result) for spec, result in runs if spec.world == world]
-            by_value = dict[str, dict[tuple[object, ...], RunResult]]()
+            by_value = dict[object, dict[tuple[object, ...], RunResult]]()
             for spec, result in own:
-                by_value.setdefault(shown(getattr(spec, axis)), {})[spec.without(axis)] = result
-            first = shown(values_of(campaign, axis)[0])
+                by_value.setdefault(getattr(spec, axis), {})[spec.without(axis)] = result
+            first = values_of(campaign, axis)[0]
             for value, results in by_value.items():
                 if value != first and first in by_value:
-                    yield PairedDifference(axis, world, value, first, _paired(results, by_value[first]))
+                    cells = _paired(results, by_value[first])
+                    yield PairedDifference(axis, shown(world), shown(value), shown(first), cells)
 
 
 def _row(results: Sequence[RunResult]) -> list[str]:

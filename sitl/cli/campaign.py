@@ -19,13 +19,15 @@ from companion.mission.mission import MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import Recorder
 from sitl.campaign.campaign_file import CampaignError, CampaignTable, load_campaign
-from sitl.campaign.drive_run import mission_of, prepared, settings_of
+from sitl.campaign.drive_run import ERROR, mission_of, prepared, settings_of
 from sitl.campaign.run_spec import RunSpec, specs_of
 from sitl.campaign.run_store import RunStore, digest_of
+from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
 from sitl.scenario import ScenarioError
 
+BAD_INPUT = (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError)
 EXIT_FAILED = 3
 FILE = "runs.jsonl"
 LINES = 10
@@ -55,30 +57,37 @@ def campaign(
 
     Exit code 2: bad input; 3: a run ended with an error of the programs; 130: stopped, what is done is kept.
     """
-    console = Console()
     try:
-        table, folder = load_campaign(file), file.resolve().parent
         if replay is not None or record is not None:
-            _drive_again(file, table, folder, replay, record)
-            return
-        place = out or Path("out") / table.name
-        writable(place / FILE)
-        store = RunStore(place / FILE, digest_of(table, folder))
-        specs = list(specs_of(table))
-        _say_what_there_is(store, specs)
-        left = [spec for spec in specs if spec.id not in store.results]
-        if left:
-            _drive(console, table, left, store, folder, jobs, cluster)
-        put_out(console, table, store.of(specs), file, place, parquet=parquet)
-    except (CampaignError, MissionError, MapError, ScenarioError, OutputError, RecordError) as error:
+            _drive_again(file, replay, record)
+        else:
+            drive_campaign(file, out, jobs, cluster, parquet=parquet)
+    except BAD_INPUT as error:
         typer.echo(str(error), err=True)
         raise typer.Exit(EXIT_BAD_INPUT) from error
-    errors = sum(result.outcome == "error" for _, result in store.of(specs))
+
+
+def drive_campaign(
+    file: Path, out: Path | None, jobs: int, cluster: str | None = None, *, parquet: bool = False
+) -> Runs:
+    """Drive what is left of a campaign and put everything out. Raises one of ``BAD_INPUT``."""
+    console = Console()
+    table, folder = load_campaign(file), file.resolve().parent
+    place = out or Path("out") / table.name
+    writable(place / FILE)
+    store = RunStore(place / FILE, digest_of(table, folder))
+    specs = list(specs_of(table))
+    _say_what_there_is(store, specs)
+    left = [spec for spec in specs if spec.id not in store.results]
+    if left:
+        _drive(console, table, left, store, folder, jobs, cluster)
+    runs = store.of(specs)
+    put_out(console, table, runs, file, place, parquet=parquet)
+    errors = sum(result.outcome == ERROR for _, result in runs)
     if errors:
-        typer.echo(
-            f"{table.name}: {errors} runs ended with an error of the programs; {place / REPORT} lists them", err=True
-        )
+        typer.echo(f"{table.name}: {errors} runs ended with an error; {place / REPORT} lists them", err=True)
         raise typer.Exit(EXIT_FAILED)
+    return runs
 
 
 def _say_what_there_is(store: RunStore, specs: list[RunSpec]) -> None:
@@ -148,8 +157,9 @@ def _progress(console: Console, total: int) -> Iterator[Callable[[], None]]:
         yield advance
 
 
-def _drive_again(file: Path, table: CampaignTable, folder: Path, run_id: str | None, record: Path | None) -> None:
+def _drive_again(file: Path, run_id: str | None, record: Path | None) -> None:
     """One run with a record. Raises CampaignError for an ID that the campaign does not have."""
+    table, folder = load_campaign(file), file.resolve().parent
     if run_id is None or record is None:
         raise CampaignError(f"{file}: --replay ID and --record FOLDER go together")
     spec = next((spec for spec in specs_of(table) if spec.id == run_id), None)

@@ -15,7 +15,7 @@ from sitl.campaign.tables import write_csv, write_parquet
 from sitl.experiments.results_page import terminal_table, without_intervals
 
 REPORT, CSV, PARQUET = "report.html", "runs.csv", "runs.parquet"
-NARROW = ("runs", "complete", "touched", "refused", "missed", "errors", "mean s")
+NARROW = ("runs", "complete", "touched", "missed", "errors", "mean s")
 """The columns for a terminal."""
 PAIRS = ("axis", "world", "values", "pairs", "ratio of times")
 

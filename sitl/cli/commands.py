@@ -8,6 +8,7 @@ import typer
 
 from companion.cli.inputs import version_option
 from sitl.cli.campaign import campaign
+from sitl.cli.compare import compare
 from sitl.cli.drive import drive
 from sitl.cli.experiment import experiment
 from sitl.cli.missions import missions
@@ -33,3 +34,4 @@ app.command()(physics)
 app.command()(missions)
 app.command()(experiment)
 app.command()(campaign)
+app.command()(compare)

@@ -119,3 +119,14 @@ def test_what_cannot_be_done_is_one_line(
     result = CliRunner().invoke(app, ["campaign", *arguments])
     assert result.exit_code == 2 and says in result.output, result.output
     assert len(result.output.strip().splitlines()) == 1
+
+
+def test_planners_side_by_side_are_a_campaign_with_a_plot(campaign: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(campaign.parent)
+    result = CliRunner().invoke(app, ["compare", "yard.toml", "--planners", "astar, dijkstra", "--seeds", "1"])
+    assert result.exit_code == 0, result.output
+    assert "dijkstra / astar" in result.output
+    assert Path("out/compare/times.png").read_bytes().startswith(b"\x89PNG")
+    assert [line["run"]["planner"] for line in lines_of(Path("out/compare"))] == ["astar", "dijkstra"]
+    bad = CliRunner().invoke(app, ["compare", "yard.toml", "--planners", "astr"])
+    assert bad.exit_code == 2 and "unknown planner 'astr'" in bad.output

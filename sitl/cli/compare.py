@@ -1,0 +1,63 @@
+"""``rover-sitl compare``: planners side by side on missions, one table, one plot, one CSV file."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from companion.cli.inputs import EXIT_BAD_INPUT, writable, written
+from sitl.campaign.campaign_file import load_campaign
+from sitl.campaign.pictures import times
+from sitl.cli.campaign import BAD_INPUT, drive_campaign
+from sitl.experiments import drawing
+
+FILE, PLOT = "campaign.toml", "times.png"
+
+
+def compare(
+    missions: Annotated[
+        list[Path], typer.Argument(metavar="MISSION...", help="Mission files; generated ground: clutter, rooms, yard.")
+    ],
+    planners: Annotated[str, typer.Option(help="Names, separated by commas; the others are compared with the first.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Runs of each planner on each mission, with paired seeds.")] = 30,
+    controllers: Annotated[str, typer.Option(help="What leads the rover, names separated by commas.")] = "points",
+    jobs: Annotated[int, typer.Option(min=1, help="Processes (needs joblib).")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder of the results; what is done there is not done again.")] = Path(
+        "out/compare"
+    ),
+) -> None:
+    """Drive each MISSION with each planner, and show driving times, paired ratios with intervals, and a plot.
+
+    It is a campaign: OUT/campaign.toml can be changed and driven with rover-sitl campaign. Exit code 2: bad input; 3: a
+    run ended with an error of the programs; 130: stopped, what is done is kept.
+    """
+    try:
+        file = out / FILE
+        writable(file)
+        worlds = [str(one) if not one.suffix else os.path.relpath(one, out) for one in missions]
+        with written(file):
+            file.write_text(_campaign(worlds, planners, controllers, seeds), encoding="utf-8")
+        runs = drive_campaign(file, out, jobs)
+        if any(result.complete for _, result in runs):
+            with written(out / PLOT):
+                drawing.save(times(load_campaign(file), runs), out / PLOT)
+            typer.echo(f"plot: {out / PLOT}")
+        typer.echo(f"table: {out / 'runs.csv'}")
+    except BAD_INPUT as error:
+        typer.echo(str(error), err=True)
+        raise typer.Exit(EXIT_BAD_INPUT) from error
+
+
+def _campaign(worlds: list[str], planners: str, controllers: str, seeds: int) -> str:
+    """The campaign's file; a list of strings is written alike in JSON and TOML."""
+    lists = {"worlds": worlds, "planners": _names(planners), "controllers": _names(controllers)}
+    lines = [f"{key} = {json.dumps(values, ensure_ascii=False)}" for key, values in lists.items()]
+    return "\n".join(['name = "compare"', *lines, f"runs = {seeds}"]) + "\n"
+
+
+def _names(listed: str) -> list[str]:
+    return [name.strip() for name in listed.split(",") if name.strip()]
