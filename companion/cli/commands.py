@@ -8,6 +8,7 @@ import typer
 
 from companion.cli import mission
 from companion.cli.bench import bench
+from companion.cli.check_planner import check_planner
 from companion.cli.compile import compile_kernels
 from companion.cli.doctor import doctor
 from companion.cli.guard import guard
@@ -36,6 +37,7 @@ app.command()(plan)
 app.command()(replay)
 app.command()(report)
 app.command()(bench)
+app.command()(check_planner)
 app.add_typer(mission.app)
 
 

@@ -47,7 +47,7 @@ class Planner(Protocol):
 
     @property
     def name(self) -> str:
-        """The name in PLANNERS."""
+        """The name that its results have."""
         ...
 
     @property

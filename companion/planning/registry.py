@@ -16,6 +16,7 @@ from companion.planning.graph_search.dijkstra import Dijkstra
 from companion.planning.graph_search.dstar_lite import DstarLite
 from companion.planning.graph_search.theta_star import ThetaStar
 from companion.planning.hybrid import Hybrid
+from companion.planning.own_planners import OwnPlannerError, own_factory, registered
 from companion.planning.papers.achour_ga import AchourGa
 from companion.planning.papers.prm import Prm
 from companion.planning.papers.sedighi_ga import geisler, hermanu, sedighi
@@ -44,16 +45,23 @@ PLANNERS: dict[str, PlannerFactory] = {
 
 
 class UnknownPlannerError(ValueError):
-    """A planner's name that is not in PLANNERS. The text lists the known names and suggests a similar one."""
+    """A planner's name that nobody has, or a planner that cannot be loaded. The text is one line."""
 
 
 def make_planner(name: str, settings: PlannerSettings) -> Planner:
-    """The planner of this name. Raises UnknownPlannerError."""
-    factory = PLANNERS.get(name)
+    """The planner of this name; one of another package by ``module:name`` or the name of its entry point.
+
+    Raises UnknownPlannerError.
+    """
+    try:
+        factory = PLANNERS.get(name) or own_factory(name)
+    except OwnPlannerError as error:
+        raise UnknownPlannerError(str(error)) from error
     if factory is None:
-        near = alike(name, PLANNERS)
+        known = (*PLANNERS, *registered())
+        near = alike(name, known)
         hint = f", did you mean {near!r}?" if near else ";"
-        raise UnknownPlannerError(f"unknown planner {name!r}{hint} known: {', '.join(PLANNERS)}")
+        raise UnknownPlannerError(f"unknown planner {name!r}{hint} known: {', '.join(known)}")
     return factory(settings)
 
 
