@@ -308,8 +308,7 @@ class Simulator:
 
     def _run(self, loops: int) -> None:
         """Run main loops until they are done, or something happens that must be reported at once."""
-        vehicle, rover = self._vehicle, self._rover[0]
-        contacts = int(rover["contacts"])
+        vehicle, contacts = self._vehicle, int(self._rover["contacts"][0])
         if self._row == NOISE_ROWS:
             self._draws = self._rng.standard_normal((NOISE_ROWS, NOISE_COLUMNS))
             self._row = 0
@@ -321,10 +320,14 @@ class Simulator:
         self._tick += done
         self._sensing.time_s = self.time_s
         for lidar in self.lidars:
-            pose = RoverPose(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
-            lidar.advance(self.time_s, pose)
-        if int(rover["contacts"]) > contacts:
-            self._collisions.append(collision_of(rover, self.world, self.time_s))
+            lidar.advance(self.time_s, RoverPose(*self._pose()))
+        if int(self._rover["contacts"][0]) > contacts:
+            self._collisions.append(collision_of(self._rover[0], self.world, self.time_s))
+
+    def _pose(self) -> tuple[float, float, float]:
+        """The true place and heading."""
+        rover = self._rover
+        return float(rover["north_m"][0]), float(rover["east_m"][0]), float(rover["heading_rad"][0])
 
     def _send(self) -> None:
         if not self.is_off:
@@ -335,17 +338,14 @@ class Simulator:
 
     def _send_due(self) -> None:
         """Measure and send everything that is due now."""
-        rover = self._rover[0]
         if self._sensing.samples:
-            self._sensing.sample(float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"]))
+            self._sensing.sample(*self._pose())
         self._autopilot.run_due()
         if self._traffic.talks:
             self._traffic.send_due(self.time_s, (link.channel for link in self._links))
         if self._lidar is None:
             return
-        data = self._lidar.packets(
-            self._vehicle.time_us, float(rover["north_m"]), float(rover["east_m"]), float(rover["heading_rad"])
-        )
+        data = self._lidar.packets(self._vehicle.time_us, *self._pose())
         if data:
             for link in self._links:
                 if link.channel.spoken:  # scans are only routed to where a client was heard

@@ -73,4 +73,4 @@ class RangeScan:
     def looks_ahead(self) -> bool:
         """Whether a reading that is not unknown lies within AHEAD_RAD of straight ahead."""
         turned = np.abs((self.bearing_rad + np.pi) % (2.0 * np.pi) - np.pi)
-        return bool(np.any((turned <= AHEAD_RAD) & ~np.isnan(self.range_m)))
+        return bool(((turned <= AHEAD_RAD) & ~np.isnan(self.range_m)).any())

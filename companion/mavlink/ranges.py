@@ -20,7 +20,6 @@ An autopilot repeats much of what it receives or measures in a coarser form (an 
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -81,9 +80,9 @@ class RangeDecoder:
         if number == points.MESSAGE:
             return self._with_place(self._points.add(message, time_s, sender), finer=True)
         if number == mavlink.MAVLINK_MSG_ID_OBSTACLE_DISTANCE:
-            return self._with_place(_from(sender, obstacle_distance(message, time_s)), finer=True)
+            return self._with_place(obstacle_distance(message, time_s, sender), finer=True)
         sector = sender == AUTOPILOT and is_sector(message)
-        scan = _from(sender, distance_sensor(message, time_s, sector=sector))
+        scan = distance_sensor(message, time_s, sender, sector=sector)
         if scan is None or (sector and self._is_echo(message.orientation, scan)):
             return None
         scan = self._with_place(scan, coarse=sector)
@@ -138,7 +137,7 @@ class RangeDecoder:
         return rangefinder(message, time_s)
 
 
-def distance_sensor(message: Any, time_s: float, *, sector: bool) -> RangeScan | None:
+def distance_sensor(message: Any, time_s: float, sender: int = AUTOPILOT, *, sector: bool) -> RangeScan | None:
     """DISTANCE_SENSOR: one beam, or a 45-degree proximity sector; None if not horizontal or unknown."""
     bearing_rad = _bearing_rad(message)
     if bearing_rad is None or message.max_distance <= message.min_distance:
@@ -155,10 +154,11 @@ def distance_sensor(message: Any, time_s: float, *, sector: bool) -> RangeScan |
         message.max_distance / 100.0,
         SECTOR_RAD if sector else width_rad,
         f"{'sector' if sector else 'distance sensor'} {message.id}",
+        sender,
     )
 
 
-def obstacle_distance(message: Any, time_s: float) -> RangeScan | None:
+def obstacle_distance(message: Any, time_s: float, sender: int = AUTOPILOT) -> RangeScan | None:
     """OBSTACLE_DISTANCE: up to 72 sectors; None if all are unknown or the message is invalid."""
     step_deg = message.increment_f if message.increment_f else float(message.increment)
     # A sector becomes as many beams as its width needs: more than a full turn is invalid.
@@ -180,6 +180,7 @@ def obstacle_distance(message: Any, time_s: float) -> RangeScan | None:
         message.max_distance / 100.0,
         math.radians(abs(step_deg)),
         "obstacle distance",
+        sender,
     )
 
 
@@ -226,17 +227,14 @@ def _scan(
     max_range_m: float,
     width_rad: float,
     source: str,
+    sender: int = AUTOPILOT,
 ) -> RangeScan:
     beams = max(1, math.ceil(width_rad / NARROW_RAD - 1e-9))
     if beams > 1:
         offsets = ((np.arange(beams) + 0.5) / beams - 0.5) * width_rad
         bearing_rad = (bearing_rad[:, None] + offsets).ravel()
         range_m = np.repeat(range_m, beams)
-    return RangeScan(time_s, bearing_rad, range_m, min_range_m, max_range_m, width_rad / beams, source)
-
-
-def _from(sender: int, scan: RangeScan | None) -> RangeScan | None:
-    return None if scan is None else replace(scan, sender=sender)
+    return RangeScan(time_s, bearing_rad, range_m, min_range_m, max_range_m, width_rad / beams, source, sender)
 
 
 def _octants(scan: RangeScan) -> set[int]:

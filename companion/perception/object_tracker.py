@@ -237,9 +237,12 @@ def _alone(scan: RangeScan) -> NDArray[np.int64]:
     """For each reading that hit something the number of the thing that stands alone to which it belongs; -1: none."""
     bearings = np.mod(scan.bearing_rad + math.pi, 2.0 * math.pi)
     order = np.argsort(bearings)
-    gaps = np.diff(bearings[order], prepend=bearings[order][-1] - 2.0 * math.pi)
-    if gaps.max() > 1.5 * scan.beam_width_rad:
-        order = np.roll(order, -int(np.argmax(gaps)))  # a fan begins and ends at its edges
+    ordered_rad = bearings[order]
+    before_rad = np.concatenate((ordered_rad[-1:] - 2.0 * math.pi, ordered_rad[:-1]))
+    gaps = ordered_rad - before_rad
+    widest = int(gaps.argmax())
+    if gaps[widest] > 1.5 * scan.beam_width_rad:
+        order = np.concatenate((order[widest:], order[:widest]))  # a fan begins and ends at its edges
     thing = np.empty(len(order), np.int64)
     thing[order] = alone_in(scan.beam_width_rad, scan.range_m[order], scan.max_range_m - IN_RANGE_M)
     return thing[np.isfinite(scan.range_m)]
@@ -253,7 +256,7 @@ def _seen_things(
     ``thing``: the number of the thing that stands alone to which a reading belongs; -1: none.
     """
     known, alone = free.copy(), []
-    for number in np.unique(thing[thing >= 0]):
+    for number in sorted(set(thing[thing >= 0].tolist())):
         own = thing == number
         if free[own].mean() >= PART_FREE:
             known[own] = True

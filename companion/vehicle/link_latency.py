@@ -80,9 +80,6 @@ def latency_after_report(latency: Latency, time_s: float, boot_s: float) -> Late
     if latency.shifts_s and shift_s < latency.least_shift_s - AHEAD_S:
         return Latency(latency.round_trips_s, (shift_s,), shift_s, time_s, time_s)
     drifted_s = DRIFT * max(0.0, time_s - latency.heard_s)
-    return replace(
-        latency,
-        shifts_s=(*latency.shifts_s[1 - KEPT :], shift_s),
-        least_shift_s=min(latency.least_shift_s + drifted_s, shift_s),
-        heard_s=time_s,
-    )
+    shifts_s = (*latency.shifts_s[1 - KEPT :], shift_s)
+    least_s = min(latency.least_shift_s + drifted_s, shift_s)
+    return Latency(latency.round_trips_s, shifts_s, least_s, time_s, latency.jumped_s)

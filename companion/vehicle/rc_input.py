@@ -8,7 +8,7 @@ Nouns: sticks.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 MIDDLE_US = 1500
 MOVED_US = 100
@@ -53,7 +53,7 @@ def sticks_after(sticks: Sticks, event: SticksSeen) -> Sticks:
         return Sticks(now_us)
     rest_us = tuple(_new_rest_us(rest, now) for rest, now in zip(sticks.rest_us, now_us, strict=True))
     away = any(abs(now - rest) > MOVED_US for rest, now in zip(rest_us, now_us, strict=True))
-    return replace(sticks, rest_us=(rest_us[0], rest_us[1]), away=sticks.away + 1 if away else 0)
+    return Sticks((rest_us[0], rest_us[1]), sticks.away + 1 if away else 0)
 
 
 def _new_rest_us(rest_us: int, now_us: int) -> int:

@@ -107,12 +107,12 @@ class Autopilot:
 
     def _report_motion(self) -> None:
         vehicle, control = self.vehicle, self.vehicle.control
-        if control[0]["arrived"]:
+        if control["arrived"][0]:
             control["arrived"] = 0
             if vehicle.in_guided:
                 for channel in vehicle.channels.values():
                     channel.send(mavlink.MAVLink_mission_item_reached_message(0))
-        if control[0]["timed_out"]:
+        if control["timed_out"][0]:
             control["timed_out"] = 0
             limit_s = vehicle.parameters["GUID_TIMEOUT"]
             vehicle.say(Severity.WARNING, f"target not received last {limit_s:.0f}secs, stopping")

@@ -73,7 +73,7 @@ class BatteryReadings(NamedTuple):
 
 def battery_readings(vehicle: Vehicle) -> BatteryReadings:
     """The readings of this moment."""
-    used_hj = 36.0 * float(vehicle.control[0]["used_wh"])
+    used_hj = 36.0 * float(vehicle.control["used_wh"][0])
     return BatteryReadings(
         _within(1000.0 * vehicle.volts() + 0.5, 0, 65534),
         _within(100.0 * vehicle.amps(), -32768, 32767),
@@ -118,7 +118,7 @@ def heartbeat(vehicle: Vehicle) -> list[Any]:
 
 
 def _attitude(vehicle: Vehicle) -> list[Any]:
-    rate = float(vehicle.estimate[0]["yaw_rate_rad_s"])
+    rate = float(vehicle.estimate["yaw_rate_rad_s"][0])
     return [mavlink.MAVLink_attitude_message(_ms(vehicle), 0.0, 0.0, vehicle.heading_rad(), 0.0, 0.0, rate)]
 
 
@@ -142,7 +142,7 @@ def _global_position(vehicle: Vehicle) -> list[Any]:
 
 def _vfr_hud(vehicle: Vehicle) -> list[Any]:
     speed = math.hypot(*vehicle.velocity_m_s())
-    throttle = min(abs(round(100.0 * float(vehicle.control[0]["throttle_before"]))), 100)
+    throttle = min(abs(round(100.0 * float(vehicle.control["throttle_before"][0]))), 100)
     return [mavlink.MAVLink_vfr_hud_message(0.0, speed, vehicle.heading_cdeg() // 100, throttle, ALTITUDE_M, 0.0)]
 
 
@@ -282,12 +282,12 @@ def _version(vehicle: Vehicle) -> list[Any]:
 
 
 def _raw_imu(vehicle: Vehicle) -> list[Any]:
-    rate = round(float(vehicle.estimate[0]["yaw_rate_rad_s"]) * 1000)
+    rate = round(float(vehicle.estimate["yaw_rate_rad_s"][0]) * 1000)
     return [mavlink.MAVLink_raw_imu_message(vehicle.time_us, 0, 0, -1001, 0, 0, rate, 219, 91, -528, 0, 2756)]
 
 
 def _second_imu(vehicle: Vehicle) -> list[Any]:
-    rate = round(float(vehicle.estimate[0]["yaw_rate_rad_s"]) * 1000)
+    rate = round(float(vehicle.estimate["yaw_rate_rad_s"][0]) * 1000)
     return [mavlink.MAVLink_scaled_imu2_message(_ms(vehicle), 0, 0, -1001, 0, 0, rate, 219, 91, -528, 2800)]
 
 

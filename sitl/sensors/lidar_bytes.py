@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
+from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -63,6 +64,9 @@ def encoder_of(make: LidarMake) -> Encoder:
     return YdlidarEncoder() if make.name.startswith("YDLIDAR") else LdrobotEncoder(make.turns_hz)
 
 
+LDROBOT_SAMPLE = np.dtype([("range_mm", "<u2"), ("quality", "u1")])
+
+
 class LdrobotEncoder:
     """LD06, LD19: 47 bytes for twelve points; no commands."""
 
@@ -71,20 +75,27 @@ class LdrobotEncoder:
     def __init__(self, turns_hz: float) -> None:
         self.talks = True
         self._speed_deg_s = round(360.0 * turns_hz)
-        self._points: list[tuple[float, float, float]] = []
+        self._angles_deg: list[float] = []
+        self._samples = b""
 
     def encode(self, angle_deg: Floats, range_m: Floats, quality: Floats, time_s: float) -> bytes:
         """The packets completed by these points."""
-        self._points += zip(angle_deg.tolist(), range_m.tolist(), quality.tolist(), strict=True)
+        samples = np.empty(len(angle_deg), LDROBOT_SAMPLE)
+        samples["range_mm"] = np.minimum(np.rint(1000.0 * range_m), 65535.0)
+        samples["quality"] = np.rint(quality)
+        self._angles_deg += angle_deg.tolist()
+        self._samples += samples.tobytes()
         data = b""
-        while len(self._points) >= self.COUNT:
-            data += self._packet(self._points[: self.COUNT], time_s)
-            del self._points[: self.COUNT]
+        while len(self._angles_deg) >= self.COUNT:
+            data += self._packet(time_s)
         return data
 
-    def _packet(self, points: list[tuple[float, float, float]], time_s: float) -> bytes:
-        first, last = (round(100.0 * one[0]) % 36000 for one in (points[0], points[-1]))
-        samples = b"".join(struct.pack("<HB", min(round(1000.0 * one[1]), 65535), round(one[2])) for one in points)
+    def _packet(self, time_s: float) -> bytes:
+        """The first points that wait."""
+        first, last = (round(100.0 * self._angles_deg[one]) % 36000 for one in (0, self.COUNT - 1))
+        size = self.COUNT * LDROBOT_SAMPLE.itemsize
+        samples, self._samples = self._samples[:size], self._samples[size:]
+        del self._angles_deg[: self.COUNT]
         tail = struct.pack("<HH", last, round(1000.0 * time_s) % 30000)
         packet = struct.pack("<BBHH", 0x54, 0x2C, self._speed_deg_s, first) + samples + tail
         return packet + bytes([crc8(packet)])
@@ -99,13 +110,21 @@ class LdrobotEncoder:
 
 
 def crc8(data: bytes) -> int:
-    """CRC-8, polynomial x^8 + x^6 + x^3 + x^2 + 1, bit by bit."""
-    crc = 0
+    """CRC-8, polynomial x^8 + x^6 + x^3 + x^2 + 1."""
+    crc, of_byte = 0, crc8_of_bytes()
     for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc << 1) ^ 0x14D if crc & 0x80 else crc << 1
+        crc = of_byte[crc ^ byte]
     return crc
+
+
+@cache
+def crc8_of_bytes() -> bytes:
+    """The CRC-8 of each single byte, bit by bit."""
+    table = bytearray(range(256))
+    for byte in range(256):
+        for _ in range(8):
+            table[byte] = (table[byte] << 1) & 0xFF ^ (0x4D if table[byte] & 0x80 else 0)
+    return bytes(table)
 
 
 class RplidarEncoder:

@@ -201,7 +201,7 @@ class RangeSensing:
             seen_m = true_m + self._noise(lidar.sectors)
             cells = np.clip(np.rint(seen_m * 100.0), 0, nothing - 1)
             cells[(true_m >= lidar.max_m) | (seen_m >= lidar.max_m)] = nothing
-        self._last_scan_cm = [int(cell) for cell in cells.tolist()] + [UNKNOWN] * (SECTORS - lidar.sectors)
+        self._last_scan_cm = cells.astype(np.int64).tolist() + [UNKNOWN] * (SECTORS - lidar.sectors)
         return list(self._last_scan_cm)
 
     def beams_cm(self, north_m: float, east_m: float, heading_rad: float) -> list[int]:

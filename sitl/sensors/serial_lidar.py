@@ -57,6 +57,11 @@ class _Points:
     angle_deg: list[float] = field(default_factory=list)
     range_m: list[float] = field(default_factory=list)
 
+    def add(self, angle_deg: Floats, range_m: Floats) -> None:
+        """Further points."""
+        self.angle_deg += angle_deg.tolist()
+        self.range_m += range_m.tolist()
+
 
 class SerialLidar:
     """Measures as it turns. ``take`` gives its bytes, ``hear`` gives it commands."""
@@ -150,11 +155,12 @@ class SerialLidar:
             places = [(self._repeated + one) % count for one in range(len(angle_deg))]
             self._repeated = (self._repeated + len(angle_deg)) % count
             return np.array(self._last_turn.angle_deg)[places], np.array(self._last_turn.range_m)[places]
-        for angle, range_ in zip(angle_deg.tolist(), range_m.tolist(), strict=True):
-            if self._turn.angle_deg and angle < self._turn.angle_deg[-1]:
-                self._last_turn, self._turn, self._repeated = self._turn, _Points(), 0
-            self._turn.angle_deg.append(angle)
-            self._turn.range_m.append(range_)
+        before_deg = np.concatenate((self._turn.angle_deg[-1:] or [-math.inf], angle_deg[:-1]))
+        begun = 0
+        for begins in np.flatnonzero(angle_deg < before_deg).tolist():
+            self._turn.add(angle_deg[begun:begins], range_m[begun:begins])
+            self._last_turn, self._turn, self._repeated, begun = self._turn, _Points(), 0, begins
+        self._turn.add(angle_deg[begun:], range_m[begun:])
         return angle_deg, range_m
 
     def _send(self, data: bytes) -> None:
