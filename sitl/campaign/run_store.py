@@ -18,6 +18,8 @@ from pathlib import Path
 from typing import Any
 
 from companion.mission.load import load_mission
+from companion.planning.own_planners import source_of
+from companion.planning.registry import PLANNERS
 from companion.storage.files import read_at_most
 from sitl.campaign.campaign_file import NOTHING, CampaignError, CampaignTable
 from sitl.campaign.run_spec import RunResult, RunSpec
@@ -86,6 +88,7 @@ def _files(campaign: CampaignTable, folder: Path) -> Iterator[Path]:
     for world in campaign.worlds:
         if world not in set(GroundKind):
             yield from load_mission(folder / world).files
+    yield from filter(None, map(source_of, set(campaign.planners) - set(PLANNERS)))
     yield from (folder / plan for plan in campaign.faults if plan != NOTHING)
     yield from (folder / one for one in campaign.sensors if one.endswith(".toml"))
 
