@@ -16,8 +16,8 @@ from companion.settings import PlannerSettings, SettingsError
 from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
 from companion.storage.toml_file import read_table
-from sitl.experiments.narrow_grounds import GroundKind
 from sitl.faults.fault_file import FaultFileError, load_faults
+from sitl.generators.kinds import GroundKind
 
 NOTHING = "none"
 """No faults."""

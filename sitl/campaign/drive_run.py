@@ -20,9 +20,10 @@ from sitl.campaign.campaign_file import NOTHING, OWN
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.experiments.dead_companion import STOOD_M_S
 from sitl.experiments.experiment import GUARD
-from sitl.experiments.narrow_grounds import GroundKind, NarrowGround, drawn
 from sitl.experiments.off_model import off_model
 from sitl.faults.fault_file import load_faults
+from sitl.generators.kinds import GroundKind
+from sitl.generators.made_ground import MadeGround, made
 from sitl.lockstep import Drive, TrackPoint
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
 from sitl.world.truth import SimStart
@@ -68,7 +69,7 @@ def settings_of(spec: RunSpec) -> Settings:
 def mission_of(spec: RunSpec, folder: Path) -> Mission:
     """The mission that is driven, with the run's sensors."""
     if spec.world in set(GroundKind):
-        mission = _mission_on(drawn(GroundKind(spec.world), spec.seed))
+        mission = _mission_on(made(GroundKind(spec.world), spec.seed))
     else:
         mission = load_mission(folder / spec.world)
     if spec.sensors == OWN:
@@ -80,7 +81,7 @@ def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenari
     mission = mission_of(spec, folder)
     scenario = scenario_from_mission(mission)
     if spec.world in set(GroundKind):
-        ground = drawn(GroundKind(spec.world), spec.seed)
+        ground = made(GroundKind(spec.world), spec.seed)
         start = SimStart(*ground.start_m, np.pi / 2.0, scenario.start.home)
         scenario = replace(scenario, world=ground.world, start=start)
     if spec.faults != NOTHING:
@@ -93,7 +94,7 @@ def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenari
     return mission, scenario
 
 
-def _mission_on(ground: NarrowGround) -> Mission:
+def _mission_on(ground: MadeGround) -> Mission:
     """From one side of generated ground to the other; nothing but the target is given."""
     place = HomePoint(ground.goal_m[0] - ground.start_m[0], ground.goal_m[1] - ground.start_m[1])
     target = Target("goal", place, 0.0, OnBlocked.SKIP)

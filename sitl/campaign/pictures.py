@@ -16,7 +16,7 @@ from sitl.campaign.campaign_file import CampaignTable
 from sitl.campaign.run_spec import RunResult
 from sitl.campaign.summary import Runs, shown, varied
 from sitl.experiments import drawing
-from sitl.experiments.narrow_grounds import GroundKind
+from sitl.generators.kinds import GroundKind
 from sitl.scenario import scenario_from_mission
 
 COLOURS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.RED, drawing.GREY, "#7b5ea7", "#56b4e9", "#444444")

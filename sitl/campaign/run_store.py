@@ -24,7 +24,7 @@ from companion.storage.files import read_at_most
 from sitl.campaign.campaign_file import NOTHING, CampaignError, CampaignTable
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.experiments.experiment import code_digest
-from sitl.experiments.narrow_grounds import GroundKind
+from sitl.generators.kinds import GroundKind
 
 MOST_BYTES = 2_000_000_000
 

@@ -14,6 +14,7 @@ from sitl.cli.experiment import experiment
 from sitl.cli.missions import missions
 from sitl.cli.physics import physics
 from sitl.cli.serve import serve
+from sitl.cli.world import app as world
 
 app = typer.Typer(
     name="rover-sitl",
@@ -35,3 +36,4 @@ app.command()(missions)
 app.command()(experiment)
 app.command()(campaign)
 app.command()(compare)
+app.add_typer(world)

@@ -26,9 +26,10 @@ from sitl.experiments.experiment import (
     chosen_controllers,
     each,
 )
-from sitl.experiments.narrow_grounds import GroundKind, NarrowGround, drawn
 from sitl.experiments.off_model import off_model, parameters_for
 from sitl.experiments.results_page import markdown_table, terminal_table, without_intervals
+from sitl.generators.kinds import GroundKind
+from sitl.generators.made_ground import MadeGround, made
 from sitl.lockstep import Drive, DriveOutcome
 from sitl.scenario import SOMEWHERE, Scenario, outline_of
 from sitl.world.truth import SimStart
@@ -43,6 +44,7 @@ REFERENCE_PLANNER = "theta-star"
 TIME_LIMIT_S = 600.0
 DRAWS = 2000
 ALL = "all"
+GROUNDS = (GroundKind.CLUTTER, GroundKind.ROOMS, GroundKind.YARD)
 SHORT = ("controller", "runs", "there", "touched", "refused", "pairs", "s", "points s", "ratio")
 HEAD = ("controller", "runs", "reached", "contacts", "refused", "pairs", "mean s", "points s", "ratio")
 
@@ -70,7 +72,7 @@ def settings_for(controller: str) -> Settings:
     return parse_settings(chosen, NAME)
 
 
-def mission_on(ground: NarrowGround, controller: str, seed: int) -> Mission:
+def mission_on(ground: MadeGround, controller: str, seed: int) -> Mission:
     """From one side to the other."""
     place = HomePoint(ground.goal_m[0] - ground.start_m[0], ground.goal_m[1] - ground.start_m[1])
     grid = (
@@ -84,7 +86,7 @@ def mission_on(ground: NarrowGround, controller: str, seed: int) -> Mission:
 
 def drive(kind: GroundKind, controller: str, seed: int, off: float = OFF_MODEL, late_s: float = 0.0) -> GroundDrive:
     """One drive. ``off``: the rover differs by up to this share from what the companion takes it for."""
-    ground = drawn(kind, seed)
+    ground = made(kind, seed)
     mission = mission_on(ground, controller, seed)
     drivetrain, limits = off_model(np.random.default_rng((seed, 52)), off)
     parameters = {**parameters_for(ROVER, controller), **limits}
@@ -114,7 +116,7 @@ class ControllersReport(ExperimentReport):
         return {"experiment": NAME, "seed": self.options.seed, "runs": self.options.runs, "drives": drives}
 
     def _kinds(self) -> list[str]:
-        return [*GroundKind, ALL]
+        return [*GROUNDS, ALL]
 
     def _rows(self, kind: str) -> list[list[str]]:
         own = [one for one in self.drives if kind in (ALL, one.kind)]
@@ -178,7 +180,7 @@ def run(options: Options, advance: Advance) -> ControllersReport:
     tasks = [
         (kind, name, seed, options.off, options.late_s)
         for name in names
-        for kind in GroundKind
+        for kind in GROUNDS
         for seed in range(options.seed, options.seed + options.runs)
     ]
     drives: list[GroundDrive] = []

@@ -35,7 +35,7 @@ def save(figure: Figure, file: Path) -> Path:
     """Write the picture (the format follows from the suffix), without the date and version that would change it."""
     file.parent.mkdir(parents=True, exist_ok=True)
     refuse_pipe(file)
-    figure.savefig(file, metadata={"Software": None})
+    figure.savefig(file, metadata={"Software": None} if file.suffix == ".png" else None)
     return file
 
 

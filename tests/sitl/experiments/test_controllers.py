@@ -14,7 +14,10 @@ from sitl.experiments.controllers import (
     settings_for,
 )
 from sitl.experiments.experiment import ExperimentError, Options
-from sitl.experiments.narrow_grounds import BODY_M, EAST_M, NORTH_M, GroundKind, drawn
+from sitl.generators.canvas import EAST_M, NORTH_M
+from sitl.generators.kinds import GroundKind
+from sitl.generators.made_ground import BODY_M
+from sitl.generators.made_ground import made as drawn
 
 
 @pytest.mark.parametrize("kind", list(GroundKind))
