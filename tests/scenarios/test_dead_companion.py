@@ -17,7 +17,7 @@ MISSIONS = Path(__file__).resolve().parents[2] / "missions"
 @pytest.mark.parametrize(
     ("name", "suite"),
     [
-        ("clutter.toml", "lidar-90"),
+        pytest.param("clutter.toml", "lidar-90", marks=pytest.mark.thorough),
         pytest.param("complex.toml", "lidar-360", marks=pytest.mark.thorough),
         pytest.param("ackermann.toml", "lidar-360", marks=pytest.mark.thorough),
     ],
@@ -32,6 +32,7 @@ def test_whenever_it_dies_nothing_is_touched(name: str, suite: str) -> None:
     assert max(death.went_m for death in deaths) < 9.0
 
 
+@pytest.mark.thorough
 def test_what_is_heard_again_is_the_same_drive() -> None:
     told = overheard(with_suite(load_mission(MISSIONS / "one-obstacle.toml"), "lidar-360"), 3)
     early, late = die(told, told.begin_s - 1.0), die(told, told.end_s + 1.0)

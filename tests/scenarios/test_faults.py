@@ -158,6 +158,7 @@ def test_same_seed_same_run() -> None:
     assert digests[0] == digests[1] != digests[2]
 
 
+@pytest.mark.thorough
 def test_the_plan_of_a_poor_radio_is_driven_from_the_command_line() -> None:
     arguments = ["drive", str(MISSIONS / "one-obstacle.toml"), "--faults", str(MISSIONS / "faults" / "radio.toml")]
     result = CliRunner().invoke(app, [*arguments, "--sensors", "lidar-90"])

@@ -121,6 +121,7 @@ def test_a_mission_that_changes_on_the_way_is_told_and_the_old_one_driven(tmp_pa
     assert rig.passed_m(20, 3) < 0.7
 
 
+@pytest.mark.thorough
 def test_a_change_that_nothing_tells_of_is_found_within_a_minute(tmp_path: Path) -> None:
     rig = holding(tmp_path, [(WAYPOINT, NONE, (15, 7)), (DELAY, (90.0, 0.0, 0.0, 0.0), None)])
     rig.restart_companion(fetched(rig))

@@ -53,7 +53,7 @@ def drive(
     [
         "LD19",
         "RPLIDAR-A1",
-        "YDLIDAR-X4",
+        pytest.param("YDLIDAR-X4", marks=pytest.mark.thorough),
         pytest.param("LD06", marks=pytest.mark.thorough),
         pytest.param("RPLIDAR-C1", marks=pytest.mark.thorough),
     ],

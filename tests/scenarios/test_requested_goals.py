@@ -187,6 +187,7 @@ def test_the_newest_request_counts(driving: Asker) -> None:
     assert driving.companion.outcome.complete
 
 
+@pytest.mark.thorough
 def test_a_place_that_cannot_be_reached_is_given_up_and_the_mission_goes_on(tmp_path: Path) -> None:
     walled = '[[target]]\nname = "corner"\nfield = [20, 2]\n'
     rig = Asker(yard(tmp_path, walled, sealed=True))

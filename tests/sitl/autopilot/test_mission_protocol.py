@@ -305,7 +305,7 @@ any_message = st.one_of(
 )  # fmt: skip
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(st.lists(any_message, min_size=1, max_size=30))
 def test_whatever_is_sent_the_vehicle_stays_up(messages: list) -> None:
     client = ready(open_ground(parameters={"FENCE_ENABLE": 1, "FENCE_ACTION": 0}))
@@ -322,7 +322,7 @@ def test_whatever_is_sent_the_vehicle_stays_up(messages: list) -> None:
     assert heard(client, "MISSION_COUNT")
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.lists(st.tuples(any_item, any_place, any_place, any_single), min_size=1, max_size=6))
 def test_whatever_mission_is_kept_can_be_run(items: list) -> None:
     client = ready(open_ground())
