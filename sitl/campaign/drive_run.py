@@ -17,7 +17,9 @@ from companion.recording.recorder import NullRecorder, Recorder
 from companion.settings import Settings
 from companion.settings.settings_file import parse_settings
 from sitl.campaign.campaign_file import NOTHING, OWN
+from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.campaign.time_bound import time_bound_s
 from sitl.experiments.dead_companion import STOOD_M_S
 from sitl.experiments.experiment import GUARD
 from sitl.experiments.off_model import off_model
@@ -26,27 +28,42 @@ from sitl.generators.kinds import GroundKind
 from sitl.generators.made_ground import MadeGround, made
 from sitl.lockstep import Drive, TrackPoint
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
+from sitl.simulator import ROOM_REACH_M
 from sitl.world.truth import SimStart
 
 USUAL_SENSORS = "lidar-360"
 """On generated ground."""
 STREAM = 71
 """Separates what the rover is like from all other random draws with the same seed."""
-ERROR = "error"
+LOOK_S = 0.5
 LEAST_S = 2.0
 """Of the time in one metre square that is kept."""
+
+
+class Nearest:
+    """How near the rover has come to anything while it moved."""
+
+    def __init__(self) -> None:
+        self.clearance_m = ROOM_REACH_M
+
+    def look(self, run: Drive) -> None:
+        """At this moment."""
+        if abs(run.simulator.truth.speed_m_s) > STOOD_M_S:
+            self.clearance_m = min(self.clearance_m, run.simulator.clearance_m)
 
 
 def drive(spec: RunSpec, folder: Path) -> RunResult:
     """One run. ``folder``: that of the campaign's file. An error of the programs is a result, too."""
     began_s = processor_s()
     try:
-        run = prepared(spec, folder)
-        run.run()
+        run, near = prepared(spec, folder), Nearest()
+        run.run(lambda status: near.look(run), LOOK_S)
     except Exception as error:
         text = " ".join(f"{type(error).__name__}: {error}".split())
-        return RunResult("", ERROR, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0, 0, processor_s() - began_s, text[:300])
-    return _result(run, processor_s() - began_s)
+        return RunResult(
+            "", ERROR, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, "", 0, 0, processor_s() - began_s, text[:300]
+        )
+    return _result(run, near.clearance_m, processor_s() - began_s)
 
 
 def prepared(spec: RunSpec, folder: Path, recorder: Recorder | NullRecorder | None = None) -> Drive:
@@ -102,7 +119,7 @@ def _mission_on(ground: MadeGround) -> Mission:
     return Mission(f"{ground.kind}", (target,), GridSpec(margin_m=30.0, by_footprint=True), RoverSpec(), sitl=sitl)
 
 
-def _result(run: Drive, cpu_s: float) -> RunResult:
+def _result(run: Drive, clearance_m: float, cpu_s: float) -> RunResult:
     report, executor, hits = run.report, run.companion.executor, run.simulator.collisions
     run_into = sum(hit.mover is not None and abs(hit.speed_m_s) < STOOD_M_S for hit in hits)
     statuses = Counter(status for _, status in report.targets)
@@ -116,14 +133,23 @@ def _result(run: Drive, cpu_s: float) -> RunResult:
         refused=report.refused,
         unreachable=statuses[TargetStatus.UNREACHABLE],
         seconds=round(report.driving_time_s, 2),
+        bound_s=0.0 if executor is None else round(time_bound_s(run.mission, run.scenario, executor), 2),
         metres=round(report.distance_m, 2),
         drawn_ah=round(run.simulator.drawn_ah, 4),
+        clearance_m=round(clearance_m, 3),
+        waits_for=_waits_for(run),
         steps=report.steps,
         searches=report.searches,
         cpu_s=round(cpu_s, 2),
         said=report.said[-1][:300] if report.said else "",
         dwelt=_dwelt(report.track),
     )
+
+
+def _waits_for(run: Drive) -> str:
+    """What the companion says that it waits for."""
+    awaited = run.companion.status().activity.awaited
+    return "" if awaited is None else str(awaited)
 
 
 def _dwelt(track: list[TrackPoint]) -> tuple[tuple[int, int, int], ...]:

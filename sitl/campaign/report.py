@@ -13,8 +13,9 @@ from matplotlib.figure import Figure
 
 from sitl.campaign.campaign_file import CampaignTable, run_count
 from sitl.campaign.pictures import heat_maps, times
+from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import RunResult, RunSpec
-from sitl.campaign.summary import HEAD, PAIR_HEAD, Runs, differences, rows, shown, varied
+from sitl.campaign.summary import HEAD, PAIR_HEAD, Runs, broken_counts, differences, rows, shown, varied
 
 MOST_LISTED = 200
 SLOWEST = 10
@@ -48,9 +49,11 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
         "Companion and simulator in lock-step. <i>complete</i>: every target reached and nothing touched, with its "
         "exact 95 % interval; <i>touched</i>: contacts while the rover moved; <i>run into</i>: it stood, and something "
         "that moves came along; <i>refused</i>: setpoints that the last look replaced by a stop; <i>mean s</i>, "
-        "<i>metres</i>, <i>mAh</i>: driving time with its 95 % interval, distance and charge of complete runs.</p>",
+        "<i>metres</i>, <i>mAh</i>: driving time with its 95 % interval, distance and charge of complete runs; "
+        "<i>/bound</i>: their time over that of the shortest way at any angle on known ground at cruise speed.</p>",
         _table((*axes, *HEAD), rows(campaign, runs), len(axes)),
     ]
+    parts.append(_policies(runs))
     if pairs:
         parts += [
             "<h2>Pairs</h2><p>Two runs that differ in one axis only: same world, same seed. Each value against the "
@@ -67,8 +70,15 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
     return _document(campaign.name, parts)
 
 
+def _policies(runs: Runs) -> str:
+    """Which were broken, in how many runs."""
+    counts = broken_counts(runs)
+    told = ", ".join(f"{policy} in {count} runs" for policy, count in counts) or "none"
+    return f"<p><b>Policies broken: {html.escape(told)}.</b> They are checked in every run: {', '.join(Policy)}.</p>"
+
+
 def _lists(campaign: CampaignTable, runs: Runs, source: Path) -> list[str]:
-    bad = [one for one in runs if not one[1].complete or one[1].refused]
+    bad = [one for one in runs if not one[1].complete or broken(one[1])]
     slow = sorted((one for one in runs if one[1].complete), key=lambda one: -one[1].seconds)[:SLOWEST]
     again = f"rover-sitl campaign {shlex.quote(str(source))} --replay ID --record FOLDER"
     parts = [
@@ -76,7 +86,7 @@ def _lists(campaign: CampaignTable, runs: Runs, source: Path) -> list[str]:
         f"<p>To drive one run again, with a record: <code>{html.escape(again)}</code></p>",
     ]
     more = f"; the first {MOST_LISTED} of them" if len(bad) > MOST_LISTED else ""
-    parts += [f"<p>{len(bad)} runs were not complete, or had a setpoint refused{more}.</p>"] if bad else []
+    parts += [f"<p>{len(bad)} runs were not complete, or broke a policy{more}.</p>"] if bad else []
     parts += [_runs(campaign, bad[:MOST_LISTED])] if bad else ["<p>Every run was complete.</p>"]
     return [*parts, "<h2>The slowest</h2>", _runs(campaign, slow)] if slow else parts
 
@@ -85,13 +95,13 @@ def _runs(campaign: CampaignTable, runs: Sequence[tuple[RunSpec, RunResult]]) ->
     axes = varied(campaign)
     lines = [
         (
-            *(shown(getattr(spec, axis)) for axis in axes), f"{spec.seed}", result.outcome,
+            *(shown(getattr(spec, axis)) for axis in axes), f"{spec.seed}", " ".join(broken(result)), result.outcome,
             f"{result.reached} of {result.targets}", f"{result.touched}", f"{result.refused}", f"{result.seconds:.1f}",
             result.said, spec.id,
         )
         for spec, result in runs
     ]  # fmt: skip
-    head = (*axes, "seed", "outcome", "targets", "touched", "refused", "s", "last word", "ID")
+    head = (*axes, "seed", "broke", "outcome", "targets", "touched", "refused", "s", "last word", "ID")
     return _table(head, lines, len(axes), wide=(len(head) - 2,), code=(len(head) - 1,))
 
 

@@ -58,27 +58,33 @@ class RunResult:
     """What really led the rover: points, where a rover or its sensors do not let motions be planned."""
     outcome: str
     """That of ``rover-sitl drive``, or ``error``."""
-    reached: int
+    reached: int = 0
     """Targets reached, of ``targets``."""
-    targets: int
-    touched: int
+    targets: int = 0
+    touched: int = 0
     """Contacts while the rover moved."""
-    run_into: int
+    run_into: int = 0
     """Contacts while it stood, and something that moves came along."""
-    refused: int
+    refused: int = 0
     """Setpoints that the last look replaced by a stop."""
-    unreachable: int
+    unreachable: int = 0
     """Targets that were called unreachable."""
-    seconds: float
+    seconds: float = 0.0
     """Driving time, from the first movement to the last."""
-    metres: float
-    drawn_ah: float
+    bound_s: float = 0.0
+    """The least driving time on known ground (``time_bound``); 0: there is none."""
+    metres: float = 0.0
+    drawn_ah: float = 0.0
     """Drawn from the battery."""
-    steps: int
-    searches: int
-    cpu_s: float
+    clearance_m: float = 0.0
+    """The least distance of its outline from anything while it moved, looked at twice a second; at most 5."""
+    waits_for: str = ""
+    """What it waited for at its end; empty if it waited for nothing."""
+    steps: int = 0
+    searches: int = 0
+    cpu_s: float = 0.0
     """Of the processor; the only figure that differs from machine to machine."""
-    said: str
+    said: str = ""
     """The last thing that the companion said, or the error."""
     dwelt: tuple[tuple[int, int, int], ...] = ()
     """Where the time went: metres north and east of the world's corner, rounded down, and seconds, 2 or more."""

@@ -8,6 +8,7 @@ Nouns: paired difference.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,13 +16,15 @@ from pathlib import Path
 import numpy as np
 
 from sitl.campaign.campaign_file import CampaignTable
+from sitl.campaign.policies import Policy, broken
 from sitl.campaign.run_spec import AXES, RunResult, RunSpec
 from sitl.experiments.results_page import share_with_interval
 
 Runs = Sequence[tuple[RunSpec, RunResult]]
 DRAWS = 2000
 HEAD = (
-    "runs", "complete", "touched", "run into", "refused", "missed", "errors", "mean s", "95 %", "metres", "mAh",
+    "runs", "complete", "touched", "run into", "refused", "missed", "errors", "mean s", "95 %", "/bound",
+    "closest m", "metres", "mAh",
 )  # fmt: skip
 PAIR_HEAD = ("pairs", "mean s", "against s", "difference s", "ratio", "both complete", "only this", "only other")
 
@@ -70,6 +73,12 @@ def rows(campaign: CampaignTable, runs: Runs) -> list[list[str]]:
     return table
 
 
+def broken_counts(runs: Runs) -> list[tuple[Policy, int]]:
+    """Each policy that was broken, and in how many runs."""
+    counts = Counter(policy for _, result in runs for policy in broken(result))
+    return [(policy, counts[policy]) for policy in Policy if counts[policy]]
+
+
 def shown(value: object) -> str:
     """A value of an axis as text; of a file its name alone."""
     if isinstance(value, bool):
@@ -102,9 +111,13 @@ def _row(results: Sequence[RunResult]) -> list[str]:
     means = [f"{np.mean(values):.1f}" if complete else "-" for values in driven]
     low_high = "-" if len(complete) < 2 else "{:.1f} to {:.1f}".format(*interval(times_s))
     mean_s = f"{times_s.mean():.1f}" if complete else "-"
+    closest = f"{min((one.clearance_m for one in results), default=0.0):.2f}"
+    bounded = [one for one in complete if one.bound_s > 0.0]
+    least_s = sum(one.bound_s for one in bounded)
+    over = f"{sum(one.seconds for one in bounded) / least_s:.2f}" if bounded else "-"
     return [
         f"{len(results)}", share_with_interval(len(complete), len(results)), *map(str, (*counts, missed, errors)),
-        mean_s, low_high, *means,
+        mean_s, low_high, over, closest, *means,
     ]  # fmt: skip
 
 

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from sitl.campaign.campaign_file import CampaignError
+from sitl.campaign.policies import broken
 from sitl.campaign.summary import Runs
 
 LEFT_OUT = ("dwelt",)
@@ -41,6 +42,7 @@ def records_of(runs: Runs) -> list[dict[str, object]]:
             **asdict(spec),
             **{name: value for name, value in asdict(result).items() if name not in LEFT_OUT},
             "complete": result.complete,
+            "broken": " ".join(broken(result)),
         }
         for spec, result in runs
     ]

@@ -19,7 +19,8 @@ from companion.mission.mission import MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import Recorder
 from sitl.campaign.campaign_file import CampaignError, CampaignTable, load_campaign
-from sitl.campaign.drive_run import ERROR, mission_of, prepared, settings_of
+from sitl.campaign.drive_run import mission_of, prepared, settings_of
+from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunSpec, specs_of
 from sitl.campaign.run_store import RunStore, digest_of
 from sitl.campaign.summary import Runs

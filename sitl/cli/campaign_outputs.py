@@ -10,7 +10,7 @@ from rich.console import Console
 from companion.cli.inputs import written
 from sitl.campaign.campaign_file import CampaignTable, run_count
 from sitl.campaign.report import write_report
-from sitl.campaign.summary import HEAD, PAIR_HEAD, Runs, differences, rows, varied
+from sitl.campaign.summary import HEAD, PAIR_HEAD, Runs, broken_counts, differences, rows, varied
 from sitl.campaign.tables import write_csv, write_parquet
 from sitl.experiments.results_page import terminal_table, without_intervals
 
@@ -36,6 +36,8 @@ def put_out(
     ]
     if pairs:
         console.print(terminal_table("pairs", PAIRS, pairs))
+    told = ", ".join(f"{policy} in {count} runs" for policy, count in broken_counts(runs)) or "none"
+    typer.echo(f"policies broken: {told}")
     with written(folder / REPORT):
         write_report(folder / REPORT, table, runs, source)
     with written(folder / CSV):

@@ -18,7 +18,7 @@ from sitl.campaign.run_store import RunStore, digest_of
 
 TABLE = CampaignTable(name="c", worlds=["clutter", "yard"], runs=3)
 SPECS = list(specs_of(TABLE))
-RESULT = RunResult("points", "reached", 1, 1, 0, 0, 0, 0, 31.25, 40.1, 0.15, 10, 3, 1.5, "said", ((1, 2, 3),))
+RESULT = RunResult("points", "reached", 1, 1, seconds=31.25, metres=40.1, said="said", dwelt=((1, 2, 3),))
 
 
 def filled(folder: Path, digest: str = "d") -> RunStore:

@@ -13,8 +13,8 @@ from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
 from sitl.campaign.summary import HEAD, PAIR_HEAD, differences, interval, rows, varied
 from sitl.campaign.tables import records_of
 
-TABLE = CampaignTable(name="a <b>", worlds=["clutter"], runs=20, controllers=["points", "motion-ga"])
-RESULT = RunResult("points", "reached", 1, 1, 0, 0, 0, 0, 0.0, 40.0, 0.1, 10, 3, 1.5, "done")
+TABLE = CampaignTable(name="a <u>", worlds=["clutter"], runs=20, controllers=["points", "motion-ga"])
+RESULT = RunResult("points", "reached", 1, 1, bound_s=25.0, metres=40.0, clearance_m=0.4, said="done")
 
 
 def result_of(spec: RunSpec) -> RunResult:
@@ -31,7 +31,11 @@ def test_a_row_for_each_combination_and_one_for_all() -> None:
     assert varied(TABLE) == ["world", "controller"]
     found = {line[1]: dict(zip(HEAD, line[2:], strict=True)) for line in rows(TABLE, RUNS)}
     assert found["points"]["runs"] == "20" and found["points"]["complete"].startswith("0.950 (0.751 to 0.999)")
-    assert found["points"]["missed"] == "1" and found["motion-ga"]["mean s"] == "49.5"
+    assert (
+        found["points"]["missed"] == "1"
+        and found["motion-ga"]["mean s"] == "49.5"
+        and found["motion-ga"]["/bound"] == "1.98"
+    )
     assert found[""]["runs"] == "40"
 
 
@@ -60,7 +64,7 @@ def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
 def test_the_page_tells_of_every_run_that_was_not_complete_and_loads_nothing(tmp_path) -> None:  # type: ignore[no-untyped-def]
     text = page(TABLE, RUNS, tmp_path / "c.toml")
     missed = next(spec for spec, result in RUNS if not result.complete)
-    assert missed.id in text and "&lt;lost&gt;" in text and "<b>" not in text.replace("a &lt;b&gt;", "")
+    assert missed.id in text and "&lt;lost&gt;" in text and "<u>" not in text and "<lost>" not in text
     assert "http" not in text and "--replay ID" in text and text.count("data:image/png") == 1
 
 

@@ -1,0 +1,40 @@
+"""Policies: what may happen in no run, whatever the world. Each is checked in every run of a campaign.
+
+Nouns: policy.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from sitl.campaign.run_spec import RunResult
+from sitl.lockstep import DriveOutcome
+
+ERROR = "error"
+
+
+class Policy(StrEnum):
+    """What a run must keep."""
+
+    NO_ERROR = "error"
+    """The programs do not end with an error."""
+    NO_CONTACT = "contact"
+    """A rover that moves touches nothing."""
+    NOTHING_REFUSED = "refused"
+    """The last look at a setpoint finds nothing to refuse: what is planned is what may be told."""
+    NO_FALSE_UNREACHABLE = "unreachable-but-free"
+    """A target is called unreachable only where no way leads for the rover."""
+    ENDS = "no-end"
+    """A mission ends, or says what it waits for, within the time limit."""
+
+
+def broken(result: RunResult) -> tuple[Policy, ...]:
+    """The policies that a run breaks."""
+    checks = {
+        Policy.NO_ERROR: result.outcome == ERROR,
+        Policy.NO_CONTACT: result.touched > 0,
+        Policy.NOTHING_REFUSED: result.refused > 0,
+        Policy.NO_FALSE_UNREACHABLE: result.unreachable > 0 and result.bound_s > 0.0,
+        Policy.ENDS: result.outcome == DriveOutcome.TIME_LIMIT and not result.waits_for,
+    }
+    return tuple(policy for policy, is_broken in checks.items() if is_broken)
