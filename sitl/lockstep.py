@@ -140,6 +140,8 @@ class Report:
     steps: int = 0
     return_steps: int = 0
     searches: int = 0
+    genetic_searches: int = 0
+    """Those that the genetic algorithm answered with a curve of its own, and not a graph search."""
     stuck: int = 0
     distance_m: float = 0.0
     collisions: int = 0
@@ -288,6 +290,7 @@ class Drive:
             report.return_steps = companion.driver.tally.return_steps
             report.stuck = companion.driver.tally.stuck
             report.searches = len(companion.driver.searcher.seconds)
+            report.genetic_searches = companion.driver.searcher.by_curves
             report.planning_time_s = math.fsum(companion.driver.searcher.seconds)
         moving = [
             p.time_s

@@ -44,11 +44,15 @@ def kinematics_of(
 
 @dataclass
 class PathSearcher:
-    """Calls the planner with the budget for each kind of search. ``seconds``: how long each search took."""
+    """Calls the planner with the budget for each kind of search. ``seconds``: how long each search took.
+
+    ``by_curves``: how many were answered by a curve of the genetic algorithm, and not by a graph search.
+    """
 
     planner: Planner
     rng: Generator
     seconds: list[float] = field(default_factory=list)
+    by_curves: int = 0
 
     def search(
         self,
@@ -75,4 +79,5 @@ class PathSearcher:
             self.rng,
         )
         self.seconds.append(stopwatch_s() - began_s)
+        self.by_curves += result.path is not None and result.control_points > 0
         return result

@@ -60,9 +60,7 @@ def drive(spec: RunSpec, folder: Path) -> RunResult:
         run.run(lambda status: near.look(run), LOOK_S)
     except Exception as error:
         text = " ".join(f"{type(error).__name__}: {error}".split())
-        return RunResult(
-            "", ERROR, 0, 0, 0, 0, 0, 0, 0.0, 0.0, 0.0, 0.0, 0.0, "", 0, 0, processor_s() - began_s, text[:300]
-        )
+        return RunResult("", ERROR, cpu_s=processor_s() - began_s, said=text[:300])
     return _result(run, near.clearance_m, processor_s() - began_s)
 
 
@@ -140,6 +138,7 @@ def _result(run: Drive, clearance_m: float, cpu_s: float) -> RunResult:
         waits_for=_waits_for(run),
         steps=report.steps,
         searches=report.searches,
+        genetic_searches=report.genetic_searches,
         cpu_s=round(cpu_s, 2),
         said=report.said[-1][:300] if report.said else "",
         dwelt=_dwelt(report.track),

@@ -50,7 +50,9 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
         "exact 95 % interval; <i>touched</i>: contacts while the rover moved; <i>run into</i>: it stood, and something "
         "that moves came along; <i>refused</i>: setpoints that the last look replaced by a stop; <i>mean s</i>, "
         "<i>metres</i>, <i>mAh</i>: driving time with its 95 % interval, distance and charge of complete runs; "
-        "<i>/bound</i>: their time over that of the shortest way at any angle on known ground at cruise speed.</p>",
+        "<i>/bound</i>: their time over that of the shortest way at any angle on known ground at cruise speed; "
+        "<i>by GA</i>: the share of searches that the genetic "
+        "algorithm answered, and not the graph search behind it.</p>",
         _table((*axes, *HEAD), rows(campaign, runs), len(axes)),
     ]
     parts.append(_policies(runs))

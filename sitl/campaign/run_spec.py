@@ -82,6 +82,8 @@ class RunResult:
     """What it waited for at its end; empty if it waited for nothing."""
     steps: int = 0
     searches: int = 0
+    genetic_searches: int = 0
+    """Those that the genetic algorithm answered."""
     cpu_s: float = 0.0
     """Of the processor; the only figure that differs from machine to machine."""
     said: str = ""

@@ -24,7 +24,7 @@ Runs = Sequence[tuple[RunSpec, RunResult]]
 DRAWS = 2000
 HEAD = (
     "runs", "complete", "touched", "run into", "refused", "missed", "errors", "mean s", "95 %", "/bound",
-    "closest m", "metres", "mAh",
+    "closest m", "metres", "mAh", "by GA",
 )  # fmt: skip
 PAIR_HEAD = ("pairs", "mean s", "against s", "difference s", "ratio", "both complete", "only this", "only other")
 
@@ -112,12 +112,14 @@ def _row(results: Sequence[RunResult]) -> list[str]:
     low_high = "-" if len(complete) < 2 else "{:.1f} to {:.1f}".format(*interval(times_s))
     mean_s = f"{times_s.mean():.1f}" if complete else "-"
     closest = f"{min((one.clearance_m for one in results), default=0.0):.2f}"
+    searches = sum(one.searches for one in results)
+    by_ga = f"{sum(one.genetic_searches for one in results) / searches:.2f}" if searches else "-"
     bounded = [one for one in complete if one.bound_s > 0.0]
     least_s = sum(one.bound_s for one in bounded)
     over = f"{sum(one.seconds for one in bounded) / least_s:.2f}" if bounded else "-"
     return [
         f"{len(results)}", share_with_interval(len(complete), len(results)), *map(str, (*counts, missed, errors)),
-        mean_s, low_high, over, closest, *means,
+        mean_s, low_high, over, closest, *means, by_ga,
     ]  # fmt: skip
 
 

@@ -1,0 +1,39 @@
+"""One run of a campaign: an error is a result, and where the time went is told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from sitl.campaign import drive_run
+from sitl.campaign.drive_run import drive
+from sitl.campaign.policies import Policy, broken
+from sitl.campaign.run_spec import RunSpec
+from sitl.lockstep import TrackPoint
+
+SPEC = RunSpec("maze", "hybrid", "points", "own", "none", False, 0.0, 0.0, "shipped", 1, 100.0, "{}")
+
+
+def test_an_error_of_the_programs_is_a_result(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(spec: RunSpec, folder: Path) -> None:
+        raise ValueError("no\nsuch thing")
+
+    monkeypatch.setattr(drive_run, "prepared", fails)
+    result = drive(SPEC, Path())
+    assert (result.outcome, result.said) == ("error", "ValueError: no such thing") and result.cpu_s >= 0.0
+    assert broken(result) == (Policy.NO_ERROR,) and not result.complete
+
+
+def test_where_the_time_went_counts_from_the_first_movement() -> None:
+    places = [(0.0, 5.0, 5.0), (40.0, 5.0, 5.0), (41.0, 5.5, 5.2), (44.0, 5.6, 5.3), (44.5, 7.0, 5.0), (46.5, 7.2, 5.1)]
+    track = [TrackPoint(time_s, north_m, east_m, "-") for time_s, north_m, east_m in places]
+    assert drive_run._dwelt(track) == ((5, 5, 4), (7, 5, 2))
+
+
+def test_settings_of_a_run_have_its_planner_its_controller_and_its_variant() -> None:
+    spec = RunSpec("maze", "astar", "motion-ga", "own", "none", True, 0.0, 0.0, "wide", 1, 100.0,
+                   '{"guidance": {"clearance_m": 0.4}}')  # fmt: skip
+    settings = drive_run.settings_of(spec)
+    assert settings.navigator.planner == "astar" and settings.guidance.controller == "motion-ga"
+    assert settings.guidance.clearance_m == 0.4 and settings.link.range_rate_hz == 20.0
