@@ -94,7 +94,7 @@ class RunResult:
     @property
     def complete(self) -> bool:
         """Whether every target was reached, and nothing touched."""
-        return self.reached == self.targets and self.touched == 0
+        return 0 < self.targets == self.reached and self.touched == 0
 
 
 def specs_of(campaign: CampaignTable) -> Iterator[RunSpec]:
