@@ -52,15 +52,16 @@ def source_of(name: str) -> Path | None:
     factory = own_factory(name)
     if factory is None:
         return None
-    file = getattr(sys.modules.get(factory.__module__), "__file__", None)
+    module = name.partition(":")[0] if ":" in name else getattr(factory, "__module__", "")
+    file = getattr(sys.modules.get(module), "__file__", None)
     return None if file is None else Path(file)
 
 
 def _imported(module: str) -> object:
     """The module; the present folder comes last, and only while it is imported."""
-    here = str(Path.cwd())
-    sys.path.append(here)
+    before = list(sys.path)
+    sys.path.append(str(Path.cwd()))
     try:
         return importlib.import_module(module)
     finally:
-        sys.path.remove(here)
+        sys.path[:] = before

@@ -9,12 +9,14 @@ import math
 from collections import deque
 
 import numpy as np
+from numpy.typing import NDArray
 
 from companion.core.grid import Cell
 from companion.planning.planner import Planner
 from companion.planning.problem import Budget, Path, PlanningProblem, PlanStatus, path_cost
 from companion.planning.raster import FAULTS, PathFault, first_fault, plain
 
+Curve = NDArray[np.float64]
 MOST_SIDE = 14
 NEAR_ENOUGH = 1e-6
 """Fields; of the ends of a smooth curve."""
@@ -42,7 +44,13 @@ def broken_by(planner: Planner, problem: PlanningProblem, budget: Budget, seed: 
         return ""
     if again.path is None or again.path.cells != result.path.cells or again.path.cost != result.path.cost:
         return "the same seed gave another path"
+    if not _same_curve(result.path.curve, again.path.curve):
+        return "the same seed gave another curve"
     return _fault_of(result.path, problem, planner)
+
+
+def _same_curve(one: Curve | None, two: Curve | None) -> bool:
+    return one is two if one is None or two is None else np.array_equal(one, two, equal_nan=True)
 
 
 def _fault_of(path: Path, problem: PlanningProblem, planner: Planner) -> str:
@@ -61,6 +69,8 @@ def _fault_of(path: Path, problem: PlanningProblem, planner: Planner) -> str:
         return ""
     if not (planner.capabilities.smooth_curve or planner.capabilities.any_angle):
         return "it gives a curve, and its capabilities say neither smooth_curve nor any_angle"
+    if path.curve.ndim != 2 or path.curve.shape[1] != 2 or not np.isfinite(path.curve).all():
+        return "its curve is no array of finite places, shape (n, 2)"
     ends = np.array((problem.start, problem.target), dtype=np.float64)
     if np.abs(path.curve[[0, -1]] - ends).max() > NEAR_ENOUGH:
         return "its curve does not begin at the start and end at the target"

@@ -62,7 +62,20 @@ def make_planner(name: str, settings: PlannerSettings) -> Planner:
         near = alike(name, known)
         hint = f", did you mean {near!r}?" if near else ";"
         raise UnknownPlannerError(f"unknown planner {name!r}{hint} known: {', '.join(known)}")
-    return factory(settings)
+    return factory(settings) if name in PLANNERS else _own(name, factory, settings)
+
+
+def _own(name: str, factory: PlannerFactory, settings: PlannerSettings) -> Planner:
+    """What another package makes, if it looks like a planner. Raises UnknownPlannerError."""
+    try:
+        planner = factory(settings)
+    except Exception as error:
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise UnknownPlannerError(f"planner {name!r:.80} cannot be made: {reason:.200}") from error
+    missing = [part for part in ("plan", "name", "capabilities") if not hasattr(planner, part)]
+    if missing:
+        raise UnknownPlannerError(f"planner {name!r:.80} has no {missing[0]}; docs/planners.md shows one")
+    return planner
 
 
 def warm_up(names: Iterable[str] = tuple(PLANNERS), settings: PlannerSettings | None = None) -> None:

@@ -5,12 +5,14 @@ Nouns: campaign.
 
 from __future__ import annotations
 
+import re
 from copy import deepcopy
 from pathlib import Path
 from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from companion.mission.sensor_tables import sensors_from, sensors_given
 from companion.planning.registry import UnknownPlannerError, make_planner
 from companion.settings import PlannerSettings, SettingsError
 from companion.settings.settings import ControllerKind
@@ -39,7 +41,7 @@ class CampaignTable(BaseModel):
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True)
 
-    name: str = Field(default="", max_length=100)
+    name: str = Field(default="", max_length=100, pattern=r"^[\w .,+()-]*$")
     worlds: list[str] = Field(min_length=1)
     seed: int = Field(default=0, ge=0)
     runs: int = Field(default=30, ge=1)
@@ -69,7 +71,13 @@ def load_campaign(path: Path) -> CampaignTable:
         _check_world(path, folder, world)
     for plan in table.faults:
         _check_faults(path, folder, plan)
-    return table.model_copy(update={"name": table.name or path.stem})
+    for number, sensors in enumerate(table.sensors, 1):
+        if sensors != OWN:
+            try:
+                sensors_from(sensors_given(sensors), folder, CampaignError)
+            except ValueError as error:
+                raise CampaignError(f"{path}: sensors {number}: {error}") from error
+    return table.model_copy(update={"name": table.name or re.sub(r"[^\w .,+()-]", "-", path.stem)})
 
 
 def run_count(table: CampaignTable) -> int:

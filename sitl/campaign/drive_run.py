@@ -36,7 +36,7 @@ USUAL_SENSORS = "lidar-360"
 STREAM = 71
 """Separates what the rover is like from all other random draws with the same seed."""
 LOOK_S = 0.5
-LEAST_S = 2.0
+LEAST_S = 1.0
 """Of the time in one metre square that is kept."""
 
 
@@ -58,10 +58,12 @@ def drive(spec: RunSpec, folder: Path) -> RunResult:
     try:
         run, near = prepared(spec, folder), Nearest()
         run.run(lambda status: near.look(run), LOOK_S)
+        return _result(run, near.clearance_m, processor_s() - began_s)
     except Exception as error:
+        if isinstance(error.__cause__ or error.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from None  # within a compiled loop
         text = " ".join(f"{type(error).__name__}: {error}".split())
         return RunResult("", ERROR, cpu_s=processor_s() - began_s, said=text[:300])
-    return _result(run, near.clearance_m, processor_s() - began_s)
 
 
 def prepared(spec: RunSpec, folder: Path, recorder: Recorder | NullRecorder | None = None) -> Drive:
@@ -90,6 +92,11 @@ def mission_of(spec: RunSpec, folder: Path) -> Mission:
     if spec.sensors == OWN:
         return mission
     return with_sensors(mission, str(folder / spec.sensors) if spec.sensors.endswith(".toml") else spec.sensors)
+
+
+def check_spec(spec: RunSpec, folder: Path) -> None:
+    """Raises MissionError, MapError or ScenarioError for a run that cannot be driven at all."""
+    _mission_and_scenario(spec, folder)
 
 
 def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenario]:
@@ -151,7 +158,7 @@ def _waits_for(run: Drive) -> str:
     return "" if awaited is None else str(awaited)
 
 
-def _dwelt(track: list[TrackPoint]) -> tuple[tuple[int, int, int], ...]:
+def _dwelt(track: list[TrackPoint]) -> tuple[tuple[int, int, float], ...]:
     """See ``RunResult``. From the first movement on: before it the autopilot starts."""
     places = [(one.north_m, one.east_m) for one in track]
     begun = next((number for number, place in enumerate(places) if place != places[0]), 0)
@@ -159,4 +166,4 @@ def _dwelt(track: list[TrackPoint]) -> tuple[tuple[int, int, int], ...]:
     for one, following in zip(track[begun:], track[begun + 1 :], strict=False):
         square = int(one.north_m // 1.0), int(one.east_m // 1.0)
         spent[square] = spent.get(square, 0.0) + following.time_s - one.time_s
-    return tuple((north, east, round(time_s)) for (north, east), time_s in spent.items() if time_s >= LEAST_S)
+    return tuple((north, east, round(time_s, 1)) for (north, east), time_s in spent.items() if time_s >= LEAST_S)

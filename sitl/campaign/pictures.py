@@ -6,63 +6,82 @@ Nouns: heat map.
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
 from companion.mission.load import load_mission
 from sitl.campaign.campaign_file import CampaignTable
-from sitl.campaign.run_spec import RunResult
-from sitl.campaign.summary import Runs, shown, varied
+from sitl.campaign.policies import ERROR
+from sitl.campaign.run_spec import RunResult, RunSpec
+from sitl.campaign.summary import Runs, labels, varied
 from sitl.experiments import drawing
 from sitl.generators.kinds import GroundKind
 from sitl.scenario import scenario_from_mission
 
 COLOURS = (drawing.BLUE, drawing.ORANGE, drawing.GREEN, drawing.RED, drawing.GREY, "#7b5ea7", "#56b4e9", "#444444")
+STROKES: tuple[Literal["-", "--", ":", "-."], ...] = ("-", "--", ":", "-.")
 
 
 def times(campaign: CampaignTable, runs: Runs) -> Figure:
-    """For each world the share of complete runs that took at most so long, a line for each combination."""
-    axes = [axis for axis in varied(campaign) if axis != "world"]
+    """For each world the share of all runs that were complete within so many seconds, a line for each combination."""
     worlds = [world for world in campaign.worlds if any(spec.world == world and one.complete for spec, one in runs)]
     columns = min(3, len(worlds))
     lines = -(-len(worlds) // columns)
     figure = Figure(figsize=(4.2 * columns + 0.6, 3.0 * lines + 0.6), layout="constrained")
     panels = figure.subplots(lines, columns, squeeze=False).ravel()
+    names = _combinations(campaign, runs)
+    looks = {key: (COLOURS[n % len(COLOURS)], STROKES[n // len(COLOURS) % len(STROKES)]) for n, key in enumerate(names)}
     for panel, world in zip(panels, worlds, strict=False):
-        groups: dict[str, list[float]] = {}
-        for spec, result in runs:
-            if spec.world == world and result.complete:
-                name = ", ".join(_named(axis, getattr(spec, axis)) for axis in axes) or "all"
-                groups.setdefault(name, []).append(result.seconds)
-        for number, (name, seconds) in enumerate(groups.items()):
-            at_s = np.sort(seconds)[[0, *range(len(seconds))]]
-            shares = np.arange(len(at_s)) / len(seconds)
-            panel.step(at_s, shares, where="post", label=name, color=COLOURS[number % len(COLOURS)])
-        drawing.title(panel, Path(world).stem)
+        for key in names:
+            own = [one for spec, one in runs if spec.world == world and _key(campaign, spec) == key]
+            at_s = sorted(one.seconds for one in own if one.complete)
+            if at_s:
+                shares = np.arange(len(at_s) + 1) / len(own)
+                colour, stroke = looks[key]
+                panel.step([at_s[0], *at_s], shares, where="post", color=colour, linestyle=stroke)
+        drawing.title(panel, labels(campaign, "world")[world])
         panel.set_ylim(0.0, 1.02)
         panel.spines[["top", "right"]].set_visible(False)
         panel.set_xlabel("driving time, s", fontsize=8)
         panel.tick_params(labelsize=8)
     for panel in panels[len(worlds) :]:
         panel.set_visible(False)
-    panels[0].set_ylabel("share of complete runs", fontsize=8)
-    handles, labels = panels[0].get_legend_handles_labels()
-    if len(labels) > 1:
-        figure.legend(handles, labels, loc="outside lower center", ncols=min(3, len(labels)), frameon=False, fontsize=8)
+    panels[0].set_ylabel("share of all runs", fontsize=8)
+    if len(names) > 1:
+        handles = [Line2D([], [], color=colour, linestyle=stroke) for colour, stroke in looks.values()]
+        figure.legend(
+            handles, names.values(), loc="outside lower center", ncols=min(3, len(names)), frameon=False, fontsize=8
+        )
     return figure
 
 
-def _named(axis: str, value: object) -> str:
-    return f"{axis} {shown(value)}" if isinstance(value, bool | float) else shown(value)
+def _key(campaign: CampaignTable, spec: RunSpec) -> tuple[object, ...]:
+    return tuple(getattr(spec, axis) for axis in varied(campaign) if axis != "world")
+
+
+def _combinations(campaign: CampaignTable, runs: Runs) -> dict[tuple[object, ...], str]:
+    """The combinations of all axes but the world, each with its name."""
+    axes = [axis for axis in varied(campaign) if axis != "world"]
+    words = {axis: labels(campaign, axis) for axis in axes}
+    return {
+        key: ", ".join(_named(axis, value, words[axis]) for axis, value in zip(axes, key, strict=True)) or "all"
+        for key in dict.fromkeys(_key(campaign, spec) for spec, _ in runs)
+    }
+
+
+def _named(axis: str, value: object, words: dict[object, str]) -> str:
+    return f"{axis} {words[value]}" if isinstance(value, bool | float) else words[value]
 
 
 def heat_maps(runs: Runs, folder: Path) -> list[tuple[str, Figure]]:
     """Of each world that is the same for every seed: the mission's name and its picture."""
     results: dict[str, list[RunResult]] = {}
     for spec, result in runs:
-        if spec.world not in set(GroundKind):
+        if spec.world not in set(GroundKind) and result.outcome != ERROR:
             results.setdefault(spec.world, []).append(result)
     return [(world, _heat_map(folder / world, own)) for world, own in results.items()]
 

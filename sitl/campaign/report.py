@@ -59,14 +59,18 @@ def page(campaign: CampaignTable, runs: Runs, source: Path) -> str:
     if pairs:
         parts += [
             "<h2>Pairs</h2><p>Two runs that differ in one axis only: same world, same seed. Each value against the "
-            "axis's first one; times where both are complete, 95 % intervals by resampling pairs.</p>",
+            "axis's first one; times where both are complete. <i>ratio</i>: the geometric mean of the pairs' ratios. "
+            "95 % intervals by Student's t over seeds.</p>",
             _table(("axis", "world", "value", "against", *PAIR_HEAD), pairs, 4),
         ]
     if any(result.complete for _, result in runs):
         parts += ["<h2>Driving times</h2>", _figure(times(campaign, runs), "driving times of complete runs")]
     maps = heat_maps(runs, source.resolve().parent)
     if maps:
-        parts.append("<h2>Where the time goes</h2><p>Seconds in each square of one metre, mean of all runs.</p>")
+        parts.append(
+            "<h2>Where the time goes</h2><p>Seconds in each square of one metre where a run stayed "
+            "for a second or more: mean over the runs of all combinations.</p>"
+        )
         parts += [_figure(figure, f"where the time goes: {world}") for world, figure in maps]
     parts += _lists(campaign, runs, source)
     return _document(campaign.name, parts)

@@ -88,8 +88,8 @@ class RunResult:
     """Of the processor; the only figure that differs from machine to machine."""
     said: str = ""
     """The last thing that the companion said, or the error."""
-    dwelt: tuple[tuple[int, int, int], ...] = ()
-    """Where the time went: metres north and east of the world's corner, rounded down, and seconds, 2 or more."""
+    dwelt: tuple[tuple[int, int, float], ...] = ()
+    """Where the time went: metres north and east of the world's corner, rounded down, and seconds, 1 or more."""
 
     @property
     def complete(self) -> bool:

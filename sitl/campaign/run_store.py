@@ -12,16 +12,19 @@ import hashlib
 import json
 import os
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from companion.mapping.map_files import MapError
 from companion.mission.load import load_mission
-from companion.planning.own_planners import source_of
+from companion.mission.mission import MissionError
+from companion.planning.own_planners import OwnPlannerError, source_of
 from companion.planning.registry import PLANNERS
 from companion.storage.files import read_at_most
-from sitl.campaign.campaign_file import NOTHING, CampaignError, CampaignTable
+from sitl.campaign.campaign_file import NOTHING, CampaignError
+from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.experiments.experiment import code_digest
 from sitl.generators.kinds import GroundKind
@@ -32,15 +35,15 @@ MOST_BYTES = 2_000_000_000
 class RunStore:
     """Results by run."""
 
-    def __init__(self, file: Path, digest: str) -> None:
-        """``digest``: of the code and the campaign's files. Raises CampaignError when the file cannot be read."""
+    def __init__(self, file: Path, digests: Callable[[RunSpec], str]) -> None:
+        """``digests``: of the code and of the files of a run. Raises CampaignError when the file cannot be read."""
         self.file = file
         self.results: dict[str, RunResult] = {}
         self.torn = 0
         """Lines that could not be read."""
         self.older = 0
         """Lines of other code or other files."""
-        self._digest = digest
+        self._digests = digests
         for line in _lines(file):
             self._take(line)
 
@@ -48,7 +51,7 @@ class RunStore:
         """Append a result; it is on the disk before this returns. Raises OSError."""
         if spec.id in self.results:
             return
-        body = {"run": asdict(spec), "result": asdict(result), "digest": self._digest, "id": spec.id}
+        body = {"run": asdict(spec), "result": asdict(result), "digest": self._digests(spec), "id": spec.id}
         line = json.dumps({**body, "check": _check_of(body)}, separators=(",", ":"))
         with self.file.open("a", encoding="utf-8") as out:
             out.write(line + "\n")
@@ -70,43 +73,57 @@ class RunStore:
         except (ValueError, KeyError, TypeError, AttributeError):
             self.torn += 1
             return
-        if body["digest"] != self._digest:
+        if body["digest"] != self._digests(spec):
             self.older += 1
-            return
-        self.results.setdefault(spec.id, result)
+        elif result.outcome != ERROR:  # what failed on one machine for want of memory is driven again
+            self.results.setdefault(spec.id, result)
 
 
-def digest_of(campaign: CampaignTable, folder: Path) -> str:
-    """A name for the code as it stands and for all files that the campaign names."""
-    digest = hashlib.sha256(code_digest().encode())
-    for file in sorted(set(_files(campaign, folder))):
-        digest.update(file.name.encode() + read_at_most(file, MOST_BYTES))
-    return digest.hexdigest()[:16]
+class Digests:
+    """Names for the code as it stands and the files that a run depends on; each is read once."""
+
+    def __init__(self, folder: Path) -> None:
+        """``folder``: of the campaign's file."""
+        self._folder = folder
+        self._known: dict[tuple[str, ...], str] = {}
+
+    def of(self, spec: RunSpec) -> str:
+        """That of a run; empty where one of its files cannot be read."""
+        key = (spec.world, spec.planner, spec.sensors, spec.faults)
+        if key not in self._known:
+            digest = hashlib.sha256(code_digest().encode())
+            try:
+                for file in _files(spec, self._folder):
+                    digest.update(file.name.encode() + read_at_most(file, MOST_BYTES))
+                self._known[key] = digest.hexdigest()[:16]
+            except (OSError, MissionError, MapError, OwnPlannerError):
+                self._known[key] = ""
+        return self._known[key]
 
 
-def _files(campaign: CampaignTable, folder: Path) -> Iterator[Path]:
-    for world in campaign.worlds:
-        if world not in set(GroundKind):
-            yield from load_mission(folder / world).files
-    yield from filter(None, map(source_of, set(campaign.planners) - set(PLANNERS)))
-    yield from (folder / plan for plan in campaign.faults if plan != NOTHING)
-    yield from (folder / one for one in campaign.sensors if one.endswith(".toml"))
+def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
+    if spec.world not in set(GroundKind):
+        yield from load_mission(folder / spec.world).files
+    source = None if spec.planner in PLANNERS else source_of(spec.planner)
+    named = (spec.faults if spec.faults != NOTHING else "", spec.sensors if spec.sensors.endswith(".toml") else "")
+    yield from (folder / name for name in named if name)
+    yield from () if source is None else (source,)
 
 
 def _lines(file: Path) -> list[str]:
     try:
         data = read_at_most(file, MOST_BYTES) if file.exists() else b""
+        if data and not data.endswith(b"\n"):
+            # A line that was torn: the next one must not be appended to it.
+            with file.open("ab") as out:
+                out.write(b"\n")
     except OSError as error:
-        raise CampaignError(f"{file}: cannot be read: {error.strerror}; choose another folder with --out") from error
-    if data and not data.endswith(b"\n"):
-        # A line that was torn: the next one must not be appended to it.
-        with file.open("ab") as out:
-            out.write(b"\n")
+        raise CampaignError(f"{file}: cannot be used: {error.strerror}; choose another folder with --out") from error
     return data.decode("utf-8", errors="replace").splitlines()
 
 
 def _result(values: dict[str, Any]) -> RunResult:
-    return RunResult(**{**values, "dwelt": tuple((int(n), int(e), int(s)) for n, e, s in values["dwelt"])})
+    return RunResult(**{**values, "dwelt": tuple((int(n), int(e), float(s)) for n, e, s in values["dwelt"])})
 
 
 def _check_of(body: dict[str, Any]) -> str:

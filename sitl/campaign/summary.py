@@ -1,27 +1,32 @@
 """What a campaign's runs come to: a row for each combination, and paired differences with intervals.
 
 A pair is two runs that differ in one axis only: same world, same seed. Times are compared where both reached every
-target; intervals are those of 95 %, by resampling pairs.
+target. Intervals are those of 95 % by Student's t, over seeds: pairs of one seed lie on the same ground, so they count
+as one.
 
 Nouns: paired difference.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sitl.campaign.campaign_file import CampaignTable
-from sitl.campaign.policies import Policy, broken
+from sitl.campaign.policies import ERROR, Policy, broken
 from sitl.campaign.run_spec import AXES, RunResult, RunSpec
-from sitl.experiments.results_page import share_with_interval
+from sitl.experiments.results_page import share_with_interval, without_intervals
 
 Runs = Sequence[tuple[RunSpec, RunResult]]
-DRAWS = 2000
+FEWEST = 3
+"""With fewer seeds no interval is told."""
+FILES = (".toml", ".plan", ".waypoints")
 HEAD = (
     "runs", "complete", "touched", "run into", "refused", "missed", "errors", "mean s", "95 %", "/bound",
     "closest m", "metres", "mAh", "by GA",
@@ -67,10 +72,31 @@ def rows(campaign: CampaignTable, runs: Runs) -> list[list[str]]:
     axes, groups = varied(campaign), dict[tuple[object, ...], list[RunResult]]()
     for spec, result in runs:
         groups.setdefault(tuple(getattr(spec, axis) for axis in axes), []).append(result)
-    table = [[*map(shown, key), *_row(results)] for key, results in groups.items()]
+    words = [labels(campaign, axis) for axis in axes]
+    table = [
+        [*(word[value] for word, value in zip(words, key, strict=True)), *_row(results)]
+        for key, results in groups.items()
+    ]
     if len(groups) > 1:
-        table.append(["all", *[""] * (len(axes) - 1), *_row([result for _, result in runs])])
+        table.append(["all", *[""] * (len(axes) - 1), *without_intervals([_row([result for _, result in runs])])[0]])
     return table
+
+
+def labels(campaign: CampaignTable, axis: str) -> dict[object, str]:
+    """The values of an axis as texts, each another one; of a file its name alone, if that says which."""
+    values = values_of(campaign, axis)
+    short = {value: shown(value) for value in values}
+    twice = {text for text, count in Counter(short.values()).items() if count > 1}
+    return {value: str(value) if text in twice else text for value, text in short.items()}
+
+
+def shown(value: object) -> str:
+    """A value of an axis as text."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, float):
+        return f"{value:g}"
+    return Path(str(value)).stem if str(value).endswith(FILES) else str(value)
 
 
 def broken_counts(runs: Runs) -> list[tuple[Policy, int]]:
@@ -79,26 +105,24 @@ def broken_counts(runs: Runs) -> list[tuple[Policy, int]]:
     return [(policy, counts[policy]) for policy in Policy if counts[policy]]
 
 
-def shown(value: object) -> str:
-    """A value of an axis as text; of a file its name alone."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return f"{value:g}" if isinstance(value, float) else Path(str(value)).stem
+Partners = dict[tuple[object, ...], tuple[int, RunResult]]
+"""By what pairs have in common: the seed and the result."""
 
 
 def differences(campaign: CampaignTable, runs: Runs) -> Iterator[PairedDifference]:
     """For each axis that varies and each world: every value against the axis's first one."""
+    worlds = labels(campaign, "world")
     for axis in (axis for axis in varied(campaign) if axis != "world"):
+        words, first = labels(campaign, axis), values_of(campaign, axis)[0]
         for world in campaign.worlds:
-            own = [(spec, result) for spec, result in runs if spec.world == world]
-            by_value = dict[object, dict[tuple[object, ...], RunResult]]()
-            for spec, result in own:
-                by_value.setdefault(getattr(spec, axis), {})[spec.without(axis)] = result
-            first = values_of(campaign, axis)[0]
+            by_value = dict[object, Partners]()
+            for spec, result in runs:
+                if spec.world == world:
+                    by_value.setdefault(getattr(spec, axis), {})[spec.without(axis)] = spec.seed, result
             for value, results in by_value.items():
                 if value != first and first in by_value:
                     cells = _paired(results, by_value[first])
-                    yield PairedDifference(axis, shown(world), shown(value), shown(first), cells)
+                    yield PairedDifference(axis, worlds[world], words[value], words[first], cells)
 
 
 def _row(results: Sequence[RunResult]) -> list[str]:
@@ -106,45 +130,62 @@ def _row(results: Sequence[RunResult]) -> list[str]:
     times_s = np.array([one.seconds for one in complete])
     counts = [sum(getattr(one, name) for one in results) for name in ("touched", "run_into", "refused")]
     missed = sum(one.targets - one.reached for one in results)
-    errors = sum(one.outcome == "error" for one in results)
+    errors = sum(one.outcome == ERROR for one in results)
     driven = [[one.metres for one in complete], [1e3 * one.drawn_ah for one in complete]]
     means = [f"{np.mean(values):.1f}" if complete else "-" for values in driven]
-    low_high = "-" if len(complete) < 2 else "{:.1f} to {:.1f}".format(*interval(times_s))
     mean_s = f"{times_s.mean():.1f}" if complete else "-"
-    closest = f"{min((one.clearance_m for one in results), default=0.0):.2f}"
-    searches = sum(one.searches for one in results)
-    by_ga = f"{sum(one.genetic_searches for one in results) / searches:.2f}" if searches else "-"
-    bounded = [one for one in complete if one.bound_s > 0.0]
-    least_s = sum(one.bound_s for one in bounded)
-    over = f"{sum(one.seconds for one in bounded) / least_s:.2f}" if bounded else "-"
+    low_high = "{:.1f} to {:.1f}".format(*interval(times_s)) if len(complete) >= FEWEST else "-"
+    moved = [one.clearance_m for one in results if one.outcome != ERROR]
+    closest = f"{min(moved):.2f}" if moved else "-"
     return [
         f"{len(results)}", share_with_interval(len(complete), len(results)), *map(str, (*counts, missed, errors)),
-        mean_s, low_high, over, closest, *means, by_ga,
+        mean_s, low_high, _over_bound(complete), closest, *means, _by_ga(results),
     ]  # fmt: skip
 
 
-def interval(values: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> tuple[float, float]:
-    """The 95 % interval of a mean, by resampling."""
-    picks = np.random.default_rng(0).integers(len(values), size=(DRAWS, len(values)))
-    low, high = np.percentile(values[picks].mean(axis=1), (2.5, 97.5))
-    return float(low), float(high)
+def _over_bound(complete: Sequence[RunResult]) -> str:
+    bounded = [one for one in complete if one.bound_s > 0.0]
+    return f"{sum(one.seconds for one in bounded) / sum(one.bound_s for one in bounded):.2f}" if bounded else "-"
 
 
-def _paired(these: dict[tuple[object, ...], RunResult], others: dict[tuple[object, ...], RunResult]) -> tuple[str, ...]:
-    pairs = [(these[key], others[key]) for key in these if key in others]
-    both = np.array([(a.seconds, b.seconds) for a, b in pairs if a.complete and b.complete]).reshape(-1, 2)
+def _by_ga(results: Sequence[RunResult]) -> str:
+    searches = sum(one.searches for one in results)
+    return f"{sum(one.genetic_searches for one in results) / searches:.2f}" if searches else "-"
+
+
+def interval(values: NDArray[np.float64]) -> tuple[float, float]:
+    """The 95 % interval of a mean, by Student's t; needs two values or more."""
+    from scipy.stats import t
+
+    mean, reach = float(values.mean()), float(values.std(ddof=1)) / math.sqrt(len(values))
+    wide = float(t.ppf(0.975, len(values) - 1)) * reach
+    return mean - wide, mean + wide
+
+
+def _paired(these: Partners, others: Partners) -> tuple[str, ...]:
+    pairs = [(these[key][0], these[key][1], others[key][1]) for key in these if key in others]
+    both = [(seed, a.seconds, b.seconds) for seed, a, b in pairs if a.complete and b.complete]
     counts = (
-        f"{len(both)}", f"{sum(a.complete > b.complete for a, b in pairs)}",
-        f"{sum(b.complete > a.complete for a, b in pairs)}",
+        f"{len(both)}", f"{sum(a.complete > b.complete for _, a, b in pairs)}",
+        f"{sum(b.complete > a.complete for _, a, b in pairs)}",
     )  # fmt: skip
-    if len(both) < 2:
+    if not both:
         return (f"{len(pairs)}", "-", "-", "-", "-", *counts)
-    low_s, high_s = interval(both[:, 0] - both[:, 1])
-    picks = np.random.default_rng(0).integers(len(both), size=(DRAWS, len(both)))
-    means = both[picks].mean(axis=1)
-    low, high = np.percentile(means[:, 0] / means[:, 1], (2.5, 97.5))
-    mean, other = both.mean(axis=0)
-    return (
-        f"{len(pairs)}", f"{mean:.1f}", f"{other:.1f}", f"{mean - other:+.1f} ({low_s:+.1f} to {high_s:+.1f})",
-        f"{mean / other:.3f} ({low:.3f} to {high:.3f})", *counts,
-    )  # fmt: skip
+    seconds = np.array([one[1:] for one in both])
+    mean, other = seconds.mean(axis=0)
+    difference = _by_seed([(seed, a - b) for seed, a, b in both])
+    ratio = _by_seed([(seed, math.log(a / b)) for seed, a, b in both if a > 0.0 and b > 0.0])
+    apart, times = f"{difference.mean():+.1f}", f"{math.exp(ratio.mean()):.3f}" if len(ratio) else "-"
+    if min(len(difference), len(ratio)) >= FEWEST:
+        apart += " ({:+.1f} to {:+.1f})".format(*interval(difference))
+        low, high = interval(ratio)
+        times += f" ({math.exp(low):.3f} to {math.exp(high):.3f})"
+    return (f"{len(pairs)}", f"{mean:.1f}", f"{other:.1f}", apart, times, *counts)
+
+
+def _by_seed(values: list[tuple[int, float]]) -> NDArray[np.float64]:
+    """The mean of each seed's values."""
+    own: dict[int, list[float]] = {}
+    for seed, value in values:
+        own.setdefault(seed, []).append(value)
+    return np.array([np.mean(one) for one in own.values()])

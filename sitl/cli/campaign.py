@@ -18,11 +18,11 @@ from companion.mapping.map_files import MapError
 from companion.mission.mission import MissionError
 from companion.recording.record_format import RecordError
 from companion.recording.recorder import Recorder
-from sitl.campaign.campaign_file import CampaignError, CampaignTable, load_campaign
-from sitl.campaign.drive_run import mission_of, prepared, settings_of
+from sitl.campaign.campaign_file import CampaignError, load_campaign
+from sitl.campaign.drive_run import check_spec, mission_of, prepared, settings_of
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunSpec, specs_of
-from sitl.campaign.run_store import RunStore, digest_of
+from sitl.campaign.run_store import Digests, RunStore
 from sitl.campaign.summary import Runs
 from sitl.campaign.workers import Done, driven_here, driven_on
 from sitl.cli.campaign_outputs import PARQUET, REPORT, put_out
@@ -76,12 +76,13 @@ def drive_campaign(
     table, folder = load_campaign(file), file.resolve().parent
     place = out or Path("out") / table.name
     writable(place / FILE)
-    store = RunStore(place / FILE, digest_of(table, folder))
+    store = RunStore(place / FILE, Digests(folder).of)
     specs = list(specs_of(table))
     _say_what_there_is(store, specs)
     left = [spec for spec in specs if spec.id not in store.results]
     if left:
-        _drive(console, table, left, store, folder, jobs, cluster)
+        _check(left, folder)
+        _drive(console, left, store, folder, jobs, cluster)
     runs = store.of(specs)
     put_out(console, table, runs, file, place, parquet=parquet)
     errors = sum(result.outcome == ERROR for _, result in runs)
@@ -102,7 +103,6 @@ def _say_what_there_is(store: RunStore, specs: list[RunSpec]) -> None:
 
 def _drive(
     console: Console,
-    table: CampaignTable,
     left: list[RunSpec],
     store: RunStore,
     folder: Path,
@@ -113,7 +113,7 @@ def _drive(
     if cluster is None:
         _warm_up(left, folder)
     before = len(store.results)
-    done: Done = driven_here(left, folder, jobs) if cluster is None else driven_on(left, table, folder, cluster)
+    done: Done = driven_here(left, folder, jobs) if cluster is None else driven_on(left, folder, cluster)
     try:
         with _progress(console, len(left)) as advance:
             for spec, result in done:
@@ -125,6 +125,12 @@ def _drive(
         raise StoppedError(
             f"{kept} of {len(left)} runs; they are kept in {store.file}, and the same command goes on"
         ) from None
+
+
+def _check(left: list[RunSpec], folder: Path) -> None:
+    """What could not be driven at all is told before hours of driving. Raises one of ``BAD_INPUT``."""
+    for spec in {(spec.world, spec.sensors, spec.faults): spec for spec in left}.values():
+        check_spec(spec, folder)
 
 
 def _warm_up(left: list[RunSpec], folder: Path) -> None:
@@ -169,8 +175,10 @@ def _drive_again(file: Path, run_id: str | None, record: Path | None) -> None:
     writable(record / "meta.json")
     mission, settings = mission_of(spec, folder), settings_of(spec)
     recorder = Recorder(record, mission, settings, spec.seed, arm=True, start_us=0)
-    report = prepared(spec, folder, recorder).run()
-    recorder.close()
+    try:
+        report = prepared(spec, folder, recorder).run()
+    finally:
+        recorder.close()
     contacts = f", {report.collisions} contacts" if report.collisions else ""
     typer.echo(f"{spec.world}, seed {spec.seed}: {report.outcome} after {report.driving_time_s:.1f} s{contacts}")
     typer.echo(f"record: {record}; rover-companion report {record} shows it")

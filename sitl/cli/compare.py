@@ -20,7 +20,7 @@ FILE, PLOT = "campaign.toml", "times.png"
 
 def compare(
     missions: Annotated[
-        list[Path], typer.Argument(metavar="MISSION...", help="Mission files; generated ground: clutter, rooms, yard.")
+        list[Path], typer.Argument(metavar="MISSION...", help="Mission files; kinds of worlds from seeds, like maze.")
     ],
     planners: Annotated[str, typer.Option(help="Names, separated by commas; the others are compared with the first.")],
     seeds: Annotated[int, typer.Option(min=1, help="Runs of each planner on each mission, with paired seeds.")] = 30,
@@ -32,8 +32,8 @@ def compare(
 ) -> None:
     """Drive each MISSION with each planner, and show driving times, paired ratios with intervals, and a plot.
 
-    It is a campaign: OUT/campaign.toml can be changed and driven with rover-sitl campaign. Exit code 2: bad input; 3: a
-    run ended with an error of the programs; 130: stopped, what is done is kept.
+    It is a campaign: a copy of OUT/campaign.toml can be changed and driven with rover-sitl campaign. Exit code 2: bad
+    input; 3: a run ended with an error of the programs; 130: stopped, what is done is kept.
     """
     try:
         file = out / FILE

@@ -7,6 +7,7 @@ import platform
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from importlib.metadata import version
 from importlib.resources import files
 from itertools import starmap
@@ -182,8 +183,12 @@ def each(
     return made
 
 
+@cache
 def code_digest() -> str:
-    """A name for the code as it stands: results that other code made are not taken for its own."""
+    """A name for the code as it stands: results that other code made are not taken for its own.
+
+    Once a process: what is written on the disk later is not what it runs.
+    """
     digest = hashlib.sha256()
     for package in ("companion", "sitl"):
         folder = Path(str(files(package)))

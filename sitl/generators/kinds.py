@@ -68,7 +68,9 @@ def _clutter(rng: np.random.Generator, given: Clutter) -> Obstacles:
 class Rooms(Parameters):
     """Walls of a building, with doors."""
 
-    least_door_m: float = Field(1.3, ge=NARROWEST_M, le=5.0, description="width of doors")
+    least_door_m: float = Field(
+        1.3, ge=NARROWEST_M, le=5.0, description="width of doors; narrower than 1.5 m seldom has a way"
+    )
     most_door_m: float = Field(2.0, ge=NARROWEST_M, le=5.0, description="width of doors")
     room_m: float = Field(9.0, ge=5.0, le=20.0, description="rooms as long as this are divided again")
 
@@ -98,7 +100,9 @@ def _rooms(rng: np.random.Generator, given: Rooms) -> Obstacles:
 class Yard(Parameters):
     """Fences across the way, with gates, and containers between them."""
 
-    least_gate_m: float = Field(1.3, ge=NARROWEST_M, le=5.0, description="width of gates")
+    least_gate_m: float = Field(
+        1.3, ge=NARROWEST_M, le=5.0, description="width of gates; narrower than 1.5 m seldom has a way"
+    )
     most_gate_m: float = Field(2.0, ge=NARROWEST_M, le=5.0, description="width of gates")
     most_containers: int = Field(3, ge=1, le=8, description="between two fences")
 

@@ -27,8 +27,8 @@ END_M = 4.0
 WAY_RESOLUTION_M = 0.2
 MOST_DRAWN = 200
 MOVER_STREAM = 52
-ROOM_M = 7.0
-"""Nothing moves within this of the west and the east edge."""
+ROOM_M, WALL_M = 7.0, 1.0
+"""Nothing moves within these of the west and the east edge, and of the others."""
 
 
 class NoWayError(ValueError):
@@ -104,6 +104,7 @@ def _movers(ground: MadeGround, seed: int, count: int) -> tuple[MoverSpec, ...]:
 
 
 def _from_start(ground: MadeGround, place_m: NDArray[np.float64]) -> HomePoint:
-    """A place in metres from the start, kept away from start and goal."""
+    """A place in metres from the start; it lies within the walls, and not near the west and the east side."""
+    north_m = min(max(float(place_m[0]), WALL_M), NORTH_M - WALL_M)
     east_m = min(max(float(place_m[1]), ROOM_M), EAST_M - ROOM_M)
-    return HomePoint(round(float(place_m[0]) - ground.start_m[0], 2), round(east_m - ground.start_m[1], 2))
+    return HomePoint(round(north_m - ground.start_m[0], 2), round(east_m - ground.start_m[1], 2))

@@ -25,10 +25,19 @@ def test_an_error_of_the_programs_is_a_result(monkeypatch: pytest.MonkeyPatch) -
     assert broken(result) == (Policy.NO_ERROR,) and not result.complete
 
 
+def test_an_interrupt_within_a_compiled_loop_ends_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(spec: RunSpec, folder: Path) -> None:
+        raise SystemError("returned a result with an exception set") from KeyboardInterrupt()
+
+    monkeypatch.setattr(drive_run, "prepared", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        drive(SPEC, Path())
+
+
 def test_where_the_time_went_counts_from_the_first_movement() -> None:
     places = [(0.0, 5.0, 5.0), (40.0, 5.0, 5.0), (41.0, 5.5, 5.2), (44.0, 5.6, 5.3), (44.5, 7.0, 5.0), (46.5, 7.2, 5.1)]
     track = [TrackPoint(time_s, north_m, east_m, "-") for time_s, north_m, east_m in places]
-    assert drive_run._dwelt(track) == ((5, 5, 4), (7, 5, 2))
+    assert drive_run._dwelt(track) == ((5, 5, 3.5), (7, 5, 2.0))
 
 
 def test_settings_of_a_run_have_its_planner_its_controller_and_its_variant() -> None:

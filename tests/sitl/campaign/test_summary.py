@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sitl.campaign.campaign_file import CampaignTable
+from sitl.campaign.pictures import times
+from sitl.campaign.policies import ERROR
 from sitl.campaign.report import page
 from sitl.campaign.run_spec import RunResult, RunSpec, specs_of
-from sitl.campaign.summary import HEAD, PAIR_HEAD, differences, interval, rows, varied
+from sitl.campaign.summary import HEAD, PAIR_HEAD, differences, interval, labels, rows, varied
 from sitl.campaign.tables import records_of
 
-TABLE = CampaignTable(name="a <u>", worlds=["clutter"], runs=20, controllers=["points", "motion-ga"])
+TABLE = CampaignTable(name="a", worlds=["clutter"], runs=20, controllers=["points", "motion-ga"])
 RESULT = RunResult("points", "reached", 1, 1, bound_s=25.0, metres=40.0, clearance_m=0.4, said="done")
 
 
@@ -53,18 +56,58 @@ def test_a_run_without_a_partner_is_no_pair() -> None:
     assert pair.cells[0] == "19"
 
 
-def test_an_interval_holds_the_mean_as_often_as_it_says() -> None:
-    """Of 200 samples of 30 the interval misses the true mean in 10 on average; 25 or more: a chance below 1e-4."""
+@pytest.mark.parametrize("count", [3, 5, 30])
+def test_an_interval_holds_the_mean_as_often_as_it_says(count: int) -> None:
+    """Of 400 samples the interval misses the true mean in 20 on average; fewer than 5 or more than 40: below 1e-4."""
     rng = np.random.default_rng(1)
-    bounds = [interval(rng.normal(5.0, 2.0, 30)) for _ in range(200)]
-    assert sum(not low < 5.0 < high for low, high in bounds) < 25
-    assert bounds[0][1] - bounds[0][0] == pytest.approx(4.0 * 2.0 / 30**0.5, rel=0.5)
+    bounds = [interval(rng.normal(5.0, 2.0, count)) for _ in range(400)]
+    assert 5 <= sum(not low < 5.0 < high for low, high in bounds) <= 40
+
+
+def test_pairs_of_one_seed_count_as_one() -> None:
+    """Another list that changes nothing makes no interval narrower."""
+    table = TABLE.model_copy(update={"late_s": [0.0, 0.1, 0.2, 0.3]})
+    rng = np.random.default_rng(2)
+    noise = {(seed, name): rng.normal(0.0, 5.0) for seed in range(20) for name in table.controllers}
+    runs = [(spec, replace(RESULT, seconds=50.0 + noise[spec.seed, spec.controller])) for spec in specs_of(table)]
+    of_all = next(one for one in differences(table, runs) if one.axis == "controller")
+    alone = [(spec, result) for spec, result in runs if spec.late_s == 0.0]
+    (of_one,) = differences(table.model_copy(update={"late_s": [0.0]}), alone)
+    assert of_all.cells[3] == of_one.cells[3] and of_all.cells[0] == "80"
+
+
+def test_values_with_one_short_name_stay_apart() -> None:
+    table = TABLE.model_copy(update={"worlds": ["a/m.toml", "b/m.toml", "c.toml"], "planners": ["p.q:A", "p.q:B"]})
+    assert list(labels(table, "world").values()) == ["a/m.toml", "b/m.toml", "c"]
+    assert list(labels(table, "planner").values()) == ["p.q:A", "p.q:B"]
+
+
+def test_an_error_takes_part_in_no_time() -> None:
+    runs = [(spec, RunResult("", ERROR, said="<lost>") if spec.seed < 5 else result) for spec, result in RUNS]
+    line = rows(TABLE, runs)[0]
+    cells = dict(zip(HEAD, line[2:], strict=True))
+    assert cells["complete"].startswith("0.750") and cells["errors"] == "5" and cells["mean s"] == "62.0"
+    assert "error in 10 runs" in page(TABLE, runs, Path("c.toml"))
+
+
+def test_a_curve_keeps_its_colour_and_ends_at_its_share() -> None:
+    table = TABLE.model_copy(update={"worlds": ["clutter", "rooms"]})
+    runs = [
+        (spec, replace(RESULT, seconds=40.0, reached=0 if (spec.world, spec.controller) == ("rooms", "points") else 1))
+        for spec in specs_of(table)
+    ]
+    figure = times(table, runs)
+    first, second = (panel.get_lines() for panel in figure.axes)
+    assert len(first) == 2 and len(second) == 1
+    assert second[0].get_color() == first[1].get_color() != first[0].get_color()
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == ["points", "motion-ga"]
+    assert first[0].get_ydata()[-1] == 1.0
 
 
 def test_the_page_tells_of_every_run_that_was_not_complete_and_loads_nothing(tmp_path) -> None:  # type: ignore[no-untyped-def]
     text = page(TABLE, RUNS, tmp_path / "c.toml")
     missed = next(spec for spec, result in RUNS if not result.complete)
-    assert missed.id in text and "&lt;lost&gt;" in text and "<u>" not in text and "<lost>" not in text
+    assert missed.id in text and "&lt;lost&gt;" in text and "<lost>" not in text
     assert "http" not in text and "--replay ID" in text and text.count("data:image/png") == 1
 
 

@@ -28,7 +28,7 @@ def test_a_seed_gives_one_world_with_a_way(kind: GroundKind) -> None:
     norths, easts = np.nonzero(one.world.obstacles)
     places_m = np.column_stack((norths, easts)) * FINE_M + 0.5 * FINE_M
     for place in one.way_m[::5]:
-        assert np.hypot(*(places_m - place).T).min() > BODY_M - 0.25, "room on both sides, but for the grid"
+        assert np.hypot(*(places_m - place).T).min() >= BODY_M
     assert np.hypot(*(one.way_m[0] - one.start_m)) < 0.3 and np.hypot(*(one.way_m[-1] - one.goal_m)) < 0.3
     assert np.hypot(*np.diff(one.way_m, axis=0).T).max() < 0.3
 
@@ -39,7 +39,6 @@ def test_parameters_change_what_they_say() -> None:
     assert many > 3 * few
     wide, narrow = (difficulty(made(GroundKind.MAZE, 1, Maze(corridor_m=m))).characteristic_m for m in (5.0, 2.0))
     assert wide > 1.5 * narrow
-    assert Rooms().least_door_m < Rooms().most_door_m
     with pytest.raises(ValidationError, match=r"most_door_m 1.5 is less than least_door_m 3"):
         Rooms(least_door_m=3.0, most_door_m=1.5)
 
