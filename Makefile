@@ -77,7 +77,7 @@ $(PROGRAM): pyproject.toml constraints.txt
 	@touch $(PROGRAM)
 
 $(TOOLS): pyproject.toml constraints.txt
-	@$(call install,.[test],the program and the tools of its tests: about 1.1 GB)
+	@$(call install,.[test],the program and the tools of its tests: about 1.4 GB)
 	@touch $(PROGRAM) $(TOOLS)
 
 define install
