@@ -19,7 +19,7 @@ from companion.settings.settings import ControllerKind
 from companion.settings.settings_file import parse_settings
 from companion.storage.toml_file import read_table
 from sitl.faults.fault_file import FaultFileError, load_faults
-from sitl.generators.kinds import GroundKind
+from sitl.generators.kinds import GroundKind, is_kind
 
 NOTHING = "none"
 """No faults."""
@@ -116,7 +116,7 @@ def _check_names(path: Path, table: CampaignTable) -> None:
 
 def _check_world(path: Path, folder: Path, world: str) -> None:
     """It must be a kind of ground or a mission. Raises CampaignError."""
-    if world not in set(GroundKind) and not (folder / world).is_file():
+    if not is_kind(world) and not (folder / world).is_file():
         kinds = ", ".join(GroundKind)
         raise CampaignError(f"{path}: worlds: {world!r:.80} is no kind of ground ({kinds}) and no mission file")
 

@@ -24,7 +24,7 @@ from sitl.experiments.dead_companion import STOOD_M_S
 from sitl.experiments.experiment import GUARD
 from sitl.experiments.off_model import off_model
 from sitl.faults.fault_file import load_faults
-from sitl.generators.kinds import GroundKind
+from sitl.generators.kinds import GroundKind, is_kind
 from sitl.generators.made_ground import MadeGround, made
 from sitl.lockstep import Drive, TrackPoint
 from sitl.scenario import Scenario, scenario_from_mission, with_faults, with_sensors
@@ -85,7 +85,7 @@ def settings_of(spec: RunSpec) -> Settings:
 
 def mission_of(spec: RunSpec, folder: Path) -> Mission:
     """The mission that is driven, with the run's sensors."""
-    if spec.world in set(GroundKind):
+    if is_kind(spec.world):
         mission = _mission_on(made(GroundKind(spec.world), spec.seed))
     else:
         mission = load_mission(folder / spec.world)
@@ -102,7 +102,7 @@ def check_spec(spec: RunSpec, folder: Path) -> None:
 def _mission_and_scenario(spec: RunSpec, folder: Path) -> tuple[Mission, Scenario]:
     mission = mission_of(spec, folder)
     scenario = scenario_from_mission(mission)
-    if spec.world in set(GroundKind):
+    if is_kind(spec.world):
         ground = made(GroundKind(spec.world), spec.seed)
         start = SimStart(*ground.start_m, np.pi / 2.0, scenario.start.home)
         scenario = replace(scenario, world=ground.world, start=start)

@@ -27,7 +27,7 @@ from sitl.campaign.campaign_file import NOTHING, CampaignError
 from sitl.campaign.policies import ERROR
 from sitl.campaign.run_spec import RunResult, RunSpec
 from sitl.experiments.experiment import code_digest
-from sitl.generators.kinds import GroundKind
+from sitl.generators.kinds import is_kind
 
 MOST_BYTES = 2_000_000_000
 
@@ -102,7 +102,7 @@ class Digests:
 
 
 def _files(spec: RunSpec, folder: Path) -> Iterator[Path]:
-    if spec.world not in set(GroundKind):
+    if not is_kind(spec.world):
         yield from load_mission(folder / spec.world).files
     source = None if spec.planner in PLANNERS else source_of(spec.planner)
     named = (spec.faults if spec.faults != NOTHING else "", spec.sensors if spec.sensors.endswith(".toml") else "")

@@ -32,6 +32,11 @@ class GroundKind(StrEnum):
     CYLINDERS = "cylinders"
 
 
+def is_kind(world: str) -> bool:
+    """Whether this names a kind of ground, and not a file."""
+    return world in set(GroundKind)
+
+
 class Parameters(BaseModel):
     """What a kind may be told."""
 
