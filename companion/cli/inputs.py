@@ -1,13 +1,12 @@
-"""Options that commands share, and their checks: usable settings, writable files, ``--version``."""
+"""Options that commands share, and their checks: usable settings, writable files."""
 
 from __future__ import annotations
 
 import contextlib
-import importlib.metadata
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -96,14 +95,3 @@ def written(path: Path) -> Iterator[None]:
     except OSError as error:
         place = error.filename if os.path.isdir(path) and error.filename else path
         raise OutputError(f"{place}: cannot be written: {error.strerror or error}; choose another place") from error
-
-
-def version_option(name: str) -> Any:
-    """The option for a script's callback: prints its name and the installed version, and ends."""
-
-    def show(asked: bool) -> None:
-        if asked:
-            typer.echo(f"{name} {importlib.metadata.version('rover-companion')}")
-            raise typer.Exit
-
-    return typer.Option("--version", callback=show, is_eager=True, help="Show the version and exit.")

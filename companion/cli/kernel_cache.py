@@ -8,7 +8,6 @@ kernel's own file only. ``use_cache`` replaces that rule by ``Locator``, through
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import hashlib
 import os
@@ -18,7 +17,9 @@ from collections import defaultdict
 from collections.abc import Callable, MutableMapping
 from functools import cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
+
+from companion.cli.source_names import SourceNames
 
 PLACE, LOCATORS = "NUMBA_CACHE_DIR", "NUMBA_CACHE_LOCATOR_CLASSES"
 ROOT = Path(__file__).resolve().parents[2]
@@ -55,9 +56,8 @@ class Locator:
     def __init__(self, file: Path, line: int) -> None:
         self._py_file = str(file)  # numba's name for it
         self._line = line
-        module = ".".join(file.relative_to(ROOT).with_suffix("").parts)
         self._digest = kernel_digest(file)
-        self._directory = Path(os.environ[PLACE]) / f"{module}-{self._digest[:16]}"
+        self._directory = Path(os.environ[PLACE]) / f"{_module_of(file)}-{self._digest[:16]}"
 
     @classmethod
     def from_function(cls, py_func: Callable[..., Any], py_file: str) -> Locator | None:
@@ -124,78 +124,34 @@ def _files_used_by(file: Path) -> set[Path]:
 
 def _used_by(file: Path, name: str) -> set[tuple[Path, str]]:
     """What a name at the top level of a file is made from: files, each with a name there."""
-    source = _source(file)
     base, _, attribute = name.partition(".")
-    found = {(file, used) for used in source.uses.get(base, ())}
-    for path, imported in source.imports.get(base, ()):
+    found = {(file, used) for used in _source(file).uses.get(base, ())}
+    for path, imported in _imports(file).get(base, ()):
         wanted = imported or attribute
         found |= {(path, one) for one in (_source(path).uses if wanted in ("", "*") else (wanted,))}
     return found
 
 
-class _Source(NamedTuple):
-    """The names at the top level of a file."""
-
-    decorated: frozenset[str]
-    """Functions with a decorator: kernels are among them."""
-    uses: dict[str, set[str]]
-    """The names in each definition; ``name.attribute`` for an attribute."""
-    imports: dict[str, set[tuple[Path, str]]]
-    """What an imported name stands for: a file, and a name there: "" for the module, "*" for all names."""
+@cache
+def _source(file: Path) -> SourceNames:
+    return SourceNames.kept(file.read_bytes(), Path(os.environ[PLACE]) / "names", _module_of(file))
 
 
 @cache
-def _source(file: Path) -> _Source:
-    tree = ast.parse(file.read_bytes())
-    decorated, uses = set(), defaultdict[str, set[str]](set)
-    for statement in _statements(tree):
-        names = _names_in(statement)
-        if isinstance(statement, ast.FunctionDef | ast.ClassDef):
-            uses[statement.name] |= names
-            if isinstance(statement, ast.FunctionDef) and statement.decorator_list:
-                decorated.add(statement.name)
-        else:
-            for name in _stored_in(statement) or names:
-                uses[name.partition(".")[0]] |= names
-    return _Source(frozenset(decorated), uses, _imports(tree))
-
-
-def _statements(tree: ast.AST) -> list[ast.stmt]:
-    """Those at the top level, also inside ``if``, ``try`` and the like."""
-    found: list[ast.stmt] = []
-    for node in ast.iter_child_nodes(tree):
-        if isinstance(node, ast.If | ast.Try | ast.With | ast.For | ast.ExceptHandler):
-            found += _statements(node)
-        if isinstance(node, ast.stmt):
-            found.append(node)
-    return found
-
-
-def _names_in(statement: ast.stmt) -> set[str]:
-    """All names it uses, those of argument types too: a kernel's code depends on the fields of a named tuple."""
-    nodes = list(ast.walk(statement))
-    attributes = {id(node.value): node.attr for node in nodes if isinstance(node, ast.Attribute)}
-    names = [node for node in nodes if isinstance(node, ast.Name)]
-    return {f"{name.id}.{attributes[id(name)]}" if id(name) in attributes else name.id for name in names}
-
-
-def _stored_in(statement: ast.stmt) -> set[str]:
-    """The names that an assignment defines; empty for statements that change a value in place."""
-    return {node.id for node in ast.walk(statement) if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)}
-
-
-def _imports(tree: ast.Module) -> dict[str, set[tuple[Path, str]]]:
+def _imports(file: Path) -> dict[str, set[tuple[Path, str]]]:
+    """What an imported name stands for: a file, and a name there: "" for the module, "*" for all names."""
     found = defaultdict[str, set[tuple[Path, str]]](set)
-    for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module and (package := _file_of(node.module)):
-            for alias in node.names:
-                module = _file_of(f"{node.module}.{alias.name}")
-                found[alias.asname or alias.name].add((module, "") if module else (package, alias.name))
-        elif isinstance(node, ast.Import):
-            for alias in node.names:
-                if module := _file_of(alias.name):
-                    found[alias.asname or alias.name.partition(".")[0]].add((module, "*"))
+    for name, module, wanted in _source(file).imports:
+        if wanted == "*" and (path := _file_of(module)):
+            found[name].add((path, "*"))
+        elif package := _file_of(module):
+            whole = _file_of(f"{module}.{wanted}")
+            found[name].add((whole, "") if whole else (package, wanted))
     return found
+
+
+def _module_of(file: Path) -> str:
+    return ".".join(file.relative_to(ROOT).with_suffix("").parts)
 
 
 def _file_of(module: str) -> Path | None:

@@ -26,7 +26,7 @@ from companion.mission.resolve import ResolvedMission, resolve
 from companion.settings import MappingSettings
 from companion.storage.toml_file import read_toml
 
-app = typer.Typer(name="mission", help="Mission files: `mission check FILE` says what is understood of one.")
+app = typer.Typer(name="mission", add_completion=False)
 
 
 @app.callback()

@@ -2,38 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from companion.cli.groups import group
 
-import typer
-
-from companion.cli.inputs import version_option
-from sitl.cli.campaign import campaign
-from sitl.cli.compare import compare
-from sitl.cli.drive import drive
-from sitl.cli.experiment import experiment
-from sitl.cli.missions import missions
-from sitl.cli.physics import physics
-from sitl.cli.serve import serve
-from sitl.cli.world import app as world
-
-app = typer.Typer(
-    name="rover-sitl",
-    help="A light rover simulator that speaks ArduRover's MAVLink.",
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+app = group(
+    "rover-sitl",
+    "A light rover simulator that speaks ArduRover's MAVLink.",
+    {
+        "drive": "sitl.cli.drive:drive",
+        "serve": "sitl.cli.serve:serve",
+        "physics": "sitl.cli.physics:physics",
+        "missions": "sitl.cli.missions:missions",
+        "experiment": "sitl.cli.experiment:experiment",
+        "campaign": "sitl.cli.campaign:campaign",
+        "compare": "sitl.cli.compare:compare",
+        "world": "sitl.cli.world:app",
+    },
 )
-
-
-@app.callback()
-def options(version: Annotated[bool, version_option("rover-sitl")] = False) -> None:
-    """A light rover simulator that speaks ArduRover's MAVLink."""
-
-
-app.command()(drive)
-app.command()(serve)
-app.command()(physics)
-app.command()(missions)
-app.command()(experiment)
-app.command()(campaign)
-app.command()(compare)
-app.add_typer(world)

@@ -18,7 +18,7 @@ from sitl.generators.kinds import KINDS, GroundKind, Parameters
 from sitl.generators.made_ground import MadeGround, NoWayError, made
 from sitl.generators.measures import Difficulty, difficulty
 
-app = typer.Typer(name="world", help="Worlds from seeds.", no_args_is_help=True)
+app = typer.Typer(add_completion=False, name="world", help="Worlds from seeds.", no_args_is_help=True)
 
 
 class WorldError(Exception):

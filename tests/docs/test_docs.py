@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import configparser
+import functools
 import json
 import re
 import runpy
 import shutil
 import subprocess
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 
 import click
@@ -139,57 +141,70 @@ def test_every_key_of_a_world_and_of_sensors_is_explained() -> None:
         assert re.search(rf"\b{key}\b", text), f"docs/worlds.md does not mention {key}"
 
 
-def usages() -> list[tuple[str, list[str]]]:
-    """Every use of one of our commands with a sub-command, in code blocks or inline code: the page, and the words."""
+def usages(page: Path) -> list[list[str]]:
+    """The words of every use of one of our commands with a sub-command, in shell blocks or inline code."""
+    text = page.read_text(encoding="utf-8")
+    blocks = re.findall(r"^ *```sh\n(.*?)^ *```", text, re.MULTILINE | re.DOTALL)
     found = []
-    for page in PAGES:
-        text = page.read_text(encoding="utf-8")
-        code = [*re.findall(r"`([^`\n]+)`", text), *(line for _, block in blocks("sh") for line in block.splitlines())]
-        for piece in code:
-            words = piece.split("#")[0].split()
-            words[:1] = [word.rpartition("/")[2] for word in words[:1]]
-            if len(words) > 1 and words[0] in APPS and re.fullmatch("[a-z]+", words[1]):
-                found.append((page.name, words))
+    for piece in (*re.findall(r"`([^`\n]+)`", text), *(line for block in blocks for line in block.splitlines())):
+        words = piece.split("#")[0].split()
+        words[:1] = [word.rpartition("/")[2] for word in words[:1]]
+        if len(words) > 1 and words[0] in APPS and re.fullmatch("[a-z][a-z-]*", words[1]):
+            found.append(words)
     return found
+
+
+@functools.cache
+def app_of(name: str) -> click.Command:
+    return typer.main.get_command(APPS[name])
 
 
 def command_of(words: list[str]) -> tuple[click.Command, list[str]]:
     """The command that the words name, and the remaining words. KeyError: there is no such command."""
-    command = typer.main.get_command(APPS[words[0]])
-    rest = words[1:]
-    while rest and isinstance(getattr(command, "commands", None), dict):
+    command, rest = app_of(words[0]), words[1:]
+    while rest and isinstance(getattr(command, "commands", None), Mapping):
         command = command.commands[rest.pop(0)]  # type: ignore[attr-defined]
     return command, rest
 
 
 def test_there_are_usages_to_check() -> None:
-    assert len(usages()) > 20
-    assert {words[1] for _, words in usages()} >= {"run", "plan", "mission", "drive", "serve", "experiment"}
+    found = [words for page in PAGES for words in usages(page)]
+    assert len(found) > 100
+    assert {words[1] for words in found} >= {"run", "plan", "mission", "drive", "serve", "experiment"}
 
 
-@pytest.mark.parametrize(
-    ("page", "words"), usages(), ids=lambda value: " ".join(value) if isinstance(value, list) else value
-)
-def test_commands_and_options_exist(page: str, words: list[str]) -> None:
-    command, rest = command_of(words)
-    options = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)} | {
-        "--help"
-    }
+def wrong_in(words: list[str]) -> str:
+    """What is wrong with a usage; empty: nothing."""
+    try:
+        command, rest = command_of(words)
+    except KeyError:
+        return f"no such command: {' '.join(words)}"
+    options = {option for parameter in command.params for option in (*parameter.opts, *parameter.secondary_opts)}
     asked = {word.strip("[]").rstrip(".,;") for word in rest if word.strip("[]").startswith("--")}
-    assert asked <= options, f"{page}: {' '.join(words)}"
+    unknown = asked - options - {"--help"}
+    return f"no such option: {', '.join(unknown)}: {' '.join(words)}" if unknown else ""
+
+
+@pages
+def test_commands_and_options_exist(page: Path) -> None:
+    assert not [wrong for words in usages(page) if (wrong := wrong_in(words))]
+
+
+def test_a_usage_that_is_wrong_is_found() -> None:
+    assert wrong_in(["rover-sitl", "drove"]) and wrong_in(["rover-sitl", "drive", "--fast"])
 
 
 def test_every_command_is_in_the_readme() -> None:
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    for name, app in APPS.items():
-        for sub in typer.main.get_command(app).commands:  # type: ignore[attr-defined]
+    for name in APPS:
+        for sub in app_of(name).commands:  # type: ignore[attr-defined]
             assert f"{name} {sub}" in text
 
 
 @pages
 def test_options_named_alone_exist_somewhere(page: Path) -> None:
     known = {"--help"}
-    queue = [typer.main.get_command(app) for app in APPS.values()]
+    queue = [app_of(name) for name in APPS]
     while queue:
         command = queue.pop()
         known |= {option for parameter in command.params for option in parameter.opts}
@@ -286,7 +301,7 @@ def test_the_service_is_one_that_systemd_takes_and_the_program_understands(tmp_p
     service = unit["Service"]
     program, command, _, *options = service["ExecStart"].split()
     assert program.endswith("/bin/rover-companion")
-    commands = typer.main.get_command(APPS["rover-companion"]).commands  # type: ignore[attr-defined]
+    commands = app_of("rover-companion").commands  # type: ignore[attr-defined]
     known = {name for parameter in commands[command].params for name in parameter.opts}
     assert {option for option in options if option.startswith("--")} <= known
     assert service["RestartPreventExitStatus"].split() == [str(EXIT_BAD_INPUT), str(EXIT_MISSED)]

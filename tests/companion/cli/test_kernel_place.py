@@ -98,7 +98,7 @@ class Program:
 
     def __init__(self, folder: Path, cache: Path) -> None:
         self.folder, self._cache = folder, cache
-        for name in ("__init__.py", "cli/__init__.py", "cli/entry.py", "cli/kernel_cache.py"):
+        for name in ("__init__.py", "cli/__init__.py", "cli/entry.py", "cli/kernel_cache.py", "cli/source_names.py"):
             (folder / "companion" / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy(PACKAGE / name, folder / "companion" / name)
         for name, text in MODULES.items():

@@ -218,6 +218,7 @@ OPENED_OTHERWISE = {
     "companion/mission/plan_reader.py": "storage/files.py's read_text",
     "companion/mapping/map_files.py": "a picture that reading.py has opened",
     "companion/cli/kernel_cache.py": "the program's own files",
+    "companion/cli/source_names.py": "the program's own files",
     "companion/lidar/serial_port.py": "a serial port, which a thread reads",
     "companion/vehicle/guard.py": "the program's own file",
     "companion/storage/unbuffered.py": "/dev/null",
