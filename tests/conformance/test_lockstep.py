@@ -55,11 +55,10 @@ def another_machine() -> dict[str, str]:
 
 
 def check_same_bytes(mission: str, environment: dict[str, str]) -> None:
-    """The seeds 5 and 6 in this process, and 5 in another with other sets and other arithmetic."""
-    here = [hashed_run(mission, seed) for seed in (5, 6)]
-    assert here[0] == elsewhere(mission, 5, **environment), "the same seed in two processes"
-    assert here[0] != here[1], "another seed"
-    _, packets, driven_m = here[0].split()
+    """In this process, and in another with other sets and other arithmetic."""
+    here = hashed_run(mission, 5)
+    assert here == elsewhere(mission, 5, **environment), "the same seed in two processes"
+    _, packets, driven_m = here.split()
     assert int(packets) > 1500
     assert float(driven_m) > 10.0
 

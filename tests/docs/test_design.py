@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import configparser
+import functools
 import re
 import runpy
 from pathlib import Path
@@ -21,6 +22,7 @@ def made() -> dict[str, Any]:
     return runpy.run_path(str(ROOT / "docs" / "make_design.py"))
 
 
+@functools.cache
 def normal(text: str) -> str:
     """Lower case, words apart: ``MissionProgress`` and ``mission_progress`` both become ``mission progress``."""
     return re.sub(r"[\s_-]+", " ", re.sub(r"(?<=[a-z0-9])(?=[A-Z])", " ", text)).lower()
@@ -56,6 +58,8 @@ def own_words(path: str, source: str) -> str:
 
 def misplaced(module: Any, sources: dict[str, str], classes: dict[str, set[str]]) -> list[str]:
     """The nouns of a module that it does not say of itself, or that name another module or a class of another."""
+    if not module.nouns:
+        return []
     said = own_words(module.path, sources[module.path])
     wrong = [noun for noun in module.nouns if normal(noun) not in said]
     for noun in set(module.nouns) - set(wrong):

@@ -20,6 +20,7 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+@pytest.mark.thorough
 def test_every_target_is_fuzzed_without_a_find() -> None:
     command = [sys.executable, "-m", "tests.fuzz", "all", "--runs", str(RUNS), "--seed", "1", "--watch", "companion"]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False, timeout=500)

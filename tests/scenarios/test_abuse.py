@@ -90,6 +90,7 @@ def check(tmp_path_factory: pytest.TempPathFactory) -> Callable[[list[list[str]]
         "import json, resource, sys\n"
         "from typer.testing import CliRunner\n"
         "from companion.cli.commands import app\n"
+        "from companion.cli import mission, plan, run  # loaded before memory is scarce\n"
         "pages = int(open('/proc/self/statm').read().split()[0]) * resource.getpagesize()\n"
         f"resource.setrlimit(resource.RLIMIT_AS, (pages + {MEMORY_BYTES},) * 2)\n"
         "for line in sys.stdin:\n"

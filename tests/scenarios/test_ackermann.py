@@ -28,7 +28,7 @@ def run_of(suite: str, seed: int) -> Drive:
     ("suite", "seed"),
     [
         pytest.param("lidar-360", 0, marks=pytest.mark.thorough),
-        ("lidar-360", 2),
+        pytest.param("lidar-360", 2, marks=pytest.mark.thorough),
         pytest.param("lidar-90", 0, marks=pytest.mark.thorough),
         pytest.param("lidar-90", 1, marks=pytest.mark.thorough),
     ],

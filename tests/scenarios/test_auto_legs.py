@@ -97,8 +97,15 @@ def assert_silent_since(rig: Asker, since_s: float) -> None:
     assert [one for one in rig.sent_since(since_s) if one.moves_or_changes] == []
 
 
-@pytest.mark.parametrize("mode", [MANUAL, HOLD, GUIDED])
-@pytest.mark.parametrize("metres", [2.2, 6.0], ids=["setting off", "at speed"])
+@pytest.mark.parametrize(
+    ("mode", "metres"),
+    [
+        (MANUAL, 2.2),  # setting off
+        (HOLD, 6.0),  # at speed
+        (GUIDED, 6.0),
+        *(pytest.param(*one, marks=pytest.mark.thorough) for one in ((HOLD, 2.2), (GUIDED, 2.2), (MANUAL, 6.0))),
+    ],
+)
 def test_a_person_who_takes_the_rover_in_a_leg_has_it(tmp_path: Path, mode: int, metres: float) -> None:
     """Not one setpoint after it, in GUIDED neither; with AUTO set again the leg is driven on."""
     rig = in_leg(tmp_path, metres=metres)

@@ -57,6 +57,7 @@ def dask(what: str, *arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         run.wait()
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_on_a_cluster_whose_worker_is_killed_the_figures_are_those_of_this_machine(campaign: Path) -> None:
     here, there = campaign.parent / "here", campaign.parent / "there"

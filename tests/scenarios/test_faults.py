@@ -169,7 +169,7 @@ def test_the_plan_of_a_poor_radio_is_driven_from_the_command_line() -> None:
 @pytest.mark.parametrize(
     ("name", "reached"),
     [
-        ("gps", True),
+        pytest.param("gps", True, marks=pytest.mark.thorough),
         pytest.param("vehicle", False, marks=pytest.mark.thorough),  # replays below it drive that one too
         ("interrupted", False),
     ],

@@ -55,8 +55,17 @@ def assert_silent(rig: Rig, since_s: float) -> None:
 # --- the pilot wins -------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("mode", [MANUAL, HOLD, RTL])
-@pytest.mark.parametrize("metres", [0.05, 3.0, 10.5], ids=["setting off", "at speed", "behind the wall"])
+@pytest.mark.parametrize(
+    ("mode", "metres"),
+    [
+        pytest.param(mode, metres, marks=() if always else pytest.mark.thorough, id=f"{mode}-{metres}")
+        for mode, metres, always in (
+            (MANUAL, 0.05, True), (HOLD, 0.05, False), (RTL, 0.05, False),
+            (MANUAL, 3.0, True), (HOLD, 3.0, True), (RTL, 3.0, False),
+            (MANUAL, 10.5, False), (HOLD, 10.5, False), (RTL, 10.5, True),
+        )
+    ],
+)  # fmt: skip
 def test_a_mode_change_silences_the_companion_until_guided_returns(tmp_path: Path, mode: int, metres: float) -> None:
     rig = Rig(yard(tmp_path))
     rig.until_driven(metres)
@@ -459,7 +468,7 @@ def test_what_cannot_be_said_stops_the_rover_and_not_the_companion(tmp_path: Pat
     ("form", "kind"),
     [
         pytest.param("local", "SET_POSITION_TARGET_LOCAL_NED", marks=pytest.mark.thorough),  # all other drives
-        ("global", "SET_POSITION_TARGET_GLOBAL_INT"),
+        pytest.param("global", "SET_POSITION_TARGET_GLOBAL_INT", marks=pytest.mark.thorough),
         pytest.param("mission-item", "MISSION_ITEM_INT", marks=pytest.mark.thorough),
         ("reposition", "COMMAND_INT"),
     ],

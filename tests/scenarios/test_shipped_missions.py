@@ -24,7 +24,7 @@ SOLVABLE = [
 """And field.waypoints, which is field.plan in another format."""
 SUITES = ["lidar-90", "lidar-360", "beams"]
 ALWAYS = [
-    ("complex.toml", "lidar-90"), ("one-obstacle.toml", "beams"),
+    ("complex.toml", "lidar-90"),
 ]  # fmt: skip
 """The others are driven by ``make test-all``; clutter with a lidar also by tests of dead companions and of seen ground,
 the dead end and the field in its other format also below."""
